@@ -1,0 +1,2 @@
+//! The `jointctl` program.
+fn main() {}

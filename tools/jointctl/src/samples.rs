@@ -1,0 +1,71 @@
+//! The recorded joint as every stage of the pipeline sees it: columns of equal length in SI units.
+
+use std::collections::BTreeMap;
+
+/// What a sample may be used for. Test samples are never seen by identification, training or selection.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// Identification and training.
+    Train,
+    /// Early stopping and model selection.
+    Validation,
+    /// Judging, once, at the end.
+    Test,
+    /// Excluded from all three.
+    Unused,
+}
+
+/// The four motion states of the mobile-robot paper (section 3.1): two independent classifications of a sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct MotionState {
+    /// |acceleration| is above the threshold (else: uniform motion).
+    pub accelerating: bool,
+    /// |velocity| is above the threshold (else: low speed).
+    pub fast: bool,
+}
+
+/// One joint's recording. All columns have the same length; rows of one `run` are contiguous and ordered in time.
+///
+/// Units are those of the joint: rad (or m), Nm (or N, A, V); the data set's description names them.
+#[derive(Clone, Debug, Default)]
+pub struct Samples {
+    /// Time since the start of the run, s.
+    pub time: Vec<f64>,
+    /// Position, rad or m.
+    pub position: Vec<f64>,
+    /// Velocity, rad/s or m/s.
+    pub velocity: Vec<f64>,
+    /// Acceleration, rad/s^2 or m/s^2.
+    pub acceleration: Vec<f64>,
+    /// Measured effort, positive where it accelerates the joint towards positive positions; Nm, N, A or V.
+    pub effort: Vec<f64>,
+    /// Temperature, degrees Celsius; the reference temperature where it was not recorded.
+    pub temperature: Vec<f64>,
+    /// Theoretical torque: the rigid-body part of the effort. Empty until the rigid body is identified.
+    pub load: Vec<f64>,
+    /// Index of the run (continuous recording) that the sample belongs to.
+    pub run: Vec<u32>,
+    /// Motion state of each sample.
+    pub state: Vec<MotionState>,
+    /// Use of each sample.
+    pub part: Vec<Part>,
+    /// Values that are constant over a run and enter the rigid-body model (mass, length), by column name.
+    pub extra: BTreeMap<String, Vec<f64>>,
+}
+
+impl Samples {
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.time.len()
+    }
+
+    /// True where there is no sample.
+    pub fn is_empty(&self) -> bool {
+        self.time.is_empty()
+    }
+
+    /// Indices of the samples of one part, in order.
+    pub fn indices(&self, part: Part) -> Vec<usize> {
+        (0..self.len()).filter(|&i| self.part[i] == part).collect()
+    }
+}
