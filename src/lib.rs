@@ -1,2 +1,9 @@
 //! Joint actuator firmware that learns the friction of the joint it runs on and cancels it.
 #![cfg_attr(not(test), no_std)]
+#![deny(unsafe_code)]
+
+#[allow(unsafe_code)]
+pub mod dsp;
+
+pub mod friction;
+pub mod quantity;

@@ -1,0 +1,127 @@
+//! The few DSP operations the control path is made of, each with the same result on every machine; any context.
+//!
+//! Names are those of the ARMv7E-M instructions (ARM DDI 0403, A4.4.3): on the microcontroller each function is that one
+//! instruction, elsewhere it is a portable twin. The compiler finds all of them but SMLAD in the portable form by itself
+//! (checked in the disassembly), so SMLAD alone is written in assembly, and this is the only file of the arithmetic that
+//! contains `unsafe`.
+
+/// `accumulator + a[low] b[low] + a[high] b[high]` over two signed 16-bit halves; wraps.
+///
+/// Callers must have proved that the sum fits: the instruction wraps (and sets the Q flag), it does not saturate.
+#[cfg(target_arch = "arm")]
+#[inline(always)]
+pub fn smlad(a: u32, b: u32, accumulator: i32) -> i32 {
+    let sum;
+    // SAFETY: a pure register-to-register instruction of every ARMv7E-M core; it touches neither memory nor stack.
+    unsafe {
+        core::arch::asm!(
+            "smlad {sum}, {a}, {b}, {accumulator}",
+            sum = lateout(reg) sum,
+            a = in(reg) a,
+            b = in(reg) b,
+            accumulator = in(reg) accumulator,
+            options(pure, nomem, nostack, preserves_flags)
+        );
+    }
+    sum
+}
+
+/// `accumulator + a[low] b[low] + a[high] b[high]` over two signed 16-bit halves; wraps.
+///
+/// Callers must have proved that the sum fits: the instruction wraps (and sets the Q flag), it does not saturate.
+#[cfg(not(target_arch = "arm"))]
+#[inline(always)]
+pub fn smlad(a: u32, b: u32, accumulator: i32) -> i32 {
+    let low = (a as i16 as i32) * (b as i16 as i32);
+    let high = ((a as i32) >> 16) * ((b as i32) >> 16);
+    accumulator.wrapping_add(low).wrapping_add(high)
+}
+
+/// `accumulator + floor(a b / 2^32)`; wraps.
+#[inline(always)]
+pub fn smmla(a: i32, b: i32, accumulator: i32) -> i32 {
+    accumulator.wrapping_add(smmul(a, b))
+}
+
+/// `floor(a b / 2^32)`.
+#[inline(always)]
+pub fn smmul(a: i32, b: i32) -> i32 {
+    ((a as i64 * b as i64) >> 32) as i32
+}
+
+/// The upper halves of two words, packed: `second` above `first`.
+#[inline(always)]
+pub fn pkhtb(first: i32, second: i32) -> u32 {
+    (second as u32 & 0xffff_0000) | (first as u32 >> 16)
+}
+
+/// Words in an interpolation table.
+pub const TABLE_LEN: usize = 512;
+
+/// Looks `x` up in a table that covers 512 steps of 2^20 around zero; result in Q31.
+///
+/// A word holds the value at its step's left end (upper half, Q15) and the slope over the step (lower half), so that one
+/// load and one SMLABB interpolate: `word + slope * fraction`, with a fraction of 12 bits. Beyond the ends the first or
+/// last word is used, whose slope must be zero. Reads no memory outside the table for any `x`.
+#[inline(always)]
+pub fn interpolate(table: &[i32; TABLE_LEN], x: i32) -> i32 {
+    let step = (x >> 20).clamp(-256, 255);
+    let fraction = (x >> 8) & 0xfff;
+    let index = (step + 256) as usize;
+    let word = table[index & (TABLE_LEN - 1)];
+    word.wrapping_add((word as i16 as i32) * fraction)
+}
+
+/// Rounds a product sum with 47 fractional bits to Q16.16, half up; saturates.
+#[inline(always)]
+pub fn narrow(sum: i64) -> i32 {
+    saturate((sum >> 31).wrapping_add((sum >> 30) & 1))
+}
+
+/// The nearest 32-bit value.
+#[inline(always)]
+pub fn saturate(value: i64) -> i32 {
+    value.clamp(i32::MIN as i64, i32::MAX as i64) as i32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn smlad_is_two_signed_products_and_wraps(a: (i16, i16), b: (i16, i16), accumulator: i32) {
+            let pack = |(low, high): (i16, i16)| (low as u16 as u32) | ((high as u16 as u32) << 16);
+            let exact = accumulator as i64 + a.0 as i64 * b.0 as i64 + a.1 as i64 * b.1 as i64;
+            prop_assert_eq!(smlad(pack(a), pack(b), accumulator), exact as i32);
+        }
+
+        #[test]
+        fn narrow_rounds_to_nearest_and_saturates(sum: i64) {
+            let exact = (sum as i128 + (1 << 30)) >> 31;
+            prop_assert_eq!(narrow(sum) as i128, exact.clamp(i32::MIN as i128, i32::MAX as i128));
+        }
+
+        #[test]
+        fn pkhtb_keeps_the_upper_halves(first: i32, second: i32) {
+            let word = pkhtb(first, second);
+            prop_assert_eq!(word as i16 as i32, first >> 16);
+            prop_assert_eq!((word as i32) >> 16, second >> 16);
+        }
+    }
+
+    #[test]
+    fn the_two_halves_of_smlad_can_overflow_and_then_wrap() {
+        let minimum = 0x8000_8000; // -32768 in both halves: the one pair of products whose sum is 2^31
+        assert_eq!(smlad(minimum, minimum, 0), i32::MIN);
+    }
+
+    #[test]
+    fn interpolation_never_leaves_the_table() {
+        let mut table = [0; TABLE_LEN];
+        (table[0], table[TABLE_LEN - 1]) = (-(7 << 16), 9 << 16);
+        assert_eq!(interpolate(&table, i32::MIN), -(7 << 16));
+        assert_eq!(interpolate(&table, i32::MAX), 9 << 16);
+    }
+}

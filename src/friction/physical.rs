@@ -1,0 +1,399 @@
+//! The physical friction model: every term of the design's equation, each switchable; control step.
+//!
+//! | term | formula | source |
+//! |---|---|---|
+//! | constant, position, temperature, load | c0 + c_q q + c_T th + c_tau tau | 001 eq. 5 |
+//! | viscous, quadratic | f_v (1 + k_v th) v + f_2 v abs(v) | |
+//! | Coulomb | F_c(+/-) (1 + k_c th + k_l abs(tau)) tanh(v / v_c) | 002 eq. 6, 001 eq. 6 |
+//! | Stribeck | sqrt(2e) (F_brk(+/-) - F_c(+/-)) exp(-(v / v_st)^2) v / v_st | 001 eq. 6 |
+//! | hysteresis | b_h atan(s v + z sign a) | 003 eq. 4 |
+//! | position harmonics | sum over j = 1..5 of b_j(+/-) 4 sin((2j-1) h q) / (pi (2j-1)) | 003 eq. 5 |
+//! | rotor inertia | I_a a | 002 |
+//!
+//! q position, v velocity, a acceleration, tau theoretical torque, th temperature minus reference; (+/-): one value for each
+//! direction of v. Two steps of the papers' formulas are made continuous, because a loop is closed around them: sign a is
+//! `k_a a` held at +-1, and the harmonics pass from one direction's set to the other's along with tanh(v / v_c).
+//!
+//! Signals come in Q31 of their [full scale](super::state::Domain::shifts), coefficients are Q16.16 torques at full scale: so a small
+//! coefficient of a large signal keeps its resolution. Products have 47 fraction bits and are summed in 64 bits; the sum
+//! wraps, an image is used only after its certificate has proved that it fits.
+
+use super::smooth::{atan, odd_sines, stribeck, tanh};
+use super::state::{Domain, Range, SIGNALS, Signal};
+use crate::dsp::{narrow, saturate};
+use crate::quantity::Torque;
+
+/// Number of position harmonics.
+pub const HARMONICS: usize = 5;
+
+/// Which terms take part.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Terms(pub u16);
+
+impl Terms {
+    /// c0.
+    pub const CONSTANT: Self = Self(1 << 0);
+    /// c_q q.
+    pub const POSITION: Self = Self(1 << 1);
+    /// c_T th.
+    pub const TEMPERATURE: Self = Self(1 << 2);
+    /// c_tau tau.
+    pub const LOAD: Self = Self(1 << 3);
+    /// f_v v.
+    pub const VISCOUS: Self = Self(1 << 4);
+    /// Factor 1 + k_v th of the viscous term.
+    pub const VISCOUS_TEMPERATURE: Self = Self(1 << 5);
+    /// f_2 v |v|.
+    pub const QUADRATIC: Self = Self(1 << 6);
+    /// F_c tanh(v / v_c).
+    pub const COULOMB: Self = Self(1 << 7);
+    /// Part k_c th of the Coulomb term's factor.
+    pub const COULOMB_TEMPERATURE: Self = Self(1 << 8);
+    /// Part k_l |tau| of the Coulomb term's factor.
+    pub const COULOMB_LOAD: Self = Self(1 << 9);
+    /// The Stribeck term.
+    pub const STRIBECK: Self = Self(1 << 10);
+    /// The hysteresis term.
+    pub const HYSTERESIS: Self = Self(1 << 11);
+    /// The position harmonics.
+    pub const HARMONICS: Self = Self(1 << 12);
+    /// I_a a.
+    pub const ROTOR_INERTIA: Self = Self(1 << 13);
+    /// Every term.
+    pub const ALL: Self = Self((1 << 14) - 1);
+
+    /// Names of the terms, from bit 0 up.
+    pub const NAMES: [&'static str; 14] = [
+        "constant",
+        "position",
+        "temperature",
+        "load",
+        "viscous",
+        "viscous_temperature",
+        "quadratic",
+        "coulomb",
+        "coulomb_temperature",
+        "coulomb_load",
+        "stribeck",
+        "hysteresis",
+        "harmonics",
+        "rotor_inertia",
+    ];
+
+    /// True where every term of `other` takes part.
+    #[inline(always)]
+    pub const fn contains(self, other: Self) -> bool {
+        self.0 & other.0 == other.0
+    }
+
+    /// The terms of both.
+    pub const fn union(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+}
+
+/// What a coefficient is multiplied with: decides its unit and its scale in SI.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Dimension {
+    /// Signal whose full scale is contained in the stored number, and its power.
+    pub per: Option<(Signal, u8)>,
+    /// True for torques, false for dimensionless numbers.
+    pub torque: bool,
+}
+
+macro_rules! coefficients {
+    ($($(#[$doc:meta])* $name:ident: $torque:literal $(per $signal:ident ^ $power:literal)?;)*) => {
+        /// The coefficients as they are stored and transferred: Q16.16 at full scale of the signals.
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+        pub struct Coefficients {
+            $($(#[$doc])* pub $name: i32,)*
+        }
+
+        impl Coefficients {
+            /// Number of coefficients.
+            pub const COUNT: usize = [$(stringify!($name)),*].len();
+            /// Names, in the order of [`Coefficients::to_array`].
+            pub const NAMES: [&'static str; Self::COUNT] = [$(stringify!($name)),*];
+            /// Dimensions, in the same order.
+            pub const DIMENSIONS: [Dimension; Self::COUNT] = [
+                $(Dimension { torque: $torque, per: coefficients!(@per $($signal $power)?) }),*
+            ];
+
+            /// All coefficients in a fixed order.
+            pub const fn to_array(&self) -> [i32; Self::COUNT] {
+                [$(self.$name),*]
+            }
+
+            /// The coefficients in the order of [`Coefficients::to_array`].
+            pub const fn from_array(array: [i32; Self::COUNT]) -> Self {
+                let [$($name),*] = array;
+                Self { $($name),* }
+            }
+        }
+    };
+    (@per) => { None };
+    (@per $signal:ident $power:literal) => { Some((Signal::$signal, $power)) };
+}
+
+coefficients! {
+    /// c0, Nm.
+    constant: true;
+    /// c_q, Nm at full-scale position.
+    position: true per Position ^ 1;
+    /// c_T, Nm at full-scale temperature difference.
+    temperature: true per Temperature ^ 1;
+    /// c_tau, Nm at full-scale theoretical torque.
+    load: true per TheoreticalTorque ^ 1;
+    /// f_v, Nm at full-scale velocity.
+    viscous: true per Velocity ^ 1;
+    /// k_v at full-scale temperature difference.
+    viscous_temperature: false per Temperature ^ 1;
+    /// f_2, Nm at full-scale velocity.
+    quadratic: true per Velocity ^ 2;
+    /// F_c for positive velocity, Nm.
+    coulomb_positive: true;
+    /// F_c for negative velocity, Nm.
+    coulomb_negative: true;
+    /// k_c at full-scale temperature difference.
+    coulomb_temperature: false per Temperature ^ 1;
+    /// k_l at full-scale theoretical torque.
+    coulomb_load: false per TheoreticalTorque ^ 1;
+    /// 1 / v_c times full-scale velocity.
+    coulomb_slope: false per Velocity ^ 1;
+    /// F_brk for positive velocity, Nm.
+    breakaway_positive: true;
+    /// F_brk for negative velocity, Nm.
+    breakaway_negative: true;
+    /// 1 / v_st times full-scale velocity.
+    stribeck_slope: false per Velocity ^ 1;
+    /// b_h, Nm (per rad of arc tangent).
+    hysteresis: true;
+    /// s times full-scale velocity.
+    hysteresis_velocity_slope: false per Velocity ^ 1;
+    /// z.
+    hysteresis_width: false;
+    /// k_a times full-scale acceleration.
+    hysteresis_acceleration_slope: false per Acceleration ^ 1;
+    /// h times full-scale position, rad.
+    harmonic_frequency: false per Position ^ 1;
+    /// b_1 for positive velocity, Nm.
+    harmonic_positive_1: true;
+    /// b_2 for positive velocity, Nm.
+    harmonic_positive_2: true;
+    /// b_3 for positive velocity, Nm.
+    harmonic_positive_3: true;
+    /// b_4 for positive velocity, Nm.
+    harmonic_positive_4: true;
+    /// b_5 for positive velocity, Nm.
+    harmonic_positive_5: true;
+    /// b_1 for negative velocity, Nm.
+    harmonic_negative_1: true;
+    /// b_2 for negative velocity, Nm.
+    harmonic_negative_2: true;
+    /// b_3 for negative velocity, Nm.
+    harmonic_negative_3: true;
+    /// b_4 for negative velocity, Nm.
+    harmonic_negative_4: true;
+    /// b_5 for negative velocity, Nm.
+    harmonic_negative_5: true;
+    /// I_a, Nm at full-scale acceleration.
+    rotor_inertia: true per Acceleration ^ 1;
+}
+
+/// A physical model as it is stored and transferred.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PhysicalParameters {
+    /// The terms that take part; coefficients of the others have no effect.
+    pub terms: Terms,
+    /// Coefficients.
+    pub coefficients: Coefficients,
+}
+
+/// A pair of values, one for each direction of the velocity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Directional {
+    pub(crate) positive: i32,
+    pub(crate) negative: i32,
+}
+
+impl Directional {
+    #[inline(always)]
+    fn at(self, velocity: i32) -> i32 {
+        if velocity < 0 { self.negative } else { self.positive }
+    }
+}
+
+/// The physical model ready to be evaluated: coefficients of absent terms are zero, products of constants are formed.
+#[derive(Clone, Copy, Debug)]
+pub struct Physical {
+    pub(crate) terms: Terms,
+    pub(crate) ranges: [Range; SIGNALS],
+    pub(crate) shifts: [u32; SIGNALS],
+    pub(crate) reference_temperature: i32,
+    pub(crate) coefficients: Coefficients,
+    pub(crate) coulomb: Directional,
+    /// F_brk - F_c.
+    pub(crate) stribeck: Directional,
+    /// b_h pi / 2.
+    pub(crate) hysteresis: i32,
+    /// h in turns at full-scale position, Q16.16.
+    pub(crate) harmonic_turns: i32,
+    /// 4 / (pi (2j - 1)) times half the sum of both directions' amplitudes.
+    pub(crate) harmonic_mean: [i32; HARMONICS],
+    /// 4 / (pi (2j - 1)) times half their difference.
+    pub(crate) harmonic_difference: [i32; HARMONICS],
+}
+
+/// One, Q16.16.
+const ONE: i32 = 1 << 16;
+
+/// A sum of products with 47 fraction bits; wraps.
+#[derive(Clone, Copy)]
+struct Sum(i64);
+
+impl Sum {
+    /// Adds a coefficient (Q16.16) times a signal (Q31).
+    #[inline(always)]
+    fn add(&mut self, coefficient: i32, signal: i32) {
+        self.0 = self.0.wrapping_add(coefficient as i64 * signal as i64);
+    }
+}
+
+/// Coefficient (Q16.16) times factor (Q16.16), rounded.
+#[inline(always)]
+pub(crate) fn times(coefficient: i32, factor: i32) -> i32 {
+    saturate((coefficient as i64 * factor as i64 + (1 << 15)) >> 16)
+}
+
+impl Physical {
+    /// Prepares a model for evaluation in `domain`.
+    pub fn new(parameters: &PhysicalParameters, domain: &Domain) -> Self {
+        let c = parameters.coefficients;
+        let on = |terms: Terms, value: i32| if parameters.terms.contains(terms) { value } else { 0 };
+        let coulomb = Directional {
+            positive: on(Terms::COULOMB, c.coulomb_positive),
+            negative: on(Terms::COULOMB, c.coulomb_negative),
+        };
+        let harmonic_pairs = [
+            (c.harmonic_positive_1, c.harmonic_negative_1),
+            (c.harmonic_positive_2, c.harmonic_negative_2),
+            (c.harmonic_positive_3, c.harmonic_negative_3),
+            (c.harmonic_positive_4, c.harmonic_negative_4),
+            (c.harmonic_positive_5, c.harmonic_negative_5),
+        ];
+        // Half of 4 / (pi (2j - 1)), Q31.
+        const FACTORS: [i64; HARMONICS] = [1_367_130_551, 455_710_184, 273_426_110, 195_304_364, 151_903_395];
+        let harmonic = |combine: fn(i64, i64) -> i64| {
+            let mut amplitudes = [0; HARMONICS];
+            for ((amplitude, (positive, negative)), factor) in amplitudes.iter_mut().zip(harmonic_pairs).zip(FACTORS) {
+                let both = combine(positive as i64, negative as i64);
+                *amplitude = saturate((both * factor + (1 << 30)) >> 31);
+            }
+            amplitudes
+        };
+        let coefficients = Coefficients {
+            constant: on(Terms::CONSTANT, c.constant),
+            position: on(Terms::POSITION, c.position),
+            temperature: on(Terms::TEMPERATURE, c.temperature),
+            load: on(Terms::LOAD, c.load),
+            viscous: on(Terms::VISCOUS, c.viscous),
+            viscous_temperature: on(Terms::VISCOUS_TEMPERATURE, c.viscous_temperature),
+            quadratic: on(Terms::QUADRATIC, c.quadratic),
+            coulomb_temperature: on(Terms::COULOMB_TEMPERATURE, c.coulomb_temperature),
+            coulomb_load: on(Terms::COULOMB_LOAD, c.coulomb_load),
+            rotor_inertia: on(Terms::ROTOR_INERTIA, c.rotor_inertia),
+            ..c
+        };
+        Self {
+            terms: parameters.terms,
+            ranges: domain.widened(),
+            shifts: domain.shifts(),
+            reference_temperature: domain.reference_temperature,
+            coefficients,
+            coulomb,
+            stribeck: Directional {
+                positive: c.breakaway_positive.saturating_sub(coulomb.positive),
+                negative: c.breakaway_negative.saturating_sub(coulomb.negative),
+            },
+            // pi / 2 in Q30.
+            hysteresis: saturate((c.hysteresis as i64 * 1_686_629_713 + (1 << 29)) >> 30),
+            // 1 / (2 pi) in Q33.
+            harmonic_turns: saturate((c.harmonic_frequency as i64 * 1_367_130_551 + (1 << 32)) >> 33),
+            harmonic_mean: harmonic(|positive, negative| positive + negative),
+            harmonic_difference: harmonic(|positive, negative| positive - negative),
+        }
+    }
+
+    /// The signals clamped to the widened box and scaled to Q31 of full scale; temperature as difference from the reference.
+    #[inline(always)]
+    pub(crate) fn scale(&self, signals: &[i32; SIGNALS]) -> [i32; SIGNALS] {
+        let mut scaled = [0; SIGNALS];
+        for i in 0..SIGNALS {
+            let range = self.ranges[i];
+            let clamped = signals[i].clamp(range.low, range.high);
+            let origin = if i == Signal::Temperature as usize { self.reference_temperature } else { 0 };
+            scaled[i] = clamped.saturating_sub(origin).wrapping_shl(self.shifts[i]);
+        }
+        scaled
+    }
+
+    /// The model's torque. `signals` in Q16.16, in the order of [`Signal`]; each is clamped to the widened box.
+    #[inline]
+    pub fn evaluate(&self, signals: &[i32; SIGNALS]) -> Torque {
+        let [q, v, load, _, th, a] = self.scale(signals);
+        let c = &self.coefficients;
+        let speed = v.saturating_abs();
+
+        let mut sum = Sum((c.constant as i64) << 31);
+        sum.add(c.position, q);
+        sum.add(c.temperature, th);
+        sum.add(c.load, load);
+        sum.add(c.rotor_inertia, a);
+
+        let viscous_factor = ONE.saturating_add(narrow(c.viscous_temperature as i64 * th as i64));
+        sum.add(times(c.viscous, viscous_factor), v);
+        // Only quadratic friction needs v |v|: the high word of their product in Q30, shifted to Q31.
+        sum.add(c.quadratic, saturate((v as i64 * speed as i64) >> 31));
+
+        let direction = tanh(saturate((c.coulomb_slope as i64 * v as i64) >> 22));
+        let coulomb_factor = ONE
+            .saturating_add(narrow(c.coulomb_temperature as i64 * th as i64))
+            .saturating_add(narrow(c.coulomb_load as i64 * load.saturating_abs() as i64));
+        sum.add(times(self.coulomb.at(v), coulomb_factor), direction);
+
+        if self.terms.contains(Terms::STRIBECK) {
+            let u = saturate((c.stribeck_slope as i64 * v as i64) >> 21);
+            sum.add(self.stribeck.at(v), stribeck(u));
+        }
+        if self.terms.contains(Terms::HYSTERESIS) {
+            sum.add(self.hysteresis, atan(self.hysteresis_argument(v, a)));
+        }
+        if self.terms.contains(Terms::HARMONICS) {
+            sum.add(self.harmonic_amplitude(q, direction), i32::MAX);
+        }
+        Torque::from_bits(narrow(sum.0))
+    }
+
+    /// s v + z sign a, Q16.16.
+    #[inline(always)]
+    pub(crate) fn hysteresis_argument(&self, v: i32, a: i32) -> i32 {
+        let c = &self.coefficients;
+        let sign = saturate((c.hysteresis_acceleration_slope as i64 * a as i64) >> 16);
+        let velocity = narrow(c.hysteresis_velocity_slope as i64 * v as i64);
+        velocity.saturating_add(narrow(c.hysteresis_width as i64 * sign as i64))
+    }
+
+    /// The sum of the harmonics, Q16.16.
+    #[inline(always)]
+    fn harmonic_amplitude(&self, q: i32, direction: i32) -> i32 {
+        let phase = ((self.harmonic_turns as i64 * q as i64) >> 15) as u32;
+        let sines = odd_sines(phase);
+        let (mut mean, mut difference) = (0i64, 0i64);
+        for ((sine, m), d) in sines.into_iter().zip(self.harmonic_mean).zip(self.harmonic_difference) {
+            mean = mean.wrapping_add(m as i64 * sine as i64);
+            difference = difference.wrapping_add(d as i64 * sine as i64);
+        }
+        let round = |sum: i64| saturate((sum >> 30).wrapping_add((sum >> 29) & 1));
+        round(mean).saturating_add(narrow(round(difference) as i64 * direction as i64))
+    }
+}

@@ -1,0 +1,248 @@
+//! The smooth functions of the friction model: tanh, the Stribeck bump, atan, sine; control step.
+//!
+//! Each is a table of 512 words for [`interpolate`], computed at compile time from its power series, so every machine holds
+//! the same words. Knots are raised by a sixteenth of step^2 times the curvature: that halves the largest error of a
+//! chord. Within a table the interpolation is continuous and follows the knots exactly, therefore it is monotone
+//! wherever the knots are; the certificate relies on that.
+
+use crate::dsp::{TABLE_LEN, interpolate, smmul};
+
+/// Words cover [-8, 8): a step of 1/32. Argument of [`tanh`] in Q25.
+pub static TANH: [i32; TABLE_LEN] = table(Shape::Tanh, 1.0 / 32.0);
+/// Words cover [-4, 4): a step of 1/64. Argument of [`stribeck`] in Q26.
+pub static STRIBECK: [i32; TABLE_LEN] = table(Shape::Stribeck, 1.0 / 64.0);
+/// Words cover [-1, 1): a step of 1/256. Holds atan in quarter turns.
+static ATAN: [i32; TABLE_LEN] = table(Shape::Atan, 1.0 / 256.0);
+
+/// Hyperbolic tangent: argument in Q25 (saturates beyond +-8), result in Q31. Error: 7e-5 maximum, 2.2e-5 RMS.
+#[inline(always)]
+pub fn tanh(x: i32) -> i32 {
+    interpolate(&TANH, x)
+}
+
+/// Stribeck bump sqrt(2e) u exp(-u^2) (001 eq. 6), +-1 at u = +-1/sqrt 2: argument in Q26 (zero beyond +-4), result in
+/// Q31. Error: 1e-4 maximum.
+#[inline(always)]
+pub fn stribeck(u: i32) -> i32 {
+    interpolate(&STRIBECK, u)
+}
+
+/// Arc tangent in quarter turns (1 is pi/2): argument in Q16.16, result in Q31. Error: 2.5e-5 maximum.
+///
+/// Beyond +-1 it uses atan(x) = pi/2 - atan(1/x).
+#[inline(always)]
+pub fn atan(x: i32) -> i32 {
+    const ONE: u32 = 1 << 16;
+    let magnitude = x.unsigned_abs();
+    let quarter_turns = match core::num::NonZeroU32::new(magnitude) {
+        Some(large) if magnitude > ONE => i32::MAX - atan_up_to_one(u32::MAX / large),
+        _ => atan_up_to_one(magnitude),
+    };
+    if x < 0 { -quarter_turns } else { quarter_turns }
+}
+
+/// For x in [0, 1], Q16.16.
+#[inline(always)]
+fn atan_up_to_one(x: u32) -> i32 {
+    interpolate(&ATAN, (x.min(0xffff) << 12) as i32)
+}
+
+/// The sines of the first five odd multiples of a phase, Q30. Phase: 2^32 is a turn. Error of the sine of n x: 1e-5 (n^2 + 1)
+/// maximum (8e-4 for n = 9, of which the model's factor 4 / (pi n) leaves 1.2e-4 of the amplitude).
+///
+/// One sine and one cosine from `idsp`, then sin((n+2) x) = 2 cos(2x) sin(n x) - sin((n-2) x): a fifth of five calls.
+#[inline(always)]
+pub fn odd_sines(phase: u32) -> [i32; 5] {
+    let (_, sine) = idsp::cossin(phase as i32);
+    let (twice, _) = idsp::cossin((phase as i32).wrapping_mul(2));
+    let first = sine >> 1;
+    let mut sines = [first; 5];
+    let (mut before, mut now) = (first.wrapping_neg(), first);
+    for place in sines.iter_mut().skip(1) {
+        // cos in Q31 times sine in Q30 leaves Q29 in the upper word; twice that, in Q30, is a shift by two.
+        let next = (smmul(twice, now) << 2).wrapping_sub(before);
+        (before, now) = (now, next);
+        *place = next;
+    }
+    sines
+}
+
+/// What a table holds. (A function pointer would say the same, but cannot be called at compile time.)
+#[derive(Clone, Copy)]
+enum Shape {
+    Tanh,
+    Stribeck,
+    Atan,
+}
+
+impl Shape {
+    const fn exact(self, x: f64) -> f64 {
+        match self {
+            Shape::Tanh => tanh_exact(x),
+            Shape::Stribeck => stribeck_exact(x),
+            Shape::Atan => atan_exact(x),
+        }
+    }
+}
+
+/// Interpolation words for a function sampled at `step`: knot in the upper half (Q15), 16 times the rise to the next
+/// knot in the lower half. The word is their sum, so a negative slope borrows from the upper half and the addition
+/// in [`interpolate`] gives it back.
+const fn table(shape: Shape, step: f64) -> [i32; TABLE_LEN] {
+    let mut words = [0; TABLE_LEN];
+    let mut i = 0;
+    while i < TABLE_LEN {
+        let here = knot(shape, i as i32 - 256, step);
+        let next = knot(shape, i as i32 - 255, step);
+        words[i] = here * 65536 + 16 * (next - here);
+        i += 1;
+    }
+    words
+}
+
+const fn knot(shape: Shape, index: i32, step: f64) -> i32 {
+    let x = index as f64 * step;
+    let curvature = shape.exact(x + step) - 2.0 * shape.exact(x) + shape.exact(x - step);
+    let scaled = (shape.exact(x) - curvature / 16.0) * 32768.0;
+    let rounded = if scaled < 0.0 { (scaled - 0.5) as i32 } else { (scaled + 0.5) as i32 };
+    if rounded > 32767 {
+        32767
+    } else if rounded < -32767 {
+        -32767
+    } else {
+        rounded
+    }
+}
+
+const fn exp(x: f64) -> f64 {
+    // exp(x) = exp(x / 2^10)^(2^10): the reduced series converges to the last bits in 12 terms.
+    let reduced = x / 1024.0;
+    let mut term = 1.0;
+    let mut sum = 1.0;
+    let mut n = 1;
+    while n < 12 {
+        term *= reduced / n as f64;
+        sum += term;
+        n += 1;
+    }
+    let mut squared = 0;
+    while squared < 10 {
+        sum *= sum;
+        squared += 1;
+    }
+    sum
+}
+
+const fn tanh_exact(x: f64) -> f64 {
+    let e = exp(2.0 * x);
+    (e - 1.0) / (e + 1.0)
+}
+
+const fn stribeck_exact(u: f64) -> f64 {
+    const SQRT_2E: f64 = 2.331_643_981_597_124;
+    SQRT_2E * u * exp(-u * u)
+}
+
+/// atan in quarter turns, |x| <= 1 (a little more at the ends, for the curvature).
+const fn atan_exact(x: f64) -> f64 {
+    // Halving the angle twice, tan(y/2) = x / (1 + sqrt(1 + x^2)), brings the series to |x| < 0.21.
+    let half = x / (1.0 + sqrt(1.0 + x * x));
+    let quarter = half / (1.0 + sqrt(1.0 + half * half));
+    let square = quarter * quarter;
+    let mut power = quarter;
+    let mut sum = 0.0;
+    let mut n = 0;
+    while n < 20 {
+        let sign = if n % 2 == 0 { 1.0 } else { -1.0 };
+        sum += sign * power / (2 * n + 1) as f64;
+        power *= square;
+        n += 1;
+    }
+    4.0 * sum / core::f64::consts::FRAC_PI_2
+}
+
+const fn sqrt(x: f64) -> f64 {
+    let mut root = x;
+    let mut n = 0;
+    while n < 30 {
+        root = 0.5 * (root + x / root);
+        n += 1;
+    }
+    root
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+    const Q31: f64 = 2_147_483_648.0;
+
+    /// Largest and RMS error of `have` against `want` over `points` arguments.
+    fn error(points: impl Iterator<Item = (f64, f64)>) -> (f64, f64) {
+        let (mut worst, mut squares, mut count) = (0.0f64, 0.0, 0.0);
+        for (have, want) in points {
+            worst = worst.max((have - want).abs());
+            squares += (have - want).powi(2);
+            count += 1.0;
+        }
+        (worst, f64::sqrt(squares / count))
+    }
+
+    #[test]
+    fn tanh_is_within_its_stated_error() {
+        let arguments = (-(10 << 25)..(10 << 25)).step_by(997);
+        let (worst, rms) = error(arguments.map(|x| (tanh(x) as f64 / Q31, (x as f64 / (1 << 25) as f64).tanh())));
+        assert!(worst < 7e-5 && rms < 2.2e-5, "{worst:e} {rms:e}");
+        assert!(worst > 6e-5, "the stated error is loose: {worst:e}");
+    }
+
+    #[test]
+    fn stribeck_bump_is_within_its_stated_error_and_peaks_at_one() {
+        let bump = |u: f64| (2.0 * std::f64::consts::E).sqrt() * u * (-u * u).exp();
+        let arguments = (-(5 << 26)..(5 << 26)).step_by(997);
+        let (worst, _) = error(arguments.map(|u| (stribeck(u) as f64 / Q31, bump(u as f64 / (1 << 26) as f64))));
+        assert!(worst < 1e-4, "{worst:e}");
+        let peak = stribeck((0.5f64.sqrt() * (1 << 26) as f64) as i32) as f64 / Q31;
+        assert!((peak - 1.0).abs() < 1e-4, "{peak}");
+    }
+
+    #[test]
+    fn atan_is_within_its_stated_error_over_the_whole_range() {
+        let near = (-(2 << 16)..(2 << 16)).step_by(3);
+        let far = (i32::MIN..i32::MAX).step_by(65_521);
+        let (worst, _) =
+            error(near.chain(far).map(|x| (atan(x) as f64 / Q31, (x as f64 / 65536.0).atan() / FRAC_PI_2)));
+        assert!(worst < 2.5e-5, "{worst:e}");
+    }
+
+    #[test]
+    fn odd_sines_are_within_their_stated_error() {
+        for j in 0..5 {
+            let multiple = (2 * j + 1) as f64;
+            let phases = (0..u32::MAX).step_by(1_000_003);
+            let (worst, _) = error(phases.map(|phase| {
+                let angle = phase as f64 / 2f64.powi(32) * TAU;
+                (odd_sines(phase)[j] as f64 / (Q31 / 2.0), (multiple * angle).sin())
+            }));
+            assert!(worst < 1e-5 * (multiple * multiple + 1.0), "harmonic {multiple}: {worst:e}");
+        }
+        assert!((odd_sines((1u32 << 31) / 2)[0] as f64 / (Q31 / 2.0) - (PI / 2.0).sin()).abs() < 4e-5);
+    }
+
+    #[test]
+    fn tanh_and_atan_never_fall_and_their_ends_are_flat() {
+        let mut last = i32::MIN;
+        for x in (-(9 << 25)..(9 << 25)).step_by(128) {
+            assert!(tanh(x) >= last);
+            last = tanh(x);
+        }
+        last = i32::MIN;
+        for x in -(3 << 16)..(3 << 16) {
+            assert!(atan(x) >= last, "{x}");
+            last = atan(x);
+        }
+        assert_eq!((tanh(i32::MAX), tanh(i32::MIN)), (32767 << 16, -32767 << 16));
+        assert_eq!((stribeck(i32::MAX), stribeck(i32::MIN)), (0, 0));
+    }
+}
