@@ -2,8 +2,10 @@
 #![cfg_attr(not(test), no_std)]
 #![deny(unsafe_code)]
 
+pub mod compensation;
 #[allow(unsafe_code)]
 pub mod dsp;
 
 pub mod friction;
+pub mod parameters;
 pub mod quantity;

@@ -1,9 +1,10 @@
 //! What friction is: pure functions of the joint's state, in fixed point, the same bits on every machine.
 //!
-//! `state` says what the model looks at, `physical` and `network` are its two parts, `smooth` holds the functions that both
+//! `state` says what the model looks at, `domain` where it was identified, `physical` and `network` are its two parts, `smooth` holds the functions that both
 //! share, `regime` chooses between parameter sets. Here they are put together: [`FrictionModel`] is prepared once from an
 //! image's parameters, outside the control interrupt, and evaluated once a control step.
 
+pub mod domain;
 pub mod network;
 pub mod physical;
 pub mod regime;
@@ -11,10 +12,11 @@ pub mod smooth;
 pub mod state;
 
 use crate::quantity::Torque;
+use domain::{Domain, Fade};
 use network::{Network, NetworkParameters};
 use physical::{Physical, PhysicalParameters};
 use regime::{MAX_SETS, Memory, Selector};
-use state::{Domain, JointState};
+use state::JointState;
 
 /// One regime's parameters: the physical model and, where one helps, a network for what it leaves.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -55,7 +57,7 @@ impl Estimate {
 /// A friction model ready to be evaluated.
 #[derive(Clone, Debug)]
 pub struct FrictionModel {
-    domain: Domain,
+    fade: Fade,
     selector: Selector,
     sets: [(Physical, Option<Network>); MAX_SETS],
     /// Cross-fade per control step, Q31.
@@ -73,7 +75,7 @@ impl FrictionModel {
             None => i32::MAX,
         };
         Self {
-            domain,
+            fade: Fade::new(&domain),
             selector: parameters.selector,
             sets: parameters.sets.map(|set| {
                 (Physical::new(&set.physical, &domain), set.network.map(|network| Network::new(&network, &domain)))
@@ -82,9 +84,9 @@ impl FrictionModel {
         }
     }
 
-    /// The box that the model was identified in.
-    pub const fn domain(&self) -> &Domain {
-        &self.domain
+    /// How much the model counts beyond the box that it was identified in.
+    pub const fn fade(&self) -> &Fade {
+        &self.fade
     }
 
     /// True where the set in use has a network.

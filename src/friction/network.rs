@@ -7,8 +7,8 @@
 //! table in Q25. Sums wrap: an image is used only after the [certificate](crate::parameters::certificate) has proved that they
 //! fit.
 
+use super::domain::{Domain, Range};
 use super::smooth::tanh;
-use super::state::{Domain, Range};
 use crate::dsp::{pkhtb, saturate, smlad, smmla, smmul};
 use crate::quantity::Torque;
 
@@ -64,6 +64,11 @@ impl InputScale {
         let shift = half_width.leading_zeros().saturating_sub(1);
         let gain = ((1u64 << 61) - (1 << 33)) / divisor >> shift;
         Self { range, centre: range.centre(), shift, gain: gain.min(i32::MAX as u64) as i32 }
+    }
+
+    /// The scaled inputs that the range can give, Q31: lowest and highest.
+    pub(crate) fn interval(&self) -> (i32, i32) {
+        (self.apply(self.range.low), self.apply(self.range.high))
     }
 
     /// The scaled input, Q31.
@@ -127,6 +132,11 @@ impl Network {
             output: PackedNeuron::new(&parameters.output),
             scale: parameters.scale,
         }
+    }
+
+    /// How each input is scaled.
+    pub(crate) const fn inputs(&self) -> &[InputScale; INPUTS] {
+        &self.inputs
     }
 
     /// The network's torque. `signals` in Q16.16, in the order of [`Signal`](super::state::Signal); each is clamped to its trained

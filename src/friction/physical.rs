@@ -14,12 +14,13 @@
 //! direction of v. Two steps of the papers' formulas are made continuous, because a loop is closed around them: sign a is
 //! `k_a a` held at +-1, and the harmonics pass from one direction's set to the other's along with tanh(v / v_c).
 //!
-//! Signals come in Q31 of their [full scale](super::state::Domain::shifts), coefficients are Q16.16 torques at full scale: so a small
+//! Signals come in Q31 of their [full scale](super::domain::Domain::shifts), coefficients are Q16.16 torques at full scale: so a small
 //! coefficient of a large signal keeps its resolution. Products have 47 fraction bits and are summed in 64 bits; the sum
 //! wraps, an image is used only after its certificate has proved that it fits.
 
+use super::domain::{Domain, Range};
 use super::smooth::{atan, odd_sines, stribeck, tanh};
-use super::state::{Domain, Range, SIGNALS, Signal};
+use super::state::{SIGNALS, Signal};
 use crate::dsp::{narrow, saturate};
 use crate::quantity::Torque;
 

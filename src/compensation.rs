@@ -1,0 +1,220 @@
+//! How a friction estimate becomes a torque that is safe to add to the command; control step.
+//!
+//! In this order: the estimate's parts fade outside the box that they were identified in, gain, clamp, slew limit. What is
+//! asked for falls back by itself (network, then physical, then nothing) and every step says what it did and why. Switched off,
+//! or without a model, the torque is exactly zero: the loop computes the same bits as one without compensation.
+
+use crate::dsp::smmul;
+use crate::friction::FrictionModel;
+use crate::friction::regime::Memory;
+use crate::friction::state::{JointState, Signal};
+use crate::quantity::Torque;
+
+/// What the operator asks for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Request {
+    /// No compensation.
+    #[default]
+    Off = 0,
+    /// The physical model alone.
+    Physical = 1,
+    /// The physical model and the network.
+    PhysicalAndNetwork = 2,
+    /// The physical model acts; the network is computed and reported, but has no effect.
+    NetworkInShadow = 3,
+}
+
+/// Which model acted in a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Acting {
+    /// Nothing.
+    #[default]
+    Nothing = 0,
+    /// The physical model.
+    Physical = 1,
+    /// The physical model and the network.
+    PhysicalAndNetwork = 2,
+}
+
+/// Why less acted than a full compensation by network and physical model.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Reason {
+    /// Switched off.
+    #[default]
+    Off,
+    /// There is no verified image.
+    NoModel,
+    /// As requested, in full.
+    AsRequested,
+    /// The image's parameter set has no network: it did not help on validation data.
+    NoNetwork,
+    /// A signal is outside the trained box: the network fades, the physical model acts in full.
+    OutsideTrainedBox(Signal),
+    /// A signal is more than a margin outside the trained box: the physical model fades too.
+    FarOutsideTrainedBox(Signal),
+}
+
+impl core::fmt::Display for Reason {
+    fn fmt(&self, f: &mut core::fmt::Formatter) -> core::fmt::Result {
+        match self {
+            Self::Off => f.write_str("compensation is switched off"),
+            Self::NoModel => f.write_str("there is no verified parameter image"),
+            Self::AsRequested => f.write_str("as requested"),
+            Self::NoNetwork => f.write_str("the image has no network for this regime: physical model only"),
+            Self::OutsideTrainedBox(signal) => {
+                write!(f, "{} is outside the trained box: the network fades out", signal.name())
+            }
+            Self::FarOutsideTrainedBox(signal) => {
+                write!(f, "{} is far outside the trained box: the physical model fades out", signal.name())
+            }
+        }
+    }
+}
+
+/// A setting beyond its range.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SettingsError {
+    /// The gain must lie in [0, 65536], that is 0 to 1.
+    Gain(u32),
+    /// The clamp must not be negative.
+    Clamp(Torque),
+    /// The slew limit must be positive.
+    Slew(Torque),
+    /// The control rate must be positive.
+    Rate(u32),
+}
+
+impl core::fmt::Display for SettingsError {
+    fn fmt(&self, f: &mut core::fmt::Formatter) -> core::fmt::Result {
+        match self {
+            Self::Gain(gain) => write!(f, "compensation gain is {gain}/65536, must be 0 to 65536"),
+            Self::Clamp(clamp) => write!(f, "compensation clamp is {clamp}, must not be negative"),
+            Self::Slew(slew) => write!(f, "compensation slew limit is {slew} a second, must be positive"),
+            Self::Rate(rate) => write!(f, "control rate is {rate} Hz, must be positive"),
+        }
+    }
+}
+
+impl core::error::Error for SettingsError {}
+
+/// How much compensation is permitted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Settings {
+    request: Request,
+    /// Q31.
+    gain: i32,
+    /// Q16.16, not negative.
+    clamp: i32,
+    /// Q16.16 per control step, at least 1.
+    slew: i32,
+}
+
+impl Settings {
+    /// Checks and prepares settings for a control loop of `rate` Hz: `gain` in Q16.16 (0 to 1), `clamp` the largest magnitude
+    /// of the torque, `slew` its largest change in a second.
+    pub fn new(request: Request, gain: u32, clamp: Torque, slew: Torque, rate: u32) -> Result<Self, SettingsError> {
+        let Some(rate) = core::num::NonZeroU32::new(rate) else { return Err(SettingsError::Rate(rate)) };
+        if gain > 1 << 16 {
+            return Err(SettingsError::Gain(gain));
+        }
+        if clamp < Torque::ZERO {
+            return Err(SettingsError::Clamp(clamp));
+        }
+        if slew <= Torque::ZERO {
+            return Err(SettingsError::Slew(slew));
+        }
+        Ok(Self {
+            request,
+            gain: ((gain as u64) << 15).min(i32::MAX as u64) as i32,
+            clamp: clamp.to_bits(),
+            slew: (slew.to_bits() as u32 / rate).max(1) as i32,
+        })
+    }
+}
+
+/// The outcome of one control step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Output {
+    /// Torque to add to the command.
+    pub torque: Torque,
+    /// What the full model would have added in this step, whatever was requested: gain and clamp applied, no slew limit.
+    pub shadow: Torque,
+    /// Which model acted.
+    pub acting: Acting,
+    /// Why.
+    pub reason: Reason,
+    /// True where the clamp or the slew limit changed the torque.
+    pub limited: bool,
+}
+
+/// Compensation of one joint, from one control step to the next.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Compensation {
+    memory: Memory,
+    last: Torque,
+}
+
+/// Weights come in Q31 and a torque in Q16.16: `i32::MAX` counts as one, so that a full weight changes no bit.
+#[inline(always)]
+fn weigh(torque: i32, weight: i32) -> i32 {
+    if weight == i32::MAX { torque } else { smmul(torque, weight) << 1 }
+}
+
+impl Compensation {
+    /// One control step. Without a model, or switched off, the torque is zero and the past is forgotten.
+    #[inline]
+    pub fn step(&mut self, model: Option<&FrictionModel>, settings: &Settings, state: &JointState) -> Output {
+        let model = match (settings.request, model) {
+            (Request::Off, _) => return self.reset(Reason::Off),
+            (_, None) => return self.reset(Reason::NoModel),
+            (_, Some(model)) => model,
+        };
+        let estimate = model.step(state, &mut self.memory);
+        let weights = model.fade().weights(&state.signals());
+        let physical = weigh(estimate.physical.to_bits(), weights.physical);
+        let network = weigh(estimate.network.to_bits(), weights.network);
+        let full = self.permitted(physical.saturating_add(network), settings);
+        let network_acts = settings.request == Request::PhysicalAndNetwork && model.has_network(&self.memory);
+        let wanted = if network_acts { full } else { self.permitted(physical, settings) };
+
+        let last = self.last.to_bits();
+        let torque = wanted.torque.clamp(last.saturating_sub(settings.slew), last.saturating_add(settings.slew));
+        self.last = Torque::from_bits(torque);
+
+        let acting = match () {
+            () if network_acts && weights.network > 0 => Acting::PhysicalAndNetwork,
+            () if weights.physical > 0 => Acting::Physical,
+            () => Acting::Nothing,
+        };
+        let reason = match weights.outside {
+            Some(signal) if weights.physical < i32::MAX => Reason::FarOutsideTrainedBox(signal),
+            Some(signal) if network_acts => Reason::OutsideTrainedBox(signal),
+            _ if settings.request == Request::PhysicalAndNetwork && !network_acts => Reason::NoNetwork,
+            _ => Reason::AsRequested,
+        };
+        let limited = wanted.limited || torque != wanted.torque;
+        Output { torque: self.last, shadow: Torque::from_bits(full.torque), acting, reason, limited }
+    }
+
+    /// Gain, then clamp.
+    #[inline(always)]
+    fn permitted(&self, torque: i32, settings: &Settings) -> Permitted {
+        let scaled = weigh(torque, settings.gain);
+        let torque = scaled.clamp(settings.clamp.saturating_neg(), settings.clamp);
+        Permitted { torque, limited: torque != scaled }
+    }
+
+    fn reset(&mut self, reason: Reason) -> Output {
+        *self = Self::default();
+        Output { reason, ..Default::default() }
+    }
+}
+
+/// A torque after gain and clamp, Q16.16.
+#[derive(Clone, Copy)]
+struct Permitted {
+    torque: i32,
+    limited: bool,
+}

@@ -1,0 +1,210 @@
+//! The box of signals that a model was identified in: its scales, and how much a model counts beyond it.
+
+use super::state::{SIGNALS, Signal};
+
+/// A closed range of one signal, Q16.16; `low <= high`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Range {
+    /// Lowest value.
+    pub low: i32,
+    /// Highest value.
+    pub high: i32,
+}
+
+impl Range {
+    /// The range of a signal that the model does not depend on: never left.
+    pub const ANY: Self = Self { low: i32::MIN, high: i32::MAX };
+
+    /// Middle of the range, rounded up.
+    pub const fn centre(self) -> i32 {
+        ((self.low as i64 + self.high as i64 + 1) >> 1) as i32
+    }
+
+    /// Largest distance of an end from the centre: half the width, rounded up; at most 2^31.
+    pub const fn half_width(self) -> u32 {
+        let centre = self.centre() as i64;
+        let (below, above) = (centre - self.low as i64, self.high as i64 - centre);
+        (if below > above { below } else { above }) as u32
+    }
+
+    /// The range with `margin` (Q16.16, in half widths) added on both sides, cut at the limits of Q16.16.
+    pub const fn widened(self, margin: u32) -> Self {
+        let extra = (self.half_width() as u64 * margin as u64) >> 16;
+        let extra = if extra > 1 << 32 { 1i64 << 32 } else { extra as i64 };
+        let (low, high) = (self.low as i64 - extra, self.high as i64 + extra);
+        Self {
+            low: if low < i32::MIN as i64 { i32::MIN } else { low as i32 },
+            high: if high > i32::MAX as i64 { i32::MAX } else { high as i32 },
+        }
+    }
+}
+
+/// The box of signals that a parameter set was trained in: one range a signal, in the order of [`Signal::ALL`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Domain {
+    /// Trained ranges.
+    pub ranges: [Range; SIGNALS],
+    /// How far beyond its half width a signal may go until the model has faded out, Q16.16: the network has no weight left at
+    /// one margin, the physical model none at two.
+    pub margin: u32,
+    /// Temperature at which the physical parameters hold, Q16.16.
+    pub reference_temperature: i32,
+}
+
+impl Domain {
+    /// The box with one margin added on every side: where the physical model is evaluated. Beyond it, signals are clamped.
+    pub fn widened(&self) -> [Range; SIGNALS] {
+        self.ranges.map(|range| range.widened(self.margin))
+    }
+
+    /// Full scale of each signal in the physical model, as the left shift that brings a signal of the widened box to Q31.
+    ///
+    /// Full scale is the smallest power of two that the signal's magnitude stays below in the widened box (temperature:
+    /// the difference from the reference); in SI it is 2^(15 - shift).
+    pub fn shifts(&self) -> [u32; SIGNALS] {
+        let mut ranges = self.widened();
+        let temperature = &mut ranges[Signal::Temperature as usize];
+        temperature.low = temperature.low.saturating_sub(self.reference_temperature);
+        temperature.high = temperature.high.saturating_sub(self.reference_temperature);
+        ranges.map(|range| {
+            let magnitude = range.low.unsigned_abs().max(range.high.unsigned_abs());
+            magnitude.leading_zeros().saturating_sub(1).min(MAX_SHIFT)
+        })
+    }
+}
+
+/// A signal that is always zero would allow any shift; this is the largest.
+const MAX_SHIFT: u32 = 30;
+
+/// How much each part of a model counts in a state, Q31; `i32::MAX` is all.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Weights {
+    /// Weight of the network: falls from the box's edge to nothing at one margin.
+    pub network: i32,
+    /// Weight of the physical model: falls from one margin to nothing at two.
+    pub physical: i32,
+    /// The signal that lowers a weight most, if any does.
+    pub outside: Option<Signal>,
+}
+
+/// A signal's distance from its range, measured in margins.
+#[derive(Clone, Copy, Debug)]
+struct Edge {
+    range: Range,
+    /// Width of the margin, at least 1 step of Q16.16.
+    margin: u32,
+    /// Q31 divided by the margin.
+    per_step: u32,
+}
+
+impl Edge {
+    fn new(range: Range, margin: u32) -> Self {
+        let width = ((range.half_width() as u64 * margin as u64) >> 16).clamp(1, i32::MAX as u64) as u32;
+        Self {
+            range,
+            margin: width,
+            per_step: i32::MAX as u32 / core::num::NonZeroU32::new(width).unwrap_or(core::num::NonZeroU32::MIN),
+        }
+    }
+
+    /// Parts of the first and of the second margin that `value` has crossed, Q31.
+    #[inline(always)]
+    fn crossed(&self, value: i32) -> (i32, i32) {
+        let nearest = value.clamp(self.range.low, self.range.high);
+        let distance = value.abs_diff(nearest);
+        (self.part(distance), self.part(distance.saturating_sub(self.margin)))
+    }
+
+    #[inline(always)]
+    fn part(&self, distance: u32) -> i32 {
+        // Below the margin the product is below 2^31.
+        if distance >= self.margin { i32::MAX } else { distance.wrapping_mul(self.per_step) as i32 }
+    }
+}
+
+/// [`Weights`] for every state, prepared from a [`Domain`].
+#[derive(Clone, Copy, Debug)]
+pub struct Fade {
+    edges: [Edge; SIGNALS],
+}
+
+impl Fade {
+    /// Prepares the fade of `domain`.
+    pub fn new(domain: &Domain) -> Self {
+        Self { edges: domain.ranges.map(|range| Edge::new(range, domain.margin)) }
+    }
+
+    /// The weights in a state.
+    #[inline]
+    pub fn weights(&self, signals: &[i32; SIGNALS]) -> Weights {
+        let mut weights = Weights { network: i32::MAX, physical: i32::MAX, outside: None };
+        for ((edge, value), signal) in self.edges.iter().zip(signals).zip(Signal::ALL) {
+            let (first, second) = edge.crossed(*value);
+            let (network, physical) = (i32::MAX - first, i32::MAX - second);
+            if network < weights.network || physical < weights.physical {
+                weights.outside = Some(signal);
+            }
+            weights.network = weights.network.min(network);
+            weights.physical = weights.physical.min(physical);
+        }
+        weights
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn the_network_fades_over_the_first_margin_and_the_physical_model_over_the_second() {
+        let mut domain = Domain { ranges: [Range::ANY; SIGNALS], margin: 1 << 15, reference_temperature: 0 };
+        domain.ranges[Signal::Velocity as usize] = Range { low: -(2 << 16), high: 2 << 16 };
+        let fade = Fade::new(&domain);
+        let at = |velocity: f64| {
+            let mut signals = [0; SIGNALS];
+            signals[Signal::Velocity as usize] = (velocity * 65536.0) as i32;
+            let weights = fade.weights(&signals);
+            let part = |weight: i32| (weight as f64 / i32::MAX as f64 * 100.0).round() as i32;
+            (part(weights.network), part(weights.physical), weights.outside)
+        };
+        let velocity = Some(Signal::Velocity);
+        assert_eq!(at(2.0), (100, 100, None));
+        assert_eq!(at(-2.5), (50, 100, velocity));
+        assert_eq!(at(3.0), (0, 100, velocity));
+        assert_eq!(at(3.75), (0, 25, velocity));
+        assert_eq!(at(-4.0), (0, 0, velocity));
+        assert_eq!(at(32_000.0), (0, 0, velocity));
+    }
+
+    #[test]
+    fn without_a_margin_the_box_has_a_hard_edge() {
+        let range = Range { low: -100, high: 100 };
+        let fade = Fade::new(&Domain { ranges: [range; SIGNALS], margin: 0, reference_temperature: 0 });
+        assert_eq!(fade.weights(&[100; SIGNALS]).network, i32::MAX);
+        assert_eq!(fade.weights(&[102; SIGNALS]), Weights { network: 0, physical: 0, outside: Some(Signal::Position) });
+    }
+
+    proptest! {
+        #[test]
+        fn every_value_of_a_range_is_within_half_a_width_of_its_centre(a: i32, b: i32, t in 0.0f64..=1.0) {
+            let range = Range { low: a.min(b), high: a.max(b) };
+            let value = (range.low as f64 + t * (range.high as f64 - range.low as f64)) as i32;
+            let distance = (value.clamp(range.low, range.high) as i64 - range.centre() as i64).unsigned_abs();
+            prop_assert!(distance <= range.half_width() as u64);
+        }
+
+        #[test]
+        fn shifting_never_overflows_in_the_widened_box(a: i32, b: i32, margin in 0u32..=4 << 16, reference: i32) {
+            let range = Range { low: a.min(b), high: a.max(b) };
+            let domain = Domain { ranges: [range; SIGNALS], margin, reference_temperature: reference };
+            for (signal, (shift, wide)) in domain.shifts().into_iter().zip(domain.widened()).enumerate() {
+                for end in [wide.low, wide.high] {
+                    let origin = if signal == Signal::Temperature as usize { reference } else { 0 };
+                    let value = end.saturating_sub(origin);
+                    prop_assert_eq!((value << shift) >> shift, value);
+                }
+            }
+        }
+    }
+}
