@@ -30,7 +30,7 @@ fn on_one_core(bencher: Bencher, samples: usize, run: impl Fn(&NetworkFit, &DVec
     let fit = NetworkFit::new(&shape, &batch, 1e-6);
     let x = DVector::from_vec(nguyen_widrow(&shape, &mut random));
     let one_core = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread");
-    one_core.install(|| bencher.counter(ItemsCount::new(samples)).bench_local(|| run(&fit, &x)));
+    bencher.counter(ItemsCount::new(samples)).bench_local(|| one_core.install(|| run(&fit, &x)));
 }
 
 #[divan::bench(args = SAMPLES)]

@@ -80,6 +80,11 @@ impl Batch {
         self.inputs
     }
 
+    /// The block of a sample and its place there.
+    pub(super) fn locate(&self, sample: usize) -> (&Block, usize) {
+        (&self.blocks[sample / BLOCK], sample % BLOCK)
+    }
+
     /// Weighted mean of squared errors in units of the output scale; the same for any number of threads.
     pub fn mean_squared_error(&self, shape: &Shape, parameters: &[f64]) -> f64 {
         let pieces: Vec<f64> = self

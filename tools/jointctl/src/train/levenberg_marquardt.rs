@@ -5,7 +5,7 @@
 //! the weights of the best epoch are kept. An epoch is an accepted step.
 
 use super::normal_equations::NetworkFit;
-use super::weights::{WeightBounds, nguyen_widrow};
+use super::weights::{Bounds, nguyen_widrow};
 use super::{OnProgress, Recorder, Stop, Task, TrainError, Trained, TrainingSet, best_of_seeds, require};
 use crate::levenberg_marquardt::{self as minimiser, Damping, minimise};
 use crate::network::{FIRMWARE_HIDDEN, InputBox, Shape};
@@ -27,7 +27,7 @@ pub struct Options {
     pub max_fail: usize,
     /// Penalty on the sum of squared weights, in units of the normalised mean squared error.
     pub decay: f64,
-    /// Bounds of the weights; `None` leaves them free (float only).
+    /// Bounds of the weights.
     pub bounds: Bounds,
     /// Stop when the largest component of the gradient is below this.
     pub gradient_tolerance: f64,
@@ -35,15 +35,6 @@ pub struct Options {
     pub cost_tolerance: f64,
     /// Stop when mu exceeds this.
     pub mu_max: f64,
-}
-
-/// How far the weights may go.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Bounds {
-    /// As far as the firmware's number format allows: [`WeightBounds::for_firmware`].
-    Firmware,
-    /// Anywhere (networks that stay in floating point).
-    None,
 }
 
 impl Default for Options {
@@ -91,10 +82,6 @@ fn run(task: &Task, shape: &Shape, options: &Options, seed: u64, progress: OnPro
         }
     };
     let _ = note(&start, task.train.mean_squared_error(shape, start.as_slice()));
-    let bounds = match options.bounds {
-        Bounds::Firmware => WeightBounds::for_firmware(shape).of_parameters(shape),
-        Bounds::None => Vec::new(),
-    };
     let solver = minimiser::Options {
         max_iterations: options.max_epochs,
         gradient_tolerance: options.gradient_tolerance,
@@ -102,7 +89,7 @@ fn run(task: &Task, shape: &Shape, options: &Options, seed: u64, progress: OnPro
         mu_initial: 1e-3,
         mu_max: options.mu_max,
         damping: Damping::Identity,
-        bounds,
+        bounds: options.bounds.of_parameters(shape),
     };
     let solution = minimise(&fit, &start, &solver, |_, x, cost| note(x, cost - fit.penalty(x.as_slice())));
     let stop = match solution.stop {

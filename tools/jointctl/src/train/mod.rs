@@ -15,11 +15,16 @@ use std::fmt;
 use thiserror::Error;
 
 pub mod batch;
+pub mod batch_norm;
 pub mod levenberg_marquardt;
 pub mod normal_equations;
 pub mod reference;
+pub mod stochastic;
 mod tanh;
 pub mod weights;
+
+#[cfg(test)]
+mod tests;
 
 /// Samples to learn from: one row of raw inputs, one target and one weight each.
 #[derive(Clone, Debug, Default, PartialEq)]

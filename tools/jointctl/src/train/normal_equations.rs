@@ -124,3 +124,105 @@ fn accumulate(tiles: &mut [Tile], jacobian: &[[[f64; PANEL]; BLOCK]]) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::network::{FIRMWARE_HIDDEN, INPUTS, InputBox, Network};
+    use crate::train::TrainingSet;
+    use crate::train::weights::nguyen_widrow;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    const DECAY: f64 = 0.01;
+
+    /// 150 weighted samples (two full blocks and a part of one), the third input unused.
+    fn problem() -> (TrainingSet, InputBox, Shape, DVector<f64>) {
+        let mut random = ChaCha8Rng::seed_from_u64(3);
+        let inputs: Vec<[f64; INPUTS]> =
+            (0..150).map(|_| std::array::from_fn(|_| random.random_range(-1.0..1.0))).collect();
+        let targets = (0..150).map(|_| random.random_range(-3.0..3.0)).collect();
+        let weights = (0..150).map(|_| random.random_range(0.1..2.0)).collect();
+        let limits = InputBox::new([-0.9; INPUTS], [0.8; INPUTS], [true, true, false, true, true]).unwrap();
+        let shape = Shape::new(4, &FIRMWARE_HIDDEN).unwrap();
+        let x = DVector::from_vec(nguyen_widrow(&shape, &mut random));
+        (TrainingSet { inputs, targets, weights }, limits, shape, x)
+    }
+
+    /// Weighted errors straight from the network's own definition.
+    fn errors(set: &TrainingSet, limits: InputBox, x: &DVector<f64>) -> DVector<f64> {
+        let network = Network::from_active(&FIRMWARE_HIDDEN, limits, 1.0, x.as_slice()).unwrap();
+        let total: f64 = set.weights.iter().sum();
+        DVector::from_fn(set.targets.len(), |i, _| {
+            (network.evaluate(&set.inputs[i]) - set.targets[i]) * (set.weights[i] / total).sqrt()
+        })
+    }
+
+    #[test]
+    fn the_derivative_by_every_weight_agrees_with_finite_differences() {
+        let (set, limits, shape, x) = problem();
+        let h = 1e-5;
+        let columns: Vec<DVector<f64>> = (0..x.len())
+            .map(|p| {
+                let [up, down] = [h, -h].map(|h| {
+                    let mut moved = x.clone();
+                    moved[p] += h;
+                    errors(&set, limits, &moved)
+                });
+                (up - down) / (2.0 * h)
+            })
+            .collect();
+        let jacobian = DMatrix::from_columns(&columns);
+        let r = errors(&set, limits, &x);
+        let cost = r.norm_squared() + DECAY * x.norm_squared();
+        let gradient = jacobian.transpose() * &r + DECAY * &x;
+        let hessian = jacobian.transpose() * &jacobian + DMatrix::identity(x.len(), x.len()) * DECAY;
+
+        let batch = Batch::new(&set, &limits, 1.0);
+        let found = NetworkFit::new(&shape, &batch, DECAY).normal_equations(&x);
+        assert!((found.cost - cost).abs() < 1e-12);
+        for p in 0..x.len() {
+            assert!(
+                (found.gradient[p] - gradient[p]).abs() < 1e-8,
+                "weight {p}: {} {}",
+                found.gradient[p],
+                gradient[p]
+            );
+        }
+        assert!((found.hessian - hessian).amax() < 1e-8);
+    }
+
+    #[test]
+    fn the_cost_alone_is_the_cost_of_the_normal_equations() {
+        let (set, limits, shape, x) = problem();
+        let batch = Batch::new(&set, &limits, 2.0);
+        let fit = NetworkFit::new(&shape, &batch, DECAY);
+        let (alone, whole) = (fit.cost(&x), fit.normal_equations(&x).cost);
+        assert!((alone - whole).abs() < 1e-12 * whole, "{alone} {whole}");
+    }
+
+    #[test]
+    fn samples_of_weight_zero_change_no_bit() {
+        let (mut set, limits, shape, x) = problem();
+        let without = NetworkFit::new(&shape, &Batch::new(&set, &limits, 1.0), DECAY).normal_equations(&x);
+        set.inputs.insert(70, [0.3; INPUTS]);
+        set.targets.insert(70, 1e9);
+        set.weights.insert(70, 0.0);
+        let with = NetworkFit::new(&shape, &Batch::new(&set, &limits, 1.0), DECAY).normal_equations(&x);
+        assert_eq!((with.cost, with.gradient, with.hessian), (without.cost, without.gradient, without.hessian));
+    }
+
+    #[test]
+    fn a_weight_of_two_is_the_sample_twice() {
+        let (mut set, limits, shape, x) = problem();
+        set.weights.fill(1.0);
+        let mut twice = set.clone();
+        set.weights[17] = 2.0;
+        twice.inputs.push(set.inputs[17]);
+        twice.targets.push(set.targets[17]);
+        twice.weights.push(1.0);
+        let [one, two] =
+            [set, twice].map(|set| NetworkFit::new(&shape, &Batch::new(&set, &limits, 1.0), 0.0).normal_equations(&x));
+        assert!((one.cost - two.cost).abs() < 1e-13 && (one.hessian - two.hessian).amax() < 1e-13);
+    }
+}

@@ -4,7 +4,8 @@
 //! defaults of a numerical toolbox (no penalty on the weights, no bounds). The firmware cannot run it; reports show what
 //! its extra width would have brought.
 
-use super::levenberg_marquardt::{Bounds, Options};
+use super::levenberg_marquardt::Options;
+use super::weights::Bounds;
 
 /// Neurons of the one hidden layer.
 pub const HIDDEN: usize = 16;

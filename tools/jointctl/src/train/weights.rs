@@ -7,41 +7,55 @@ use crate::network::Shape;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-/// Largest magnitude that one weight or bias of each layer may take.
+/// How far the weights and biases may go.
 ///
 /// The firmware's format needs sum |w| + |b| < 64 for every neuron and |w| < 32 for every weight (DESIGN, number formats).
+/// Bounds of single weights keep the training problem simple (a box); they are chosen so that no neuron can leave the
+/// format whatever its weights do.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct WeightBounds {
-    /// Weights and biases of the first layer.
-    pub first_layer: f64,
-    /// Weights and biases of all further layers.
-    pub further_layers: f64,
+pub enum Bounds {
+    /// In the first layer 62.7 / (number of active inputs + 1), at most 31.9; 8 in all further layers or what their width
+    /// allows.
+    Firmware,
+    /// Everywhere: for networks that stay in floating point.
+    None,
 }
 
-impl WeightBounds {
-    /// Limit of sum |w| + |b| of a neuron in the firmware's format.
-    pub const NEURON_SUM: f64 = 64.0;
-    /// Limit of one weight in the firmware's format.
-    pub const WEIGHT: f64 = 31.9;
-    /// Share of the limits that training may use: rounding to fixed point must not pass them.
-    const SHARE: f64 = 0.98;
+/// Limit of sum |w| + |b| of a neuron: that of the format less 2 %, since rounding to fixed point may add to it.
+const NEURON_SUM: f64 = 0.98 * 64.0;
+/// Limit of one weight.
+const WEIGHT: f64 = 31.9;
+/// Limit of one weight or bias behind the first layer.
+const FURTHER_WEIGHT: f64 = 8.0;
 
-    /// The widest equal bounds under which no neuron of `shape` can leave the firmware's format.
-    pub fn for_firmware(shape: &Shape) -> Self {
-        let limit = |inputs: usize| Self::WEIGHT.min(Self::SHARE * Self::NEURON_SUM / (inputs + 1) as f64);
-        let mut inputs = shape.layers().map(|layer| layer.inputs);
-        let first_layer = limit(inputs.next().unwrap_or(0));
-        Self { first_layer, further_layers: inputs.map(limit).fold(8.0, f64::min) }
+impl Bounds {
+    /// Lower and upper bound of every parameter of `shape`; empty where there are none.
+    pub fn of_parameters(self, shape: &Shape) -> Vec<(f64, f64)> {
+        let mut bounds = Vec::new();
+        if self == Self::Firmware {
+            for (l, layer) in shape.layers().enumerate() {
+                let largest = if l == 0 { WEIGHT } else { FURTHER_WEIGHT };
+                let bound = largest.min(NEURON_SUM / (layer.inputs + 1) as f64);
+                bounds.resize(bounds.len() + layer.neurons * (layer.inputs + 1), (-bound, bound));
+            }
+        }
+        bounds
     }
 
-    /// Lower and upper bound of every parameter of `shape`.
-    pub fn of_parameters(&self, shape: &Shape) -> Vec<(f64, f64)> {
-        let bound = |l| if l == 0 { self.first_layer } else { self.further_layers };
-        shape
-            .layers()
-            .enumerate()
-            .flat_map(|(l, layer)| std::iter::repeat_n((-bound(l), bound(l)), layer.neurons * (layer.inputs + 1)))
-            .collect()
+    /// Largest sum |w| + |b| of a neuron.
+    pub fn neuron_sum(self) -> f64 {
+        match self {
+            Self::Firmware => NEURON_SUM,
+            Self::None => f64::INFINITY,
+        }
+    }
+
+    /// Largest magnitude of a weight.
+    pub fn weight(self) -> f64 {
+        match self {
+            Self::Firmware => WEIGHT,
+            Self::None => f64::INFINITY,
+        }
     }
 }
 
@@ -63,6 +77,17 @@ pub fn nguyen_widrow(shape: &Shape, random: &mut ChaCha8Rng) -> Vec<f64> {
             parameters.extend(direction.iter().map(|w| w / norm * length));
             parameters.push(random.random_range(-length..length));
         }
+    }
+    parameters
+}
+
+/// First values uniform in +-1 / sqrt(n), n the inputs of the neuron: the default of the framework that the mobile-robot
+/// paper used.
+pub fn uniform(shape: &Shape, random: &mut ChaCha8Rng) -> Vec<f64> {
+    let mut parameters = Vec::with_capacity(shape.parameter_count());
+    for layer in shape.layers() {
+        let limit = 1.0 / (layer.inputs.max(1) as f64).sqrt();
+        parameters.extend((0..layer.neurons * (layer.inputs + 1)).map(|_| random.random_range(-limit..limit)));
     }
     parameters
 }
