@@ -5,4 +5,6 @@
 //! model on validation data is quantised, certified and judged by the same `no_std` code that the board runs.
 
 pub mod levenberg_marquardt;
+pub mod network;
 pub mod samples;
+pub mod train;
