@@ -4,7 +4,14 @@
 //! split; the rigid body and the physical friction are identified, a network is trained on what is left, the better
 //! model on validation data is quantised, certified and judged by the same `no_std` code that the board runs.
 
+pub mod friction_model;
+pub mod friction_parameter;
+pub mod identify;
+pub mod image_text;
 pub mod levenberg_marquardt;
 pub mod network;
+pub mod presets;
+pub mod quantize;
+pub mod rigid;
 pub mod samples;
 pub mod train;

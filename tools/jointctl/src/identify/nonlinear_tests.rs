@@ -1,0 +1,3 @@
+//! Tests of the fit: the Jacobian.
+
+use super::*;

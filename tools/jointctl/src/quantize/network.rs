@@ -1,0 +1,70 @@
+//! A trained network as the image holds it: layer 0 in 32 bits, the others in 16 with a power of two per neuron.
+
+use super::QuantizeError;
+use super::full_scale::to_integer;
+use crate::network::Network;
+use joint_firmware::friction::network::{INPUTS, MAX_FRACTION, MIN_FRACTION, NEURONS, NetworkParameters, Neuron};
+
+/// Largest sum of a neuron's weights and bias that fits: Q25 in layer 0, Q15 times at least 10 fraction bits in the others.
+const SUM_LIMIT: f64 = 64.0;
+/// What the firmware multiplies a 16-bit bias with, instead of one.
+const BIAS_INPUT: f64 = 32767.0 / 32768.0;
+
+/// Quantises `network`. Its box must be the one of the image's domain, to a step of Q16.16.
+pub fn quantize(network: &Network) -> Result<NetworkParameters, QuantizeError> {
+    let sizes = network.shape().sizes();
+    if sizes != [INPUTS, NEURONS, NEURONS, NEURONS, 1] {
+        return Err(QuantizeError::Shape { found: sizes.to_vec() });
+    }
+    let layers: Vec<_> = network.layers().collect();
+    let mut parameters = NetworkParameters::default();
+    for (j, (weights, bias)) in layers[0].iter().enumerate() {
+        check_sum(0, j, weights, *bias)?;
+        for (i, weight) in weights.iter().enumerate() {
+            parameters.first[j][i] = fixed(&format!("weight {i} of neuron {j} in layer 0"), *weight, 26)?;
+        }
+        parameters.first[j][INPUTS] = fixed(&format!("bias of neuron {j} in layer 0"), *bias, 25)?;
+    }
+    for (layer, neurons) in parameters.hidden.iter_mut().enumerate() {
+        for (j, place) in neurons.iter_mut().enumerate() {
+            let (weights, bias) = layers[layer + 1][j];
+            *place = neuron(layer + 1, j, weights, bias)?;
+        }
+    }
+    let (weights, bias) = layers[3][0];
+    // The scale takes the output's magnitude, a whole number of steps of Q16.16; the weights take the exact rest.
+    let torques: Vec<f64> = weights.iter().map(|w| w * network.output_scale()).collect();
+    let bias = bias * network.output_scale();
+    let largest = torques.iter().fold(bias.abs(), |most, t| most.max(t.abs()));
+    let scale = (largest * 65536.0).ceil().max(1.0);
+    parameters.scale = to_integer("scale of the network", scale, 1.0, 1.0, f64::from(i32::MAX))?;
+    let weights: Vec<f64> = torques.iter().map(|t| t * 65536.0 / scale).collect();
+    parameters.output = neuron(3, 0, &weights, bias * 65536.0 / scale)?;
+    Ok(parameters)
+}
+
+fn fixed(what: &str, value: f64, fraction: i32) -> Result<i32, QuantizeError> {
+    to_integer(what, value, 2f64.powi(fraction), f64::from(i32::MIN), f64::from(i32::MAX))
+}
+
+fn check_sum(layer: usize, neuron: usize, weights: &[f64], bias: f64) -> Result<(), QuantizeError> {
+    let sum = weights.iter().map(|w| w.abs()).sum::<f64>() + bias.abs();
+    if sum < SUM_LIMIT { Ok(()) } else { Err(QuantizeError::Sum { layer, neuron, sum, limit: SUM_LIMIT }) }
+}
+
+/// The finest scale at which all weights fit 16 bits and their sum 32.
+fn neuron(layer: usize, index: usize, weights: &[f64], bias: f64) -> Result<Neuron, QuantizeError> {
+    check_sum(layer, index, weights, bias)?;
+    for fraction in (MIN_FRACTION..=MAX_FRACTION).rev() {
+        let scale = 2f64.powi(i32::from(fraction));
+        let rounded: Vec<f64> =
+            weights.iter().map(|w| (w * scale).round()).chain([(bias / BIAS_INPUT * scale).round()]).collect();
+        let fits = rounded.iter().all(|w| w.abs() <= f64::from(i16::MAX));
+        let sum: f64 = rounded.iter().map(|w| w.abs()).sum();
+        if fits && sum * 32768.0 < 2f64.powi(31) {
+            return Ok(Neuron { weights: std::array::from_fn(|i| rounded[i] as i16), fraction });
+        }
+    }
+    let sum = weights.iter().map(|w| w.abs()).sum::<f64>() + bias.abs();
+    Err(QuantizeError::Sum { layer, neuron: index, sum, limit: SUM_LIMIT / 2.0 })
+}
