@@ -4,6 +4,11 @@
 //! split; the rigid body and the physical friction are identified, a network is trained on what is left, the better
 //! model on validation data is quantised, certified and judged by the same `no_std` code that the board runs.
 
+pub mod classify;
+pub mod clean;
+pub mod dataset;
+pub mod differentiate;
+pub mod filter;
 pub mod friction_model;
 pub mod friction_parameter;
 pub mod identify;
@@ -14,4 +19,5 @@ pub mod presets;
 pub mod quantize;
 pub mod rigid;
 pub mod samples;
+pub mod split;
 pub mod train;
