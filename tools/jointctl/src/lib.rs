@@ -5,4 +5,7 @@
 //! model on validation data is quantised, certified and judged by the same `no_std` code that the board runs.
 
 pub mod levenberg_marquardt;
+pub mod metrics;
+pub mod output;
+pub mod report;
 pub mod samples;
