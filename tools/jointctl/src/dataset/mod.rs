@@ -15,5 +15,5 @@ mod validate;
 
 pub use description::{Description, EffortUnit, Gravity, PositionUnit, RigidDescription};
 pub use error::DatasetError;
-pub use prepare::{MINIMUM_SAMPLES, Note, Prepared, Recording, SIGNAL_LIMIT, prepare, prepare_with};
+pub use prepare::{MINIMUM_SAMPLES, Note, Prepared, Recording, SIGNAL_LIMIT, prepare, prepare_as, prepare_with};
 pub use validate::parse;

@@ -73,11 +73,25 @@ pub fn prepare(path: &Path) -> Result<Prepared, DatasetError> {
     prepare_with(path, &|name| std::env::var(name).ok())
 }
 
+/// As [`prepare`], with the description changed by `change` after it was read.
+pub fn prepare_as(path: &Path, change: impl FnOnce(&mut Description)) -> Result<Prepared, DatasetError> {
+    prepare_changed(path, &|name| std::env::var(name).ok(), change)
+}
+
 /// Prepares the data set that the TOML file at `path` describes; `environment` gives the variables in `source.root`.
 pub fn prepare_with(path: &Path, environment: Environment) -> Result<Prepared, DatasetError> {
+    prepare_changed(path, environment, |_| ())
+}
+
+fn prepare_changed(
+    path: &Path,
+    environment: Environment,
+    change: impl FnOnce(&mut Description),
+) -> Result<Prepared, DatasetError> {
     let text =
         std::fs::read_to_string(path).map_err(|source| DatasetError::Unreadable { file: path.to_owned(), source })?;
-    let description = validate::parse(&text, path)?;
+    let mut description = validate::parse(&text, path)?;
+    change(&mut description);
     let recordings = Recordings::load(&description, path, &text, environment)?;
     let layout = Layout::of(&description, uses_velocity_column(&description));
     let extracted = extract(&recordings, &description, layout)?;

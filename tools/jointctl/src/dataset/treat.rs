@@ -8,7 +8,7 @@ use super::error::DatasetError;
 use super::signals::Layout;
 use super::treatment::{Keep, LowPass};
 use crate::clean::Stretch;
-use crate::differentiate::central_difference;
+use crate::differentiate::{backward_difference, central_difference};
 use crate::filter::{FilterError, LowPassFilter, advance};
 
 /// Filter before decimation: that of the `decimate` of MATLAB and SciPy.
@@ -69,10 +69,14 @@ pub fn treat(
 ) -> Result<Option<Motion>, DatasetError> {
     let Stretch { period, time, signals, row } = stretch;
     let filter = &description.filter;
-    let low_pass = |signal: &'static str, setting: &Option<LowPass>, values: &[f64]| match setting {
-        Some(setting) => apply(setting, values, period, filter.zero_phase, signal, run),
-        None => Ok(values.to_vec()),
+    let low_pass = |signal: &'static str, setting: &Option<LowPass>, values: &[f64]| {
+        let zero_phase = filter.zero_phase && (signal == "effort" || !filter.causal_motion);
+        match setting {
+            Some(setting) => apply(setting, values, period, zero_phase, signal, run),
+            None => Ok(values.to_vec()),
+        }
     };
+    let difference = if filter.causal_motion { backward_difference } else { central_difference };
     let position = low_pass("position", &filter.position, &signals[Layout::POSITION])?;
     let effort = &signals[Layout::EFFORT];
     let effort = match filter.effort_lag {
@@ -81,9 +85,9 @@ pub fn treat(
     };
     let velocity = match layout.velocity {
         Some(column) => low_pass("velocity", &filter.velocity, &signals[column])?,
-        None => low_pass("velocity", &filter.velocity, &central_difference(&position, period))?,
+        None => low_pass("velocity", &filter.velocity, &difference(&position, period))?,
     };
-    let acceleration = central_difference(&velocity, period);
+    let acceleration = difference(&velocity, period);
     let temperature = match layout.temperature {
         Some(column) => Some(low_pass("temperature", &filter.temperature, &signals[column])?),
         None => None,

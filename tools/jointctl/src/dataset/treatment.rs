@@ -110,6 +110,9 @@ pub enum Resample {
 pub struct Filter {
     /// Forward and backward (no delay, twice the attenuation); false: forward only, as the joint itself would filter.
     pub zero_phase: bool,
+    /// Position, velocity and temperature forwards only, and backward differences: the signals that a joint has at that instant.
+    /// The effort, which is to be predicted and not an input, stays as `zero_phase` says.
+    pub causal_motion: bool,
     /// Filter of the position.
     pub position: Option<LowPass>,
     /// Filter of the velocity, recorded or differentiated.
@@ -128,6 +131,7 @@ impl Default for Filter {
     fn default() -> Self {
         Filter {
             zero_phase: true,
+            causal_motion: false,
             position: None,
             velocity: None,
             effort: None,

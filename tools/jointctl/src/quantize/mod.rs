@@ -32,6 +32,9 @@ pub enum QuantizeError {
         /// Neurons in each layer.
         found: Vec<usize>,
     },
+    /// A stored network that is no network.
+    #[error("{0}")]
+    Network(String),
     /// A neuron whose sum would not fit 32 bits.
     #[error("neuron {neuron} of layer {layer}: its weights and bias add up to {sum}, the limit is {limit}")]
     Sum {

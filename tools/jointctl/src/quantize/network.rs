@@ -1,8 +1,10 @@
 //! A trained network as the image holds it: layer 0 in 32 bits, the others in 16 with a power of two per neuron.
 
 use super::QuantizeError;
+use super::full_scale::from_q16;
 use super::full_scale::to_integer;
-use crate::network::Network;
+use crate::network::{FIRMWARE_HIDDEN, InputBox, Network};
+use joint_firmware::friction::domain::Domain;
 use joint_firmware::friction::network::{INPUTS, MAX_FRACTION, MIN_FRACTION, NEURONS, NetworkParameters, Neuron};
 
 /// Largest sum of a neuron's weights and bias that fits: Q25 in layer 0, Q15 times at least 10 fraction bits in the others.
@@ -41,6 +43,29 @@ pub fn quantize(network: &Network) -> Result<NetworkParameters, QuantizeError> {
     let weights: Vec<f64> = torques.iter().map(|t| t * 65536.0 / scale).collect();
     parameters.output = neuron(3, 0, &weights, bias * 65536.0 / scale)?;
     Ok(parameters)
+}
+
+/// The network that stored parameters stand for. Inputs whose range is empty or without limits have no influence.
+pub fn dequantize(parameters: &NetworkParameters, domain: &Domain) -> Result<Network, QuantizeError> {
+    let ends = |pick: fn(&joint_firmware::friction::domain::Range) -> i32| {
+        std::array::from_fn(|i| from_q16(pick(&domain.ranges[i])))
+    };
+    let impossible = |error: crate::network::NetworkError| QuantizeError::Network(error.to_string());
+    let used: [bool; INPUTS] = std::array::from_fn(|i| parameters.first.iter().any(|weights| weights[i] != 0));
+    let input_box = InputBox::new(ends(|range| range.low), ends(|range| range.high), used).map_err(impossible)?;
+    let active = input_box.active();
+    let mut values = Vec::new();
+    for weights in &parameters.first {
+        let weight = |i: usize| if active[i] { f64::from(weights[i]) / 2f64.powi(26) } else { 0.0 };
+        values.extend((0..INPUTS).map(weight));
+        values.push(f64::from(weights[INPUTS]) / 2f64.powi(25));
+    }
+    for neuron in parameters.hidden.iter().flatten().chain([&parameters.output]) {
+        let unit = 2f64.powi(i32::from(neuron.fraction));
+        values.extend(neuron.weights[..NEURONS].iter().map(|w| f64::from(*w) / unit));
+        values.push(f64::from(neuron.weights[NEURONS]) * BIAS_INPUT / unit);
+    }
+    Network::new(&FIRMWARE_HIDDEN, input_box, from_q16(parameters.scale), values).map_err(impossible)
 }
 
 fn fixed(what: &str, value: f64, fraction: i32) -> Result<i32, QuantizeError> {

@@ -1,8 +1,8 @@
 //! The physical friction model as the image holds it.
 
 use super::QuantizeError;
-use super::full_scale::from_si;
-use crate::friction_model::{FrictionModel, Term};
+use super::full_scale::{from_q16, from_si, to_si};
+use crate::friction_model::{Directional, FrictionModel, Term, Terms as FloatTerms};
 use joint_firmware::friction::domain::Domain;
 use joint_firmware::friction::physical::{Coefficients, PhysicalParameters, Terms};
 use joint_firmware::friction::state::SIGNALS;
@@ -64,6 +64,41 @@ fn natural(model: &FrictionModel) -> [f64; Coefficients::COUNT] {
     std::array::from_fn(|i| values[i])
 }
 
+/// The model that stored parameters stand for.
+pub fn dequantize(parameters: &PhysicalParameters, domain: &Domain) -> FrictionModel {
+    let shifts = domain.shifts();
+    let bits = parameters.coefficients.to_array();
+    let values: [f64; Coefficients::COUNT] =
+        std::array::from_fn(|i| to_si(bits[i], Coefficients::DIMENSIONS[i], &shifts));
+    let terms: Vec<Term> =
+        Term::ALL.into_iter().filter(|term| parameters.terms.contains(firmware_term(*term))).collect();
+    FrictionModel {
+        terms: FloatTerms::of(&terms),
+        offset: values[0],
+        position_slope: values[1],
+        temperature_slope: values[2],
+        load_slope: values[3],
+        viscous: values[4],
+        viscous_temperature: values[5],
+        quadratic: values[6],
+        coulomb: Directional { positive: values[7], negative: values[8] },
+        coulomb_temperature: values[9],
+        coulomb_load: values[10],
+        coulomb_slope: values[11],
+        breakaway: Directional { positive: values[12], negative: values[13] },
+        stribeck_slope: values[14],
+        hysteresis: values[15],
+        hysteresis_velocity_slope: values[16],
+        hysteresis_width: values[17],
+        hysteresis_acceleration_slope: values[18],
+        harmonic_frequency: values[19],
+        harmonic_positive: std::array::from_fn(|j| values[20 + j]),
+        harmonic_negative: std::array::from_fn(|j| values[25 + j]),
+        rotor_inertia: values[30],
+        reference_temperature: from_q16(domain.reference_temperature),
+    }
+}
+
 /// Which signals the model depends on, in the order of [`Signal`](joint_firmware::friction::state::Signal).
 pub fn depends_on(model: &FrictionModel) -> [bool; SIGNALS] {
     let any = |terms: &[Term]| terms.iter().any(|&term| model.terms.contains(term));
@@ -97,5 +132,15 @@ mod tests {
             [at("constant"), at("stribeck_slope"), at("harmonic_negative_5"), at("rotor_inertia")],
             [1.0, 14.0, 29.0, 7.0]
         );
+    }
+
+    #[test]
+    fn a_stored_model_stands_for_what_was_stored() {
+        let range = joint_firmware::friction::domain::Range { low: -(3 << 16), high: 3 << 16 };
+        let domain = Domain { ranges: [range; SIGNALS], margin: 1 << 15, reference_temperature: 25 << 16 };
+        let bits = std::array::from_fn(|i| (i as i32 + 1) * 1000);
+        let terms = Terms::ALL;
+        let parameters = PhysicalParameters { terms, coefficients: Coefficients::from_array(bits) };
+        assert_eq!(quantize(&dequantize(&parameters, &domain), &domain), Ok(parameters));
     }
 }

@@ -99,5 +99,5 @@ pub fn compensated_ink(report: &Report) -> (Ink, &'static str) {
 /// How many values lie beyond their [`robust_extent`].
 pub fn outside(values: &[f64]) -> usize {
     let range = robust_extent(values);
-    values.iter().filter(|value| !(range.start..=range.end).contains(value)).count()
+    values.iter().filter(|value| !(range.start..=range.end).contains(*value)).count()
 }
