@@ -78,6 +78,9 @@ pub struct Choices {
     /// Networks trained from different first weights; the best on validation data is used
     #[arg(long, value_name = "N", default_value_t = 4)]
     restarts: usize,
+    /// Epochs without a lower validation error after which training stops
+    #[arg(long, value_name = "N", default_value_t = 30)]
+    patience: usize,
     /// Seed of everything random: the same seed, data and choices give the same image
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
@@ -127,6 +130,7 @@ impl Choices {
                 TrainerChoice::None => None,
             },
             restarts: self.restarts.max(1),
+            patience: self.patience,
             seed: self.seed,
             samples: self.samples,
             equalise: fraction("equalise", self.equalise, 1.0)?,

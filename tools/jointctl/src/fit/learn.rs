@@ -215,7 +215,11 @@ impl Task<'_> {
         let tell = |p: train::Progress| self.tell("network", p);
         Ok(match trainer {
             Trainer::LevenbergMarquardt => {
-                let options = levenberg_marquardt::Options { seeds: self.seeds(), ..Default::default() };
+                let options = levenberg_marquardt::Options {
+                    seeds: self.seeds(),
+                    max_fail: self.options.patience.max(1),
+                    ..Default::default()
+                };
                 levenberg_marquardt::train(train, validation, input_box, &options, &tell)?
             }
             Trainer::StochasticGradient => {

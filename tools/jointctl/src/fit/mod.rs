@@ -36,6 +36,8 @@ pub struct Options {
     pub trainer: Option<Trainer>,
     /// Networks that are trained from different first weights.
     pub restarts: usize,
+    /// Epochs without a lower validation error after which training stops.
+    pub patience: usize,
     /// Seed of everything random.
     pub seed: u64,
     /// Most training samples that a network sees.
@@ -68,6 +70,7 @@ impl Default for Options {
             presets: vec![Preset::CoulombViscous, Preset::Full],
             trainer: Some(Trainer::LevenbergMarquardt),
             restarts: 4,
+            patience: 30,
             seed: 1,
             samples: 12_000,
             equalise: 0.5,
