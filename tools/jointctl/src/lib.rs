@@ -4,10 +4,12 @@
 //! split; the rigid body and the physical friction are identified, a network is trained on what is left, the better
 //! model on validation data is quantised, certified and judged by the same `no_std` code that the board runs.
 
+pub mod augment;
 pub mod classify;
 pub mod clean;
 pub mod dataset;
 pub mod differentiate;
+pub mod equalise;
 pub mod filter;
 pub mod levenberg_marquardt;
 pub mod samples;
