@@ -86,12 +86,13 @@ pub fn steady(values: &mut [f64], missing: &[bool], limit: f64) -> usize {
 }
 
 /// For each row whether it belongs to a frozen read-out: good rows that repeat one value before a step larger than
-/// `step`, with `margin` rows before them and `margin` rows after the first one behind the step.
+/// `step` a row, with `margin` rows before them and `margin` rows after the first one behind the step.
 pub fn frozen(values: &[f64], missing: &[bool], step: f64, margin: usize) -> Vec<bool> {
     let mut unused = vec![false; values.len()];
     let good: Vec<usize> = (0..values.len()).filter(|&i| !missing[i]).collect();
     for at in 1..good.len() {
-        if (values[good[at]] - values[good[at - 1]]).abs() <= step {
+        let rows = (good[at] - good[at - 1]) as f64;
+        if (values[good[at]] - values[good[at - 1]]).abs() <= step * rows {
             continue;
         }
         let repeats = (1..at).rev().take_while(|&k| values[good[k]] == values[good[k - 1]]).count();
@@ -202,4 +203,121 @@ fn median(values: &mut [f64]) -> Option<f64> {
     }
     values.sort_unstable_by(f64::total_cmp);
     Some(if values.len() % 2 == 1 { values[middle] } else { 0.5 * (values[middle - 1] + values[middle]) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn run(time: &[f64], signal: &[f64], missing: &[usize]) -> RawRun {
+        let missing = (0..time.len()).map(|i| missing.contains(&i)).collect();
+        RawRun { time: time.to_vec(), signals: vec![signal.to_vec()], missing }
+    }
+
+    fn even(count: usize) -> Vec<f64> {
+        (0..count).map(|i| i as f64 * 0.01).collect()
+    }
+
+    #[test]
+    fn a_spike_is_found_and_neither_a_slope_nor_its_ends_nor_its_neighbours_are() {
+        let mut values: Vec<f64> = (0..20).map(|i| 0.1 * f64::from(i)).collect();
+        let none = vec![false; 20];
+        assert!(spikes(&values, &none, 0.5, None).is_empty());
+        for at in [0, 1, 7, 18, 19] {
+            let right = values[at];
+            values[at] = -9.0;
+            assert_eq!(spikes(&values, &none, 0.5, None), [at]);
+            values[at] = right;
+        }
+    }
+
+    #[test]
+    fn the_edge_of_a_wrapping_angle_is_no_spike_and_unwraps_to_a_straight_line() {
+        let straight: Vec<f64> = (0..60).map(|i| 0.7 * f64::from(i)).collect();
+        let mut wrapped: Vec<f64> = straight.iter().map(|x| (x + 12.5).rem_euclid(25.0) - 12.5).collect();
+        let mut missing = vec![false; 60];
+        assert!(spikes(&wrapped, &missing, 2.0, Some(25.0)).is_empty());
+        missing[20] = true;
+        wrapped[20] = 7.77;
+        unwrap(&mut wrapped, &missing, 25.0);
+        for i in (0..60).filter(|&i| i != 20) {
+            assert!((wrapped[i] - straight[i]).abs() < 1e-9, "{i}");
+        }
+    }
+
+    #[test]
+    fn a_steady_column_takes_the_median_where_it_is_misread() {
+        let mut values = vec![12.1, 12.0, 0.0, 22.6, 12.2, 99.0];
+        let missing = [false, false, false, false, false, true];
+        assert_eq!(steady(&mut values, &missing, 1.2), 2);
+        assert_eq!(values, [12.1, 12.0, 12.1, 12.1, 12.2, 99.0]);
+    }
+
+    #[test]
+    fn a_frozen_read_out_is_unused_from_before_it_repeats_until_after_it_steps() {
+        let mut values: Vec<f64> = (0..40).map(|i| 0.05 * f64::from(i)).collect();
+        values[10..20].fill(0.5);
+        let unused = frozen(&values, &[false; 40], 0.2, 3);
+        let expected: Vec<usize> = (7..=23).collect();
+        assert_eq!((0..40).filter(|&i| unused[i]).collect::<Vec<_>>(), expected);
+    }
+
+    #[test]
+    fn a_fast_motion_across_missing_rows_is_not_a_step() {
+        let values: Vec<f64> = (0..40).map(|i| 0.15 * f64::from(i)).collect();
+        let mut missing = [false; 40];
+        missing[20..23].fill(true);
+        assert!(!frozen(&values, &missing, 0.2, 3).contains(&true));
+    }
+
+    #[test]
+    fn a_short_gap_is_bridged_on_a_straight_line() {
+        let mut signal: Vec<f64> = (0..50).map(f64::from).collect();
+        signal[20..23].fill(f64::NAN);
+        let (found, repairs) = stretches(&run(&even(50), &signal, &[20, 21, 22]), &Clean::default(), 3);
+        assert_eq!(found.len(), 1);
+        assert_eq!(repairs, Repairs { bridged: 3, ..Repairs::default() });
+        for (i, x) in found[0].signals[0].iter().enumerate() {
+            assert!((x - i as f64).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_long_gap_ends_a_recording_and_short_pieces_are_left_out() {
+        let missing: Vec<usize> = (10..30).collect();
+        let signal = vec![1.0; 50];
+        let (found, repairs) = stretches(&run(&even(50), &signal, &missing), &Clean::default(), 15);
+        assert_eq!(found.len(), 1);
+        assert_eq!(found[0].row, (30..50).collect::<Vec<_>>());
+        assert_eq!(repairs, Repairs { gaps: 1, too_short: 10, ..Repairs::default() });
+    }
+
+    #[test]
+    fn uneven_times_are_interpolated_onto_even_ones_with_the_nearest_row_beside() {
+        let time: Vec<f64> = (0..50).map(|i| f64::from(i) * 0.011 + if i % 2 == 1 { 0.001 } else { 0.0 }).collect();
+        let signal: Vec<f64> = time.iter().map(|t| 3.0 * t).collect();
+        let options = Clean { sample_period: Some(0.01), ..Clean::default() };
+        let (found, repairs) = stretches(&run(&time, &signal, &[]), &options, 3);
+        let stretch = &found[0];
+        assert_eq!(repairs.resampled, stretch.time.len());
+        for (i, (&t, &x)) in stretch.time.iter().zip(&stretch.signals[0]).enumerate() {
+            assert!((t - 0.01 * i as f64).abs() < 1e-12 && (x - 3.0 * t).abs() < 1e-12);
+            assert!((time[stretch.row[i]] - t).abs() <= 0.006 + 1e-12);
+        }
+    }
+
+    #[test]
+    fn resampling_can_be_refused() {
+        let time: Vec<f64> = (0..50).map(|i| f64::from(i) * 0.01 + if i % 2 == 1 { 0.002 } else { 0.0 }).collect();
+        let options = Clean { resample: Resample::Never, ..Clean::default() };
+        let (found, repairs) = stretches(&run(&time, &time, &[]), &options, 3);
+        assert_eq!((found[0].time.clone(), repairs.resampled), (time, 0));
+    }
+
+    #[test]
+    fn a_single_row_makes_no_recording() {
+        let (found, repairs) = stretches(&run(&[0.0], &[1.0], &[]), &Clean::default(), 3);
+        assert!(found.is_empty());
+        assert_eq!(repairs.too_short, 1);
+    }
 }

@@ -41,8 +41,8 @@ mod tests {
         let x: Vec<f64> = (0..400).map(|i| (w * period * f64::from(i)).sin()).collect();
         let v = central_difference(&x, period);
         let gain = (w * period).sin() / (w * period);
-        for i in 1..399 {
-            assert!((v[i] - gain * w * (w * period * i as f64).cos()).abs() < 1e-9);
+        for (i, v) in v.iter().enumerate().take(399).skip(1) {
+            assert!((v - gain * w * (w * period * i as f64).cos()).abs() < 1e-9);
         }
     }
 

@@ -130,3 +130,92 @@ fn check(order: usize, cutoff: f64) -> Result<(), FilterError> {
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn signal() -> Vec<f64> {
+        (0..60).map(|i| (0.05 * f64::from(i)).sin() + 0.3 * (1.3 * f64::from(i)).sin() + 0.01 * f64::from(i)).collect()
+    }
+
+    /// Compares with `scipy.signal.sosfiltfilt` and `sosfilt` (SciPy 1.x) at a few samples, both ends among them.
+    fn assert_like_scipy(values: &[f64], expected: [f64; 5]) {
+        for (i, e) in [0, 1, 10, 30, 59].into_iter().zip(expected) {
+            assert!((values[i] - e).abs() < 1e-9, "sample {i}: {} {e}", values[i]);
+        }
+    }
+
+    #[test]
+    fn zero_phase_butterworth_is_that_of_scipy() {
+        let even = LowPassFilter::butterworth(4, 0.2).unwrap().zero_phase(&signal()).unwrap();
+        assert_like_scipy(
+            &even,
+            [0.0010630170386058879, 0.06101721429780587, 0.5796635838238037, 1.297821526457123, 1.0696621223422111],
+        );
+        let odd = LowPassFilter::butterworth(3, 0.2).unwrap().zero_phase(&signal()).unwrap();
+        assert_like_scipy(
+            &odd,
+            [-0.0012902996947949628, 0.060534377854417405, 0.5801698981919344, 1.299223530862071, 1.070416419905145],
+        );
+    }
+
+    #[test]
+    fn causal_butterworth_is_that_of_scipy_from_its_steady_state() {
+        let causal = LowPassFilter::butterworth(4, 0.2).unwrap().causal(&signal());
+        assert_like_scipy(
+            &causal,
+            [0.0, 0.0016839207663494956, 0.35183059022522706, 1.2292935520958894, 0.9389951844457393],
+        );
+        assert_eq!(LowPassFilter::butterworth(4, 0.2).unwrap().causal(&[]), Vec::<f64>::new());
+    }
+
+    #[test]
+    fn the_decimation_filter_is_that_of_scipy() {
+        let filtered = LowPassFilter::chebyshev(8, 0.05, 0.08).unwrap().zero_phase(&signal()).unwrap();
+        assert_like_scipy(
+            &filtered,
+            [0.0009761648930098465, 0.05932785353757102, 0.5763875538357043, 1.298794006380219, 1.0129003017777578],
+        );
+    }
+
+    #[test]
+    fn every_order_passes_a_constant_and_halves_the_power_at_its_cut_off() {
+        for order in 1..=12 {
+            let filter = LowPassFilter::butterworth(order, 0.25).unwrap();
+            assert!(filter.causal(&[7.5; 200]).iter().all(|x| (x - 7.5).abs() < 1e-6), "order {order}");
+            let tone: Vec<f64> = (0..4000).map(|i| (0.25 * PI * f64::from(i)).sin()).collect();
+            let settled = &filter.causal(&tone)[2000..];
+            let power = settled.iter().map(|x| x * x).sum::<f64>() / 1000.0;
+            assert!((power - 0.5).abs() < 1e-3, "order {order}: {power}");
+        }
+    }
+
+    #[test]
+    fn order_zero_and_a_cut_off_beyond_nyquist_are_refused() {
+        assert_eq!(LowPassFilter::butterworth(0, 0.2).unwrap_err(), FilterError::Order(0));
+        assert_eq!(LowPassFilter::butterworth(13, 0.2).unwrap_err(), FilterError::Order(13));
+        assert_eq!(LowPassFilter::chebyshev(7, 0.05, 0.2).unwrap_err(), FilterError::Order(7));
+        assert_eq!(LowPassFilter::butterworth(4, 1.0).unwrap_err(), FilterError::Cutoff(1.0));
+        assert!(LowPassFilter::butterworth(4, f64::NAN).is_err());
+    }
+
+    #[test]
+    fn a_signal_shorter_than_its_mirrored_ends_is_refused_and_one_longer_is_not() {
+        for order in 1..=12 {
+            let filter = LowPassFilter::butterworth(order, 0.2).unwrap();
+            let required = filter.minimum_samples();
+            assert!(filter.zero_phase(&vec![1.0; required]).is_ok());
+            let found = required - 1;
+            assert_eq!(filter.zero_phase(&vec![1.0; found]), Err(FilterError::TooShort { found, required }));
+        }
+    }
+
+    #[test]
+    fn advancing_moves_a_signal_earlier_between_its_samples() {
+        let moved = advance(&[0.0, 1.0, 4.0, 9.0], 0.5);
+        assert_eq!(moved, [0.5, 2.5, 6.5, 9.0]);
+        assert_eq!(advance(&[0.0, 1.0, 4.0], -1.0), [0.0, 0.0, 1.0]);
+        assert_eq!(advance(&[], 1.0), Vec::<f64>::new());
+    }
+}

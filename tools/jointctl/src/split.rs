@@ -143,10 +143,11 @@ fn block_numbers(recorded: Recorded, length: f64) -> Vec<usize> {
     numbers
 }
 
-/// Time covered by all runs, s.
+/// Time covered by all runs, s; a little more, so that the very last sample does not begin a block of its own.
 fn duration(recorded: Recorded) -> f64 {
     let Recorded { time, run, .. } = recorded;
-    (1..time.len()).filter(|&i| run[i] == run[i - 1]).map(|i| time[i] - time[i - 1]).sum::<f64>().max(f64::MIN_POSITIVE)
+    let within = (1..time.len()).filter(|&i| run[i] == run[i - 1]).map(|i| time[i] - time[i - 1]);
+    (within.sum::<f64>() * (1.0 + 1e-6)).max(f64::MIN_POSITIVE)
 }
 
 /// Draws the share of the units (blocks or runs) that hold candidates.

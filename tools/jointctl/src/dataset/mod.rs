@@ -17,3 +17,6 @@ pub use description::{Description, EffortUnit, Gravity, PositionUnit, RigidDescr
 pub use error::DatasetError;
 pub use prepare::{MINIMUM_SAMPLES, Note, Prepared, Recording, SIGNAL_LIMIT, prepare, prepare_as, prepare_with};
 pub use validate::parse;
+
+#[cfg(test)]
+mod tests;

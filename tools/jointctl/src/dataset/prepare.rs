@@ -286,7 +286,7 @@ fn in_range(samples: &Samples, runs: &[Recording], description: &Description) ->
     for (signal, values) in signals {
         let used = (0..values.len()).filter(|&i| samples.part[i] != Part::Unused);
         if let Some(i) = used.max_by(|&a, &b| values[a].abs().total_cmp(&values[b].abs()))
-            && !(values[i].abs() <= SIGNAL_LIMIT)
+            && (values[i].is_nan() || values[i].abs() > SIGNAL_LIMIT)
         {
             return Err(DatasetError::OutOfRange {
                 signal,
