@@ -32,15 +32,20 @@ fn everything() -> FrictionModel {
 }
 
 fn states() -> Vec<JointState> {
-    [(0.4, 0.03, -2.0, 3.0, 31.0), (-1.1, -0.02, 0.6, -4.0, 22.0), (2.0, 1.4, 0.0, 0.5, 25.0), (0.3, -0.9, 5.0, 0.0, 40.0)]
-        .map(|(position, velocity, acceleration, load, temperature)| JointState {
-            position,
-            velocity,
-            acceleration,
-            load,
-            temperature,
-        })
-        .to_vec()
+    [
+        (0.4, 0.03, -2.0, 3.0, 31.0),
+        (-1.1, -0.02, 0.6, -4.0, 22.0),
+        (2.0, 1.4, 0.0, 0.5, 25.0),
+        (0.3, -0.9, 5.0, 0.0, 40.0),
+    ]
+    .map(|(position, velocity, acceleration, load, temperature)| JointState {
+        position,
+        velocity,
+        acceleration,
+        load,
+        temperature,
+    })
+    .to_vec()
 }
 
 #[test]
@@ -58,9 +63,7 @@ fn it_is_the_sum_that_the_design_writes() {
                 b * 4.0 * (odd * 2.2 * q).sin() / (PI * odd)
             })
             .sum();
-        let by_hand = 0.11 - 0.07 * q + 0.013 * th + 0.05 * tau
-            + 0.9 * (1.0 - 0.011 * th) * v
-            - 0.08 * v * v.abs()
+        let by_hand = 0.11 - 0.07 * q + 0.013 * th + 0.05 * tau + 0.9 * (1.0 - 0.011 * th) * v - 0.08 * v * v.abs()
             + fc * (1.0 - 0.006 * th + 0.04 * tau.abs()) * d
             + (2.0 * 1f64.exp()).sqrt() * (fb - fc) * (-u * u).exp() * u
             + 0.21 * (3.0 * v + 0.8 * (0.7 * a).clamp(-1.0, 1.0)).atan()

@@ -195,7 +195,8 @@ mod tests {
 
     #[test]
     fn the_effort_of_a_pendulum_is_its_equation_of_motion() {
-        let pendulum = RigidParameters { inertia: 0.02, load_inertia: 1.0, load_gravity_sine: 9.81, ..Default::default() };
+        let pendulum =
+            RigidParameters { inertia: 0.02, load_inertia: 1.0, load_gravity_sine: 9.81, ..Default::default() };
         let state = RigidState { position: 0.7, acceleration: -3.0, mass: 1.2, length: 0.15 };
         let by_hand = (0.02 + 1.2 * 0.15 * 0.15) * -3.0 + 1.2 * 9.81 * 0.15 * 0.7f64.sin();
         assert!((pendulum.effort(&state) - by_hand).abs() < 1e-14);

@@ -68,7 +68,11 @@ pub fn normal_equations(sums: &[f64], n: usize, count: usize) -> NormalEquations
             at += 1;
         }
     }
-    NormalEquations { cost: sums[0] * mean, gradient: DVector::from_iterator(n, sums[1..=n].iter().map(|s| s * mean)), hessian }
+    NormalEquations {
+        cost: sums[0] * mean,
+        gradient: DVector::from_iterator(n, sums[1..=n].iter().map(|s| s * mean)),
+        hessian,
+    }
 }
 
 /// A column that the columns before it explain.
@@ -192,7 +196,9 @@ mod tests {
         let at = equations(&rows, &residual);
         let free = (f64::NEG_INFINITY, f64::INFINITY);
         let (x, cost) = bounded_step(&at, &[0, 1, 2], vec![free; 3]);
-        assert!((x[0] - 2.0).abs() < 1e-9 && (x[1] + 1.0).abs() < 1e-9 && (x[2] - 0.5).abs() < 1e-9 && cost.abs() < 1e-12);
+        assert!(
+            (x[0] - 2.0).abs() < 1e-9 && (x[1] + 1.0).abs() < 1e-9 && (x[2] - 0.5).abs() < 1e-9 && cost.abs() < 1e-12
+        );
         let (x, _) = bounded_step(&at, &[0, 1, 2], vec![free, (0.0, 9.0), free]);
         let (others, _) = bounded_step(&at, &[0, 2], vec![free; 2]);
         assert!(x[1] == 0.0 && (x[0] - others[0]).abs() < 1e-9 && (x[2] - others[1]).abs() < 1e-9, "{x}");

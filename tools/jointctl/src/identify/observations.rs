@@ -116,9 +116,9 @@ impl Limits {
         let mut speed: Vec<f64> = rows.iter().map(|row| row.joint.velocity.abs()).collect();
         speed.sort_by(f64::total_cmp);
         let range = |value: fn(&JointState) -> f64| {
-            rows.iter().map(|row| value(&row.joint)).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
-                (low.min(x), high.max(x))
-            })
+            rows.iter()
+                .map(|row| value(&row.joint))
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
         };
         let (coldest, warmest) = range(|s| s.temperature);
         let (lowest, highest) = range(|s| s.position);
