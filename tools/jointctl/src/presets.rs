@@ -124,13 +124,13 @@ mod tests {
     #[test]
     fn each_preset_has_exactly_the_terms_of_its_paper() {
         use Term::*;
-        let fixed = RigidModel { inertia: true, ..RigidModel::default() };
+        let (none, fixed) = (RigidModel::default(), RigidModel { inertia: true, ..RigidModel::default() });
         let terms = |preset: Preset, rigid| preset.structure(rigid).unwrap().terms.iter().collect::<Vec<_>>();
         assert_eq!(terms(Preset::CoulombViscous, &fixed), [Constant, Viscous, Coulomb]);
         assert_eq!(terms(Preset::Linear, &fixed), [Constant, Position, Temperature, Load, Viscous]);
         assert_eq!(terms(Preset::Stribeck, &fixed), [Viscous, Coulomb, Stribeck]);
         assert_eq!(terms(Preset::Nscf, &fixed), [Constant, Viscous, Coulomb]);
-        assert_eq!(terms(Preset::Nscf, &RigidModel::default()), [Constant, Viscous, Coulomb, RotorInertia]);
+        assert_eq!(terms(Preset::Nscf, &none), [Constant, Viscous, Coulomb, RotorInertia]);
         assert_eq!(terms(Preset::Hysteresis, &fixed), [Viscous, Hysteresis]);
         assert_eq!(terms(Preset::HysteresisHarmonics, &fixed), [Position, Viscous, Hysteresis, Harmonics]);
         assert!(Preset::Nscf.structure(&fixed).unwrap().asymmetric_coulomb);

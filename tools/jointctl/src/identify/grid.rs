@@ -7,6 +7,7 @@ use super::layout::Role;
 use super::linear::bounded_step;
 use super::nonlinear::{Candidate, Effort, Fit, Problem, Residuals};
 use super::observations::{Row, decimated};
+use crate::friction_model::Term;
 use crate::friction_parameter::FrictionParameter as P;
 use crate::levenberg_marquardt::LeastSquares;
 use crate::presets::Structure;
@@ -58,11 +59,26 @@ pub fn search(problem: &Problem, structure: &Structure) -> Fit {
     })
 }
 
-/// Fits a structure over the search rows from the parameters of another fit.
-pub fn search_from(problem: &Problem, structure: &Structure, start: &Fit) -> Fit {
+/// Fits a structure over the search rows from the parameters of another fit; the shapes of a term that is new to it are
+/// searched on the grid.
+pub fn search_from(problem: &Problem, structure: &Structure, start: &Fit, new: Option<Term>) -> Fit {
     let candidate = Candidate::new(problem, structure);
     let x = candidate.layout.encode(&start.rigid, &start.friction);
-    candidate.descend(problem, &problem.search, &x, NEARBY)
+    let (_, hysteresis, frequency) = axes(problem, &candidate);
+    let (axes, rows) = match new {
+        Some(Term::Stribeck) => (slope_axes(&candidate, &[P::StribeckSlope]), ROWS),
+        Some(Term::Hysteresis) => (hysteresis, ROWS),
+        Some(Term::Harmonics) => (frequency, FREQUENCY_ROWS),
+        _ => (vec![], 0),
+    };
+    if axes.is_empty() {
+        return candidate.descend(problem, &problem.search, &x, NEARBY);
+    }
+    let points = apart(evaluate(&candidate, &decimated(&problem.search, rows), &x, &axes));
+    let fits: Vec<Fit> =
+        points.into_par_iter().map(|x| candidate.descend(problem, &problem.search, &x, NEARBY)).collect();
+    let best = fits.into_iter().reduce(|best, fit| if fit.at.cost < best.at.cost { fit } else { best });
+    best.unwrap_or_else(|| candidate.descend(problem, &problem.search, &x, NEARBY))
 }
 
 /// The best points of the grid, far enough apart to lead to different minima.
@@ -90,14 +106,9 @@ fn starts(problem: &Problem, candidate: &Candidate) -> Vec<DVector<f64>> {
 /// The axes over slopes, over the hysteresis and over the harmonic frequency.
 fn axes(problem: &Problem, candidate: &Candidate) -> (Vec<Axis>, Vec<Axis>, Vec<Axis>) {
     let bounds = candidate.layout.bounds();
-    let even = |column: usize, n: usize| {
-        let (low, high) = bounds[column];
-        Axis { column, values: (0..n).map(|i| low + (high - low) * (i as f64 + 0.5) / n as f64).collect() }
-    };
+    let even = |column: usize, points: usize| even(bounds[column], column, points);
     let column_of = |parameter| candidate.layout.column_of(parameter);
-    let mut columns: Vec<usize> = [P::CoulombSlope, P::StribeckSlope].into_iter().filter_map(column_of).collect();
-    columns.dedup();
-    let slopes = columns.iter().map(|&column| even(column, SLOPES[columns.len() - 1])).collect();
+    let slopes = slope_axes(candidate, &[P::CoulombSlope, P::StribeckSlope]);
     let mut hysteresis: Vec<Axis> =
         column_of(P::HysteresisVelocitySlope).map(|column| even(column, 9)).into_iter().collect();
     hysteresis.extend(column_of(P::HysteresisWidth).map(|column| Axis { column, values: WIDTHS.to_vec() }));
@@ -108,6 +119,19 @@ fn axes(problem: &Problem, candidate: &Candidate) -> (Vec<Axis>, Vec<Axis>, Vec<
         even(column, points.clamp(1, FREQUENCIES))
     });
     (slopes, hysteresis, frequency.into_iter().collect())
+}
+
+/// The axes over those of the slopes that have a column.
+fn slope_axes(candidate: &Candidate, slopes: &[P]) -> Vec<Axis> {
+    let bounds = candidate.layout.bounds();
+    let mut columns: Vec<usize> = slopes.iter().filter_map(|&slope| candidate.layout.column_of(slope)).collect();
+    columns.dedup();
+    columns.iter().map(|&column| even(bounds[column], column, SLOPES[columns.len() - 1])).collect()
+}
+
+/// Points in the middle of equal intervals.
+fn even((low, high): (f64, f64), column: usize, points: usize) -> Axis {
+    Axis { column, values: (0..points).map(|i| low + (high - low) * (i as f64 + 0.5) / points as f64).collect() }
 }
 
 /// The points of the grid spanned by the axes around `x`, each with its linear parameters solved; without axes, `x` alone.
@@ -127,11 +151,11 @@ fn evaluate(candidate: &Candidate, rows: &[Row], x: &DVector<f64>, axes: &[Axis]
     (0..count).into_par_iter().map(point).collect()
 }
 
-/// Solves the coefficients within their bounds, factors at 0 and shapes as they are.
+/// Solves the coefficients within their bounds; factors and shapes stay as they are.
 fn solve_linear(candidate: &Candidate, rows: &[Row], mut x: DVector<f64>) -> (f64, DVector<f64>) {
     let columns = &candidate.layout.columns;
     for (value, column) in x.iter_mut().zip(columns) {
-        if matches!(column.role, Role::Coefficient | Role::Factor) {
+        if column.role == Role::Coefficient {
             *value = 0.0;
         }
     }

@@ -20,7 +20,7 @@ pub const PARAMETERS: usize = RigidRegressor::ALL.len() + P::COUNT;
 /// Range of v_c and of the hysteresis' 1/s, as fractions of the highest velocity.
 const EDGE_VELOCITY: (f64, f64) = (5e-4, 0.5);
 /// Range of v_st, as fractions of the highest velocity.
-const STRIBECK_VELOCITY: (f64, f64) = (2e-3, 1.0);
+const STRIBECK_VELOCITY: (f64, f64) = (2e-3, 0.5);
 /// Largest relative change of a friction over the temperatures of the train rows.
 const TEMPERATURE_EFFECT: f64 = 0.9;
 /// Largest relative change of the Coulomb friction over the loads of the train rows.
@@ -29,6 +29,9 @@ const LOAD_EFFECT: f64 = 20.0;
 const HYSTERESIS_WIDTH: f64 = 20.0;
 /// Range of the harmonic frequency in periods over the position range.
 const HARMONIC_PERIODS: (f64, f64) = (0.5, 20.0);
+/// Lowest harmonic frequency where the rigid part has gravity, whose own is 1: closer to it, harmonics and gravity grow
+/// without limit against each other, and friction becomes many times the measured effort for hardly any gain.
+const FREQUENCY_ABOVE_GRAVITY: f64 = 2.0;
 
 /// How a column enters the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -149,7 +152,8 @@ impl Layout {
                 layout.own(P::HarmonicNegative(j), Role::Coefficient, FREE);
             }
         }
-        layout.shapes(structure, limits);
+        let gravity = |r: &RigidRegressor| !matches!(r, RigidRegressor::Inertia | RigidRegressor::LoadInertia);
+        layout.shapes(structure, limits, regressors.iter().any(gravity));
         layout
     }
 
@@ -196,7 +200,7 @@ impl Layout {
         }
     }
 
-    fn shapes(&mut self, structure: &Structure, limits: &Limits) {
+    fn shapes(&mut self, structure: &Structure, limits: &Limits, gravity: bool) {
         let on = |term| structure.terms.contains(term);
         let velocity = limits.velocity.max(f64::MIN_POSITIVE);
         let slope = |(slowest, fastest): (f64, f64)| (1.0 / (fastest * velocity), 1.0 / (slowest * velocity));
@@ -218,7 +222,8 @@ impl Layout {
         }
         if on(Term::Harmonics) {
             let turn = 2.0 * PI / limits.position_range.max(f64::MIN_POSITIVE);
-            self.own(P::HarmonicFrequency, Role::Shape, (HARMONIC_PERIODS.0 * turn, HARMONIC_PERIODS.1 * turn));
+            let low = (HARMONIC_PERIODS.0 * turn).max(if gravity { FREQUENCY_ABOVE_GRAVITY } else { 0.0 });
+            self.own(P::HarmonicFrequency, Role::Shape, (low, (HARMONIC_PERIODS.1 * turn).max(low)));
         }
     }
 
@@ -314,5 +319,60 @@ impl Layout {
             x[column] = if of.role == Role::Slope { inside.ln() } else { inside };
         }
         x
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::synthetic::{RIGID, friction, motion, rigid};
+    use super::*;
+    use crate::friction_model::Terms;
+    use crate::samples::Part;
+
+    fn layout(structure: &Structure) -> Layout {
+        let limits = Limits::of(&super::super::observations::rows(&motion(2_000), Part::Train), 30.0);
+        Layout::new(structure, &RIGID.regressors(), &limits)
+    }
+
+    fn free() -> Structure {
+        let terms = Terms::of(&Term::ALL).without(Term::Load);
+        Structure { terms, asymmetric_coulomb: true, asymmetric_breakaway: true, coupled_slopes: false }
+    }
+
+    #[test]
+    fn a_model_survives_the_way_into_the_vector_and_back() {
+        let truth = friction(free().terms);
+        let layout = layout(&free());
+        let (r, f) = layout.decode(&layout.encode(&rigid(), &truth), &truth);
+        assert_eq!(r, rigid());
+        for p in P::all().into_iter().filter(|&p| p != P::LoadSlope) {
+            assert!((f.parameter(p) - truth.parameter(p)).abs() < 1e-12, "{p}");
+        }
+    }
+
+    #[test]
+    fn a_smaller_structure_takes_over_what_it_shares_with_a_larger_one() {
+        let truth = friction(free().terms);
+        let layout = layout(&Structure { terms: free().terms.without(Term::Stribeck), ..Structure::default() });
+        let (_, f) = layout.decode(&layout.encode(&rigid(), &truth), &truth);
+        let mean = 0.5 * (truth.coulomb.positive + truth.coulomb.negative);
+        assert!((f.coulomb.positive - mean).abs() < 1e-12 && (f.coulomb.negative - mean).abs() < 1e-12);
+        assert!((f.viscous - truth.viscous).abs() < 1e-12);
+    }
+
+    #[test]
+    fn breakaway_friction_is_never_below_coulomb_friction() {
+        let mut weak = friction(free().terms);
+        weak.breakaway.positive = 0.0;
+        let layout = layout(&free());
+        let (_, f) = layout.decode(&layout.encode(&rigid(), &weak), &weak);
+        assert_eq!(f.breakaway.positive, f.coulomb.positive);
+    }
+
+    #[test]
+    fn harmonics_keep_away_from_the_frequency_of_gravity() {
+        let layout = layout(&free());
+        let column = layout.column_of(P::HarmonicFrequency).unwrap();
+        assert!(layout.columns[column].bounds.0 >= FREQUENCY_ABOVE_GRAVITY);
     }
 }

@@ -199,3 +199,10 @@ fn theoretical_torque(samples: &mut Samples, rigid: &RigidModel, options: &Optio
     problem.limits = Limits::of(&problem.train, reference_temperature);
     Ok(problem)
 }
+
+#[cfg(test)]
+mod recovery_tests;
+#[cfg(test)]
+mod synthetic;
+#[cfg(test)]
+mod tests;
