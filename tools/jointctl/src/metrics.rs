@@ -58,7 +58,9 @@ pub struct Metrics {
     pub r2: Option<f64>,
     /// Mean |predicted - measured| / |measured|, % (001 eq. 11). None where every sample is below the floor.
     pub relative_torque_error: Option<f64>,
-    /// Samples that the relative torque error leaves out because |measured| is below the floor.
+    /// |measured| below which the relative torque error leaves a sample out.
+    pub relative_floor: f64,
+    /// Number of samples that it leaves out.
     pub relative_excluded: usize,
 }
 
@@ -182,6 +184,7 @@ fn over(measured: &[f64], predicted: &[f64], floor: f64, belongs: impl Fn(usize)
         percent_of_rms: (squares > 0.0).then(|| 100.0 * (error_squares / squares).sqrt()),
         r2: (!constant).then(|| 1.0 - error_squares / spread),
         relative_torque_error: (!relative.is_empty()).then(|| relative.iter().sum::<f64>() / relative.len() as f64),
+        relative_floor: floor,
         relative_excluded: chosen.len() - relative.len(),
     })
 }

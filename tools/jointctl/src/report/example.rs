@@ -57,7 +57,7 @@ pub fn report(samples: usize) -> Report {
         network: NetworkOutcome::Kept,
         errors: vec![ErrorTable { test_set: "other speeds".into(), rows }],
         fixed_point: Some(FixedPointDifference { rms: 0.00021, max: 0.00093, max_percent_of_full_scale: 0.057 }),
-        training: (0..5).map(|seed| curve(seed, seed == 3)).collect(),
+        training: (0..5).map(|seed| curve(seed, seed == 1)).collect(),
         certificate: certificate(),
         test,
     }

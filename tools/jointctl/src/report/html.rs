@@ -2,10 +2,9 @@
 //!
 //! All text goes through maud, which escapes it.
 
-use super::figures::{Figure, style_sheet};
 use super::number::{count, optional, percent, significant};
 use super::summary::verdict;
-use super::{NetworkOutcome, Report, Role, tables};
+use super::{Figure, NetworkOutcome, Report, Role, style_sheet, tables};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 const PAGE_STYLE: &str = include_str!("page.css");

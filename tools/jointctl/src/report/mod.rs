@@ -11,7 +11,7 @@ mod number;
 mod summary;
 mod tables;
 
-pub use figures::{Figure, FigureError, figures};
+pub use figures::{Figure, FigureError, figures, style_sheet};
 pub use summary::{Verdict, verdict};
 
 use crate::metrics::{ByState, Metrics};
@@ -339,12 +339,23 @@ pub fn render(report: &Report) -> Result<Vec<OutputFile>, ReportError> {
     let figures = figures(report)?;
     let mut files = vec![
         OutputFile::new("report.html", html::page(report, &figures)),
-        OutputFile::new("report.json", serde_json::to_string_pretty(report)? + "\n"),
+        OutputFile::new("report.json", numbers(report)?),
     ];
     for figure in &figures {
         files.push(OutputFile::new(format!("figures/{}.svg", figure.name), figure.standalone()));
     }
     Ok(files)
+}
+
+/// The content of `report.json`: the report without its samples, and the verdict.
+fn numbers(report: &Report) -> Result<String, ReportError> {
+    #[derive(Serialize)]
+    struct Numbers<'a> {
+        verdict: Verdict,
+        #[serde(flatten)]
+        report: &'a Report,
+    }
+    Ok(serde_json::to_string_pretty(&Numbers { verdict: verdict(report), report })? + "\n")
 }
 
 /// Writes the report into `directory`; files of others in it stay.

@@ -27,6 +27,19 @@ pub fn optional(value: Option<f64>) -> String {
     value.map_or_else(|| NONE.to_owned(), |value| significant(value, 4))
 }
 
+/// A value and its standard error with the same decimals, such that the error has two significant digits.
+pub fn with_error(value: f64, error: Option<f64>) -> (String, String) {
+    let Some(error) = error.filter(|error| error.is_finite() && *error > 0.0 && value.is_finite()) else {
+        return (significant(value, 4), NONE.to_owned());
+    };
+    let decimals = 1.0 - error.log10().floor();
+    if !(0.0..=9.0).contains(&decimals) {
+        return (significant(value, 5), significant(error, 2));
+    }
+    let decimals = decimals as usize;
+    (format!("{value:.decimals$}"), format!("{error:.decimals$}"))
+}
+
 /// A percentage with one decimal (two below 10, none above 1000), without the sign %, or a dash.
 pub fn percent(value: Option<f64>) -> String {
     match value {
@@ -70,6 +83,16 @@ mod tests {
         assert_eq!(four(1.23456e-9), "1.235e-9");
         assert_eq!(four(0.0), "0");
         assert_eq!(four(f64::NAN), NONE);
+    }
+
+    #[test]
+    fn a_value_has_the_decimals_that_its_error_leaves() {
+        let text = |value, error| with_error(value, error);
+        assert_eq!(text(1.097_312, Some(0.004_13)), ("1.0973".into(), "0.0041".into()));
+        assert_eq!(text(-1234.5, Some(3.21)), ("-1234.5".into(), "3.2".into()));
+        assert_eq!(text(1.5e-9, Some(2e-12)), ("1.5000e-9".into(), "2.0e-12".into()));
+        assert_eq!(text(0.25, None), ("0.2500".into(), NONE.into()));
+        assert_eq!(text(0.25, Some(f64::INFINITY)), ("0.2500".into(), NONE.into()));
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The tables of the page; host.
 
-use super::number::{NONE, count, optional, percent, significant};
+use super::number::{NONE, count, optional, percent, significant, with_error};
 use super::{ErrorRow, ErrorTable, NetworkOutcome, Report, Role};
 use crate::metrics::Metrics;
 use maud::{Markup, html};
@@ -9,9 +9,9 @@ use maud::{Markup, html};
 fn table(heading: &[&str], text_columns: usize, rows: &[(Option<&'static str>, Vec<Markup>)], caption: &str) -> Markup {
     let align = |column: usize| (column >= text_columns).then_some("number");
     html! {
+        p.caption { (caption) }
         div.scroll {
             table {
-                caption { (caption) }
                 thead { tr { @for (column, name) in heading.iter().enumerate() { th scope="col" class=[align(column)] { (name) } } } }
                 tbody {
                     @for (class, cells) in rows {
@@ -92,9 +92,13 @@ fn overall(set: &ErrorTable, unit: &str) -> Markup {
             (row_class(row, set), cells)
         })
         .collect();
-    let caption = "Errors of the effort that each model predicts, all test samples. The highlighted row is what the joint would \
-                   run. The relative torque error leaves out samples with small measured effort (how many: left out).";
-    table(&heading, 1, &rows, caption)
+    let floor = set.rows.iter().find_map(|row| row.errors.overall.as_ref()).map(|errors| errors.relative_floor);
+    let caption = format!(
+        "Errors of the effort that each model predicts, all test samples. The highlighted row is what the joint would run. \
+         The relative torque error leaves out samples with less than {} {unit} of measured effort (how many: left out).",
+        optional(floor)
+    );
+    table(&heading, 1, &rows, &caption)
 }
 
 fn per_state(set: &ErrorTable, caption: &str, cell: impl Fn(&Metrics) -> String) -> Markup {
@@ -108,7 +112,7 @@ fn per_state(set: &ErrorTable, caption: &str, cell: impl Fn(&Metrics) -> String)
             (row_class(row, set), [text(&row.model)].into_iter().chain(values).collect())
         })
         .collect();
-    table(&heading, 1, &rows, caption)
+    html! { div.states { (table(&heading, 1, &rows, caption)) } }
 }
 
 /// Physical parameters with their standard errors.
@@ -119,26 +123,24 @@ pub fn parameters(report: &Report) -> Markup {
         .map(|p| {
             let relative = p.standard_error.filter(|_| p.value != 0.0).map(|error| 100.0 * (error / p.value).abs());
             let note = if p.at_bound { "at bound" } else { "" };
+            let (value, error) = with_error(p.value, p.standard_error);
+            let (letter, index) = p.symbol.split_once('_').unwrap_or((&p.symbol, ""));
             let cells = vec![
                 text(&p.name),
-                html! { i { (p.symbol) } },
+                html! { i { (letter) sub { (index) } } },
                 text(&p.unit),
                 text(note),
-                text(significant(p.value, 5)),
-                text(p.standard_error.map_or_else(|| NONE.to_owned(), |e| format!("± {}", significant(e, 2)))),
+                text(value),
+                text(error),
                 text(percent(relative)),
             ];
             (p.at_bound.then_some("warn"), cells)
         })
         .collect();
     let heading = ["parameter", "symbol", "unit", "note", "value", "standard error", "of value [%]"];
-    table(
-        &heading,
-        4,
-        &rows,
-        "A standard error above some 30 % of the value means that the data hardly determine the parameter; \
-                               a value at its bound would like to go further.",
-    )
+    let caption = "A standard error above some 30 % of the value means that the data hardly determine the parameter; \
+                   a value at its bound would like to go further.";
+    table(&heading, 4, &rows, caption)
 }
 
 /// The models that were compared, with the reason for each decision.
@@ -159,12 +161,8 @@ pub fn candidates(report: &Report) -> Markup {
         })
         .collect();
     let heading = ["model", "", "why", "parameters", &format!("validation RMSE [{}]", report.units.effort)];
-    table(
-        &heading,
-        3,
-        &rows,
-        "Models by their error on validation data, which neither identification nor training has seen.",
-    )
+    let caption = "Models by their error on validation data, which neither identification nor training has seen.";
+    table(&heading, 3, &rows, caption)
 }
 
 /// One row for each seed, and what became of the network.
@@ -220,12 +218,8 @@ pub fn certificate(report: &Report) -> Markup {
         })
         .collect();
     let heading = ["property", "unit", "result", "worst found", "proven bound", "limit"];
-    table(
-        &heading,
-        3,
-        &rows,
-        "The proven bound must not exceed the limit; the worst value that a search found must not exceed the proven bound.",
-    )
+    let caption = "The proven bound must not exceed the limit; the worst value that a search found must not exceed the proven bound.";
+    table(&heading, 3, &rows, caption)
 }
 
 /// What each stage did to the samples.

@@ -104,6 +104,7 @@ fn the_numbers_file_holds_the_numbers_and_no_samples() {
     assert_eq!(json["parameters"][5]["standard_error"], serde_json::Value::Null);
     assert_eq!(json["training"][3]["best_epoch"], report.training[3].best_epoch);
     assert_eq!(json["network"], "kept");
+    assert_eq!(json["verdict"]["good"], true);
     assert!(json.get("test").is_none());
 }
 
@@ -169,6 +170,16 @@ fn samples_that_stand_still_can_be_drawn() {
     report.test.physical.fill(0.0);
     report.test.network = None;
     assert_no_nan(&report);
+}
+
+#[test]
+fn a_huge_spike_is_drawn_beyond_the_axes_without_overflow() {
+    let mut report = example::report(400);
+    report.test.effort[7] = 1e300;
+    report.test.velocity[8] = -1e300;
+    assert_no_nan(&report);
+    let files = render(&report).unwrap();
+    assert!(text(&files, "figures/friction-velocity.svg").contains("1 of 400 samples lie beyond the axes"));
 }
 
 #[test]

@@ -103,16 +103,17 @@ impl Axis {
     }
 }
 
-/// The smallest of 1, 2, 5 times a power of ten that is not below `rough`.
+/// The one of 1, 2, 5 times a power of ten that is nearest to `rough` by ratio.
 fn nice_step(rough: f64) -> f64 {
     let decade = 10f64.powf(rough.log10().floor());
     // A power of ten below the smallest number is zero, and no step at all would never end.
     let decade = if decade > 0.0 { decade } else { f64::MIN_POSITIVE };
-    [1.0, 2.0, 5.0, 10.0]
-        .map(|multiple| multiple * decade)
-        .into_iter()
-        .find(|&step| step >= rough * 0.999)
-        .unwrap_or(rough)
+    match rough / decade {
+        ratio if ratio < 2f64.sqrt() => decade,
+        ratio if ratio < 10f64.sqrt() => 2.0 * decade,
+        ratio if ratio < 50f64.sqrt() => 5.0 * decade,
+        _ => 10.0 * decade,
+    }
 }
 
 /// `range`, or something around its middle where it is too narrow to be divided.
@@ -168,7 +169,7 @@ mod tests {
         assert_eq!(labels(&Axis::linear(-1.2..1.3, 5, "")), ["−1.0", "−0.5", "0", "0.5", "1.0"]);
         assert_eq!(labels(&Axis::linear(0.0..0.05, 5, "")), ["0", "0.01", "0.02", "0.03", "0.04", "0.05"]);
         assert_eq!(labels(&Axis::linear(100.0..900.0, 4, "")), ["200", "400", "600", "800"]);
-        assert_eq!(labels(&Axis::linear(0.0..2.1e7, 2, "")), ["0", "2.0e7"]);
+        assert_eq!(labels(&Axis::linear(0.0..2.1e7, 2, "")), ["0", "1.0e7", "2.0e7"]);
     }
 
     #[test]

@@ -7,8 +7,8 @@ pub const CLOUD_POINTS: usize = 4000;
 
 /// Indices of at most `limit` of `count` samples, in order.
 ///
-/// A sample is kept by the fractional part of its index times the golden ratio: spread evenly, and yet not in step with a
-/// periodic motion as every n-th sample would be.
+/// A sample is kept by the fractional part of its index times the golden ratio: spread evenly, and yet not in step with
+/// a periodic motion as every n-th sample would be.
 pub fn thin(count: usize, limit: usize) -> Vec<usize> {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
     if count <= limit {
@@ -32,7 +32,8 @@ pub fn widen(range: Range<f64>, share: f64) -> Range<f64> {
     range.start - margin..range.end + margin
 }
 
-/// The range of `values` with a margin, but not much more than what holds 99 % of them: a few spikes must not press the rest flat.
+/// The range of `values` with a margin, but not much more than what holds 99 % of them: a few spikes must not press the
+/// rest flat.
 pub fn robust_extent(values: &[f64]) -> Range<f64> {
     let all = extent(values.iter().copied());
     let (low, high) = (quantile(values, 0.005), quantile(values, 0.995));

@@ -21,6 +21,8 @@ const UNIT: i32 = UNITS_PER_PIXEL as i32;
 const FONT: i32 = 13 * UNIT;
 /// Height of one row of a legend.
 const LEGEND_ROW: i32 = 22 * UNIT;
+/// Empty edge of the paper.
+const MARGIN: i32 = 6 * UNIT;
 const SWATCH: i32 = 24 * UNIT;
 
 /// Draws on paper of `width` by `height` CSS pixels and returns the `<svg>` element.
@@ -29,7 +31,7 @@ pub fn paper(width: u32, height: u32, draw: impl FnOnce(&Area) -> Result<()>) ->
     let mut body = String::new();
     {
         let area = SvgBackend::new(&mut body, (units_x, units_y)).into_drawing_area();
-        draw(&area)?;
+        draw(&area.margin(MARGIN, MARGIN, MARGIN, 0))?;
         area.present()?;
     }
     Ok(format!(
@@ -59,7 +61,7 @@ pub fn legend<'a>(area: &Area<'a>, indent: i32, entries: &[Entry]) -> Result<Are
     let width = area.dim_in_pixel().0 as i32;
     let (mut x, mut row) = (indent * UNIT, 0);
     for (ink, swatch, text) in entries {
-        let length = SWATCH + 7 * UNIT + text_width(text, f64::from(FONT)) as i32 + 16 * UNIT;
+        let length = SWATCH + 7 * UNIT + text_width(text, f64::from(FONT)) as i32 + 20 * UNIT;
         if x + length > width && x > indent * UNIT {
             (x, row) = (indent * UNIT, row + 1);
         }
@@ -143,10 +145,12 @@ impl<'a> Panel<'a> {
         Ok(outside)
     }
 
-    /// A line of `width` pixels through the points; it stays inside the axes.
+    /// A line of `width` pixels through the points, or a dot where there is but one; it stays inside the axes.
     pub fn line(&self, points: impl IntoIterator<Item = (f64, f64)>, ink: Ink, width: f64, opacity: f64) -> Result<()> {
         let points: Vec<(f64, f64)> = points.into_iter().map(|(x, y)| (x, self.y.clip(y))).collect();
-        if points.len() > 1 {
+        if let [point] = points[..] {
+            self.cloud([point], ink, opacity, width)?;
+        } else if points.len() > 1 {
             let style = ShapeStyle { color: ink.colour().mix(opacity), ..line_style(ink, width) };
             self.chart.plotting_area().draw(&PathElement::new(points, style))?;
         }

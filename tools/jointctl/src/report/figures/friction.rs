@@ -21,7 +21,7 @@ pub fn against_velocity(report: &Report) -> Result<Option<Figure>, FigureError> 
         bins(&test.velocity, &friction(total), CURVE_BINS, 3).into_iter().map(|bin| (bin.x, bin.median)).collect()
     };
     let mut entries: Vec<Entry> =
-        vec![(Ink::Measured, Swatch::Points, "measured − rigid body"), (Ink::Physical, Swatch::Line, "physical")];
+        vec![(Ink::Measured, Swatch::Points, "measured − rigid body"), (Ink::PhysicalCurve, Swatch::Line, "physical")];
     if test.network.is_some() {
         entries.push((Ink::Network, Swatch::Line, "physical + network"));
     }
@@ -35,11 +35,11 @@ pub fn against_velocity(report: &Report) -> Result<Option<Figure>, FigureError> 
         let y = Axis::linear(robust_extent(&measured), 7, format!("friction [{}]", units.effort));
         let panel = Panel::new(&area, x, y, 0)?;
         let points = thin(measured.len(), CLOUD_POINTS).into_iter().map(|i| (test.velocity[i], measured[i]));
-        panel.cloud(points, Ink::Measured, 0.45, 1.3)?;
+        panel.cloud(points, Ink::Measured, 0.5, 1.4)?;
         if let Some(network) = &test.network {
             panel.line(curve(network), Ink::Network, 2.4, 1.0)?;
         }
-        panel.line(curve(&test.physical), Ink::Physical, 2.4, 1.0)?;
+        panel.line(curve(&test.physical), Ink::PhysicalCurve, 2.4, 1.0)?;
         panel.note_outside(outside(&measured), measured.len())
     })?;
     let caption = "Dots are the measured effort less the rigid body; the lines are the medians of the models' friction at \
@@ -74,8 +74,8 @@ pub fn predicted_against_measured(report: &Report) -> Result<Option<Figure>, Fig
         let y = Axis::linear(range.clone(), 6, format!("predicted effort [{unit}]"));
         let panel = Panel::new(&area, x, y, 0)?;
         let kept = thin(test.effort.len(), CLOUD_POINTS / 2);
-        panel.cloud(kept.iter().map(|&i| (test.effort[i], test.rigid[i])), Ink::Nothing, 0.4, 1.2)?;
-        panel.cloud(kept.iter().map(|&i| (test.effort[i], after[i])), ink, 0.5, 1.2)?;
+        panel.cloud(kept.iter().map(|&i| (test.effort[i], test.rigid[i])), Ink::Nothing, 0.6, 1.3)?;
+        panel.cloud(kept.iter().map(|&i| (test.effort[i], after[i])), ink, 0.6, 1.3)?;
         panel.line([(range.start, range.start), (range.end, range.end)], Ink::Axis, 1.2, 1.0)
     })?;
     let caption = "Dots on the identity line are predicted exactly; their distance from it is the error.";

@@ -1,8 +1,9 @@
 //! The colours of the figures by what they mean, in a light and a dark version; host.
 //!
-//! The hues are those of Okabe and Ito (Color Universal Design, 2008), which people with colour-blindness can tell apart,
-//! made lighter for dark paper. The lines of the physical model and of the network also differ in their dashes,
-//! so that a print in grey can be read. A figure names inks by CSS class; only the style sheet knows colours.
+//! The hues are those of Okabe and Ito (Color Universal Design, 2008), which people with colour-blindness can tell
+//! apart, made lighter for dark paper. Where the curves of the physical model and of the network lie close, they also
+//! differ in their dashes, so that a print in grey can be read. A figure names inks by CSS class; only the style sheet
+//! knows colours.
 
 use plotters::style::RGBColor;
 
@@ -21,6 +22,8 @@ pub enum Ink {
     Nothing,
     /// The physical friction model.
     Physical,
+    /// A curve of the physical friction model that others lie close to: dashed.
+    PhysicalCurve,
     /// Physical friction and network.
     Network,
     /// Training data, and the seeds that were not chosen.
@@ -32,13 +35,14 @@ pub enum Ink {
 }
 
 /// Ink, class, colour on white paper, colour on dark paper, dashes in tenths of a pixel.
-const INKS: [(Ink, &str, &str, &str, &str); 10] = [
+const INKS: [(Ink, &str, &str, &str, &str); 11] = [
     (Ink::Text, "text", "#1b1f24", "#e6e9ee", ""),
     (Ink::Axis, "axis", "#6a737d", "#9aa4af", ""),
     (Ink::Grid, "grid", "#e4e7eb", "#30363d", ""),
     (Ink::Measured, "measured", "#7a828c", "#a3acb6", ""),
     (Ink::Nothing, "nothing", "#d55e00", "#f0894a", ""),
-    (Ink::Physical, "physical", "#0072b2", "#56b4e9", "90 40"),
+    (Ink::Physical, "physical", "#0072b2", "#56b4e9", ""),
+    (Ink::PhysicalCurve, "physical-curve", "#0072b2", "#56b4e9", "90 40"),
     (Ink::Network, "network", "#009e73", "#2fcf9f", ""),
     (Ink::Train, "train", "#56a0d3", "#56b4e9", ""),
     (Ink::Validation, "validation", "#d55e00", "#f0894a", ""),

@@ -10,8 +10,9 @@ use crate::report::Report;
 
 const HISTOGRAM_BINS: usize = 81;
 const MEAN_BINS: usize = 40;
-/// Bins with less samples say nothing about a mean.
+/// Bins with less samples than this, or with less than one in [`LEAST_SHARE`] of all, say too little about a mean.
 const LEAST_SAMPLES: usize = 5;
+const LEAST_SHARE: usize = 1000;
 
 /// Histogram of the error without compensation and with each model.
 pub fn histogram(report: &Report) -> Result<Option<Figure>, FigureError> {
@@ -23,7 +24,8 @@ pub fn histogram(report: &Report) -> Result<Option<Figure>, FigureError> {
     if let Some(network) = &test.network {
         models.push((Ink::Network, "physical + network", left(report, network)));
     }
-    models.push((Ink::Physical, "physical", left(report, &test.physical)));
+    let physical = if test.network.is_some() { Ink::PhysicalCurve } else { Ink::Physical };
+    models.push((physical, "physical", left(report, &test.physical)));
     let reach = models
         .iter()
         .map(|(_, _, values)| quantile(values, 0.002).abs().max(quantile(values, 0.998).abs()))
@@ -44,7 +46,7 @@ pub fn histogram(report: &Report) -> Result<Option<Figure>, FigureError> {
                 [(from, share), (from + width, share)]
             });
             let steps: Vec<(f64, f64)> = steps.collect();
-            if *ink != Ink::Physical || test.network.is_none() {
+            if *ink != Ink::PhysicalCurve {
                 let edges: Vec<(f64, f64, f64)> = steps.iter().map(|&(x, share)| (x, 0.0, share)).collect();
                 panel.band(&edges, *ink, 0.25)?;
             }
@@ -98,32 +100,34 @@ fn against(
     }
     let after = left(report, test.compensated());
     let (ink, model) = compensated_ink(report);
-    let mean_name = format!("{model}: mean ± standard deviation");
+    let mean_name = format!("{model}: mean ± std");
     let mut entries: Vec<Entry> = vec![(Ink::Measured, Swatch::Points, "error"), (ink, Swatch::Line, &mean_name)];
     if test.network.is_some() {
-        entries.push((Ink::Physical, Swatch::Line, "physical: mean"));
+        entries.push((Ink::PhysicalCurve, Swatch::Line, "physical: mean"));
     }
     let svg = paper(530, 430, |area| {
         let area = legend(area, 10, &entries)?;
         let x = Axis::linear(widen(extent(abscissa.iter().copied()), 0.02), 6, label);
         let panel = Panel::new(&area, x, Axis::linear(robust_extent(&after), 6, format!("error [{unit}]")), 0)?;
         let kept = thin(after.len(), CLOUD_POINTS);
-        panel.cloud(kept.into_iter().map(|i| (abscissa[i], after[i])), Ink::Measured, 0.35, 1.1)?;
+        panel.cloud(kept.into_iter().map(|i| (abscissa[i], after[i])), Ink::Measured, 0.5, 1.2)?;
         let range = extent(abscissa.iter().copied());
         panel.line([(range.start, 0.0), (range.end, 0.0)], Ink::Axis, 1.0, 1.0)?;
-        let means = bins(abscissa, &after, MEAN_BINS, LEAST_SAMPLES);
+        let least = LEAST_SAMPLES.max(after.len() / LEAST_SHARE);
+        let means = bins(abscissa, &after, MEAN_BINS, least);
         let edges: Vec<(f64, f64, f64)> =
             means.iter().map(|bin| (bin.x, bin.mean - bin.deviation, bin.mean + bin.deviation)).collect();
         panel.band(&edges, ink, 0.3)?;
         panel.line(means.iter().map(|bin| (bin.x, bin.mean)), ink, 2.2, 1.0)?;
+        panel.cloud(means.iter().map(|bin| (bin.x, bin.mean)), ink, 1.0, 2.6)?;
         if test.network.is_some() {
-            let physical = bins(abscissa, &left(report, &test.physical), MEAN_BINS, LEAST_SAMPLES);
-            panel.line(physical.iter().map(|bin| (bin.x, bin.mean)), Ink::Physical, 1.8, 1.0)?;
+            let physical = bins(abscissa, &left(report, &test.physical), MEAN_BINS, least);
+            panel.line(physical.iter().map(|bin| (bin.x, bin.mean)), Ink::PhysicalCurve, 1.8, 1.0)?;
         }
         panel.note_outside(outside(&after), after.len())
     })?;
-    let caption = "The mean should lie on zero everywhere; where it does not, the model misses something that depends on \
-                   this quantity.";
+    let caption = "The mean (one dot for each bin) should lie on zero everywhere; where it does not, the model misses \
+                   something that depends on this quantity.";
     Ok(Some(Figure { name, title, caption: caption.into(), wide: false, svg }))
 }
 

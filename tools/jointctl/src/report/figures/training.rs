@@ -19,14 +19,14 @@ pub fn curves(report: &Report) -> Result<Option<Figure>, FigureError> {
     if !values().any(|value| drawable(&value)) {
         return Ok(None);
     }
-    let svg = paper(530, 430, |area| {
+    let svg = paper(1080, 400, |area| {
         let entries = [
             (Ink::Train, Swatch::Line, "training"),
             (Ink::Validation, Swatch::Line, "validation"),
             (Ink::Mark, Swatch::Circle, "best epoch"),
         ];
-        let area = legend(area, 30, &entries)?;
-        let x = Axis::linear(0.0..epochs.saturating_sub(1) as f64, 6, "epoch");
+        let area = legend(area, 84, &entries)?;
+        let x = Axis::linear(0.0..epochs.saturating_sub(1) as f64, 10, "epoch");
         let label = format!("mean square error [{}²]", report.units.effort);
         let panel = Panel::new(&area, x, Axis::logarithmic(range.start / 1.15..range.end * 1.15, label), 0)?;
         let (chosen, others): (Vec<_>, Vec<_>) = report.training.iter().partition(|curve| curve.chosen);
@@ -43,7 +43,7 @@ pub fn curves(report: &Report) -> Result<Option<Figure>, FigureError> {
     })?;
     let caption = "One pair of lines for each seed, the chosen seed in full colour; training stops when the validation error \
                    no longer falls, and the weights of the best epoch are kept.";
-    Ok(Some(Figure { name: "training", title: "Training", caption: caption.into(), wide: false, svg }))
+    Ok(Some(Figure { name: "training", title: "Training", caption: caption.into(), wide: true, svg }))
 }
 
 /// The epochs with their errors, thinned; an error that has no logarithm is left out.
