@@ -222,6 +222,19 @@ fn a_causal_filter_knows_nothing_of_the_future() {
 }
 
 #[test]
+fn causal_motion_knows_nothing_of_the_future_while_the_effort_has_no_delay() {
+    let from = |at: f64| {
+        joint_with(move |_, [t, q, u, temp]| Some(if t < at { [t, q, u, temp] } else { [t, q + 0.5, u + 0.5, temp] }))
+    };
+    let filter = "[filter]\ncausal_motion = true\n\
+        position = { order = 2, cutoff_hz = 5.0 }\neffort = { order = 2, cutoff_hz = 5.0 }\n";
+    let [changed, whole] = [10.0, 99.0].map(|at| prepare(&with(filter), &from(at)).unwrap().samples);
+    assert_eq!(changed.velocity[..1000], whole.velocity[..1000]);
+    assert_eq!(changed.acceleration[..1000], whole.acceleration[..1000]);
+    assert!((changed.effort[995] - whole.effort[995]).abs() > 0.02);
+}
+
+#[test]
 fn a_byte_order_mark_spaces_and_windows_line_ends_do_no_harm() {
     let csv = format!("\u{feff}{}", joint().replace(',', " , ").replace('\n', "\r\n"));
     assert_eq!(prepare(DESCRIPTION, &csv).unwrap().samples.len(), 2000);
