@@ -76,11 +76,14 @@ pub struct Choices {
     #[arg(long, value_enum, default_value_t)]
     trainer: TrainerChoice,
     /// Networks trained from different first weights; the best on validation data is used
-    #[arg(long, value_name = "N", default_value_t = 4)]
+    #[arg(long, value_name = "N", default_value_t = 8)]
     restarts: usize,
     /// Epochs without a lower validation error after which training stops
-    #[arg(long, value_name = "N", default_value_t = 30)]
+    #[arg(long, value_name = "N", default_value_t = 40)]
     patience: usize,
+    /// Penalty on the sum of squared weights, in units of the normalised mean squared error
+    #[arg(long, value_name = "X", default_value_t = 1e-5)]
+    decay: f64,
     /// Seed of everything random: the same seed, data and choices give the same image
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
@@ -93,7 +96,7 @@ pub struct Choices {
     /// Train on mirrored samples too: for a joint without preferred direction
     #[arg(long)]
     mirror: bool,
-    /// Inputs of the network [default: position, velocity, load, temperature, as far as they vary]
+    /// Inputs of the network [default: position, velocity, load where there is gravity, temperature where it varies by 10 K]
     #[arg(long, value_enum, value_delimiter = ',')]
     inputs: Vec<InputChoice>,
     /// Regimes with a network each; up to two
@@ -131,6 +134,7 @@ impl Choices {
             },
             restarts: self.restarts.max(1),
             patience: self.patience,
+            decay: self.decay,
             seed: self.seed,
             samples: self.samples,
             equalise: fraction("equalise", self.equalise, 1.0)?,
@@ -155,8 +159,9 @@ impl Choices {
             options.presets = self.preset.clone();
         }
         if !self.inputs.is_empty() {
-            options.inputs = [false; 5];
-            self.inputs.iter().for_each(|&input| options.inputs[input as usize] = true);
+            let mut inputs = [false; 5];
+            self.inputs.iter().for_each(|&input| inputs[input as usize] = true);
+            options.inputs = Some(inputs);
         }
         Ok(options)
     }

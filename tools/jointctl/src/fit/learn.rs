@@ -27,8 +27,8 @@ pub enum Trainer {
 
 /// Least number of training samples, and of validation samples, with which a network is trained.
 const MINIMUM_SAMPLES: usize = 300;
-/// A temperature that varies less than this in training is no input, K.
-const TEMPERATURE_RANGE: f64 = 3.0;
+/// A temperature that varies less than this in training is no input, K: over a few kelvins it stands for time.
+const TEMPERATURE_RANGE: f64 = 10.0;
 /// Cross-fade between regimes, s.
 const FADE_TIME: f64 = 0.02;
 
@@ -55,7 +55,7 @@ pub struct Learned {
 
 impl Learned {
     /// The physical model alone.
-    fn physical(physical: &Identified, outcome: NetworkOutcome) -> Self {
+    pub(super) fn physical(physical: &Identified, outcome: NetworkOutcome) -> Self {
         Self {
             float: FloatFriction { sets: vec![(physical.friction.clone(), None)] },
             selector: Selector::default(),
@@ -84,12 +84,22 @@ impl Learned {
     }
 }
 
-/// Trains as the options say and keeps the network where it lowers the validation error enough.
+/// The inputs that a recording supports: position and velocity; the theoretical torque where gravity makes it more than
+/// a multiple of the acceleration, which would let the network fit the recording's delays; the temperature where it
+/// varies enough. Never the measured torque: in a recording it is the very effort that is to be predicted.
+pub fn inputs(samples: &Samples, static_load: bool) -> [bool; 5] {
+    let temperatures = samples.indices(Part::Train).into_iter().map(|i| samples.temperature[i]);
+    let (low, high) = temperatures.fold((f64::MAX, f64::MIN), |(low, high), t| (low.min(t), high.max(t)));
+    [true, true, static_load, false, high - low >= TEMPERATURE_RANGE]
+}
+
+/// Trains on `used` inputs as the options say and keeps the network where it lowers the validation error enough.
 pub fn learn(
     samples: &Samples,
     states: &[JointState],
     physical: &Identified,
     thresholds: &Thresholds,
+    used: [bool; 5],
     options: &Options,
     progress: &dyn Progress,
 ) -> Result<Learned, FitError> {
@@ -108,7 +118,7 @@ pub fn learn(
         return Ok(Learned::physical(physical, NetworkOutcome::Rejected { reason }));
     }
     let inputs: Vec<_> = samples.indices(Part::Train).into_iter().map(|i| network_inputs(samples, i)).collect();
-    let input_box = InputBox::around(&inputs, used(&inputs, options)).map_err(crate::train::TrainError::from)?;
+    let input_box = InputBox::around(&inputs, used).map_err(crate::train::TrainError::from)?;
     let selector = selector(&options.regimes, thresholds);
     let sets = regimes(&selector, states, samples);
     let residual = |i: usize| samples.effort[i] - physical.rigid_effort(samples, i) - physical.friction(samples, i);
@@ -173,15 +183,6 @@ fn decide(learned: &mut Learned, samples: &Samples, physical: &Identified, sets:
     *learned = whole.rejected(reason);
 }
 
-/// The inputs that are allowed and vary enough to learn from.
-fn used(inputs: &[[f64; 5]], options: &Options) -> [bool; 5] {
-    let mut used = options.inputs;
-    let temperatures = inputs.iter().map(|row| row[4]);
-    let (low, high) = temperatures.fold((f64::MAX, f64::MIN), |(low, high), t| (low.min(t), high.max(t)));
-    used[4] &= high - low >= TEMPERATURE_RANGE;
-    used
-}
-
 fn selector(measures: &[Measure], thresholds: &Thresholds) -> Selector {
     let mut criteria = [None; MAX_CRITERIA];
     for (criterion, measure) in criteria.iter_mut().zip(measures) {
@@ -218,6 +219,7 @@ impl Task<'_> {
                 let options = levenberg_marquardt::Options {
                     seeds: self.seeds(),
                     max_fail: self.options.patience.max(1),
+                    decay: self.options.decay,
                     ..Default::default()
                 };
                 levenberg_marquardt::train(train, validation, input_box, &options, &tell)?

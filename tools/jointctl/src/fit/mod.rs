@@ -38,6 +38,8 @@ pub struct Options {
     pub restarts: usize,
     /// Epochs without a lower validation error after which training stops.
     pub patience: usize,
+    /// Penalty on squared weights, in units of the normalised mean squared error.
+    pub decay: f64,
     /// Seed of everything random.
     pub seed: u64,
     /// Most training samples that a network sees.
@@ -47,8 +49,9 @@ pub struct Options {
     /// Copies of training samples.
     #[serde(skip)]
     pub augment: Augment,
-    /// Inputs that the network may use: position, velocity, theoretical torque, measured torque, temperature.
-    pub inputs: [bool; 5],
+    /// Inputs that the network uses: position, velocity, theoretical torque, measured torque, temperature; None: position and
+    /// velocity, and the others by the rules of [`learn`].
+    pub inputs: Option<[bool; 5]>,
     /// Least fall of the validation error, as a fraction, for which a network is kept.
     pub least_gain: f64,
     /// Criteria of regimes with a network each; none: one network for all.
@@ -69,14 +72,14 @@ impl Default for Options {
         Self {
             presets: vec![Preset::CoulombViscous, Preset::Full],
             trainer: Some(Trainer::LevenbergMarquardt),
-            restarts: 4,
-            patience: 30,
+            restarts: 8,
+            patience: 40,
+            decay: 1e-5,
             seed: 1,
             samples: 12_000,
             equalise: 0.5,
             augment: Augment::default(),
-            // Never the measured torque by default: in a recording it is the very effort that is to be predicted.
-            inputs: [true, true, true, false, true],
+            inputs: None,
             least_gain: 0.02,
             regimes: vec![],
             reference: true,
@@ -139,15 +142,17 @@ pub fn fit(prepared: &mut Prepared, options: &Options, progress: &dyn Progress) 
     let samples = &mut prepared.samples;
 
     let identified = identify_all(samples, &rigid_model, &units, options, progress)?;
-    let chosen = best_on_validation(&identified);
+    let effort = prepared.description.columns.effort.unit;
+    let context = assemble::Context { effort, sha256: &prepared.sha256, options };
+    let (chosen, refused) = choose_physical(samples, &identified, &context)?;
     let physical = &identified[chosen];
     let states = firmware_states(samples)?;
 
-    let learned = learn::learn(samples, &states, physical, &prepared.thresholds, options, progress)?;
+    let static_load = rigid_model.gravity != Gravity::None;
+    let inputs = options.inputs.unwrap_or_else(|| learn::inputs(samples, static_load));
+    let learned = learn::learn(samples, &states, physical, &prepared.thresholds, inputs, options, progress)?;
 
     progress.stage("quantise and certify");
-    let effort = prepared.description.columns.effort.unit;
-    let context = assemble::Context { effort, sha256: &prepared.sha256, options };
     let built = build_image(samples, physical, &learned, &context)?;
     let learned = built.learned;
 
@@ -179,7 +184,7 @@ pub fn fit(prepared: &mut Prepared, options: &Options, progress: &dyn Progress) 
         },
         stages: stages(prepared),
         parameters: physical.parameters.iter().map(parameter).collect(),
-        candidates: candidates(&identified, chosen, &learned),
+        candidates: candidates(&identified, chosen, &refused, &learned),
         network: learned.outcome.clone(),
         errors,
         fixed_point: Some(difference),
@@ -210,10 +215,29 @@ fn identify_all(
     if identified.is_empty() { Err(FitError::NoPreset) } else { Ok(identified) }
 }
 
-/// Index of the model with the lowest validation error; of equals the first.
-fn best_on_validation(identified: &[Identified]) -> usize {
-    let error = |one: &Identified| one.validation_rmse.unwrap_or(one.train_rmse);
-    (0..identified.len()).min_by(|&a, &b| error(&identified[a]).total_cmp(&error(&identified[b]))).unwrap_or(0)
+/// The model with the lowest validation error that the certificate accepts, and why it refused better ones.
+fn choose_physical(
+    samples: &Samples,
+    identified: &[Identified],
+    context: &assemble::Context,
+) -> Result<(usize, Vec<(usize, String)>), FitError> {
+    let error = |i: usize| identified[i].validation_rmse.unwrap_or(identified[i].train_rmse);
+    let mut order: Vec<usize> = (0..identified.len()).collect();
+    order.sort_by(|&a, &b| error(a).total_cmp(&error(b)));
+    let mut refused = Vec::new();
+    let mut last = FitError::NoPreset;
+    for i in order {
+        let alone = Learned::physical(&identified[i], NetworkOutcome::NotTrained);
+        match build_image(samples, &identified[i], &alone, context) {
+            Ok(_) => return Ok((i, refused)),
+            Err(error @ (FitError::Refused(_) | FitError::Quantize(_))) => {
+                refused.push((i, error.to_string()));
+                last = error;
+            }
+            Err(error) => return Err(error),
+        }
+    }
+    Err(last)
 }
 
 /// The rigid part of the description, as identification knows it.
@@ -281,7 +305,12 @@ fn parameter(estimated: &identify::Estimated) -> report::Parameter {
     }
 }
 
-fn candidates(identified: &[Identified], chosen: usize, learned: &Learned) -> Vec<Candidate> {
+fn candidates(
+    identified: &[Identified],
+    chosen: usize,
+    refused: &[(usize, String)],
+    learned: &Learned,
+) -> Vec<Candidate> {
     let mut all: Vec<Candidate> = identified
         .iter()
         .enumerate()
@@ -290,12 +319,11 @@ fn candidates(identified: &[Identified], chosen: usize, learned: &Learned) -> Ve
             parameters: one.parameters.len(),
             validation_rmse: one.validation_rmse.unwrap_or(one.train_rmse),
             kept: i == chosen,
-            reason: if i == chosen {
-                "lowest validation error of the physical models"
-            } else {
-                "higher validation error"
-            }
-            .to_owned(),
+            reason: match refused.iter().find(|(refused, _)| *refused == i) {
+                Some((_, reason)) => reason.clone(),
+                None if i == chosen => "lowest validation error of the physical models".to_owned(),
+                None => "higher validation error".to_owned(),
+            },
         })
         .collect();
     if let Some(validation_rmse) = learned.validation_rmse {

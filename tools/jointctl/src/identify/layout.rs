@@ -29,6 +29,9 @@ const LOAD_EFFECT: f64 = 20.0;
 const HYSTERESIS_WIDTH: f64 = 20.0;
 /// Range of the harmonic frequency in periods over the position range.
 const HARMONIC_PERIODS: (f64, f64) = (0.5, 20.0);
+/// Fewest periods over the position range where the rigid part has gravity: a slower wave, the position slope and a piece of
+/// gravity's sine are almost one shape, and fitted together they cancel each other at thousands of times the effort.
+const PERIODS_BESIDE_GRAVITY: f64 = 1.5;
 /// Lowest harmonic frequency where the rigid part has gravity, whose own is 1: closer to it, harmonics and gravity grow
 /// without limit against each other, and friction becomes many times the measured effort for hardly any gain.
 const FREQUENCY_ABOVE_GRAVITY: f64 = 2.0;
@@ -222,7 +225,10 @@ impl Layout {
         }
         if on(Term::Harmonics) {
             let turn = 2.0 * PI / limits.position_range.max(f64::MIN_POSITIVE);
-            let low = (HARMONIC_PERIODS.0 * turn).max(if gravity { FREQUENCY_ABOVE_GRAVITY } else { 0.0 });
+            let low = match gravity {
+                true => (PERIODS_BESIDE_GRAVITY * turn).max(FREQUENCY_ABOVE_GRAVITY),
+                false => HARMONIC_PERIODS.0 * turn,
+            };
             self.own(P::HarmonicFrequency, Role::Shape, (low, (HARMONIC_PERIODS.1 * turn).max(low)));
         }
     }
