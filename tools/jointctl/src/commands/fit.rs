@@ -79,10 +79,10 @@ pub struct Choices {
     #[arg(long, value_name = "N", default_value_t = 8)]
     restarts: usize,
     /// Epochs without a lower validation error after which training stops
-    #[arg(long, value_name = "N", default_value_t = 40)]
+    #[arg(long, value_name = "N", default_value_t = 60)]
     patience: usize,
     /// Penalty on the sum of squared weights, in units of the normalised mean squared error
-    #[arg(long, value_name = "X", default_value_t = 1e-5)]
+    #[arg(long, value_name = "X", default_value_t = 1e-4)]
     decay: f64,
     /// Seed of everything random: the same seed, data and choices give the same image
     #[arg(long, value_name = "N", default_value_t = 1)]

@@ -14,7 +14,7 @@ use joint_firmware::parameters::image::{Effort, Image, MAX_LENGTH, Target};
 /// Golden vectors of an image; fewer where they do not fit.
 const GOLDEN: usize = 6;
 /// The image may give this many times the largest effort of the training data.
-const OUTPUT_LIMIT: f64 = 2.0;
+const OUTPUT_LIMIT: f64 = 3.0;
 /// Slopes may be this much above what is proved of the image: room for a later retraining within the same limits.
 const SLOPE_ROOM: f64 = 1.5;
 /// A loop gain through the measured torque that no image may exceed.

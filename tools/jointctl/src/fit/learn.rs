@@ -4,6 +4,7 @@ use super::{FitError, Options, part_rmse};
 use crate::augment::augment;
 use crate::classify::Thresholds;
 use crate::equalise::{Equalise, draw};
+use crate::evaluate::rmse;
 use crate::identify::Identified;
 use crate::joint_model::{FloatFriction, network_inputs, regimes};
 use crate::network::{InputBox, Network};
@@ -146,6 +147,7 @@ pub fn learn(
             validation: TrainingSet::unweighted(checks, checked),
             input_box,
             options,
+            restarts: options.restarts,
             progress,
         };
         let trained = task.run(trainer)?;
@@ -158,7 +160,63 @@ pub fn learn(
         learned.float.sets.push((physical.friction.clone(), Some(trained.network)));
     }
     decide(&mut learned, samples, physical, &sets, options);
+    if learned.has_network() && used[LOAD] {
+        progress.detail("does the network extrapolate over load?");
+        let ratio = extrapolation(samples, physical, &train, &validation, used, trainer, options, progress)?;
+        if ratio >= 1.0 {
+            let percent = 100.0 * (ratio - 1.0);
+            let reason = format!(
+                "trained without the tenth of the samples with the highest load, it raises the error there by {percent:.1} %"
+            );
+            learned = learned.rejected(reason);
+        }
+    }
     Ok(learned)
+}
+
+/// Index of the theoretical torque among the inputs.
+const LOAD: usize = 2;
+/// Share of the samples with the highest |theoretical torque| that the check of extrapolation holds back.
+const HELD_BACK: f64 = 0.1;
+
+/// Error with a network over error without, on loads above all that the network was trained with.
+///
+/// Recorded trajectories repeat themselves: a network that has learned them by heart does well on any block of time cut from
+/// them. On loads that it has not seen it does not.
+#[expect(clippy::too_many_arguments, reason = "the same task as that of `learn`, on other samples")]
+fn extrapolation(
+    samples: &Samples,
+    physical: &Identified,
+    train: &[usize],
+    validation: &[usize],
+    used: [bool; 5],
+    trainer: Trainer,
+    options: &Options,
+    progress: &dyn Progress,
+) -> Result<f64, FitError> {
+    let mut loads: Vec<f64> = train.iter().map(|&i| samples.load[i].abs()).collect();
+    loads.sort_by(f64::total_cmp);
+    let limit = loads[((loads.len() - 1) as f64 * (1.0 - HELD_BACK)) as usize];
+    let (low, high): (Vec<usize>, Vec<usize>) = train.iter().partition(|&&i| samples.load[i].abs() <= limit);
+    let (low_checks, high_checks): (Vec<usize>, Vec<usize>) =
+        validation.iter().partition(|&&i| samples.load[i].abs() <= limit);
+    let residual = |i: usize| samples.effort[i] - physical.rigid_effort(samples, i) - physical.friction(samples, i);
+    let set = |indices: &[usize]| {
+        let inputs: Vec<_> = indices.iter().map(|&i| network_inputs(samples, i)).collect();
+        TrainingSet::unweighted(inputs, indices.iter().map(|&i| residual(i)).collect())
+    };
+    if low.len().min(low_checks.len()) < MINIMUM_SAMPLES || high.is_empty() {
+        return Ok(0.0);
+    }
+    let (train, validation) = (set(&low), set(&low_checks));
+    let input_box = InputBox::around(&train.inputs, used).map_err(crate::train::TrainError::from)?;
+    // Half the restarts: the question is whether such a network extrapolates, not which is best.
+    let restarts = options.restarts.div_ceil(2);
+    let network = Task { train, validation, input_box, options, restarts, progress }.run(trainer)?.network;
+    let judged: Vec<usize> = high.into_iter().chain(high_checks).collect();
+    let without = rmse(judged.iter().map(|&i| residual(i)));
+    let with = rmse(judged.iter().map(|&i| residual(i) - network.evaluate(&network_inputs(samples, i))));
+    Ok(with / without)
 }
 
 /// Keeps the networks only where they pay on validation samples.
@@ -203,12 +261,13 @@ struct Task<'a> {
     validation: TrainingSet,
     input_box: InputBox,
     options: &'a Options,
+    restarts: usize,
     progress: &'a dyn Progress,
 }
 
 impl Task<'_> {
     fn seeds(&self) -> Vec<u64> {
-        (0..self.options.restarts.max(1) as u64).map(|n| self.options.seed.wrapping_add(n)).collect()
+        (0..self.restarts.max(1) as u64).map(|n| self.options.seed.wrapping_add(n)).collect()
     }
 
     fn run(&self, trainer: Trainer) -> Result<Trained, FitError> {
