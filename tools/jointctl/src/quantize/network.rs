@@ -93,3 +93,65 @@ fn neuron(layer: usize, index: usize, weights: &[f64], bias: f64) -> Result<Neur
     let sum = weights.iter().map(|w| w.abs()).sum::<f64>() + bias.abs();
     Err(QuantizeError::Sum { layer, neuron: index, sum, limit: SUM_LIMIT / 2.0 })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use joint_firmware::friction::domain::Range;
+    use joint_firmware::friction::network::Network as FirmwareNetwork;
+    use joint_firmware::friction::state::SIGNALS;
+    use rand::RngExt;
+    use rand_chacha::ChaCha8Rng;
+    use rand_chacha::rand_core::SeedableRng;
+
+    /// A network like a trained one: weights of the first layer up to 3, of the velocity up to 20, of the others up to 1.5.
+    fn network(seed: u64) -> (Network, Domain) {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let range = Range { low: -(4 << 16), high: 4 << 16 };
+        let domain = Domain { ranges: [range; SIGNALS], margin: 0, reference_temperature: 0 };
+        let input_box = InputBox::new([-4.0; INPUTS], [4.0; INPUTS], [true; INPUTS]).unwrap();
+        let mut parameters = Vec::new();
+        for _ in 0..NEURONS {
+            for input in 0..=INPUTS {
+                let largest = if input == 1 { 20.0 } else { 3.0 };
+                parameters.push(random.random_range(-largest..=largest));
+            }
+        }
+        parameters.extend((0..2 * NEURONS * (NEURONS + 1) + NEURONS + 1).map(|_| random.random_range(-1.5..=1.5)));
+        (Network::new(&FIRMWARE_HIDDEN, input_box, 2.5, parameters).unwrap(), domain)
+    }
+
+    #[test]
+    fn sixteen_networks_depart_from_f64_by_at_most_a_thousandth_of_full_scale() {
+        for seed in 0..16 {
+            let (float, domain) = network(seed);
+            let fixed = FirmwareNetwork::new(&quantize(&float).unwrap(), &domain);
+            let mut random = ChaCha8Rng::seed_from_u64(100 + seed);
+            let (mut worst, mut full_scale) = (0.0f64, 0.0f64);
+            for _ in 0..20_000 {
+                let signals: [i32; SIGNALS] = std::array::from_fn(|_| random.random_range(-(4 << 16)..=4 << 16));
+                let exact = float.evaluate(&std::array::from_fn(|i| f64::from(signals[i]) / 65536.0));
+                full_scale = full_scale.max(exact.abs());
+                worst = worst.max((fixed.evaluate(&signals).to_f64() - exact).abs());
+            }
+            assert!(worst <= 1e-3 * full_scale, "seed {seed}: {worst} of {full_scale}");
+        }
+    }
+
+    #[test]
+    fn a_stored_network_stands_for_what_was_stored() {
+        let (float, domain) = network(1);
+        let stored = quantize(&float).unwrap();
+        assert_eq!(quantize(&dequantize(&stored, &domain).unwrap()).unwrap().first, stored.first);
+    }
+
+    #[test]
+    fn a_weight_that_does_not_fit_is_refused_by_layer_and_neuron() {
+        let (float, _) = network(1);
+        let mut parameters = float.parameters().to_vec();
+        parameters[NEURONS * (INPUTS + 1) + NEURONS + 1] = 70.0;
+        let network = Network::new(&FIRMWARE_HIDDEN, *float.input_box(), 1.0, parameters).unwrap();
+        let text = quantize(&network).unwrap_err().to_string();
+        assert!(text.starts_with("neuron 1 of layer 1"), "{text}");
+    }
+}
