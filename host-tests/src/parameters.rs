@@ -39,6 +39,15 @@ pub fn coefficients(domain: &Domain, si: &[f64; Coefficients::COUNT]) -> Coeffic
     Coefficients::from_array(stored)
 }
 
+/// One set without any term or network, in a box of +-1 of every signal's unit without a margin.
+pub fn frictionless() -> FrictionParameters {
+    FrictionParameters {
+        domain: Domain { ranges: [range(-1.0, 1.0); SIGNALS], margin: 0, reference_temperature: 0 },
+        selector: Selector::default(),
+        sets: Default::default(),
+    }
+}
+
 /// Parameters like those of an identified joint: 1, 2 or 4 sets, each with a network in two cases of three.
 pub fn tame(random: &mut ChaCha8Rng) -> FrictionParameters {
     let domain = tame_domain(random);
