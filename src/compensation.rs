@@ -4,7 +4,6 @@
 //! asked for falls back by itself (network, then physical, then nothing) and every step says what it did and why. Switched off,
 //! or without a model, the torque is exactly zero: the loop computes the same bits as one without compensation.
 
-use crate::dsp::smmul;
 use crate::friction::FrictionModel;
 use crate::friction::regime::Memory;
 use crate::friction::state::{JointState, Signal};
@@ -80,8 +79,13 @@ pub enum SettingsError {
     Gain(u32),
     /// The clamp must not be negative.
     Clamp(Torque),
-    /// The slew limit must be positive.
-    Slew(Torque),
+    /// The slew limit is too small for the control rate to keep: the torque moves in whole steps of Q16.16.
+    Slew {
+        /// Slew limit in a second.
+        slew: Torque,
+        /// Least slew limit, one step of Q16.16 a control step.
+        least: Torque,
+    },
     /// The control rate must be positive.
     Rate(u32),
 }
@@ -91,7 +95,9 @@ impl core::fmt::Display for SettingsError {
         match self {
             Self::Gain(gain) => write!(f, "compensation gain is {gain}/65536, must be 0 to 65536"),
             Self::Clamp(clamp) => write!(f, "compensation clamp is {clamp}, must not be negative"),
-            Self::Slew(slew) => write!(f, "compensation slew limit is {slew} a second, must be positive"),
+            Self::Slew { slew, least } => {
+                write!(f, "compensation slew limit is {slew} a second, must be at least {least} at this control rate")
+            }
             Self::Rate(rate) => write!(f, "control rate is {rate} Hz, must be positive"),
         }
     }
@@ -113,7 +119,7 @@ pub struct Settings {
 
 impl Settings {
     /// Checks and prepares settings for a control loop of `rate` Hz: `gain` in Q16.16 (0 to 1), `clamp` the largest magnitude
-    /// of the torque, `slew` its largest change in a second.
+    /// of the torque, `slew` its largest change in a second, at least one step of Q16.16 a control step (0.31 Nm/s at 20 kHz).
     pub fn new(request: Request, gain: u32, clamp: Torque, slew: Torque, rate: u32) -> Result<Self, SettingsError> {
         let Some(rate) = core::num::NonZeroU32::new(rate) else { return Err(SettingsError::Rate(rate)) };
         if gain > 1 << 16 {
@@ -122,8 +128,9 @@ impl Settings {
         if clamp < Torque::ZERO {
             return Err(SettingsError::Clamp(clamp));
         }
-        if slew <= Torque::ZERO {
-            return Err(SettingsError::Slew(slew));
+        let least = Torque::from_bits(rate.get().min(i32::MAX as u32) as i32);
+        if slew < least {
+            return Err(SettingsError::Slew { slew, least });
         }
         Ok(Self {
             request,
@@ -156,10 +163,11 @@ pub struct Compensation {
     last: Torque,
 }
 
-/// Weights come in Q31 and a torque in Q16.16: `i32::MAX` counts as one, so that a full weight changes no bit.
+/// Weights come in Q31 and a torque in Q16.16: `i32::MAX` counts as one, so that a full weight changes no bit. Never larger in
+/// magnitude than the torque.
 #[inline(always)]
 fn weigh(torque: i32, weight: i32) -> i32 {
-    if weight == i32::MAX { torque } else { smmul(torque, weight) << 1 }
+    if weight == i32::MAX { torque } else { ((torque as i64 * weight as i64) >> 31) as i32 }
 }
 
 impl Compensation {

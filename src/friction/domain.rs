@@ -93,18 +93,18 @@ struct Edge {
     range: Range,
     /// Width of the margin, at least 1 step of Q16.16.
     margin: u32,
-    /// Q31 divided by the margin.
+    /// Left shift that brings the margin's width to [2^31, 2^32).
+    shift: u32,
+    /// 2^63 divided by the shifted width.
     per_step: u32,
 }
 
 impl Edge {
     fn new(range: Range, margin: u32) -> Self {
         let width = ((range.half_width() as u64 * margin as u64) >> 16).clamp(1, i32::MAX as u64) as u32;
-        Self {
-            range,
-            margin: width,
-            per_step: i32::MAX as u32 / core::num::NonZeroU32::new(width).unwrap_or(core::num::NonZeroU32::MIN),
-        }
+        let shift = width.leading_zeros();
+        let divisor = core::num::NonZeroU64::new((width as u64) << shift).unwrap_or(core::num::NonZeroU64::MIN);
+        Self { range, margin: width, shift, per_step: ((1u64 << 63) / divisor).min(u32::MAX as u64) as u32 }
     }
 
     /// Parts of the first and of the second margin that `value` has crossed, Q31.
@@ -117,8 +117,11 @@ impl Edge {
 
     #[inline(always)]
     fn part(&self, distance: u32) -> i32 {
-        // Below the margin the product is below 2^31.
-        if distance >= self.margin { i32::MAX } else { distance.wrapping_mul(self.per_step) as i32 }
+        if distance >= self.margin {
+            return i32::MAX;
+        }
+        // Below the margin the shift loses nothing and the product is below 2^63.
+        ((distance.wrapping_shl(self.shift) as u64 * self.per_step as u64) >> 32) as i32
     }
 }
 
@@ -186,6 +189,19 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn a_fade_has_no_step_greater_than_its_slope(half_width in 1..i32::MAX, margin in 1u32..=2 << 16, part in 0.0f64..2.0) {
+            let edge = Edge::new(Range { low: -half_width, high: half_width }, margin);
+            let steps = (edge.margin as f64 * part) as i64;
+            for value in [steps, edge.margin as i64 - 1].map(|steps| half_width as i64 + steps) {
+                let at = |value: i64| edge.crossed(value.clamp(0, i32::MAX as i64) as i32);
+                let (before, after) = (at(value), at(value + 1));
+                let slope = i32::MAX / edge.margin as i32 + 2;
+                prop_assert!((0..=slope).contains(&(after.0 - before.0)), "{:?} {:?}", before, after);
+                prop_assert!((0..=slope).contains(&(after.1 - before.1)), "{:?} {:?}", before, after);
+            }
+        }
+
         #[test]
         fn every_value_of_a_range_is_within_half_a_width_of_its_centre(a: i32, b: i32, t in 0.0f64..=1.0) {
             let range = Range { low: a.min(b), high: a.max(b) };

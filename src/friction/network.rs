@@ -62,7 +62,7 @@ impl InputScale {
         // The centred value is first shifted left until the half width lies in [2^30, 2^31], then multiplied by a gain in
         // (2^29, 2^31): the high word of the product is below 2^29, so that a last shift by two gives Q31.
         let shift = half_width.leading_zeros().saturating_sub(1);
-        let gain = ((1u64 << 61) - (1 << 33)) / divisor >> shift;
+        let gain = (((1u64 << 61) - (1 << 33)) / divisor) >> shift;
         Self { range, centre: range.centre(), shift, gain: gain.min(i32::MAX as u64) as i32 }
     }
 

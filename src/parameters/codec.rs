@@ -1,9 +1,7 @@
 //! Reading and writing the bytes of an image, field by field, in the order of the [layout](super::image).
 
 use super::certificate::Limits;
-use super::image::{
-    CRC_LENGTH, Effort, FORMAT, GoldenVector, Image, ImageError, MAGIC, MAX_GOLDEN, MAX_LENGTH, Target,
-};
+use super::image::{CRC_LENGTH, Effort, FORMAT, GoldenVector, Image, ImageError, MAGIC, MAX_GOLDEN, Target};
 use crate::friction::domain::{Domain, Range};
 use crate::friction::network::{INPUTS, MAX_FRACTION, MIN_FRACTION, NEURONS, NetworkParameters, Neuron};
 use crate::friction::physical::{Coefficients, PhysicalParameters, Terms};
@@ -127,75 +125,66 @@ fn decode_neuron(reader: &mut Reader) -> Result<Neuron, ImageError> {
 }
 
 /// Everything before the checksum; the length stays open.
-pub(super) fn encode_content(image: &Image, writer: &mut Writer) -> Result<(), ImageError> {
+pub(super) fn encode_content(image: &Image, writer: &mut Writer) {
     let Image { friction, limits, golden, .. } = image;
     let sets = friction.selector.sets();
     let networks = (0..sets).filter(|&i| friction.sets[i].network.is_some()).fold(0u8, |mask, i| mask | 1 << i);
-    if golden.is_empty() {
-        let (name, high) = ("number of golden vectors", MAX_GOLDEN as i64);
-        return Err(ImageError::Field { name, offset: 0, value: 0, low: 1, high });
-    }
-    writer.put(&MAGIC)?;
-    writer.put(&FORMAT.to_le_bytes())?;
-    writer.put(&[0; 2])?; // the length, known at the end
-    writer.put(&image.version.to_le_bytes())?;
-    writer.put(&image.target.product.to_le_bytes())?;
-    writer.put(&image.target.serial.to_le_bytes())?;
-    writer.put(&image.created.to_le_bytes())?;
-    writer.put(&[image.effort as u8, sets as u8, networks, golden.len() as u8])?;
-    writer.put(&image.data_hash)?;
+    writer.put(&MAGIC);
+    writer.put(&FORMAT.to_le_bytes());
+    writer.put(&[0; 2]); // the length, known at the end
+    writer.put(&image.version.to_le_bytes());
+    writer.put(&image.target.product.to_le_bytes());
+    writer.put(&image.target.serial.to_le_bytes());
+    writer.put(&image.created.to_le_bytes());
+    writer.put(&[image.effort as u8, sets as u8, networks, golden.len() as u8]);
+    writer.put(&image.data_hash);
     for range in &friction.domain.ranges {
-        writer.i32(range.low)?;
-        writer.i32(range.high)?;
+        writer.i32(range.low);
+        writer.i32(range.high);
     }
-    writer.put(&friction.domain.margin.to_le_bytes())?;
-    writer.i32(friction.domain.reference_temperature)?;
-    writer.put(&friction.selector.fade_time.to_le_bytes())?;
+    writer.put(&friction.domain.margin.to_le_bytes());
+    writer.i32(friction.domain.reference_temperature);
+    writer.put(&friction.selector.fade_time.to_le_bytes());
     for criterion in &friction.selector.criteria {
         let (measure, enter, leave) = criterion.map_or((0, 0, 0), |c| (c.measure as u8, c.enter, c.leave));
-        writer.put(&[measure, 0, 0, 0])?;
-        writer.i32(enter)?;
-        writer.i32(leave)?;
+        writer.put(&[measure, 0, 0, 0]);
+        writer.i32(enter);
+        writer.i32(leave);
     }
     for limit in [limits.output, limits.torque_gain, limits.velocity_slope] {
-        writer.put(&limit.to_le_bytes())?;
+        writer.put(&limit.to_le_bytes());
     }
     for set in friction.sets.iter().take(sets) {
-        encode_set(set, writer)?;
+        encode_set(set, writer);
     }
     for vector in golden {
-        if vector.set as usize >= sets {
-            let (name, high) = ("golden vector's set", sets as i64 - 1);
-            return Err(ImageError::Field { name, offset: writer.offset, value: vector.set as i64, low: 0, high });
-        }
-        writer.put(&[vector.set, 0, 0, 0])?;
+        writer.put(&[vector.set, 0, 0, 0]);
         for signal in vector.signals {
-            writer.i32(signal)?;
+            writer.i32(signal);
         }
-        writer.i32(vector.expected.physical.to_bits())?;
-        writer.i32(vector.expected.network.to_bits())?;
+        writer.i32(vector.expected.physical.to_bits());
+        writer.i32(vector.expected.network.to_bits());
     }
-    Ok(())
 }
 
-fn encode_set(set: &ParameterSet, writer: &mut Writer) -> Result<(), ImageError> {
-    writer.put(&set.physical.terms.0.to_le_bytes())?;
-    writer.put(&[0; 2])?;
+fn encode_set(set: &ParameterSet, writer: &mut Writer) {
+    writer.put(&set.physical.terms.0.to_le_bytes());
+    writer.put(&[0; 2]);
     for coefficient in set.physical.coefficients.to_array() {
-        writer.i32(coefficient)?;
+        writer.i32(coefficient);
     }
-    let Some(network) = &set.network else { return Ok(()) };
+    let Some(network) = &set.network else { return };
     for weight in network.first.iter().flatten() {
-        writer.i32(*weight)?;
+        writer.i32(*weight);
     }
     for neuron in network.hidden.iter().flatten().chain([&network.output]) {
         for weight in neuron.weights {
-            writer.put(&weight.to_le_bytes())?;
+            writer.put(&weight.to_le_bytes());
         }
-        writer.put(&[neuron.fraction, 0])?;
+        writer.put(&[neuron.fraction, 0]);
     }
-    writer.i32(network.scale)?;
-    writer.put(&[0; 2])
+    writer.i32(network.scale);
+    writer.put(&[0; 2]);
 }
 
 /// Takes numbers off the front of a byte string.
@@ -263,26 +252,26 @@ impl Reader<'_> {
     }
 }
 
-/// Puts numbers into a buffer, front to back.
+/// Puts numbers into a buffer, front to back; beyond its end they are only counted.
 pub(super) struct Writer<'a> {
-    pub(super) buffer: &'a mut [u8],
+    pub(super) rest: &'a mut [u8],
     pub(super) offset: usize,
 }
 
 impl Writer<'_> {
-    fn put(&mut self, bytes: &[u8]) -> Result<(), ImageError> {
-        let end = self.offset + bytes.len();
-        let limit = self.buffer.len().saturating_sub(CRC_LENGTH);
-        let Some(place) = self.buffer.get_mut(self.offset..end).filter(|_| end <= limit) else {
-            return Err(ImageError::TooLong { length: end + CRC_LENGTH, limit: MAX_LENGTH });
-        };
-        place.copy_from_slice(bytes);
-        self.offset = end;
-        Ok(())
+    fn put(&mut self, bytes: &[u8]) {
+        self.offset += bytes.len();
+        match core::mem::take(&mut self.rest).split_at_mut_checked(bytes.len()) {
+            Some((place, rest)) => {
+                place.copy_from_slice(bytes);
+                self.rest = rest;
+            }
+            None => self.rest = &mut [],
+        }
     }
 
-    fn i32(&mut self, value: i32) -> Result<(), ImageError> {
-        self.put(&value.to_le_bytes())
+    fn i32(&mut self, value: i32) {
+        self.put(&value.to_le_bytes());
     }
 }
 

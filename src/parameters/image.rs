@@ -53,7 +53,7 @@ use super::codec::{Reader, Writer, decode_content, encode_content};
 use crate::friction::network::{MAX_FRACTION, MIN_FRACTION};
 use crate::friction::physical::Terms;
 use crate::friction::state::{JointState, SIGNALS, Signal};
-use crate::friction::{Estimate, FrictionModel, FrictionParameters};
+use crate::friction::{Estimate, FrictionModel, FrictionParameters, ParameterSet};
 
 /// The magic bytes.
 pub const MAGIC: [u8; 4] = *b"JFPI";
@@ -277,24 +277,17 @@ impl Image {
         decode_content(Reader { bytes: content, offset: 0 })
     }
 
-    /// Writes the image to the start of `buffer`; the number of bytes used. An image that [`Image::decode`] would refuse is
-    /// refused here.
+    /// Writes the image to the start of `buffer`; the number of bytes used. An image that [`Image::decode`] would not give
+    /// back is refused.
     pub fn encode(&self, buffer: &mut [u8; MAX_LENGTH]) -> Result<usize, ImageError> {
-        self.friction.check()?;
-        let mut writer = Writer { buffer: &mut buffer[..], offset: 0 };
-        encode_content(self, &mut writer)?;
+        self.check()?;
+        let mut writer = Writer { rest: &mut buffer[..], offset: 0 };
+        encode_content(self, &mut writer);
         let length = writer.offset + CRC_LENGTH;
-        let field = buffer.get_mut(6..8);
-        if let Some(field) = field {
-            field.copy_from_slice(&(length as u16).to_le_bytes());
-        }
-        let Some((content, rest)) = buffer.split_at_mut_checked(length - CRC_LENGTH) else {
-            return Err(ImageError::TooLong { length, limit: MAX_LENGTH });
-        };
-        let Some(place) = rest.first_chunk_mut::<CRC_LENGTH>() else {
-            return Err(ImageError::TooLong { length, limit: MAX_LENGTH });
-        };
-        *place = CRC.checksum(content).to_le_bytes();
+        let too_long = ImageError::TooLong { length, limit: MAX_LENGTH };
+        buffer.get_mut(6..8).ok_or(too_long)?.copy_from_slice(&(length as u16).to_le_bytes());
+        let (content, rest) = buffer.split_at_mut_checked(length - CRC_LENGTH).ok_or(too_long)?;
+        *rest.first_chunk_mut::<CRC_LENGTH>().ok_or(too_long)? = CRC.checksum(content).to_le_bytes();
         Ok(length)
     }
 
@@ -310,29 +303,35 @@ impl Image {
     }
 }
 
-impl FrictionParameters {
-    /// Refuses parameters that no image may hold.
+impl Image {
+    /// Refuses what no image may hold, but its types can.
     fn check(&self) -> Result<(), ImageError> {
+        let Self { friction: FrictionParameters { domain, selector, sets }, golden, .. } = self;
         let field = |name, value: i64, low: i64, high: i64| match (low..=high).contains(&value) {
             true => Ok(()),
             false => Err(ImageError::Field { name, offset: 0, value, low, high }),
         };
-        for (range, signal) in self.domain.ranges.iter().zip(Signal::ALL) {
+        for (range, signal) in domain.ranges.iter().zip(Signal::ALL) {
             field(signal.name(), range.high as i64, range.low as i64, i32::MAX as i64)?;
         }
-        if let [None, Some(second)] = self.selector.criteria {
+        if let [None, Some(second)] = selector.criteria {
             field("second criterion without a first", second.measure as i64, 0, 0)?;
         }
-        for criterion in self.selector.criteria.iter().flatten() {
+        for criterion in selector.criteria.iter().flatten() {
             field("lower threshold", criterion.leave as i64, i32::MIN as i64, criterion.enter as i64)?;
         }
-        for set in self.sets.iter().take(self.selector.sets()) {
+        let last = selector.sets() as i64 - 1;
+        for (index, set) in sets.iter().enumerate() {
+            if *set != ParameterSet::default() {
+                field("index of a set in use", index as i64, 0, last)?;
+            }
             field("terms", set.physical.terms.0 as i64, 0, Terms::ALL.0 as i64)?;
             let Some(network) = &set.network else { continue };
             for neuron in network.hidden.iter().flatten().chain([&network.output]) {
                 field("fraction bits", neuron.fraction as i64, MIN_FRACTION as i64, MAX_FRACTION as i64)?;
             }
         }
-        Ok(())
+        field("number of golden vectors", golden.len() as i64, 1, MAX_GOLDEN as i64)?;
+        golden.iter().try_for_each(|vector| field("golden vector's set", vector.set as i64, 0, last))
     }
 }

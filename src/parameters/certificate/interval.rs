@@ -1,6 +1,9 @@
-//! Closed intervals of 64-bit integers, rounded outwards and held at the ends of the type.
+//! Closed intervals of 64-bit integers, rounded outwards; an end that leaves the type is unbounded and stays so.
 
-/// All values from `low` to `high`.
+/// All values from `low` to `high`; a `low` of `i64::MIN` and a `high` of `i64::MAX` mean that there is no bound on that side.
+///
+/// Were an end merely held at the end of the type, a later term of the other sign would bring it back and hide that a
+/// sum had left the type.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Interval {
     pub(super) low: i64,
@@ -25,7 +28,12 @@ impl Interval {
     }
 
     pub(super) fn add(self, other: Self) -> Self {
-        Self { low: self.low.saturating_add(other.low), high: self.high.saturating_add(other.high) }
+        let lowest = self.low.min(other.low);
+        let highest = self.high.max(other.high);
+        Self {
+            low: if lowest == i64::MIN { lowest } else { self.low.saturating_add(other.low) },
+            high: if highest == i64::MAX { highest } else { self.high.saturating_add(other.high) },
+        }
     }
 
     pub(super) fn union(self, other: Self) -> Self {
@@ -36,8 +44,18 @@ impl Interval {
         self.low <= other.low && other.high <= self.high
     }
 
+    const fn bounded(self) -> bool {
+        self.low > i64::MIN && self.high < i64::MAX
+    }
+
     /// All products of a value of each.
     pub(super) fn times(self, other: Self) -> Self {
+        if self == Self::ZERO || other == Self::ZERO {
+            return Self::ZERO;
+        }
+        if !self.bounded() || !other.bounded() {
+            return Self { low: i64::MIN, high: i64::MAX };
+        }
         let a = self.low.saturating_mul(other.low);
         let b = self.low.saturating_mul(other.high);
         let c = self.high.saturating_mul(other.low);
@@ -47,11 +65,13 @@ impl Interval {
 
     /// Division by a power of two, rounded outwards.
     pub(super) fn shift_right(self, bits: u32) -> Self {
-        if bits > 62 {
-            return Self { low: if self.low < 0 { -1 } else { 0 }, high: if self.high > 0 { 1 } else { 0 } };
+        let bits = bits.min(63);
+        let quotient = self.high >> bits;
+        let rounded_up = if quotient << bits == self.high { quotient } else { quotient + 1 };
+        Self {
+            low: if self.low == i64::MIN { self.low } else { self.low >> bits },
+            high: if self.high == i64::MAX { self.high } else { rounded_up },
         }
-        let round_up = (1i64 << bits) - 1;
-        Self { low: self.low >> bits, high: self.high.saturating_add(round_up) >> bits }
     }
 
     pub(super) fn shift_left(self, bits: u32) -> Self {
@@ -74,5 +94,43 @@ impl Interval {
     /// Largest magnitude; held at the end of the type.
     pub(super) fn magnitude(self) -> u32 {
         self.low.unsigned_abs().max(self.high.unsigned_abs()).min(u32::MAX as u64) as u32
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn interval(a: i64, b: i64) -> Interval {
+        Interval::between(a, b)
+    }
+
+    #[test]
+    fn an_end_that_left_the_type_does_not_come_back() {
+        let far = Interval::point(i64::MAX - 1).add(Interval::point(i64::MAX - 1));
+        assert_eq!(far.high, i64::MAX);
+        assert_eq!(far.add(Interval::point(-1000)).high, i64::MAX);
+        assert_eq!(far.shift_right(40).high, i64::MAX);
+        assert_eq!(far.times(Interval::point(-1)).low, i64::MIN);
+        assert_eq!(far.times(Interval::ZERO), Interval::ZERO);
+    }
+
+    proptest! {
+        #[test]
+        fn operations_contain_what_they_bound(a: i64, b: i64, c: i64, d: i64, s in 0.0f64..=1.0, t in 0.0f64..=1.0, bits in 0u32..70) {
+            let pick = |i: Interval, part: f64| (i.low as f64 + (i.high as f64 - i.low as f64) * part) as i64;
+            let (first, second) = (interval(a, b), interval(c, d));
+            let (x, y) = (pick(first, s).clamp(first.low, first.high), pick(second, t).clamp(second.low, second.high));
+            let holds = |i: Interval, value: i128| {
+                (i.low == i64::MIN || i.low as i128 <= value) && (i.high == i64::MAX || value <= i.high as i128)
+            };
+            prop_assert!(holds(first.add(second), x as i128 + y as i128));
+            prop_assert!(holds(first.times(second), x as i128 * y as i128));
+            prop_assert!(holds(first.shift_right(bits), x as i128 >> bits));
+            prop_assert!(holds(first.shift_right(bits), -((-(x as i128)) >> bits)));
+            prop_assert!(holds(first.shift_left(bits.min(62)), (x as i128) << bits.min(62)));
+            prop_assert!(holds(first.abs(), (x as i128).abs()));
+        }
     }
 }

@@ -9,13 +9,17 @@
 //! - no sum wraps, in the network or in the physical model;
 //! - |friction|, |network| never exceed the stated torques;
 //! - the slope of the network over measured torque, which closes a loop around the compensation, and the slope of
-//!   friction over velocity, which is negative damping, stay within the stated intervals. The fixed-point model is a fine
-//!   staircase: between two states that differ in that signal alone it moves by at most slope times distance plus
-//!   twice the [resolution](Certificate::resolution).
+//!   friction over velocity, which is negative damping, stay within the stated intervals; these contain zero, the slope
+//!   where a signal is clamped or a torque saturates. The fixed-point model is a fine staircase: between two states that differ
+//!   in that signal alone it moves by at most slope times distance plus twice the [resolution](Certificate::resolution).
+//!
+//! Not certified: what the [fade](crate::friction::domain::Fade) beyond the trained box and the cross-fade between sets add to these slopes.
+//! The compensation limits both by its slew rate.
 
 mod interval;
 mod network;
 mod physical;
+mod slopes;
 
 use crate::friction::FrictionParameters;
 use crate::friction::network::Network;
@@ -45,11 +49,11 @@ pub struct Certificate {
     pub output: u32,
     /// |network| is at most this, Q16.16.
     pub network: u32,
-    /// |d(network) / d(measured torque)| is at most this, Q16.16.
+    /// |d(network) / d(measured torque)| is at most this, Q16.16; `u32::MAX`: nothing is proved.
     pub torque_gain: u32,
-    /// d(friction) / d(velocity) is at least this, 1/256 Nm s/rad.
+    /// d(friction) / d(velocity) is at least this, 1/256 Nm s/rad; never positive; `i64::MIN`: nothing is proved.
     pub velocity_slope_low: i64,
-    /// d(friction) / d(velocity) is at most this, 1/256 Nm s/rad.
+    /// d(friction) / d(velocity) is at most this, 1/256 Nm s/rad; never negative; `i64::MAX`: nothing is proved.
     pub velocity_slope_high: i64,
     /// The fixed-point staircase departs from the smooth model that the slopes are of by at most this, Q16.16.
     pub resolution: u32,
@@ -109,15 +113,15 @@ impl core::fmt::Display for Refusal {
                 write!(f, "physical model can overflow: set {set} can leave +-32768, the range of Q16.16")
             }
             Self::Output { bound, limit } => {
-                let [bound, limit] = [bound, limit].map(Thousandths::of_q16);
+                let [bound, limit] = [bound, limit].map(Decimal::of_q16);
                 write!(f, "friction can reach {bound}, limit {limit} Nm")
             }
             Self::TorqueGain { bound, limit } => {
-                let [bound, limit] = [bound, limit].map(Thousandths::of_q16);
+                let [bound, limit] = [bound, limit].map(Decimal::of_q16);
                 write!(f, "d(network)/d(measured torque) can reach {bound}, limit {limit}")
             }
             Self::VelocitySlope { bound, limit } => {
-                let [bound, limit] = [bound, limit as i64].map(|q8| Thousandths(q8.saturating_mul(1000) >> 8));
+                let [bound, limit] = [bound, limit as i64].map(Decimal::of_q8);
                 write!(f, "d(friction)/d(velocity) can reach {bound}, limit {limit} Nm s/rad")
             }
         }
@@ -126,18 +130,31 @@ impl core::fmt::Display for Refusal {
 
 impl core::error::Error for Refusal {}
 
-/// A decimal with three places, printed without floating point.
-struct Thousandths(i64);
+/// A binary fraction, printed without floating point, cut to so many places that two that differ look different.
+struct Decimal {
+    value: i64,
+    fraction_bits: u32,
+    places: u32,
+}
 
-impl Thousandths {
+impl Decimal {
     fn of_q16(bits: u32) -> Self {
-        Self((bits as i64 * 1000) >> 16)
+        Self { value: bits as i64, fraction_bits: 16, places: 5 }
+    }
+
+    fn of_q8(bits: i64) -> Self {
+        Self { value: bits, fraction_bits: 8, places: 3 }
     }
 }
 
-impl core::fmt::Display for Thousandths {
+impl core::fmt::Display for Decimal {
     fn fmt(&self, f: &mut core::fmt::Formatter) -> core::fmt::Result {
-        write!(f, "{}.{:03}", self.0 / 1000, (self.0 % 1000).unsigned_abs())
+        let &Self { value, fraction_bits, places } = self;
+        let magnitude = value.unsigned_abs();
+        let whole = magnitude >> fraction_bits;
+        let fraction = ((magnitude - (whole << fraction_bits)) * 10u64.pow(places)) >> fraction_bits;
+        let sign = if value < 0 { "-" } else { "" };
+        write!(f, "{sign}{whole}.{fraction:0width$}", width = places as usize)
     }
 }
 
@@ -175,7 +192,7 @@ pub fn certify(parameters: &FrictionParameters, limits: &Limits) -> Result<Certi
     if proved.output > limits.output {
         return Err(Refusal::Output { bound: proved.output, limit: limits.output });
     }
-    if proved.torque_gain > limits.torque_gain {
+    if proved.torque_gain > limits.torque_gain || proved.torque_gain == u32::MAX {
         return Err(Refusal::TorqueGain { bound: proved.torque_gain, limit: limits.torque_gain });
     }
     for bound in [proved.velocity_slope_low, proved.velocity_slope_high] {
@@ -247,5 +264,19 @@ impl Interval {
         // Full scale is 2^(15 - shift) units: divide by it, and by 2^8 for the change from Q16 to Q8.
         let right = 8 + 15 - shift as i32;
         if right >= 0 { self.shift_right(right as u32) } else { self.shift_left(right.unsigned_abs()) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_refusal_tells_a_bound_from_a_limit_one_unit_below_and_keeps_its_sign() {
+        let output = Refusal::Output { bound: 65_537, limit: 65_536 }.to_string();
+        assert_eq!(output, "friction can reach 1.00001, limit 1.00000 Nm");
+        let slope = Refusal::VelocitySlope { bound: -129, limit: 128 }.to_string();
+        assert_eq!(slope, "d(friction)/d(velocity) can reach -0.503, limit 0.500 Nm s/rad");
+        assert_eq!(Decimal::of_q8(i64::MIN).to_string(), "-36028797018963968.000");
     }
 }

@@ -1,13 +1,13 @@
 //! Bounds of the network: torque, slopes over measured torque and velocity, for every input in the box.
 
 use super::interval::Interval;
-use super::{MAX_DEPTH, bisect};
+use super::{bisect, slopes};
 use crate::dsp::smmul;
 use crate::friction::domain::Domain;
 use crate::friction::network::{
     INPUTS, InputScale, MIN_FRACTION, NEURONS, Network, NetworkParameters, Neuron, to_torque,
 };
-use crate::friction::smooth::{TANH, tanh};
+use crate::friction::smooth::tanh;
 use crate::friction::state::Signal;
 
 /// What holds of the network in the whole box.
@@ -36,46 +36,28 @@ struct Cell {
     inputs: [(i32, i32); INPUTS],
 }
 
-/// What holds in one cell; slopes are over scaled inputs, in units of the network's output, Q20.
-#[derive(Clone, Copy)]
-struct CellBounds {
-    torque: Interval,
-    slopes: [Interval; SLOPES],
-}
-
-/// Inputs whose slopes are bounded.
-const SLOPE_INPUTS: [usize; SLOPES] = [Signal::MeasuredTorque as usize, Signal::Velocity as usize];
-const SLOPES: usize = 2;
-/// Fraction bits of slopes.
-const SLOPE_BITS: u32 = 20;
 /// The bias' input, Q15.
 const ONE: i64 = 0x7fff;
 
 pub(super) fn bounds(network: &Network, parameters: &NetworkParameters, domain: &Domain) -> Result<Bounds, Overflow> {
     let root = Cell { inputs: network.input_intervals() };
     check_sums(&root, parameters)?;
-    let found = bisect(
+    let torque = bisect(
         root,
-        &|cell| cell_bounds(cell, parameters),
-        &|a, b| CellBounds {
-            torque: a.torque.union(b.torque),
-            slopes: [a.slopes[0].union(b.slopes[0]), a.slopes[1].union(b.slopes[1])],
-        },
-        &|found, new| {
-            found.torque.contains(new.torque)
-                && found.slopes[0].contains(new.slopes[0])
-                && found.slopes[1].contains(new.slopes[1])
-        },
+        &|cell| Layers::of(cell, parameters).output.map(|sum| to_torque(sum as i32, parameters.scale) as i64),
+        &|a, b| a.union(b),
+        &|found, new| found.contains(*new),
         &|cell| split(cell, parameters),
     );
-    let slope = |which: usize, fraction_bits: u32| {
-        let half_width = domain.ranges[SLOPE_INPUTS[which]].half_width();
-        per_signal(found.slopes[which], parameters.scale, half_width, fraction_bits)
+    let tanh_slopes = Layers::of(&root, parameters).sums.map(|sums| sums.map(slopes::of_tanh));
+    let slope = |signal: Signal, fraction_bits: u32| {
+        let over_input = slopes::over_input(parameters, &tanh_slopes, signal as usize);
+        per_signal(over_input, parameters.scale, domain.ranges[signal as usize].half_width(), fraction_bits)
     };
     Ok(Bounds {
-        torque: found.torque,
-        torque_gain: slope(0, 16),
-        velocity_slope: slope(1, 8),
+        torque,
+        torque_gain: slope(Signal::MeasuredTorque, 16),
+        velocity_slope: slope(Signal::Velocity, 8),
         resolution: resolution(parameters),
     })
 }
@@ -85,15 +67,24 @@ fn per_signal(slope: Interval, scale: i32, half_width: u32, fraction_bits: u32) 
     let Some(divisor) = core::num::NonZeroU64::new(half_width as u64) else {
         return Interval::ZERO; // an input without a range has no influence
     };
-    let torque = slope.times(Interval::point(scale as i64)).shift_right(SLOPE_BITS - fraction_bits);
+    let torque = slope.times(Interval::point(scale as i64)).shift_right(slopes::FRACTION_BITS - fraction_bits);
     // Outwards: one more than the truncated quotient, and for the input's gain, which is short by less than 2^-28.
     let divide = |value: i64| {
         let quotient = value.unsigned_abs() / divisor;
         ((quotient + (quotient >> 27) + 1).min(i64::MAX as u64)) as i64
     };
+    // Zero belongs to it, for beyond the range the input is clamped; what has no bound keeps none.
     Interval {
-        low: if torque.low < 0 { -divide(torque.low) } else { 0 },
-        high: if torque.high > 0 { divide(torque.high) } else { 0 },
+        low: match torque.low {
+            i64::MIN => i64::MIN,
+            low if low < 0 => -divide(low),
+            _ => 0,
+        },
+        high: match torque.high {
+            i64::MAX => i64::MAX,
+            high if high > 0 => divide(high),
+            _ => 0,
+        },
     }
 }
 
@@ -149,66 +140,27 @@ fn check_sums(root: &Cell, parameters: &NetworkParameters) -> Result<(), Overflo
     check(3, 0, raw_sum(&parameters.output, &active)).map(|_| ())
 }
 
-fn cell_bounds(cell: &Cell, parameters: &NetworkParameters) -> CellBounds {
-    let sums = first_sums(cell, parameters);
-    let mut active = activations(sums);
-    let derivatives = sums.map(tanh_slopes);
-    let mut slopes = SLOPE_INPUTS.map(|input| {
-        let mut layer = [Interval::ZERO; NEURONS];
-        for ((place, weights), derivative) in layer.iter_mut().zip(&parameters.first).zip(&derivatives) {
-            // Weight Q26 times table slope Q14.
-            *place = derivative.times(Interval::point(weights[input] as i64)).shift_right(26 + 14 - SLOPE_BITS);
-        }
-        layer
-    });
-    for neurons in &parameters.hidden {
-        let mut sums = [Interval::ZERO; NEURONS];
-        for (neuron, place) in neurons.iter().zip(&mut sums) {
-            *place = shifted(neuron, raw_sum(neuron, &active));
-        }
-        let derivatives = sums.map(tanh_slopes);
-        slopes = slopes.map(|before| {
-            let mut layer = [Interval::ZERO; NEURONS];
-            for ((place, neuron), derivative) in layer.iter_mut().zip(neurons).zip(&derivatives) {
-                *place = weighted(neuron, &before).times(*derivative).shift_right(14);
-            }
-            layer
-        });
-        active = activations(sums);
-    }
-    let output = shifted(&parameters.output, raw_sum(&parameters.output, &active));
-    CellBounds {
-        torque: output.map(|sum| to_torque(sum as i32, parameters.scale) as i64),
-        slopes: slopes.map(|layer| weighted(&parameters.output, &layer)),
+/// What the layers can give in one cell.
+struct Layers {
+    /// Sums of the three hidden layers, Q25.
+    sums: [[Interval; NEURONS]; 3],
+    /// The output's sum, Q25.
+    output: Interval,
+}
+
+impl Layers {
+    fn of(cell: &Cell, parameters: &NetworkParameters) -> Self {
+        let [second, third] = &parameters.hidden;
+        let sums_0 = first_sums(cell, parameters);
+        let sums_1 = hidden_sums(second, &activations(sums_0));
+        let sums_2 = hidden_sums(third, &activations(sums_1));
+        let output = shifted(&parameters.output, raw_sum(&parameters.output, &activations(sums_2)));
+        Self { sums: [sums_0, sums_1, sums_2], output }
     }
 }
 
-/// Weighted sum of slopes.
-fn weighted(neuron: &Neuron, slopes: &[Interval; NEURONS]) -> Interval {
-    let mut sum = Interval::ZERO;
-    for (weight, slope) in neuron.weights.iter().zip(slopes) {
-        sum = sum.add(slope.times(Interval::point(*weight as i64)));
-    }
-    sum.shift_right(neuron.fraction as u32)
-}
-
-/// Slopes of the tanh table, Q14, over an interval of arguments in Q25.
-///
-/// The slope falls with the distance from zero, up to the rounding of the knots: one unit of Q15 on either side of a step.
-fn tanh_slopes(sum: Interval) -> Interval {
-    const ROUNDING: i64 = 32;
-    let step = |end: i64| (end >> 20).clamp(-256, 255);
-    let (low, high) = (step(sum.low), step(sum.high));
-    let slope = |step: i64| TANH[(step + 256) as usize & 511] as i16 as i64;
-    let steepest = if low > 0 {
-        slope(low)
-    } else if high < 0 {
-        slope(high)
-    } else {
-        slope(0).max(slope(-1))
-    };
-    let flattest = slope(low).min(slope(high));
-    Interval { low: (flattest - ROUNDING).max(0), high: (steepest + ROUNDING).min(16384) }
+fn hidden_sums(neurons: &[Neuron; NEURONS], activations: &[Interval; NEURONS]) -> [Interval; NEURONS] {
+    neurons.each_ref().map(|neuron| shifted(neuron, raw_sum(neuron, activations)))
 }
 
 /// Halves the cell along the input that moves the first layer most; nothing when no input moves it.
@@ -234,8 +186,8 @@ fn split(cell: &Cell, parameters: &NetworkParameters) -> Option<(Cell, Cell)> {
 /// Worst departure of the fixed-point network from exact arithmetic on the same weights and tables, Q16.16.
 fn resolution(parameters: &NetworkParameters) -> u32 {
     // In units of 2^-31. Layer 0: a sum is short by at most six units of Q25 and by the fraction's 12 bits (2^-17);
-    // the scaled input by 2^-28 times the weights (below 2^6). An activation is cut to Q15.
-    const SUM: i64 = (6 << 6) + (1 << 14) + (1 << 9);
+    // the one input that differs is cut by at most four units of Q31, times a weight below 2^5. An activation is cut to Q15.
+    const SUM: i64 = (6 << 6) + (1 << 14) + (4 << 5);
     const CUT: i64 = 1 << 16;
     let spread = |neuron: &Neuron, error: [i64; NEURONS]| {
         let mut sum = 0i64;
@@ -252,12 +204,10 @@ fn resolution(parameters: &NetworkParameters) -> u32 {
         }
         error = next;
     }
-    let output = spread(&parameters.output, error).saturating_add(1 << 6);
+    let output = spread(&parameters.output, error).saturating_add(1 + (1 << 6));
     let torque = (output >> 8).saturating_add(1).saturating_mul((parameters.scale as i64).abs()) >> 23;
     torque.saturating_add(2).min(u32::MAX as i64) as u32
 }
-
-const _: () = assert!(MAX_DEPTH < 16);
 
 impl Network {
     /// The scaled inputs that the box can give, Q31.

@@ -50,8 +50,9 @@ pub(super) fn bounds(physical: &Physical) -> Option<Bounds> {
     let fits = Interval::symmetric((1 << 62) - (1 << 31));
     fits.contains(found.sum).then(|| Bounds {
         torque: found.sum.map(|sum| narrow(sum) as i64),
-        slope: found.slope,
-        resolution: resolution(physical),
+        // Zero belongs to it, for beyond the box the velocity is clamped.
+        slope: found.slope.union(Interval::ZERO),
+        resolution: resolution(physical, &box_),
     })
 }
 
@@ -89,12 +90,31 @@ fn rounded_times(a: Interval, b: Interval) -> Interval {
         .union(Interval::between(corner(a.low, b.high), corner(a.high, b.low)))
 }
 
+fn product(coefficient: i32, signal: Interval) -> Interval {
+    signal.times(Interval::point(coefficient as i64))
+}
+
+/// Part of a factor, Q16.16.
+fn factor_part(coefficient: i32, signal: Interval) -> Interval {
+    product(coefficient, signal).map(|p| narrow(p) as i64)
+}
+
+fn clip(interval: Interval) -> Interval {
+    interval.map(|value| saturate(value) as i64)
+}
+
+/// The Coulomb levels, with their factor, that a velocity interval can select, Q16.16.
+fn coulomb_levels(physical: &Physical, box_: &[Interval; SIGNALS], velocity: Interval) -> Interval {
+    let [_, _, load, _, th, _] = *box_;
+    let c = &physical.coefficients;
+    let factor =
+        clip(clip(ONE.add(factor_part(c.coulomb_temperature, th))).add(factor_part(c.coulomb_load, load.abs())));
+    rounded_times(level(physical.coulomb, velocity), factor)
+}
+
 fn cell_bounds(physical: &Physical, box_: &[Interval; SIGNALS], v: Interval) -> CellBounds {
     let [q, _, load, _, th, a] = *box_;
     let c = &physical.coefficients;
-    let product = |coefficient: i32, signal: Interval| signal.times(Interval::point(coefficient as i64));
-    let factor_part = |coefficient: i32, signal: Interval| product(coefficient, signal).map(|p| narrow(p) as i64);
-    let clip = |i: Interval| i.map(|value| saturate(value) as i64);
 
     let mut sum = Interval::point((c.constant as i64) << 31)
         .add(product(c.position, q))
@@ -114,9 +134,7 @@ fn cell_bounds(physical: &Physical, box_: &[Interval; SIGNALS], v: Interval) -> 
 
     let argument = product(c.coulomb_slope, v).map(|p| saturate(p >> 22) as i64);
     let direction = argument.map(|x| tanh(x as i32) as i64);
-    let coulomb_factor =
-        clip(clip(ONE.add(factor_part(c.coulomb_temperature, th))).add(factor_part(c.coulomb_load, load.abs())));
-    let coulomb = rounded_times(level(physical.coulomb, v), coulomb_factor);
+    let coulomb = coulomb_levels(physical, box_, v);
     sum = sum.add(coulomb.times(direction));
     // Slope of the direction over full-scale velocity, Q16: table slope Q14 times 1 / v_c in Q16.
     let edge = tanh_slopes(argument).times(Interval::point(c.coulomb_slope as i64)).shift_right(14);
@@ -198,16 +216,89 @@ fn atan_slopes(argument: Interval) -> Interval {
     Interval { low: 0, high: ((STEEPEST << 16) / divisor) as i64 + 64 }
 }
 
-/// Worst departure from the smooth model: arguments are cut to 17 fraction bits before the tables, factors rounded to Q16.
-fn resolution(physical: &Physical) -> u32 {
-    let magnitude = |pair: Directional| (pair.positive as i64).abs().max((pair.negative as i64).abs());
-    let harmonics: i64 =
-        physical.harmonic_mean.iter().chain(&physical.harmonic_difference).map(|a| (*a as i64).abs()).sum();
-    // Coulomb: 2^-17 of its level and as much for the factor; Stribeck: slope 2.4 at 2^-18; atan: knots at 2^-15;
-    // harmonics follow the same direction as Coulomb friction.
-    let levels = (magnitude(physical.coulomb) >> 14)
-        + (magnitude(physical.stribeck) >> 15)
-        + ((physical.hysteresis as i64).abs() >> 13)
-        + (harmonics >> 15);
-    (levels + 4).min(u32::MAX as i64) as u32
+/// Worst departure from the smooth model whose slopes are bounded, Q16.16.
+fn resolution(physical: &Physical, box_: &[Interval; SIGNALS]) -> u32 {
+    let coulomb = coulomb_levels(physical, box_, box_[Signal::Velocity as usize]).abs().high;
+    let stribeck = level(physical.stribeck, box_[Signal::Velocity as usize]).abs().high;
+    let harmonics: i64 = physical.harmonic_difference.iter().map(|a| (*a as i64).abs()).sum();
+    // Arguments are cut to 17 fraction bits before tanh (slope 1), to 18 before the Stribeck bump (slope 2.33): hardly more
+    // than 2^-17 of the Coulomb level and of the harmonics that follow the same edge, 2^-16.7 of the Stribeck level. Twice that, because
+    // where two directions have different levels, they meet at this distance from zero. The arc tangent's argument and
+    // reciprocal are rounded at 2^-16 (slope 2 / pi).
+    let levels = (coulomb >> 16) + (harmonics >> 16) + (stribeck >> 15) + ((physical.hysteresis as i64).abs() >> 15);
+    // Shifts above, v |v|, the harmonics' two roundings and the last one.
+    (levels + 4 + 1 + 2 + 1).min(u32::MAX as i64) as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::friction::smooth::odd_sines;
+    use proptest::prelude::*;
+
+    /// Every interval of whole steps of a table, with the hull of a property of its steps.
+    fn for_every_interval(of_step: impl Fn(i64) -> Interval, mut check: impl FnMut(Interval, Interval)) {
+        for first in -256i64..256 {
+            let mut hull = of_step(first);
+            for last in first..256 {
+                hull = hull.union(of_step(last));
+                check(Interval { low: first << 20, high: (last << 20) + (1 << 20) - 1 }, hull);
+            }
+        }
+    }
+
+    fn slope_of(table: &'static [i32; 512]) -> impl Fn(i64) -> Interval {
+        |step| Interval::point(table[(step + 256) as usize] as i16 as i64)
+    }
+
+    #[test]
+    fn slopes_of_both_tables_are_bounded_over_every_interval() {
+        for_every_interval(slope_of(&TANH), |steps, exact| assert!(tanh_slopes(steps).contains(exact), "{steps:?}"));
+        for_every_interval(slope_of(&STRIBECK), |steps, exact| {
+            assert!(stribeck_slopes(steps).contains(exact), "{steps:?}");
+        });
+    }
+
+    #[test]
+    fn the_stribeck_bump_is_bounded_over_every_interval_and_turns_only_at_its_peaks() {
+        let step_values = |step: i64| {
+            let at = |x: i64| stribeck(x as i32) as i64;
+            Interval::between(at(step << 20), at((step << 20) + (1 << 20) - 1))
+        };
+        for_every_interval(step_values, |steps, exact| {
+            let bound = stribeck_values(steps);
+            assert!(bound.contains(exact), "{steps:?}: {exact:?} not in {bound:?}");
+            // The bump is flat near a peak: a step or two beside it, the peak is a thousandth too high a bound.
+            assert!(bound.high - exact.high < 1 << 21 && exact.low - bound.low < 1 << 21, "{steps:?}");
+        });
+    }
+
+    proptest! {
+        #[test]
+        fn the_stribeck_bump_is_bounded_between_any_two_arguments(a in -(5i64 << 26)..5 << 26, b in -(5i64 << 26)..5 << 26, part in 0.0f64..=1.0) {
+            let arguments = Interval::between(a, b);
+            let between = a + ((b - a) as f64 * part) as i64;
+            prop_assert!(stribeck_values(arguments).contains(Interval::point(stribeck(between as i32) as i64)));
+        }
+
+        #[test]
+        fn the_arc_tangent_rises_by_no_more_than_its_slope_times_the_distance(
+            x in prop_oneof![-(3i32 << 16)..3 << 16, any::<i32>()],
+            distance in (0u32..31).prop_flat_map(|bits| 0..1i32 << bits),
+        ) {
+            let end = x.saturating_add(distance);
+            let slopes = atan_slopes(Interval { low: x as i64, high: end as i64 });
+            // Q31 of a quarter turn; slope Q16 times distance Q16 is Q32. The argument is rounded at 2^-16.
+            let rise = atan(end) as i64 - atan(x) as i64;
+            let slack = 2 << 15;
+            prop_assert!(rise >= 0 && rise <= ((slopes.high * (end as i64 - x as i64)) >> 1) + slack, "{} {}", x, rise);
+        }
+    }
+
+    #[test]
+    fn sines_exceed_one_by_less_than_is_allowed_for() {
+        let largest = (0..u32::MAX).step_by(9_973).flat_map(odd_sines).map(|sine| sine.unsigned_abs()).max();
+        let largest = largest.unwrap_or(0);
+        assert!(largest < (1 << 30) + (1 << 20), "{largest}");
+    }
 }

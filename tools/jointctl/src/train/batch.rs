@@ -143,13 +143,8 @@ impl<'a> Pass<'a> {
 
     /// Weighted sum of squared errors of a block.
     pub(super) fn squared_error(&mut self, parameters: &[f64], block: &Block) -> f64 {
-        let output = self.forward(parameters, block);
-        let mut sum = 0.0;
-        for s in 0..BLOCK {
-            let error = (output[s] - block.targets[s]) * block.root_weights[s];
-            sum += error * error;
-        }
-        sum
+        self.forward(parameters, block);
+        self.weighted_errors(block).iter().map(|error| error * error).sum()
     }
 
     /// Weighted errors of the block that was evaluated last.

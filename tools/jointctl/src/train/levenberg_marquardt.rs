@@ -24,8 +24,14 @@ pub struct Options {
     /// Limit of epochs.
     pub max_epochs: usize,
     /// Epochs without improvement of the validation error after which training stops.
+    ///
+    /// The toolbox's 6 ends many runs on a plateau, some before the first improvement: where time allows, ten times that
+    /// finds better networks on recorded joints.
     pub max_fail: usize,
     /// Penalty on the sum of squared weights, in units of the normalised mean squared error.
+    ///
+    /// It keeps directions that no sample determines from growing. Between 0 and 1e-4 its effect on recorded joints is
+    /// smaller than that of another seed.
     pub decay: f64,
     /// Bounds of the weights.
     pub bounds: Bounds,
@@ -44,7 +50,7 @@ impl Default for Options {
             seeds: (0..4).collect(),
             max_epochs: 1000,
             max_fail: 6,
-            decay: 1e-6,
+            decay: 1e-5,
             bounds: Bounds::Firmware,
             gradient_tolerance: 1e-7,
             cost_tolerance: 0.0,

@@ -12,5 +12,5 @@ pub const HIDDEN: usize = 16;
 
 /// Options that make [`super::levenberg_marquardt::train`] the paper's trainer, for the runs `seeds`.
 pub fn options(seeds: Vec<u64>) -> Options {
-    Options { hidden: vec![HIDDEN], seeds, decay: 0.0, bounds: Bounds::None, ..Options::default() }
+    Options { hidden: vec![HIDDEN], seeds, max_fail: 6, decay: 0.0, bounds: Bounds::None, ..Options::default() }
 }
