@@ -16,7 +16,7 @@ pub fn central_difference(values: &[f64], period: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Backward difference (x[i] - x[i-1]) / T, zero at the start: what is known at the instant itself, half a period late.
+/// Backward difference `(x[i] - x[i-1]) / T`, zero at the start: what is known at the instant itself, half a period late.
 pub fn backward_difference(values: &[f64], period: f64) -> Vec<f64> {
     let before = values.first().into_iter().chain(values);
     values.iter().zip(before).map(|(now, before)| (now - before) / period).collect()

@@ -50,7 +50,7 @@ pub struct Options {
     #[serde(skip)]
     pub augment: Augment,
     /// Inputs that the network uses: position, velocity, theoretical torque, measured torque, temperature; None: position and
-    /// velocity, and the others by the rules of [`learn`].
+    /// velocity; the theoretical torque where there is gravity; the temperature where it varies by 10 K.
     pub inputs: Option<[bool; 5]>,
     /// Least fall of the validation error, as a fraction, for which a network is kept.
     pub least_gain: f64,
