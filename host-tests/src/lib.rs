@@ -1,6 +1,7 @@
-//! What several scenarios share: friction parameters and joint states drawn from a seed, and the friction model once more in
-//! arithmetic too wide to overflow.
+//! What several scenarios share: friction parameters and joint states drawn from a seed, the friction model once more in
+//! arithmetic too wide to overflow, and images as bytes.
 
+pub mod image_bytes;
 pub mod parameters;
 pub mod states;
 pub mod wide;
