@@ -188,7 +188,7 @@ impl Compensation {
         let wanted = if network_acts { full } else { self.permitted(physical, settings) };
 
         let last = self.last.to_bits();
-        let torque = wanted.torque.clamp(last.saturating_sub(settings.slew), last.saturating_add(settings.slew));
+        let torque = wanted.torque.max(last.saturating_sub(settings.slew)).min(last.saturating_add(settings.slew));
         self.last = Torque::from_bits(torque);
 
         let acting = match () {
@@ -210,7 +210,7 @@ impl Compensation {
     #[inline(always)]
     fn permitted(&self, torque: i32, settings: &Settings) -> Permitted {
         let scaled = weigh(torque, settings.gain);
-        let torque = scaled.clamp(settings.clamp.saturating_neg(), settings.clamp);
+        let torque = scaled.max(settings.clamp.saturating_neg()).min(settings.clamp);
         Permitted { torque, limited: torque != scaled }
     }
 

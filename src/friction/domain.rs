@@ -15,6 +15,12 @@ impl Range {
     /// The range of a signal that the model does not depend on: never left.
     pub const ANY: Self = Self { low: i32::MIN, high: i32::MAX };
 
+    /// The value of the range that is nearest to `value`. (`i32::clamp` would panic on an inverted range.)
+    #[inline(always)]
+    pub fn nearest(self, value: i32) -> i32 {
+        value.max(self.low).min(self.high)
+    }
+
     /// Middle of the range, rounded up.
     pub const fn centre(self) -> i32 {
         ((self.low as i64 + self.high as i64 + 1) >> 1) as i32
@@ -110,7 +116,7 @@ impl Edge {
     /// Parts of the first and of the second margin that `value` has crossed, Q31.
     #[inline(always)]
     fn crossed(&self, value: i32) -> (i32, i32) {
-        let nearest = value.clamp(self.range.low, self.range.high);
+        let nearest = self.range.nearest(value);
         let distance = value.abs_diff(nearest);
         (self.part(distance), self.part(distance.saturating_sub(self.margin)))
     }

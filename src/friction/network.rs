@@ -74,7 +74,7 @@ impl InputScale {
     /// The scaled input, Q31.
     #[inline(always)]
     pub fn apply(&self, value: i32) -> i32 {
-        let centred = value.clamp(self.range.low, self.range.high).wrapping_sub(self.centre);
+        let centred = self.range.nearest(value).wrapping_sub(self.centre);
         smmul(centred.wrapping_shl(self.shift), self.gain) << 2
     }
 }

@@ -331,7 +331,7 @@ impl Physical {
         let mut scaled = [0; SIGNALS];
         for i in 0..SIGNALS {
             let range = self.ranges[i];
-            let clamped = signals[i].clamp(range.low, range.high);
+            let clamped = range.nearest(signals[i]);
             let origin = if i == Signal::Temperature as usize { self.reference_temperature } else { 0 };
             scaled[i] = clamped.saturating_sub(origin).wrapping_shl(self.shifts[i]);
         }

@@ -134,7 +134,7 @@ fn blend(old: Torque, new: Torque, weight: i32) -> Torque {
     let part = (smmul(half, weight) as i64) << 2;
     let blended = new.to_bits() as i64 + part;
     let (low, high) = if old < new { (old, new) } else { (new, old) };
-    Torque::from_bits(blended.clamp(low.to_bits() as i64, high.to_bits() as i64) as i32)
+    Torque::from_bits(blended.max(low.to_bits() as i64).min(high.to_bits() as i64) as i32)
 }
 
 #[cfg(test)]

@@ -180,7 +180,11 @@ pub fn fit(prepared: &mut Prepared, options: &Options, progress: &dyn Progress) 
             description: prepared.description.name.clone(),
             options: option_list(options),
             seed: options.seed,
-            created: if options.created == 0 { "not stated".to_owned() } else { options.created.to_string() },
+            created: if options.created == 0 {
+                "creation time not stated".to_owned()
+            } else {
+                options.created.to_string()
+            },
         },
         stages: stages(prepared),
         parameters: physical.parameters.iter().map(parameter).collect(),

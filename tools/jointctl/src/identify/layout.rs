@@ -347,8 +347,9 @@ mod tests {
 
     #[test]
     fn a_model_survives_the_way_into_the_vector_and_back() {
-        let truth = friction(free().terms);
         let layout = layout(&free());
+        let bounds = layout.bounds()[layout.column_of(P::HarmonicFrequency).unwrap()];
+        let truth = FrictionModel { harmonic_frequency: 0.5 * (bounds.0 + bounds.1), ..friction(free().terms) };
         let (r, f) = layout.decode(&layout.encode(&rigid(), &truth), &truth);
         assert_eq!(r, rigid());
         for p in P::all().into_iter().filter(|&p| p != P::LoadSlope) {

@@ -1,0 +1,125 @@
+//! The library on the board's core: it links no panic and no floating-point library, and gives the host's bits.
+//!
+//! Needs the target `thumbv7em-none-eabihf`, and for the bits `qemu-system-arm`. Where they are missing the tests are reported
+//! as ignored, by name; with `CI` set they run and fail.
+
+#[path = "../probe/src/sequence.rs"]
+mod sequence;
+
+use host_tests::image_bytes::encoded;
+use host_tests::parameters::{image, tame};
+use joint_firmware::parameters::certificate::{Limits, prove};
+use libtest_mimic::{Arguments, Failed, Trial};
+use object::{Object, ObjectSection, ObjectSymbol};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+const TARGET: &str = "thumbv7em-none-eabihf";
+/// Images that the probe evaluates.
+const IMAGES: usize = 12;
+/// Flash that friction, compensation, parameters and their tables may take, bytes.
+const LARGEST_PROGRAM: u64 = 48 * 1024;
+
+fn main() {
+    let arguments = Arguments::from_args();
+    let required = std::env::var_os("CI").is_some();
+    let target = required || target_installed();
+    let emulator = target && (required || Command::new("qemu-system-arm").arg("--version").output().is_ok());
+    let trials = vec![
+        Trial::test("friction_compensation_and_parameters_link_no_panic_and_no_float_library", links_little)
+            .with_ignored_flag(!target),
+        Trial::test("the_emulated_core_gives_the_same_bits_as_the_host", same_bits).with_ignored_flag(!emulator),
+    ];
+    libtest_mimic::run(&arguments, trials).exit();
+}
+
+fn target_installed() -> bool {
+    let output = Command::new("rustc").args(["--print", "target-libdir", "--target", TARGET]).output();
+    output.is_ok_and(|output| {
+        let folder = String::from_utf8_lossy(&output.stdout).trim().to_owned();
+        Path::new(&folder).read_dir().is_ok_and(|mut files| files.next().is_some())
+    })
+}
+
+/// Images like trained ones, that certify within their own limits.
+fn images() -> Vec<Vec<u8>> {
+    let mut random = ChaCha8Rng::seed_from_u64(7);
+    let mut images = Vec::new();
+    while images.len() < IMAGES {
+        let parameters = tame(&mut random);
+        if prove(&parameters).is_ok() {
+            let limits = Limits { output: u32::MAX, torque_gain: u32::MAX, velocity_slope: u32::MAX };
+            let mut image = image(&mut random, parameters, 4);
+            image.limits = limits;
+            images.push(encoded(&image));
+        }
+    }
+    images
+}
+
+/// Builds the probe around the images; the program's path.
+fn build(name: &str) -> Result<PathBuf, Failed> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("probe");
+    let target = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    std::fs::create_dir_all(&target)?;
+    let mut bytes = Vec::new();
+    for image in images() {
+        bytes.extend_from_slice(&(image.len() as u16).to_le_bytes());
+        bytes.extend_from_slice(&image);
+    }
+    let images = target.join("images.bin");
+    std::fs::write(&images, bytes)?;
+    let flags = format!("-C linker=rust-lld -C link-arg=-T{} -C link-arg=--nmagic", folder.join("link.x").display());
+    let output = Command::new(env!("CARGO"))
+        .args(["build", "--release", "--target", TARGET])
+        .current_dir(&folder)
+        .env("CARGO_TARGET_DIR", &target)
+        .env("PROBE_IMAGES", &images)
+        .env("RUSTFLAGS", flags)
+        .output()?;
+    match output.status.success() {
+        true => Ok(target.join(TARGET).join("release/probe")),
+        false => Err(String::from_utf8_lossy(&output.stderr).into_owned().into()),
+    }
+}
+
+fn links_little() -> Result<(), Failed> {
+    // That it links at all shows that no panic can be reached: see the probe's panic handler.
+    let bytes = std::fs::read(build("links")?)?;
+    let program = object::File::parse(&*bytes)?;
+    let names: Vec<String> = program.symbols().filter_map(|symbol| symbol.name().ok().map(str::to_owned)).collect();
+    let floating = |name: &str| name.starts_with("__aeabi_f") || name.starts_with("__aeabi_d") && !name.contains("div");
+    let unwanted: Vec<&String> = names
+        .iter()
+        .filter(|name| name.contains("panic") || name.contains("unwrap_failed") || floating(name))
+        .collect();
+    if !unwanted.is_empty() || names.is_empty() {
+        return Err(format!("linked: {unwanted:?} of {} symbols", names.len()).into());
+    }
+    let size = |name: &str| program.section_by_name(name).map_or(0, |section| section.size());
+    let (code, constants) = (size(".text"), size(".rodata"));
+    let images: u64 = images().iter().map(|image| image.len() as u64 + 2).sum();
+    println!("code {code} B, tables and constants {} B, without the images of the test", constants - images);
+    match code + constants - images <= LARGEST_PROGRAM {
+        true => Ok(()),
+        false => Err(format!("{} B, at most {LARGEST_PROGRAM} B", code + constants - images).into()),
+    }
+}
+
+fn same_bits() -> Result<(), Failed> {
+    let output = Command::new("qemu-system-arm")
+        .args(["-M", "mps2-an386", "-nographic", "-monitor", "none", "-serial", "none"])
+        .args(["-semihosting-config", "enable=on,target=native", "-kernel"])
+        .arg(build("bits")?)
+        .output()?;
+    let text = format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    let emulated: Vec<u32> = text.lines().filter_map(|line| u32::from_str_radix(line.trim(), 16).ok()).collect();
+    let host: Vec<u32> = images().iter().map(|image| sequence::run(image).unwrap_or(0)).collect();
+    println!("{} images x {} states", host.len(), sequence::STATES);
+    match emulated == host && host.iter().all(|sum| *sum != 0) {
+        true => Ok(()),
+        false => Err(format!("core {emulated:08x?}, host {host:08x?}").into()),
+    }
+}
