@@ -4,5 +4,31 @@
 //! split; the rigid body and the physical friction are identified, a network is trained on what is left, the better
 //! model on validation data is quantised, certified and judged by the same `no_std` code that the board runs.
 
+pub mod augment;
+pub mod certificate_search;
+pub mod classify;
+pub mod clean;
+pub mod commands;
+pub mod dataset;
+pub mod differentiate;
+pub mod equalise;
+pub mod evaluate;
+pub mod filter;
+pub mod fit;
+pub mod friction_model;
+pub mod friction_parameter;
+pub mod identify;
+pub mod image_text;
+pub mod joint_model;
 pub mod levenberg_marquardt;
+pub mod metrics;
+pub mod network;
+pub mod output;
+pub mod presets;
+pub mod progress;
+pub mod quantize;
+pub mod report;
+pub mod rigid;
 pub mod samples;
+pub mod split;
+pub mod train;

@@ -1,0 +1,94 @@
+//! `jointctl evaluate`: an image judged on a recorded joint, beside every preset that is fitted to the same recording.
+
+use super::CommandError;
+use super::image::{read, verify};
+use crate::dataset::{Description, prepare_as};
+use crate::evaluate::{Prediction, error_tables, fixed_point_difference, rigid_beside};
+use crate::fit::{FitError, rigid_model, units};
+use crate::identify::{self, identify};
+use crate::joint_model::{FloatFriction, firmware_states, fixed_point, regimes, replay, rigid_efforts};
+use crate::presets::Preset;
+use crate::progress::{Progress, Terminal};
+use crate::report::{Role, console};
+use clap::Args;
+use std::path::PathBuf;
+
+/// Arguments of `evaluate`.
+#[derive(Debug, Args)]
+pub struct Evaluate {
+    /// Image, binary or TOML
+    image: PathBuf,
+    /// Description of the data set
+    dataset: PathBuf,
+    /// Filter position and velocity forwards only and replay the log sample by sample through the joint's own compensation
+    /// (regimes, fades, full gain), as the joint would meet it; the effort to be predicted stays filtered as described
+    #[arg(long)]
+    causal: bool,
+    /// Print the tables as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+impl Evaluate {
+    /// Runs the command.
+    pub fn run(&self) -> Result<(), CommandError> {
+        let progress = Terminal::new();
+        progress.stage("load and clean");
+        let image = read(&self.image)?;
+        verify(&image, &self.image)?;
+        let causal = self.causal;
+        let mut prepared = prepare_as(&self.dataset, |description: &mut Description| {
+            description.filter.causal_motion |= causal;
+        })?;
+        let unit = prepared.description.columns.effort.unit.symbol();
+        if unit != image.effort.symbol() {
+            let text = format!("the image speaks of {}, the data set of {unit}", image.effort.symbol());
+            return Err(CommandError::Arguments(text));
+        }
+        let rigid_model = rigid_model(&prepared.description.rigid);
+        let choices = identify::Options { units: units(&prepared), ..identify::Options::default() };
+        let mut predictions = Vec::new();
+        progress.stage("identify");
+        for preset in Preset::ALL {
+            progress.detail(preset.name());
+            let samples = &mut prepared.samples;
+            let identified = identify(samples, &rigid_model, preset, &choices)
+                .map_err(|source| FitError::Identify { preset, source })?;
+            let rigid = rigid_efforts(&identified.rigid, samples);
+            predictions.push(Prediction::new(preset.name(), Role::Preset, &rigid, |i| identified.friction(samples, i)));
+        }
+        progress.stage("judge");
+        let samples = &prepared.samples;
+        let states = firmware_states(samples).map_err(FitError::from)?;
+        let sets = regimes(&image.friction.selector, &states, samples);
+        let fixed = fixed_point(&image.friction, &states, &sets);
+        let float = FloatFriction::of_image(&image.friction).map_err(FitError::from)?;
+        let friction: Vec<f64> = fixed.iter().map(|(physical, network)| physical + network).collect();
+        let rigid = rigid_efforts(&rigid_beside(&friction, &rigid_model, samples), samples);
+        predictions.insert(0, Prediction::new("nothing", Role::Nothing, &rigid, |_| 0.0));
+        predictions.push(Prediction::new("image's model, f64", Role::PhysicalAndNetwork, &rigid, |i| {
+            let (physical, network) = float.parts(sets[i], samples, i);
+            physical + network
+        }));
+        predictions.push(Prediction::new("image, fixed point", Role::FixedPoint, &rigid, |i| friction[i]));
+        if self.causal {
+            let torque = replay(&image.friction, &states, samples);
+            predictions.push(Prediction::new("image, compensation", Role::FixedPoint, &rigid, |i| torque[i]));
+        }
+        let tables = error_tables(samples, &prepared.test_sets, &predictions).map_err(FitError::from)?;
+        let difference = fixed_point_difference(&float, &fixed, &sets, samples);
+        progress.finish();
+        if self.json {
+            println!("{}", serde_json::json!({ "errors": tables, "fixed_point": difference }));
+            return Ok(());
+        }
+        for table in &tables {
+            println!("{}", console::error_table(table, unit));
+        }
+        println!(
+            "Fixed point against the same model in f64: RMS {:.2e} {unit}, largest {:.2e} {unit}.",
+            difference.rms, difference.max
+        );
+        Ok(())
+    }
+}

@@ -1,0 +1,222 @@
+//! `jointctl fit`: from a described data set to an image, its TOML twin and a report.
+
+use super::CommandError;
+use crate::dataset::{Prepared, prepare};
+use crate::fit::{Fitted, Options, Trainer, fit};
+use crate::image_text;
+use crate::output::{OutputFile, write_directory};
+use crate::presets::Preset;
+use crate::progress::{Progress, Terminal};
+use crate::report::{NetworkOutcome, console, render, verdict};
+use clap::{Args, ValueEnum};
+use joint_firmware::friction::regime::Measure;
+use joint_firmware::parameters::image::{Image, MAX_LENGTH};
+use std::path::{Path, PathBuf};
+
+/// Arguments of `fit`.
+#[derive(Debug, Args)]
+pub struct Fit {
+    /// Description of the data set (README, "Your own joint")
+    dataset: PathBuf,
+    /// Folder for image, report and figures; files of the same names are replaced, others are left alone
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Choices of the fit.
+    #[command(flatten)]
+    choices: Choices,
+}
+
+/// How a network is trained.
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+pub enum TrainerChoice {
+    /// Levenberg-Marquardt, up to 1000 epochs (legged-robot paper)
+    #[default]
+    Lm,
+    /// Stochastic gradient descent with batch normalisation, 500 epochs (mobile-robot paper)
+    Sgd,
+    /// No network
+    None,
+}
+
+/// What tells motion regimes apart, each of which gets a network of its own.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum RegimeChoice {
+    /// Accelerating against uniform motion
+    Acceleration,
+    /// High against low speed
+    Speed,
+}
+
+/// Inputs of the network.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum InputChoice {
+    /// Position
+    Position,
+    /// Velocity
+    Velocity,
+    /// Theoretical torque
+    Load,
+    /// Measured torque: only where it is measured apart from the effort
+    MeasuredTorque,
+    /// Temperature
+    Temperature,
+}
+
+/// Choices that `fit` and `demo` share.
+#[derive(Debug, Args)]
+pub struct Choices {
+    /// Physical model: coulomb-viscous, linear, stribeck, nscf, hysteresis, hysteresis-harmonics, full; repeatable, the best
+    /// on validation data is used [default: coulomb-viscous and full]
+    #[arg(long, value_name = "NAME")]
+    preset: Vec<Preset>,
+    /// Fit every physical model and rank them
+    #[arg(long, conflicts_with = "preset")]
+    all: bool,
+    /// How the network is trained
+    #[arg(long, value_enum, default_value_t)]
+    trainer: TrainerChoice,
+    /// Networks trained from different first weights; the best on validation data is used
+    #[arg(long, value_name = "N", default_value_t = 8)]
+    restarts: usize,
+    /// Epochs without a lower validation error after which training stops
+    #[arg(long, value_name = "N", default_value_t = 60)]
+    patience: usize,
+    /// Penalty on the sum of squared weights, in units of the normalised mean squared error
+    #[arg(long, value_name = "X", default_value_t = 1e-4)]
+    decay: f64,
+    /// Seed of everything random: the same seed, data and choices give the same image
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Most training samples that the network sees
+    #[arg(long, value_name = "N", default_value_t = 12_000)]
+    samples: usize,
+    /// How far their selection makes rare states count: 0 not at all, 1 as much as frequent ones
+    #[arg(long, value_name = "0..1", default_value_t = 0.5)]
+    equalise: f64,
+    /// Train on mirrored samples too: for a joint without preferred direction
+    #[arg(long)]
+    mirror: bool,
+    /// Inputs of the network [default: position, velocity, load where there is gravity, temperature where it varies by 10 K]
+    #[arg(long, value_enum, value_delimiter = ',')]
+    inputs: Vec<InputChoice>,
+    /// Regimes with a network each; up to two
+    #[arg(long, value_enum, value_delimiter = ',')]
+    regimes: Vec<RegimeChoice>,
+    /// Least fall of the validation error for which a network is kept, %
+    #[arg(long, value_name = "%", default_value_t = 2.0)]
+    least_gain: f64,
+    /// How far beyond the trained box the network fades out, in half widths of the box
+    #[arg(long, value_name = "X", default_value_t = 0.5)]
+    margin: f64,
+    /// Version of the image; must rise for a joint that has one
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    image_version: u32,
+    /// Creation time of the image, seconds since 1970 [default: SOURCE_DATE_EPOCH, or not stated]
+    #[arg(long, value_name = "S")]
+    created: Option<u64>,
+}
+
+impl Choices {
+    /// The options of the pipeline.
+    pub fn options(&self) -> Result<Options, CommandError> {
+        let fraction = |name: &str, value: f64, high: f64| match (0.0..=high).contains(&value) {
+            true => Ok(value),
+            false => Err(CommandError::Arguments(format!("--{name} is {value}, must be 0 to {high}"))),
+        };
+        if self.regimes.len() > 2 {
+            return Err(CommandError::Arguments(format!("--regimes names {} criteria, at most 2", self.regimes.len())));
+        }
+        let mut options = Options {
+            trainer: match self.trainer {
+                TrainerChoice::Lm => Some(Trainer::LevenbergMarquardt),
+                TrainerChoice::Sgd => Some(Trainer::StochasticGradient),
+                TrainerChoice::None => None,
+            },
+            restarts: self.restarts.max(1),
+            patience: self.patience,
+            decay: self.decay,
+            seed: self.seed,
+            samples: self.samples,
+            equalise: fraction("equalise", self.equalise, 1.0)?,
+            least_gain: fraction("least-gain", self.least_gain, 100.0)? / 100.0,
+            margin: fraction("margin", self.margin, 100.0)?,
+            version: self.image_version,
+            created: self.created.or_else(source_date_epoch).unwrap_or(0),
+            ..Options::default()
+        };
+        options.augment.mirror = self.mirror;
+        options.regimes = self
+            .regimes
+            .iter()
+            .map(|choice| match choice {
+                RegimeChoice::Acceleration => Measure::Acceleration,
+                RegimeChoice::Speed => Measure::Speed,
+            })
+            .collect();
+        if self.all {
+            options.presets = Preset::ALL.to_vec();
+        } else if !self.preset.is_empty() {
+            options.presets = self.preset.clone();
+        }
+        if !self.inputs.is_empty() {
+            let mut inputs = [false; 5];
+            self.inputs.iter().for_each(|&input| inputs[input as usize] = true);
+            options.inputs = Some(inputs);
+        }
+        Ok(options)
+    }
+}
+
+/// The agreed variable for reproducible builds.
+fn source_date_epoch() -> Option<u64> {
+    std::env::var("SOURCE_DATE_EPOCH").ok()?.parse().ok()
+}
+
+impl Fit {
+    /// Runs the command.
+    pub fn run(&self) -> Result<(), CommandError> {
+        let options = self.choices.options()?;
+        let stem = self.dataset.file_stem().unwrap_or_default();
+        let out = self.out.clone().unwrap_or_else(|| PathBuf::from(stem));
+        let progress = Terminal::new();
+        progress.stage("load and clean");
+        let mut prepared = prepare(&self.dataset)?;
+        let fitted = fit(&mut prepared, &options, &progress)?;
+        progress.stage("write");
+        write(&fitted, &out)?;
+        progress.finish();
+        print_summary(&prepared, &fitted, &out);
+        Ok(())
+    }
+}
+
+/// Writes image, TOML twin, report and figures into `out`, all or nothing.
+pub fn write(fitted: &Fitted, out: &Path) -> Result<(), CommandError> {
+    let mut files = render(&fitted.report)?;
+    files.push(OutputFile::new("friction.img", bytes(&fitted.image, out)?));
+    files.push(OutputFile::new("friction.toml", image_text::to_text(&fitted.image)));
+    write_directory(out, &files)?;
+    Ok(())
+}
+
+/// The image in its binary form.
+pub fn bytes(image: &Image, path: &Path) -> Result<Vec<u8>, CommandError> {
+    let mut buffer = [0; MAX_LENGTH];
+    let length = image
+        .encode(&mut buffer)
+        .map_err(|error| CommandError::Image { path: path.to_owned(), reason: error.to_string() })?;
+    Ok(buffer[..length].to_vec())
+}
+
+/// Tables and verdict on standard output.
+pub fn print_summary(prepared: &Prepared, fitted: &Fitted, out: &Path) {
+    let report = &fitted.report;
+    for table in &report.errors {
+        println!("{}", console::error_table(table, &report.units.effort));
+    }
+    if let NetworkOutcome::Rejected { reason } = &report.network {
+        println!("Network left out: {reason}.");
+    }
+    println!("{}", verdict(report).sentence);
+    println!("{} samples. Written: {}", prepared.samples.len(), out.join("report.html").display());
+}

@@ -1,0 +1,128 @@
+//! `jointctl image`: look into a parameter image, verify it as a joint would, convert it to TOML and back.
+
+use super::CommandError;
+use super::fit::bytes;
+use crate::image_text;
+use crate::output::write_file;
+use crate::quantize::golden_vectors;
+use clap::{Args, Subcommand};
+use joint_firmware::friction::FrictionModel;
+use joint_firmware::parameters::certificate::{Certificate, certify};
+use joint_firmware::parameters::image::Image;
+use std::path::{Path, PathBuf};
+
+/// What to do with an image.
+#[derive(Debug, Subcommand)]
+pub enum ImageCommand {
+    /// Print an image as TOML
+    Inspect {
+        /// Image, binary or TOML
+        image: PathBuf,
+    },
+    /// Check an image as a joint does before it uses one: checksum, fields, certificate, golden vectors
+    Verify {
+        /// Image, binary or TOML
+        image: PathBuf,
+    },
+    /// Convert between the binary form and TOML (by the names' endings: .toml is TOML)
+    Convert(Convert),
+}
+
+/// Arguments of `image convert`.
+#[derive(Debug, Args)]
+pub struct Convert {
+    /// Image, binary or TOML
+    from: PathBuf,
+    /// File to write
+    to: PathBuf,
+    /// Compute the golden vectors anew, after an edit of the parameters
+    #[arg(long)]
+    recompute_golden: bool,
+}
+
+impl ImageCommand {
+    /// Runs the command.
+    pub fn run(&self) -> Result<(), CommandError> {
+        match self {
+            Self::Inspect { image } => print!("{}", image_text::to_text(&read(image)?)),
+            Self::Verify { image: path } => {
+                let image = read(path)?;
+                let certificate = verify(&image, path)?;
+                print!("{}", summary(&image, &certificate));
+            }
+            Self::Convert(convert) => convert.run()?,
+        }
+        Ok(())
+    }
+}
+
+impl Convert {
+    fn run(&self) -> Result<(), CommandError> {
+        let mut image = read(&self.from)?;
+        if self.recompute_golden {
+            let vectors = golden_vectors(&image.friction, image.golden.len());
+            image.golden = heapless::Vec::from_slice(&vectors).unwrap_or_default();
+        }
+        let refused = |error: &dyn std::fmt::Display| CommandError::Image {
+            path: self.from.clone(),
+            reason: format!("{error}; after an edit, --recompute-golden computes them anew"),
+        };
+        image.verify_golden(&FrictionModel::new(&image.friction, 1)).map_err(|error| refused(&error))?;
+        let contents = match is_text(&self.to) {
+            true => image_text::to_text(&image).into_bytes(),
+            false => bytes(&image, &self.from)?,
+        };
+        write_file(&self.to, &contents)?;
+        Ok(())
+    }
+}
+
+fn is_text(path: &Path) -> bool {
+    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
+}
+
+/// Reads an image: TOML where the name ends in `.toml`, else binary.
+pub fn read(path: &Path) -> Result<Image, CommandError> {
+    let unreadable = |source| CommandError::Read { path: path.to_owned(), source };
+    let refused = |reason: String| CommandError::Image { path: path.to_owned(), reason };
+    if is_text(path) {
+        let text = std::fs::read_to_string(path).map_err(unreadable)?;
+        return image_text::from_text(&text).map_err(|error| refused(error.to_string()));
+    }
+    let bytes = std::fs::read(path).map_err(unreadable)?;
+    Image::decode(&bytes).map_err(|error| refused(error.to_string()))
+}
+
+/// What a joint checks before it uses an image, after decoding.
+pub fn verify(image: &Image, path: &Path) -> Result<Certificate, CommandError> {
+    let refused = |reason: String| CommandError::Image { path: path.to_owned(), reason };
+    let certificate = certify(&image.friction, &image.limits).map_err(|error| refused(error.to_string()))?;
+    let model = FrictionModel::new(&image.friction, 1);
+    image.verify_golden(&model).map_err(|error| refused(error.to_string()))?;
+    Ok(certificate)
+}
+
+fn summary(image: &Image, certificate: &Certificate) -> String {
+    let unit = image.effort.symbol();
+    let q16 = |bits: u32| f64::from(bits) / 65536.0;
+    let slope = |q8: i64| q8 as f64 / 256.0;
+    let networks = image.friction.sets.iter().filter(|set| set.network.is_some()).count();
+    format!(
+        "version {}, {} parameter set(s), {networks} network(s), effort in {unit}\n\
+         |friction|                         <= {:.4} {unit} (limit {:.4})\n\
+         |d(network) / d(measured torque)|  <= {:.4} (limit {:.4})\n\
+         d(friction) / d(velocity)          in [{:.3}, {:.3}] (limit {:.3})\n\
+         golden vectors                     {} of {} exact\n",
+        image.version,
+        image.friction.selector.sets(),
+        q16(certificate.output),
+        q16(image.limits.output),
+        q16(certificate.torque_gain),
+        q16(image.limits.torque_gain),
+        slope(certificate.velocity_slope_low),
+        slope(certificate.velocity_slope_high),
+        slope(i64::from(image.limits.velocity_slope)),
+        image.golden.len(),
+        image.golden.len(),
+    )
+}

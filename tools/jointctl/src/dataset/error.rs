@@ -1,0 +1,228 @@
+//! What can be wrong with a data set, said so that the file, line or column can be corrected without a debugger; host.
+
+use crate::filter::FilterError;
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// Why a data set could not be prepared.
+#[derive(Debug, Error)]
+pub enum DatasetError {
+    /// A file that is named by the command line or by the description cannot be read.
+    #[error("{}: cannot be read: {source}", file.display())]
+    Unreadable {
+        /// The file.
+        file: PathBuf,
+        /// What the operating system said.
+        source: std::io::Error,
+    },
+    /// The description is not TOML, has an unknown key, lacks one, or a value has the wrong type.
+    #[error("{}: {message}", file.display())]
+    Toml {
+        /// The description.
+        file: PathBuf,
+        /// Line, column and reason.
+        message: String,
+    },
+    /// A value in the description is of the right type but makes no sense.
+    #[error("{}: {key} = {value}: expected {expected}", file.display())]
+    Description {
+        /// The description.
+        file: PathBuf,
+        /// The key, with the tables that it is in.
+        key: String,
+        /// The value that was found.
+        value: String,
+        /// What would have been accepted.
+        expected: String,
+    },
+    /// The root folder begins with an environment variable that is not set and has no default.
+    #[error("{}: source.root = {root:?}: environment variable {variable} is not set; set it or write ${{{variable}:-default}}", file.display())]
+    Environment {
+        /// The description.
+        file: PathBuf,
+        /// The root as written.
+        root: String,
+        /// The variable's name.
+        variable: String,
+    },
+    /// A file ends in the middle of its compressed stream or fails its checksum.
+    #[error("{}: not a whole gzip file: {source}", file.display())]
+    Gzip {
+        /// The file.
+        file: PathBuf,
+        /// What the decompressor said.
+        source: std::io::Error,
+    },
+    /// A file without any row of data.
+    #[error("{}: no rows: expected a header line and at least one line of values", file.display())]
+    Empty {
+        /// The file.
+        file: PathBuf,
+    },
+    /// A row with more or fewer fields than the header.
+    #[error("{} line {line}: {found} fields, expected {expected} as in the header", file.display())]
+    Ragged {
+        /// The file.
+        file: PathBuf,
+        /// Line, the header being line 1.
+        line: u64,
+        /// Fields in the header.
+        expected: u64,
+        /// Fields in the line.
+        found: u64,
+    },
+    /// Any other defect of the table's form.
+    #[error("{}: not a table of comma-separated values: {message}", file.display())]
+    Csv {
+        /// The file.
+        file: PathBuf,
+        /// What the reader said.
+        message: String,
+    },
+    /// A column that the description names does not exist.
+    #[error("{}: no column {column:?}; available: {}", file.display(), available.join(", "))]
+    MissingColumn {
+        /// The file.
+        file: PathBuf,
+        /// The column that was asked for.
+        column: String,
+        /// The columns that exist.
+        available: Vec<String>,
+    },
+    /// A column that the description names exists twice.
+    #[error("{}: column {column:?} appears more than once in the header", file.display())]
+    AmbiguousColumn {
+        /// The file.
+        file: PathBuf,
+        /// The column's name.
+        column: String,
+    },
+    /// A field that should be a number is not.
+    #[error("{} line {line}, column {column:?}: {text:?}: expected a number", file.display())]
+    NotANumber {
+        /// The file.
+        file: PathBuf,
+        /// Line, the header being line 1.
+        line: u64,
+        /// The column's name.
+        column: String,
+        /// The text in the field.
+        text: String,
+    },
+    /// A field that should be a finite number is NaN or infinite.
+    #[error("{} line {line}, column {column:?}: {text}: expected a finite number (name it in clean.missing_text if it marks a missing sample)", file.display())]
+    NotFinite {
+        /// The file.
+        file: PathBuf,
+        /// Line, the header being line 1.
+        line: u64,
+        /// The column's name.
+        column: String,
+        /// The text in the field.
+        text: String,
+    },
+    /// Time runs backwards within a run.
+    #[error("{} line {line}: time {time} s after {previous} s in run {run:?}: expected time to increase", file.display())]
+    TimeNotIncreasing {
+        /// The file.
+        file: PathBuf,
+        /// Line of the later row.
+        line: u64,
+        /// The run's label.
+        run: String,
+        /// Time of the row before, s.
+        previous: f64,
+        /// Time of this row, s.
+        time: f64,
+    },
+    /// A run of the recordings has no row in the table of runs.
+    #[error("{}: no row for run {run:?}", file.display())]
+    MissingRun {
+        /// The table of runs.
+        file: PathBuf,
+        /// The run's label.
+        run: String,
+    },
+    /// Two rows of the table of runs have the same label.
+    #[error("{}: more than one row for run {run:?}", file.display())]
+    AmbiguousRun {
+        /// The table of runs.
+        file: PathBuf,
+        /// The run's label.
+        run: String,
+    },
+    /// A signal never changes.
+    #[error("{signal} (column {column:?}) is {value} in all {count} samples: expected a signal that varies")]
+    Constant {
+        /// Position, velocity or effort.
+        signal: &'static str,
+        /// The column or columns that it is made from.
+        column: String,
+        /// The constant value.
+        value: f64,
+        /// Number of samples.
+        count: usize,
+    },
+    /// Nothing, or almost nothing, is left to identify from.
+    #[error("{found} usable samples are left {stage}: expected at least {required}")]
+    TooFewSamples {
+        /// After which stage.
+        stage: &'static str,
+        /// Number of samples left.
+        found: usize,
+        /// Number of samples required.
+        required: usize,
+    },
+    /// A filter's cut-off does not lie below half of the sampling rate.
+    #[error(
+        "filter.{signal}: cut-off {cutoff_hz} Hz in run {run:?}: expected more than 0 and less than the Nyquist frequency of {nyquist_hz} Hz"
+    )]
+    Cutoff {
+        /// The filtered signal.
+        signal: &'static str,
+        /// The run's label.
+        run: String,
+        /// Cut-off, Hz.
+        cutoff_hz: f64,
+        /// Half of the sampling rate, Hz.
+        nyquist_hz: f64,
+    },
+    /// A filter cannot be applied for another reason.
+    #[error("filter.{signal} in run {run:?}: {error}")]
+    Filter {
+        /// The filtered signal.
+        signal: &'static str,
+        /// The run's label.
+        run: String,
+        /// The reason.
+        error: FilterError,
+    },
+    /// A signal does not fit the firmware's number format.
+    #[error(
+        "{signal} (column {column:?}) reaches {value} in run {run:?} at {time} s: the limit of Q16.16 is +-{limit}; give columns.{signal}.scale a smaller value"
+    )]
+    OutOfRange {
+        /// Position, velocity, acceleration, effort or temperature.
+        signal: &'static str,
+        /// The column or columns that it is made from.
+        column: String,
+        /// The run's label.
+        run: String,
+        /// Time within the run, s.
+        time: f64,
+        /// The value.
+        value: f64,
+        /// Largest accepted magnitude.
+        limit: f64,
+    },
+    /// The split leaves nothing to train with, to validate with, or to judge by.
+    #[error("the split leaves {part} without samples ({usable} usable samples in all): {hint}")]
+    EmptyPart {
+        /// The part or the test set's name.
+        part: String,
+        /// Usable samples in the whole data set.
+        usable: usize,
+        /// What to look at.
+        hint: String,
+    },
+}

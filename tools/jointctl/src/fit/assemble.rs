@@ -1,0 +1,144 @@
+//! The image: quantised parameters, limits, certificate and golden vectors.
+
+use super::{FitError, Learned, Options};
+use crate::dataset::description::EffortUnit;
+use crate::identify::Identified;
+use crate::quantize::{self, full_scale::to_unsigned_q16, golden_vectors};
+use crate::samples::{Part, Samples};
+use joint_firmware::friction::regime::MAX_SETS;
+use joint_firmware::friction::state::SIGNALS;
+use joint_firmware::friction::{FrictionParameters, ParameterSet};
+use joint_firmware::parameters::certificate::{Certificate, Limits, certify, prove};
+use joint_firmware::parameters::image::{Effort, Image, MAX_LENGTH, Target};
+
+/// Golden vectors of an image; fewer where they do not fit.
+const GOLDEN: usize = 6;
+/// The image may give this many times the largest effort of the training data.
+const OUTPUT_LIMIT: f64 = 3.0;
+/// Slopes may be this much above what is proved of the image: room for a later retraining within the same limits.
+const SLOPE_ROOM: f64 = 1.5;
+/// A loop gain through the measured torque that no image may exceed.
+const TORQUE_GAIN_LIMIT: f64 = 0.5;
+
+/// What an image says beside its parameters.
+pub struct Context<'a> {
+    /// Unit of the effort.
+    pub effort: EffortUnit,
+    /// Hash of the data set.
+    pub sha256: &'a [u8; 32],
+    /// Choices of the fit.
+    pub options: &'a Options,
+}
+
+/// An image with its proof, and the model that it holds.
+pub struct Built {
+    /// The image.
+    pub image: Image,
+    /// What is proved of it.
+    pub certificate: Certificate,
+    /// The model, without network where the certificate refuses it.
+    pub learned: Learned,
+}
+
+/// Quantises and certifies the learned model; a network that the certificate refuses is left out, with the reason.
+pub fn build_image(
+    samples: &Samples,
+    physical: &Identified,
+    learned: &Learned,
+    context: &Context,
+) -> Result<Built, FitError> {
+    let limit = to_unsigned_q16("limit of the output", OUTPUT_LIMIT * largest_effort(samples))?;
+    let mut learned = learned.clone();
+    let mut parameters = quantized(samples, physical, &learned, context.options)?;
+    let mut proved = prove(&parameters);
+    let refusal = match &proved {
+        Err(refusal) => Some(refusal.to_string()),
+        Ok(proved) if proved.output > limit => {
+            let [bound, limit] = [proved.output, limit].map(|bits| f64::from(bits) / 65536.0);
+            Some(format!("friction can reach {bound:.3}, limit {limit:.3} {}", context.effort.symbol()))
+        }
+        Ok(_) => None,
+    };
+    if let Some(refusal) = refusal.filter(|_| learned.has_network()) {
+        learned = learned.rejected(format!("the certificate refuses it: {refusal}"));
+        parameters = quantized(samples, physical, &learned, context.options)?;
+        proved = prove(&parameters);
+    }
+    let proved = proved.map_err(FitError::Refused)?;
+    let limits = limits(&proved, limit);
+    let certificate = certify(&parameters, &limits).map_err(FitError::Refused)?;
+    Ok(Built { image: image(parameters, limits, context)?, certificate, learned })
+}
+
+fn limits(proved: &Certificate, output: u32) -> Limits {
+    let slope = proved.velocity_slope_high.max(-proved.velocity_slope_low) as f64 * SLOPE_ROOM;
+    Limits {
+        output,
+        torque_gain: (TORQUE_GAIN_LIMIT * 65536.0) as u32,
+        velocity_slope: slope.ceil().clamp(256.0, f64::from(u32::MAX)) as u32,
+    }
+}
+
+/// The image with as many golden vectors as fit.
+fn image(parameters: FrictionParameters, limits: Limits, context: &Context) -> Result<Image, FitError> {
+    let effort = match context.effort {
+        EffortUnit::NewtonMetre => Effort::NewtonMetre,
+        EffortUnit::Newton => Effort::Newton,
+        EffortUnit::Ampere => Effort::Ampere,
+        EffortUnit::Volt => Effort::Volt,
+    };
+    let mut data_hash = [0; 16];
+    data_hash.copy_from_slice(&context.sha256[..16]);
+    let golden = golden_vectors(&parameters, GOLDEN);
+    let image = Image {
+        version: context.options.version,
+        target: Target::default(),
+        created: context.options.created,
+        effort,
+        data_hash,
+        friction: parameters,
+        limits,
+        golden: heapless::Vec::from_slice(&golden).unwrap_or_default(),
+    };
+    image.encode(&mut [0; MAX_LENGTH])?;
+    Ok(image)
+}
+
+fn largest_effort(samples: &Samples) -> f64 {
+    samples.indices(Part::Train).into_iter().fold(0.0, |most, i| most.max(samples.effort[i].abs()))
+}
+
+fn quantized(
+    samples: &Samples,
+    physical: &Identified,
+    learned: &Learned,
+    options: &Options,
+) -> Result<FrictionParameters, FitError> {
+    let depends = quantize::physical::depends_on(&physical.friction);
+    let train = samples.indices(Part::Train);
+    let range = |column: &[f64]| {
+        let values = train.iter().map(|&i| column[i]);
+        values.fold((f64::MAX, f64::MIN), |(low, high), value| (low.min(value), high.max(value)))
+    };
+    let columns: [&[f64]; SIGNALS] = [
+        &samples.position,
+        &samples.velocity,
+        &samples.load,
+        &samples.effort,
+        &samples.temperature,
+        &samples.acceleration,
+    ];
+    let limits = std::array::from_fn(|i| {
+        let network = learned.input_box.as_ref().is_some_and(|input_box| i < 5 && input_box.active()[i]);
+        (depends[i] || network).then(|| range(columns[i]))
+    });
+    let domain = quantize::domain(&limits, options.margin, physical.friction.reference_temperature)?;
+    let mut sets = [ParameterSet::default(); MAX_SETS];
+    for (place, (friction, network)) in sets.iter_mut().zip(&learned.float.sets) {
+        *place = ParameterSet {
+            physical: quantize::physical::quantize(friction, &domain)?,
+            network: network.as_ref().map(quantize::network::quantize).transpose()?,
+        };
+    }
+    Ok(FrictionParameters { domain, selector: learned.selector, sets })
+}

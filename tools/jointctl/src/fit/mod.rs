@@ -1,0 +1,427 @@
+//! From a prepared data set to an image and a report: the whole pipeline, stage by stage; host.
+//!
+//! Identification and training see training samples, choices are made on validation samples, test samples are looked at once,
+//! at the end, through the image in the firmware's own arithmetic.
+
+mod assemble;
+mod learn;
+
+use assemble::build_image;
+pub use learn::{Learned, Trainer};
+
+use crate::augment::Augment;
+use crate::certificate_search::{Found, search};
+use crate::dataset::Prepared;
+use crate::dataset::description::{Gravity as DescribedGravity, PositionUnit, RigidDescription};
+use crate::evaluate::{Prediction, error_tables, fixed_point_difference, rmse};
+use crate::friction_parameter::Units;
+use crate::identify::{self, Identified, identify};
+use crate::joint_model::{firmware_states, fixed_point, regimes, rigid_efforts};
+use crate::presets::Preset;
+use crate::progress::Progress;
+use crate::report::{self, Candidate, CertificateItem, NetworkOutcome, Report, Role};
+use crate::rigid::{Gravity, RigidModel};
+use crate::samples::{Part, Samples};
+use joint_firmware::friction::regime::Measure;
+use joint_firmware::parameters::certificate::Certificate;
+use joint_firmware::parameters::image::Image;
+use serde::Serialize;
+
+/// Choices of a fit.
+#[derive(Clone, Debug, Serialize)]
+pub struct Options {
+    /// Physical models that compete; the best on validation samples is used.
+    pub presets: Vec<Preset>,
+    /// How the network is trained; None trains none.
+    pub trainer: Option<Trainer>,
+    /// Networks that are trained from different first weights.
+    pub restarts: usize,
+    /// Epochs without a lower validation error after which training stops.
+    pub patience: usize,
+    /// Penalty on squared weights, in units of the normalised mean squared error.
+    pub decay: f64,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Most training samples that a network sees.
+    pub samples: usize,
+    /// How far their selection departs from natural frequencies towards equal ones, 0 to 1.
+    pub equalise: f64,
+    /// Copies of training samples.
+    #[serde(skip)]
+    pub augment: Augment,
+    /// Inputs that the network uses: position, velocity, theoretical torque, measured torque, temperature; None: position and
+    /// velocity; the theoretical torque where there is gravity; the temperature where it varies by 10 K.
+    pub inputs: Option<[bool; 5]>,
+    /// Least fall of the validation error, as a fraction, for which a network is kept.
+    pub least_gain: f64,
+    /// Criteria of regimes with a network each; none: one network for all.
+    #[serde(skip)]
+    pub regimes: Vec<Measure>,
+    /// Train the legged-robot paper's network too, for comparison.
+    pub reference: bool,
+    /// How far beyond the trained box the network fades out, in half widths.
+    pub margin: f64,
+    /// Version of the image.
+    pub version: u32,
+    /// Creation time of the image, s since 1970; 0 = not stated.
+    pub created: u64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            presets: vec![Preset::CoulombViscous, Preset::Full],
+            trainer: Some(Trainer::LevenbergMarquardt),
+            restarts: 8,
+            patience: 60,
+            decay: 1e-4,
+            seed: 1,
+            samples: 12_000,
+            equalise: 0.5,
+            augment: Augment::default(),
+            inputs: None,
+            least_gain: 0.02,
+            regimes: vec![],
+            reference: true,
+            margin: 0.5,
+            version: 1,
+            created: 0,
+        }
+    }
+}
+
+/// Why a fit ended without an image.
+#[derive(Debug, thiserror::Error)]
+pub enum FitError {
+    /// Identification of the physical models.
+    #[error("{preset}: {source}")]
+    Identify {
+        /// The model.
+        preset: Preset,
+        /// What is wrong.
+        source: identify::IdentifyError,
+    },
+    /// No physical model was asked for.
+    #[error("no physical model is chosen; at least one is needed")]
+    NoPreset,
+    /// Training of the network.
+    #[error(transparent)]
+    Train(#[from] crate::train::TrainError),
+    /// The model does not fit the image's numbers.
+    #[error(transparent)]
+    Quantize(#[from] crate::quantize::QuantizeError),
+    /// A sample does not fit the firmware's quantities.
+    #[error(transparent)]
+    State(#[from] crate::joint_model::StateError),
+    /// The image would be refused by the joint.
+    #[error("the certificate refuses the physical model: {0}")]
+    Refused(joint_firmware::parameters::certificate::Refusal),
+    /// The image cannot be written.
+    #[error(transparent)]
+    Image(#[from] joint_firmware::parameters::image::ImageError),
+    /// Judging.
+    #[error(transparent)]
+    Metrics(#[from] crate::metrics::MetricsError),
+}
+
+/// The result of a fit.
+#[derive(Debug)]
+pub struct Fitted {
+    /// The image.
+    pub image: Image,
+    /// What is proved of it.
+    pub certificate: Certificate,
+    /// Everything worth knowing, for people.
+    pub report: Report,
+}
+
+/// Runs the whole pipeline on a prepared data set.
+pub fn fit(prepared: &mut Prepared, options: &Options, progress: &dyn Progress) -> Result<Fitted, FitError> {
+    let rigid_model = rigid_model(&prepared.description.rigid);
+    let units = units(prepared);
+    let samples = &mut prepared.samples;
+
+    let identified = identify_all(samples, &rigid_model, &units, options, progress)?;
+    let effort = prepared.description.columns.effort.unit;
+    let context = assemble::Context { effort, sha256: &prepared.sha256, options };
+    let (chosen, refused) = choose_physical(samples, &identified, &context)?;
+    let physical = &identified[chosen];
+    let states = firmware_states(samples)?;
+
+    let static_load = rigid_model.gravity != Gravity::None;
+    let inputs = options.inputs.unwrap_or_else(|| learn::inputs(samples, static_load));
+    let learned = learn::learn(samples, &states, physical, &prepared.thresholds, inputs, options, progress)?;
+
+    progress.stage("quantise and certify");
+    let built = build_image(samples, physical, &learned, &context)?;
+    let learned = built.learned;
+
+    progress.stage("judge");
+    let parameters = &built.image.friction;
+    let sets = regimes(&parameters.selector, &states, samples);
+    let fixed = fixed_point(parameters, &states, &sets);
+    let predictions = predictions(samples, &identified, chosen, &learned, &sets, &fixed);
+    let errors = error_tables(samples, &prepared.test_sets, &predictions)?;
+    let difference = fixed_point_difference(&learned.float, &fixed, &sets, samples);
+    let worst = search(parameters, 20_000, options.seed);
+
+    let rigid = rigid_efforts(&physical.rigid, samples);
+    let report = Report {
+        title: format!("Friction of {}", prepared.description.name),
+        data_set: prepared.description.name.clone(),
+        units: report::Units {
+            position: units.position.clone(),
+            velocity: format!("{}/s", units.position),
+            effort: units.effort.clone(),
+        },
+        provenance: report::Provenance {
+            tool_version: env!("CARGO_PKG_VERSION").to_owned(),
+            data_sha256: prepared.sha256.iter().map(|byte| format!("{byte:02x}")).collect(),
+            description: prepared.description.name.clone(),
+            options: option_list(options),
+            seed: options.seed,
+            created: if options.created == 0 { "not stated".to_owned() } else { options.created.to_string() },
+        },
+        stages: stages(prepared),
+        parameters: physical.parameters.iter().map(parameter).collect(),
+        candidates: candidates(&identified, chosen, &refused, &learned),
+        network: learned.outcome.clone(),
+        errors,
+        fixed_point: Some(difference),
+        training: learned.curves.clone(),
+        certificate: certificate_items(&built.certificate, &built.image, &worst, &units),
+        test: test_samples(prepared, &rigid, physical, &learned, &fixed),
+    };
+    progress.stage("done");
+    Ok(Fitted { image: built.image, certificate: built.certificate, report })
+}
+
+/// Every preset, in the order asked for.
+fn identify_all(
+    samples: &mut Samples,
+    rigid: &RigidModel,
+    units: &Units,
+    options: &Options,
+    progress: &dyn Progress,
+) -> Result<Vec<Identified>, FitError> {
+    progress.stage("identify");
+    let choices = identify::Options { units: units.clone(), ..identify::Options::default() };
+    let mut identified = Vec::new();
+    for &preset in &options.presets {
+        progress.detail(preset.name());
+        let one = identify(samples, rigid, preset, &choices).map_err(|source| FitError::Identify { preset, source })?;
+        identified.push(one);
+    }
+    if identified.is_empty() { Err(FitError::NoPreset) } else { Ok(identified) }
+}
+
+/// The model with the lowest validation error that the certificate accepts, and why it refused better ones.
+fn choose_physical(
+    samples: &Samples,
+    identified: &[Identified],
+    context: &assemble::Context,
+) -> Result<(usize, Vec<(usize, String)>), FitError> {
+    let error = |i: usize| identified[i].validation_rmse.unwrap_or(identified[i].train_rmse);
+    let mut order: Vec<usize> = (0..identified.len()).collect();
+    order.sort_by(|&a, &b| error(a).total_cmp(&error(b)));
+    let mut refused = Vec::new();
+    let mut last = FitError::NoPreset;
+    for i in order {
+        let alone = Learned::physical(&identified[i], NetworkOutcome::NotTrained);
+        match build_image(samples, &identified[i], &alone, context) {
+            Ok(_) => return Ok((i, refused)),
+            Err(error @ (FitError::Refused(_) | FitError::Quantize(_))) => {
+                refused.push((i, error.to_string()));
+                last = error;
+            }
+            Err(error) => return Err(error),
+        }
+    }
+    Err(last)
+}
+
+/// The rigid part of the description, as identification knows it.
+pub fn rigid_model(description: &RigidDescription) -> RigidModel {
+    RigidModel {
+        inertia: description.inertia,
+        gravity: match description.gravity {
+            DescribedGravity::None => Gravity::None,
+            DescribedGravity::Sine => Gravity::Sine,
+            DescribedGravity::Cosine | DescribedGravity::SineAndCosine => Gravity::SineAndCosine,
+        },
+        mass_and_length: description.mass_and_length,
+    }
+}
+
+/// Units of the data set.
+pub fn units(prepared: &Prepared) -> Units {
+    let position = match prepared.description.columns.position.unit {
+        PositionUnit::Radian => "rad",
+        PositionUnit::Metre => "m",
+    };
+    Units { position: position.to_owned(), effort: prepared.description.columns.effort.unit.symbol().to_owned() }
+}
+
+fn predictions(
+    samples: &Samples,
+    identified: &[Identified],
+    chosen: usize,
+    learned: &Learned,
+    sets: &[usize],
+    fixed: &[(f64, f64)],
+) -> Vec<Prediction> {
+    let physical = &identified[chosen];
+    let rigid = rigid_efforts(&physical.rigid, samples);
+    let mut all = vec![Prediction::new("nothing", Role::Nothing, &rigid, |_| 0.0)];
+    for (i, one) in identified.iter().enumerate() {
+        let own_rigid = rigid_efforts(&one.rigid, samples);
+        let role = if i == chosen { Role::Physical } else { Role::Preset };
+        all.push(Prediction::new(one.preset.name(), role, &own_rigid, |i| one.friction(samples, i)));
+    }
+    if learned.has_network() {
+        let name = format!("{} + network, f64", physical.preset);
+        all.push(Prediction::new(name, Role::PhysicalAndNetwork, &rigid, |i| {
+            let (physical, network) = learned.float.parts(sets[i], samples, i);
+            physical + network
+        }));
+    }
+    all.push(Prediction::new("image, fixed point", Role::FixedPoint, &rigid, |i| fixed[i].0 + fixed[i].1));
+    if let Some(reference) = &learned.reference {
+        all.push(Prediction::new("legged-robot network (16), f64", Role::Reference, &rigid, |i| {
+            physical.friction(samples, i) + reference.evaluate(&crate::joint_model::network_inputs(samples, i))
+        }));
+    }
+    all
+}
+
+fn parameter(estimated: &identify::Estimated) -> report::Parameter {
+    report::Parameter {
+        name: estimated.name.clone(),
+        symbol: estimated.symbol.clone(),
+        value: estimated.value,
+        unit: estimated.unit.clone(),
+        standard_error: estimated.standard_error,
+        at_bound: estimated.at_bound,
+    }
+}
+
+fn candidates(
+    identified: &[Identified],
+    chosen: usize,
+    refused: &[(usize, String)],
+    learned: &Learned,
+) -> Vec<Candidate> {
+    let mut all: Vec<Candidate> = identified
+        .iter()
+        .enumerate()
+        .map(|(i, one)| Candidate {
+            model: one.preset.name().to_owned(),
+            parameters: one.parameters.len(),
+            validation_rmse: one.validation_rmse.unwrap_or(one.train_rmse),
+            kept: i == chosen,
+            reason: match refused.iter().find(|(refused, _)| *refused == i) {
+                Some((_, reason)) => reason.clone(),
+                None if i == chosen => "lowest validation error of the physical models".to_owned(),
+                None => "higher validation error".to_owned(),
+            },
+        })
+        .collect();
+    if let Some(validation_rmse) = learned.validation_rmse {
+        let (kept, reason) = match &learned.outcome {
+            NetworkOutcome::Kept => (true, "lowers the validation error".to_owned()),
+            NetworkOutcome::Rejected { reason } => (false, reason.clone()),
+            NetworkOutcome::NotTrained => (false, "not trained".to_owned()),
+        };
+        let model = format!("{} + network", identified[chosen].preset);
+        let parameters = identified[chosen].parameters.len() + learned.parameters;
+        all.push(Candidate { model, parameters, validation_rmse, kept, reason });
+    }
+    all.sort_by(|a, b| a.validation_rmse.total_cmp(&b.validation_rmse));
+    all
+}
+
+fn certificate_items(certificate: &Certificate, image: &Image, found: &Found, units: &Units) -> Vec<CertificateItem> {
+    let item = |name: &str, value: f64, limit: f64, unit: String, worst: f64| CertificateItem {
+        name: name.to_owned(),
+        value,
+        limit,
+        unit,
+        worst_found: Some(worst),
+        passed: value <= limit,
+    };
+    let Units { position, effort } = units;
+    let slope = certificate.velocity_slope_high.max(-certificate.velocity_slope_low);
+    vec![
+        item(
+            "|friction|",
+            f64::from(certificate.output) / 65536.0,
+            f64::from(image.limits.output) / 65536.0,
+            effort.clone(),
+            found.output,
+        ),
+        item(
+            "|d(network) / d(measured torque)|",
+            f64::from(certificate.torque_gain) / 65536.0,
+            f64::from(image.limits.torque_gain) / 65536.0,
+            "1".to_owned(),
+            found.torque_gain,
+        ),
+        item(
+            "|d(friction) / d(velocity)|",
+            slope as f64 / 256.0,
+            f64::from(image.limits.velocity_slope) / 256.0,
+            format!("{effort} s/{position}"),
+            found.velocity_slope,
+        ),
+    ]
+}
+
+fn stages(prepared: &Prepared) -> Vec<report::StageNote> {
+    let mut stages: Vec<report::StageNote> = Vec::new();
+    for note in &prepared.notes {
+        let count = (note.what.to_owned(), note.count as u64);
+        match stages.iter_mut().find(|stage| stage.stage == note.stage) {
+            Some(stage) => stage.counts.push(count),
+            None => stages.push(report::StageNote {
+                stage: note.stage.to_owned(),
+                note: String::new(),
+                counts: vec![count],
+            }),
+        }
+    }
+    stages
+}
+
+fn option_list(options: &Options) -> Vec<(String, String)> {
+    let value = serde_json::to_value(options).unwrap_or_default();
+    let entries = value.as_object().into_iter().flatten();
+    entries.map(|(key, value)| (key.clone(), value.to_string().replace('"', ""))).collect()
+}
+
+fn test_samples(
+    prepared: &Prepared,
+    rigid: &[f64],
+    physical: &Identified,
+    learned: &Learned,
+    fixed: &[(f64, f64)],
+) -> report::TestSamples {
+    let samples = &prepared.samples;
+    let test = samples.indices(Part::Test);
+    let pick = |value: &dyn Fn(usize) -> f64| test.iter().map(|&i| value(i)).collect::<Vec<_>>();
+    report::TestSamples {
+        time: pick(&|i| samples.time[i]),
+        run: test.iter().map(|&i| samples.run[i]).collect(),
+        position: pick(&|i| samples.position[i]),
+        velocity: pick(&|i| samples.velocity[i]),
+        temperature: prepared.description.columns.temperature.as_ref().map(|_| pick(&|i| samples.temperature[i])),
+        effort: pick(&|i| samples.effort[i]),
+        rigid: pick(&|i| rigid[i]),
+        physical: pick(&|i| rigid[i] + physical.friction(samples, i)),
+        network: learned.has_network().then(|| pick(&|i| rigid[i] + fixed[i].0 + fixed[i].1)),
+    }
+}
+
+/// Root mean square of what a friction leaves of the effort over one part.
+pub(crate) fn part_rmse(samples: &Samples, part: Part, predicted: impl Fn(usize) -> f64) -> f64 {
+    rmse(samples.indices(part).into_iter().map(|i| samples.effort[i] - predicted(i)))
+}

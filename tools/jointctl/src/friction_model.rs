@@ -1,0 +1,388 @@
+//! The physical friction in f64: the twin of the firmware's fixed-point model, with the same terms and names; host.
+//!
+//! v velocity, a acceleration, q position, tau_t theoretical torque, th = T - T_ref, d = tanh(v / v_c):
+//!
+//! ```text
+//! friction = c0 + c_q q + c_T th + c_tau tau_t                              linear      (001 eq. 5)
+//!          + f_v (1 + k_v th) v + f_2 v |v|                                 viscous
+//!          + F_c(+/-) (1 + k_c th + k_l |tau_t|) tanh(v / v_c)              Coulomb     (002 eq. 6, asymmetric)
+//!          + sqrt(2e) (F_brk(+/-) - F_c(+/-)) exp(-u^2) u,  u = v / v_st    Stribeck    (001 eq. 6)
+//!          + b_h atan(s v + z clamp(k_a a, -1, 1))                          hysteresis  (003 eq. 4)
+//!          + sum_j (b_j+ (1 + d)/2 + b_j- (1 - d)/2) 4 sin((2j-1) h q) / (pi (2j-1))    (003 eq. 5)
+//!          + I_a a                                                          rotor       (002)
+//! ```
+//!
+//! (+/-) is one value per direction of v. Where 003 switches the harmonics with sign(v), which jumps at standstill, the
+//! two directions are blended by d; its sign(a) is a ramp of slope k_a, so that noise around a = 0 does not chatter.
+
+use crate::friction_parameter::{FrictionParameter, HARMONICS};
+use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
+
+/// sqrt(2 e): makes the Stribeck peak, at u = 1/sqrt(2), exactly F_brk - F_c.
+pub const STRIBECK_PEAK: f64 = 2.331_643_981_597_124;
+
+/// One summand, or one factor, of the friction formula that can be on or off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Term {
+    /// c0.
+    Constant,
+    /// c_q q.
+    Position,
+    /// c_T th.
+    Temperature,
+    /// c_tau tau_t.
+    Load,
+    /// f_v v.
+    Viscous,
+    /// The factor k_v th of the viscous friction.
+    ViscousTemperature,
+    /// f_2 v |v|.
+    Quadratic,
+    /// F_c tanh(v / v_c).
+    Coulomb,
+    /// The factor k_c th of the Coulomb friction.
+    CoulombTemperature,
+    /// The factor k_l |tau_t| of the Coulomb friction.
+    CoulombLoad,
+    /// The Stribeck peak.
+    Stribeck,
+    /// The hysteresis over velocity and acceleration.
+    Hysteresis,
+    /// The position harmonics.
+    Harmonics,
+    /// I_a a.
+    RotorInertia,
+}
+
+impl Term {
+    /// All terms, in the order of the formula.
+    pub const ALL: [Self; 14] = [
+        Self::Constant,
+        Self::Position,
+        Self::Temperature,
+        Self::Load,
+        Self::Viscous,
+        Self::ViscousTemperature,
+        Self::Quadratic,
+        Self::Coulomb,
+        Self::CoulombTemperature,
+        Self::CoulombLoad,
+        Self::Stribeck,
+        Self::Hysteresis,
+        Self::Harmonics,
+        Self::RotorInertia,
+    ];
+}
+
+/// A set of terms; written to files as the list of their names.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(from = "Vec<Term>", into = "Vec<Term>")]
+pub struct Terms(u16);
+
+impl Terms {
+    /// The set of the given terms.
+    pub fn of(terms: &[Term]) -> Self {
+        terms.iter().fold(Self::default(), |set, &term| set.with(term))
+    }
+
+    /// True when the term is on.
+    pub const fn contains(self, term: Term) -> bool {
+        self.0 & (1 << term as u16) != 0
+    }
+
+    /// The set with the term on.
+    pub const fn with(self, term: Term) -> Self {
+        Self(self.0 | 1 << term as u16)
+    }
+
+    /// The set with the term off.
+    pub const fn without(self, term: Term) -> Self {
+        Self(self.0 & !(1 << term as u16))
+    }
+
+    /// The terms that are on, in the order of the formula.
+    pub fn iter(self) -> impl Iterator<Item = Term> {
+        Term::ALL.into_iter().filter(move |&term| self.contains(term))
+    }
+}
+
+impl From<Vec<Term>> for Terms {
+    fn from(terms: Vec<Term>) -> Self {
+        Self::of(&terms)
+    }
+}
+
+impl From<Terms> for Vec<Term> {
+    fn from(terms: Terms) -> Self {
+        terms.iter().collect()
+    }
+}
+
+/// What friction depends on, in the units of the joint (rad or m, s, Nm or N, A, V; degrees Celsius).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct JointState {
+    /// Position q.
+    pub position: f64,
+    /// Velocity v.
+    pub velocity: f64,
+    /// Acceleration a.
+    pub acceleration: f64,
+    /// Theoretical torque tau_t, never the measured one.
+    pub load: f64,
+    /// Temperature T.
+    pub temperature: f64,
+}
+
+/// One value for each direction of the velocity.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Directional {
+    /// At v >= 0.
+    pub positive: f64,
+    /// At v < 0.
+    pub negative: f64,
+}
+
+impl Directional {
+    /// The value that applies at this velocity.
+    pub fn at(self, velocity: f64) -> f64 {
+        if velocity < 0.0 { self.negative } else { self.positive }
+    }
+}
+
+/// The physical friction model: which terms are on, and all their parameters (module documentation: formula).
+///
+/// Parameters of terms that are off are ignored. Units are those of the data set.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct FrictionModel {
+    /// Terms that are on.
+    pub terms: Terms,
+    /// c0.
+    pub offset: f64,
+    /// c_q.
+    pub position_slope: f64,
+    /// c_T, 1/K.
+    pub temperature_slope: f64,
+    /// c_tau, dimensionless.
+    pub load_slope: f64,
+    /// f_v, including a motor's back-EMF where the effort is a voltage.
+    pub viscous: f64,
+    /// k_v, 1/K.
+    pub viscous_temperature: f64,
+    /// f_2.
+    pub quadratic: f64,
+    /// F_c.
+    pub coulomb: Directional,
+    /// k_c, 1/K.
+    pub coulomb_temperature: f64,
+    /// k_l, 1 per unit of effort.
+    pub coulomb_load: f64,
+    /// 1/v_c.
+    pub coulomb_slope: f64,
+    /// F_brk.
+    pub breakaway: Directional,
+    /// 1/v_st.
+    pub stribeck_slope: f64,
+    /// b_h.
+    pub hysteresis: f64,
+    /// s.
+    pub hysteresis_velocity_slope: f64,
+    /// z, dimensionless.
+    pub hysteresis_width: f64,
+    /// k_a: 1 / the acceleration from which sign(a) counts fully.
+    pub hysteresis_acceleration_slope: f64,
+    /// h.
+    pub harmonic_frequency: f64,
+    /// b_j+, j = 1..5.
+    pub harmonic_positive: [f64; HARMONICS],
+    /// b_j-, j = 1..5.
+    pub harmonic_negative: [f64; HARMONICS],
+    /// I_a.
+    pub rotor_inertia: f64,
+    /// T_ref, degrees Celsius.
+    pub reference_temperature: f64,
+}
+
+impl FrictionModel {
+    /// The friction: the effort that is lost in this state, in the data set's unit of effort.
+    pub fn friction(&self, state: &JointState) -> f64 {
+        self.friction_and_derivatives(state, |_, _| ())
+    }
+
+    /// The friction, and through `derivative` its exact partial derivative by each parameter of the terms that are on
+    /// (parameters whose derivative is zero for this direction may be left out).
+    #[inline(always)]
+    pub fn friction_and_derivatives(&self, s: &JointState, mut derivative: impl FnMut(FrictionParameter, f64)) -> f64 {
+        use FrictionParameter as P;
+        let on = |term| self.terms.contains(term);
+        let (q, v, a) = (s.position, s.velocity, s.acceleration);
+        let warming = s.temperature - self.reference_temperature;
+        let mut sum = 0.0;
+        if on(Term::Constant) {
+            sum += self.offset;
+            derivative(P::Offset, 1.0);
+        }
+        if on(Term::Position) {
+            sum += self.position_slope * q;
+            derivative(P::PositionSlope, q);
+        }
+        if on(Term::Temperature) {
+            sum += self.temperature_slope * warming;
+            derivative(P::TemperatureSlope, warming);
+        }
+        if on(Term::Load) {
+            sum += self.load_slope * s.load;
+            derivative(P::LoadSlope, s.load);
+        }
+        if on(Term::Viscous) {
+            let mut gain = 1.0;
+            if on(Term::ViscousTemperature) {
+                gain += self.viscous_temperature * warming;
+                derivative(P::ViscousTemperature, self.viscous * warming * v);
+            }
+            sum += self.viscous * gain * v;
+            derivative(P::Viscous, gain * v);
+        }
+        if on(Term::Quadratic) {
+            sum += self.quadratic * v * v.abs();
+            derivative(P::Quadratic, v * v.abs());
+        }
+        if on(Term::RotorInertia) {
+            sum += self.rotor_inertia * a;
+            derivative(P::RotorInertia, a);
+        }
+        if on(Term::Coulomb) || on(Term::Harmonics) {
+            let direction = (v * self.coulomb_slope).tanh();
+            let steepness = v * (1.0 - direction * direction);
+            let mut by_slope = 0.0;
+            if on(Term::Coulomb) {
+                sum += self.coulomb_and_stribeck(s, warming, direction, steepness, &mut by_slope, &mut derivative);
+            }
+            if on(Term::Harmonics) {
+                sum += self.harmonics(q, direction, steepness, &mut by_slope, &mut derivative);
+            }
+            derivative(P::CoulombSlope, by_slope);
+        }
+        if on(Term::Hysteresis) {
+            let side = (self.hysteresis_acceleration_slope * a).clamp(-1.0, 1.0);
+            let w = self.hysteresis_velocity_slope * v + self.hysteresis_width * side;
+            let by_w = self.hysteresis / (1.0 + w * w);
+            sum += self.hysteresis * w.atan();
+            derivative(P::Hysteresis, w.atan());
+            derivative(P::HysteresisVelocitySlope, by_w * v);
+            derivative(P::HysteresisWidth, by_w * side);
+        }
+        sum
+    }
+
+    #[inline(always)]
+    fn coulomb_and_stribeck(
+        &self,
+        s: &JointState,
+        warming: f64,
+        direction: f64,
+        steepness: f64,
+        by_slope: &mut f64,
+        derivative: &mut impl FnMut(FrictionParameter, f64),
+    ) -> f64 {
+        use FrictionParameter as P;
+        let (v, coulomb) = (s.velocity, self.coulomb.at(s.velocity));
+        let (of_coulomb, of_breakaway) = if v < 0.0 {
+            (P::CoulombNegative, P::BreakawayNegative)
+        } else {
+            (P::CoulombPositive, P::BreakawayPositive)
+        };
+        let mut gain = 1.0;
+        if self.terms.contains(Term::CoulombTemperature) {
+            gain += self.coulomb_temperature * warming;
+            derivative(P::CoulombTemperature, coulomb * warming * direction);
+        }
+        if self.terms.contains(Term::CoulombLoad) {
+            gain += self.coulomb_load * s.load.abs();
+            derivative(P::CoulombLoad, coulomb * s.load.abs() * direction);
+        }
+        *by_slope += coulomb * gain * steepness;
+        if !self.terms.contains(Term::Stribeck) {
+            derivative(of_coulomb, gain * direction);
+            return coulomb * gain * direction;
+        }
+        let u = v * self.stribeck_slope;
+        let bell = STRIBECK_PEAK * (-u * u).exp();
+        let excess = self.breakaway.at(v) - coulomb;
+        derivative(of_coulomb, gain * direction - bell * u);
+        derivative(of_breakaway, bell * u);
+        derivative(P::StribeckSlope, excess * bell * (1.0 - 2.0 * u * u) * v);
+        coulomb * gain * direction + excess * bell * u
+    }
+
+    #[inline(always)]
+    fn harmonics(
+        &self,
+        q: f64,
+        direction: f64,
+        steepness: f64,
+        by_slope: &mut f64,
+        derivative: &mut impl FnMut(FrictionParameter, f64),
+    ) -> f64 {
+        use FrictionParameter as P;
+        let (forward, backward) = (0.5 * (1.0 + direction), 0.5 * (1.0 - direction));
+        // sin and cos of the odd multiples by the Chebyshev recurrence f((2j+1) x) = 2 cos(2x) f((2j-1) x) - f((2j-3) x).
+        let (sine, cosine) = (self.harmonic_frequency * q).sin_cos();
+        let twice = 2.0 * (2.0 * cosine * cosine - 1.0);
+        let (mut s, mut s_before, mut c, mut c_before) = (sine, -sine, cosine, cosine);
+        let (mut sum, mut by_frequency) = (0.0, 0.0);
+        for j in 0..HARMONICS {
+            let shape = 4.0 / PI * s / (2 * j + 1) as f64;
+            let (positive, negative) = (self.harmonic_positive[j], self.harmonic_negative[j]);
+            let amplitude = positive * forward + negative * backward;
+            sum += amplitude * shape;
+            by_frequency += amplitude * 4.0 / PI * c * q;
+            *by_slope += 0.5 * (positive - negative) * shape * steepness;
+            derivative(P::HarmonicPositive(j), forward * shape);
+            derivative(P::HarmonicNegative(j), backward * shape);
+            (s, s_before) = (twice * s - s_before, s);
+            (c, c_before) = (twice * c - c_before, c);
+        }
+        derivative(P::HarmonicFrequency, by_frequency);
+        sum
+    }
+
+    /// The value of one parameter.
+    pub fn parameter(&self, parameter: FrictionParameter) -> f64 {
+        *self.clone().parameter_mut(parameter)
+    }
+
+    /// The value of one parameter, to be changed.
+    pub fn parameter_mut(&mut self, parameter: FrictionParameter) -> &mut f64 {
+        use FrictionParameter as P;
+        match parameter {
+            P::Offset => &mut self.offset,
+            P::PositionSlope => &mut self.position_slope,
+            P::TemperatureSlope => &mut self.temperature_slope,
+            P::LoadSlope => &mut self.load_slope,
+            P::Viscous => &mut self.viscous,
+            P::ViscousTemperature => &mut self.viscous_temperature,
+            P::Quadratic => &mut self.quadratic,
+            P::CoulombPositive => &mut self.coulomb.positive,
+            P::CoulombNegative => &mut self.coulomb.negative,
+            P::CoulombTemperature => &mut self.coulomb_temperature,
+            P::CoulombLoad => &mut self.coulomb_load,
+            P::CoulombSlope => &mut self.coulomb_slope,
+            P::BreakawayPositive => &mut self.breakaway.positive,
+            P::BreakawayNegative => &mut self.breakaway.negative,
+            P::StribeckSlope => &mut self.stribeck_slope,
+            P::Hysteresis => &mut self.hysteresis,
+            P::HysteresisVelocitySlope => &mut self.hysteresis_velocity_slope,
+            P::HysteresisWidth => &mut self.hysteresis_width,
+            P::HarmonicFrequency => &mut self.harmonic_frequency,
+            P::RotorInertia => &mut self.rotor_inertia,
+            P::HarmonicPositive(n) => &mut self.harmonic_positive[n],
+            P::HarmonicNegative(n) => &mut self.harmonic_negative[n],
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "friction_model_tests.rs"]
+mod tests;

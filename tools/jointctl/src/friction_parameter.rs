@@ -1,0 +1,243 @@
+//! The identifiable numbers of the physical friction model, one by one: name, symbol and unit of each; host.
+//!
+//! The model itself (`friction_model`) has fields; identification, reports and bounds need to speak of "the third
+//! harmonic of the positive direction" as a value. The names and symbols are those of the design's friction formula.
+
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// Number of odd position harmonics in each direction (003 eq. 5).
+pub const HARMONICS: usize = 5;
+
+/// One identifiable number of the friction model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum FrictionParameter {
+    /// Constant offset.
+    Offset,
+    /// Slope of the friction over position.
+    PositionSlope,
+    /// Slope of the friction over temperature.
+    TemperatureSlope,
+    /// Slope of the friction over the theoretical torque.
+    LoadSlope,
+    /// Viscous coefficient. A motor's back-EMF is proportional to velocity too and is contained in it.
+    Viscous,
+    /// Relative change of the viscous coefficient with temperature.
+    ViscousTemperature,
+    /// Coefficient of v |v|.
+    Quadratic,
+    /// Coulomb friction at positive velocity.
+    CoulombPositive,
+    /// Coulomb friction at negative velocity.
+    CoulombNegative,
+    /// Relative change of the Coulomb friction with temperature.
+    CoulombTemperature,
+    /// Relative change of the Coulomb friction with the magnitude of the theoretical torque.
+    CoulombLoad,
+    /// Inverse of the Coulomb velocity.
+    CoulombSlope,
+    /// Breakaway friction at positive velocity.
+    BreakawayPositive,
+    /// Breakaway friction at negative velocity.
+    BreakawayNegative,
+    /// Inverse of the Stribeck velocity.
+    StribeckSlope,
+    /// Amplitude of the hysteresis.
+    Hysteresis,
+    /// Steepness of the hysteresis over velocity.
+    HysteresisVelocitySlope,
+    /// Width of the hysteresis.
+    HysteresisWidth,
+    /// Angular frequency of the first position harmonic.
+    HarmonicFrequency,
+    /// Inertia of the rotor.
+    RotorInertia,
+    /// Amplitude of a position harmonic at positive velocity; 0-based: n stands for the (2 n + 1)-th multiple.
+    HarmonicPositive(usize),
+    /// Amplitude of a position harmonic at negative velocity, numbered alike.
+    HarmonicNegative(usize),
+}
+
+/// Units of a data set's position and effort, in which those of all parameters are expressed.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Units {
+    /// Unit of position: rad or m.
+    pub position: String,
+    /// Unit of effort: Nm, N, A or V.
+    pub effort: String,
+}
+
+impl Default for Units {
+    fn default() -> Self {
+        Self { position: "rad".into(), effort: "Nm".into() }
+    }
+}
+
+impl FrictionParameter {
+    /// Number of different parameters.
+    pub const COUNT: usize = 20 + 2 * HARMONICS;
+
+    /// Position in a table of all parameters, 0..COUNT.
+    pub const fn index(self) -> usize {
+        match self {
+            Self::Offset => 0,
+            Self::PositionSlope => 1,
+            Self::TemperatureSlope => 2,
+            Self::LoadSlope => 3,
+            Self::Viscous => 4,
+            Self::ViscousTemperature => 5,
+            Self::Quadratic => 6,
+            Self::CoulombPositive => 7,
+            Self::CoulombNegative => 8,
+            Self::CoulombTemperature => 9,
+            Self::CoulombLoad => 10,
+            Self::CoulombSlope => 11,
+            Self::BreakawayPositive => 12,
+            Self::BreakawayNegative => 13,
+            Self::StribeckSlope => 14,
+            Self::Hysteresis => 15,
+            Self::HysteresisVelocitySlope => 16,
+            Self::HysteresisWidth => 17,
+            Self::HarmonicFrequency => 18,
+            Self::RotorInertia => 19,
+            Self::HarmonicPositive(n) => 20 + n,
+            Self::HarmonicNegative(n) => 20 + HARMONICS + n,
+        }
+    }
+
+    /// All parameters in the order of their index.
+    pub fn all() -> [Self; Self::COUNT] {
+        let mut all = [Self::Offset; Self::COUNT];
+        let single = [
+            Self::Offset,
+            Self::PositionSlope,
+            Self::TemperatureSlope,
+            Self::LoadSlope,
+            Self::Viscous,
+            Self::ViscousTemperature,
+            Self::Quadratic,
+            Self::CoulombPositive,
+            Self::CoulombNegative,
+            Self::CoulombTemperature,
+            Self::CoulombLoad,
+            Self::CoulombSlope,
+            Self::BreakawayPositive,
+            Self::BreakawayNegative,
+            Self::StribeckSlope,
+            Self::Hysteresis,
+            Self::HysteresisVelocitySlope,
+            Self::HysteresisWidth,
+            Self::HarmonicFrequency,
+            Self::RotorInertia,
+        ];
+        let harmonics = (0..HARMONICS).map(Self::HarmonicPositive).chain((0..HARMONICS).map(Self::HarmonicNegative));
+        for parameter in single.into_iter().chain(harmonics) {
+            all[parameter.index()] = parameter;
+        }
+        all
+    }
+
+    /// Symbol in the design's formula.
+    pub fn symbol(self) -> String {
+        match self {
+            Self::Offset => "c_0".into(),
+            Self::PositionSlope => "c_q".into(),
+            Self::TemperatureSlope => "c_T".into(),
+            Self::LoadSlope => "c_tau".into(),
+            Self::Viscous => "f_v".into(),
+            Self::ViscousTemperature => "k_v".into(),
+            Self::Quadratic => "f_2".into(),
+            Self::CoulombPositive => "F_c+".into(),
+            Self::CoulombNegative => "F_c-".into(),
+            Self::CoulombTemperature => "k_c".into(),
+            Self::CoulombLoad => "k_l".into(),
+            Self::CoulombSlope => "1/v_c".into(),
+            Self::BreakawayPositive => "F_brk+".into(),
+            Self::BreakawayNegative => "F_brk-".into(),
+            Self::StribeckSlope => "1/v_st".into(),
+            Self::Hysteresis => "b_h".into(),
+            Self::HysteresisVelocitySlope => "s".into(),
+            Self::HysteresisWidth => "z".into(),
+            Self::HarmonicFrequency => "h".into(),
+            Self::RotorInertia => "I_a".into(),
+            Self::HarmonicPositive(n) => format!("b_{}+", n + 1),
+            Self::HarmonicNegative(n) => format!("b_{}-", n + 1),
+        }
+    }
+
+    /// Unit, from those of the data set.
+    pub fn unit(self, units: &Units) -> String {
+        let Units { position, effort } = units;
+        match self {
+            Self::PositionSlope => format!("{effort}/{position}"),
+            Self::TemperatureSlope => format!("{effort}/K"),
+            Self::LoadSlope | Self::HysteresisWidth => "1".into(),
+            Self::Viscous => format!("{effort} s/{position}"),
+            Self::ViscousTemperature | Self::CoulombTemperature => "1/K".into(),
+            Self::Quadratic => format!("{effort} s^2/{position}^2"),
+            Self::CoulombLoad => format!("1/{effort}"),
+            Self::CoulombSlope | Self::StribeckSlope | Self::HysteresisVelocitySlope => format!("s/{position}"),
+            Self::HarmonicFrequency => format!("rad/{position}"),
+            Self::RotorInertia => format!("{effort} s^2/{position}"),
+            Self::Offset
+            | Self::CoulombPositive
+            | Self::CoulombNegative
+            | Self::BreakawayPositive
+            | Self::BreakawayNegative
+            | Self::Hysteresis
+            | Self::HarmonicPositive(_)
+            | Self::HarmonicNegative(_) => effort.clone(),
+        }
+    }
+}
+
+/// The parameter's name in the field's words.
+impl fmt::Display for FrictionParameter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Offset => f.write_str("offset"),
+            Self::PositionSlope => f.write_str("position slope"),
+            Self::TemperatureSlope => f.write_str("temperature slope"),
+            Self::LoadSlope => f.write_str("load slope"),
+            Self::Viscous => f.write_str("viscous coefficient"),
+            Self::ViscousTemperature => f.write_str("viscous temperature coefficient"),
+            Self::Quadratic => f.write_str("quadratic coefficient"),
+            Self::CoulombPositive => f.write_str("Coulomb friction, positive direction"),
+            Self::CoulombNegative => f.write_str("Coulomb friction, negative direction"),
+            Self::CoulombTemperature => f.write_str("Coulomb temperature coefficient"),
+            Self::CoulombLoad => f.write_str("Coulomb load coefficient"),
+            Self::CoulombSlope => f.write_str("Coulomb slope"),
+            Self::BreakawayPositive => f.write_str("breakaway friction, positive direction"),
+            Self::BreakawayNegative => f.write_str("breakaway friction, negative direction"),
+            Self::StribeckSlope => f.write_str("Stribeck slope"),
+            Self::Hysteresis => f.write_str("hysteresis amplitude"),
+            Self::HysteresisVelocitySlope => f.write_str("hysteresis velocity slope"),
+            Self::HysteresisWidth => f.write_str("hysteresis width"),
+            Self::HarmonicFrequency => f.write_str("harmonic frequency"),
+            Self::RotorInertia => f.write_str("rotor inertia"),
+            Self::HarmonicPositive(n) => write!(f, "position harmonic {}, positive direction", 2 * n + 1),
+            Self::HarmonicNegative(n) => write!(f, "position harmonic {}, negative direction", 2 * n + 1),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn every_parameter_has_its_own_index_symbol_and_name() {
+        let all = FrictionParameter::all();
+        assert!(all.iter().enumerate().all(|(i, p)| p.index() == i));
+        assert_eq!(all.iter().map(|p| p.symbol()).collect::<BTreeSet<_>>().len(), FrictionParameter::COUNT);
+        assert_eq!(all.iter().map(|p| p.to_string()).collect::<BTreeSet<_>>().len(), FrictionParameter::COUNT);
+    }
+
+    #[test]
+    fn units_follow_those_of_the_data_set() {
+        let emps = Units { position: "m".into(), effort: "N".into() };
+        assert_eq!(FrictionParameter::Viscous.unit(&emps), "N s/m");
+        assert_eq!(FrictionParameter::CoulombPositive.unit(&emps), "N");
+    }
+}

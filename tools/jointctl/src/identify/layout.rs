@@ -1,0 +1,384 @@
+//! How the parameters of a model are laid out in the vector that is searched: columns, links, bounds; host.
+//!
+//! One column may serve several parameters (symmetric Coulomb friction, coupled slopes) and one parameter may be the sum
+//! of two columns (breakaway = Coulomb friction + excess, so that F_brk >= F_c is a bound on one number). Slopes are searched
+//! as logarithms: their plausible range covers three decades.
+
+use super::observations::Limits;
+use crate::friction_model::{FrictionModel, Term};
+use crate::friction_parameter::{FrictionParameter as P, HARMONICS};
+use crate::presets::Structure;
+use crate::rigid::{RigidParameters, RigidRegressor};
+use nalgebra::DVector;
+use std::f64::consts::{PI, SQRT_2};
+
+/// v_st / v_c where both follow from one breakaway velocity (001 eq. 7 and 8).
+pub const STRIBECK_OVER_COULOMB: f64 = 10.0 * SQRT_2;
+/// Number of physical parameters, rigid ones first.
+pub const PARAMETERS: usize = RigidRegressor::ALL.len() + P::COUNT;
+
+/// Range of v_c and of the hysteresis' 1/s, as fractions of the highest velocity.
+const EDGE_VELOCITY: (f64, f64) = (5e-4, 0.5);
+/// Range of v_st, as fractions of the highest velocity.
+const STRIBECK_VELOCITY: (f64, f64) = (2e-3, 0.5);
+/// Largest relative change of a friction over the temperatures of the train rows.
+const TEMPERATURE_EFFECT: f64 = 0.9;
+/// Largest relative change of the Coulomb friction over the loads of the train rows.
+const LOAD_EFFECT: f64 = 20.0;
+/// Largest |z|: the arctangent is saturated beyond.
+const HYSTERESIS_WIDTH: f64 = 20.0;
+/// Range of the harmonic frequency in periods over the position range.
+const HARMONIC_PERIODS: (f64, f64) = (0.5, 20.0);
+/// Fewest periods over the position range where the rigid part has gravity: a slower wave, the position slope and a piece of
+/// gravity's sine are almost one shape, and fitted together they cancel each other at thousands of times the effort.
+const PERIODS_BESIDE_GRAVITY: f64 = 1.5;
+/// Lowest harmonic frequency where the rigid part has gravity, whose own is 1: closer to it, harmonics and gravity grow
+/// without limit against each other, and friction becomes many times the measured effort for hardly any gain.
+const FREQUENCY_ABOVE_GRAVITY: f64 = 2.0;
+
+/// How a column enters the model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// The model is linear in it.
+    Coefficient,
+    /// Factor of a coefficient: linear while that is held.
+    Factor,
+    /// Searched as it is.
+    Shape,
+    /// Searched as a logarithm.
+    Slope,
+}
+
+/// A physical parameter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Parameter {
+    /// Of the rigid part.
+    Rigid(RigidRegressor),
+    /// Of the friction.
+    Friction(P),
+}
+
+impl Parameter {
+    /// Position in a table of all parameters, 0..PARAMETERS.
+    pub fn index(self) -> usize {
+        match self {
+            Self::Rigid(regressor) => regressor as usize,
+            Self::Friction(parameter) => RigidRegressor::ALL.len() + parameter.index(),
+        }
+    }
+}
+
+/// One searched number.
+#[derive(Clone, Debug)]
+pub struct Column {
+    /// Name for messages.
+    pub name: String,
+    /// How it enters the model.
+    pub role: Role,
+    /// Bounds of the physical value.
+    pub bounds: (f64, f64),
+}
+
+/// parameter += factor * physical value of the column.
+#[derive(Clone, Copy, Debug)]
+pub struct Link {
+    /// The parameter.
+    pub parameter: Parameter,
+    /// The column.
+    pub column: usize,
+    /// The factor.
+    pub factor: f64,
+    /// The column was made for this parameter (else it only contributes).
+    pub made_for: bool,
+}
+
+/// The columns of one identification, in the order in which they are kept when the data cannot tell them apart.
+#[derive(Clone, Debug, Default)]
+pub struct Layout {
+    /// Searched numbers.
+    pub columns: Vec<Column>,
+    /// How parameters follow from them.
+    pub links: Vec<Link>,
+}
+
+impl Layout {
+    /// Lays out a structure on top of the given regressors, with bounds from the limits of the train rows.
+    pub fn new(structure: &Structure, regressors: &[RigidRegressor], limits: &Limits) -> Self {
+        let mut layout = Self::default();
+        layout.coulomb(structure);
+        let on = |term| structure.terms.contains(term);
+        const FREE: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
+        const POSITIVE: (f64, f64) = (0.0, f64::INFINITY);
+        if on(Term::Viscous) {
+            layout.own(P::Viscous, Role::Coefficient, POSITIVE);
+        }
+        if on(Term::Constant) {
+            layout.own(P::Offset, Role::Coefficient, FREE);
+        }
+        if !structure.holds_rigid() {
+            for &regressor in regressors {
+                let inertial = matches!(regressor, RigidRegressor::Inertia | RigidRegressor::LoadInertia);
+                let column = layout.column(regressor, Role::Coefficient, if inertial { POSITIVE } else { FREE });
+                layout.links.push(Link { parameter: Parameter::Rigid(regressor), column, factor: 1.0, made_for: true });
+            }
+        }
+        for (term, parameter, bounds) in [
+            (Term::RotorInertia, P::RotorInertia, POSITIVE),
+            (Term::Load, P::LoadSlope, FREE),
+            (Term::Position, P::PositionSlope, FREE),
+            (Term::Temperature, P::TemperatureSlope, FREE),
+            (Term::Quadratic, P::Quadratic, FREE),
+        ] {
+            if on(term) {
+                layout.own(parameter, Role::Coefficient, bounds);
+            }
+        }
+        if on(Term::Stribeck) {
+            layout.stribeck(structure);
+        }
+        if on(Term::Hysteresis) {
+            layout.own(P::Hysteresis, Role::Coefficient, POSITIVE);
+        }
+        let by_temperature = TEMPERATURE_EFFECT / limits.warming.max(f64::MIN_POSITIVE);
+        for (term, parameter, bounds) in [
+            (Term::ViscousTemperature, P::ViscousTemperature, (-by_temperature, by_temperature)),
+            (Term::CoulombTemperature, P::CoulombTemperature, (-by_temperature, by_temperature)),
+            (Term::CoulombLoad, P::CoulombLoad, (0.0, LOAD_EFFECT / limits.load.max(f64::MIN_POSITIVE))),
+        ] {
+            if on(term) {
+                layout.own(parameter, Role::Factor, bounds);
+            }
+        }
+        if on(Term::Harmonics) {
+            for j in 0..HARMONICS {
+                layout.own(P::HarmonicPositive(j), Role::Coefficient, FREE);
+                layout.own(P::HarmonicNegative(j), Role::Coefficient, FREE);
+            }
+        }
+        let gravity = |r: &RigidRegressor| !matches!(r, RigidRegressor::Inertia | RigidRegressor::LoadInertia);
+        layout.shapes(structure, limits, regressors.iter().any(gravity));
+        layout
+    }
+
+    fn column(&mut self, name: impl ToString, role: Role, bounds: (f64, f64)) -> usize {
+        self.columns.push(Column { name: name.to_string(), role, bounds });
+        self.columns.len() - 1
+    }
+
+    fn link(&mut self, parameter: P, column: usize, factor: f64, made_for: bool) {
+        self.links.push(Link { parameter: Parameter::Friction(parameter), column, factor, made_for });
+    }
+
+    fn own(&mut self, parameter: P, role: Role, bounds: (f64, f64)) {
+        let column = self.column(parameter, role, bounds);
+        self.link(parameter, column, 1.0, true);
+    }
+
+    fn coulomb(&mut self, structure: &Structure) {
+        if !structure.terms.contains(Term::Coulomb) {
+            return;
+        }
+        let sides: &[&[usize]] = if structure.asymmetric_coulomb { &[&[0], &[1]] } else { &[&[0, 1]] };
+        let parameters = [(P::CoulombPositive, P::BreakawayPositive), (P::CoulombNegative, P::BreakawayNegative)];
+        for side in sides {
+            let name = if side.len() == 2 { "Coulomb friction".into() } else { parameters[side[0]].0.to_string() };
+            let column = self.column(name, Role::Coefficient, (0.0, f64::INFINITY));
+            for &direction in *side {
+                self.link(parameters[direction].0, column, 1.0, true);
+                self.link(parameters[direction].1, column, 1.0, false);
+            }
+        }
+    }
+
+    fn stribeck(&mut self, structure: &Structure) {
+        let sides: &[&[P]] = if structure.asymmetric_breakaway {
+            &[&[P::BreakawayPositive], &[P::BreakawayNegative]]
+        } else {
+            &[&[P::BreakawayPositive, P::BreakawayNegative]]
+        };
+        for side in sides {
+            let name = if side.len() == 2 { "breakaway friction".into() } else { side[0].to_string() };
+            let column = self.column(name, Role::Coefficient, (0.0, f64::INFINITY));
+            side.iter().for_each(|&parameter| self.link(parameter, column, 1.0, true));
+        }
+    }
+
+    fn shapes(&mut self, structure: &Structure, limits: &Limits, gravity: bool) {
+        let on = |term| structure.terms.contains(term);
+        let velocity = limits.velocity.max(f64::MIN_POSITIVE);
+        let slope = |(slowest, fastest): (f64, f64)| (1.0 / (fastest * velocity), 1.0 / (slowest * velocity));
+        let (edge, peak) = (slope(EDGE_VELOCITY), slope(STRIBECK_VELOCITY));
+        if on(Term::Coulomb) && on(Term::Stribeck) && structure.coupled_slopes {
+            let low = peak.0.max(edge.0 / STRIBECK_OVER_COULOMB);
+            let high = peak.1.min(edge.1 / STRIBECK_OVER_COULOMB);
+            self.own(P::StribeckSlope, Role::Slope, (low, high));
+            self.link(P::CoulombSlope, self.columns.len() - 1, STRIBECK_OVER_COULOMB, false);
+        } else if on(Term::Coulomb) {
+            self.own(P::CoulombSlope, Role::Slope, edge);
+            if on(Term::Stribeck) {
+                self.own(P::StribeckSlope, Role::Slope, peak);
+            }
+        }
+        if on(Term::Hysteresis) {
+            self.own(P::HysteresisVelocitySlope, Role::Slope, edge);
+            self.own(P::HysteresisWidth, Role::Shape, (-HYSTERESIS_WIDTH, HYSTERESIS_WIDTH));
+        }
+        if on(Term::Harmonics) {
+            let turn = 2.0 * PI / limits.position_range.max(f64::MIN_POSITIVE);
+            let low = match gravity {
+                true => (PERIODS_BESIDE_GRAVITY * turn).max(FREQUENCY_ABOVE_GRAVITY),
+                false => HARMONIC_PERIODS.0 * turn,
+            };
+            self.own(P::HarmonicFrequency, Role::Shape, (low, (HARMONIC_PERIODS.1 * turn).max(low)));
+        }
+    }
+
+    /// Number of columns.
+    pub fn len(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// The column that determines a parameter of the friction alone or on top of others.
+    pub fn column_of(&self, parameter: P) -> Option<usize> {
+        let parameter = Parameter::Friction(parameter);
+        self.links.iter().rev().find(|link| link.parameter == parameter).map(|link| link.column)
+    }
+
+    /// The layout without some columns; their parameters keep what other columns give them, or 0.
+    pub fn without(&self, dropped: &[bool]) -> Self {
+        let mut target = 0;
+        let mut moved = Vec::with_capacity(self.len());
+        for &drop in dropped {
+            moved.push(target);
+            target += usize::from(!drop);
+        }
+        let columns = self.columns.iter().zip(dropped).filter(|(_, drop)| !**drop).map(|(column, _)| column.clone());
+        let links = self.links.iter().filter(|link| !dropped[link.column]);
+        Self {
+            columns: columns.collect(),
+            links: links.map(|link| Link { column: moved[link.column], ..*link }).collect(),
+        }
+    }
+
+    /// Bounds of the searched numbers.
+    pub fn bounds(&self) -> Vec<(f64, f64)> {
+        let bounds = |c: &Column| match c.role {
+            Role::Slope => (c.bounds.0.ln(), c.bounds.1.ln()),
+            _ => c.bounds,
+        };
+        self.columns.iter().map(bounds).collect()
+    }
+
+    /// Derivative of a column's physical value by its searched number.
+    pub fn physical_derivative(&self, column: usize, x: f64) -> f64 {
+        if self.columns[column].role == Role::Slope { x.exp() } else { 1.0 }
+    }
+
+    /// The model at `x`. Parameters without a column are 0, but those that only shape (slopes, widths) and the fixed ones
+    /// come from `template`.
+    pub fn decode(&self, x: &DVector<f64>, template: &FrictionModel) -> (RigidParameters, FrictionModel) {
+        let mut rigid = RigidParameters::default();
+        let mut friction = FrictionModel {
+            terms: template.terms,
+            coulomb_slope: template.coulomb_slope,
+            hysteresis_acceleration_slope: template.hysteresis_acceleration_slope,
+            reference_temperature: template.reference_temperature,
+            ..FrictionModel::default()
+        };
+        if self.column_of(P::CoulombSlope).is_some() {
+            friction.coulomb_slope = 0.0;
+        }
+        for link in &self.links {
+            let physical = match self.columns[link.column].role {
+                Role::Slope => x[link.column].exp(),
+                _ => x[link.column],
+            };
+            match link.parameter {
+                Parameter::Rigid(regressor) => *rigid.coefficient_mut(regressor) += link.factor * physical,
+                Parameter::Friction(p) => *friction.parameter_mut(p) += link.factor * physical,
+            }
+        }
+        (rigid, friction)
+    }
+
+    /// The vector whose model comes closest to the given one: columns that serve several parameters take their mean, and
+    /// all are moved into their bounds.
+    pub fn encode(&self, rigid: &RigidParameters, friction: &FrictionModel) -> DVector<f64> {
+        let mut x = DVector::zeros(self.len());
+        for (column, of) in self.columns.iter().enumerate() {
+            let values: Vec<f64> = self
+                .links
+                .iter()
+                .filter(|link| link.column == column && link.made_for)
+                .map(|link| {
+                    let value = match link.parameter {
+                        Parameter::Rigid(regressor) => rigid.coefficient(regressor),
+                        Parameter::Friction(p) => friction.parameter(p),
+                    };
+                    // Earlier columns of the same parameter (breakaway: the Coulomb friction) have their part already.
+                    let earlier = self.links.iter().filter(|l| l.parameter == link.parameter && l.column < column);
+                    (value - earlier.map(|l| l.factor * x[l.column]).sum::<f64>()) / link.factor
+                })
+                .collect();
+            let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+            let inside = mean.clamp(of.bounds.0, of.bounds.1);
+            x[column] = if of.role == Role::Slope { inside.ln() } else { inside };
+        }
+        x
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::synthetic::{RIGID, friction, motion, rigid};
+    use super::*;
+    use crate::friction_model::Terms;
+    use crate::samples::Part;
+
+    fn layout(structure: &Structure) -> Layout {
+        let limits = Limits::of(&super::super::observations::rows(&motion(2_000), Part::Train), 30.0);
+        Layout::new(structure, &RIGID.regressors(), &limits)
+    }
+
+    fn free() -> Structure {
+        let terms = Terms::of(&Term::ALL).without(Term::Load);
+        Structure { terms, asymmetric_coulomb: true, asymmetric_breakaway: true, coupled_slopes: false }
+    }
+
+    #[test]
+    fn a_model_survives_the_way_into_the_vector_and_back() {
+        let truth = friction(free().terms);
+        let layout = layout(&free());
+        let (r, f) = layout.decode(&layout.encode(&rigid(), &truth), &truth);
+        assert_eq!(r, rigid());
+        for p in P::all().into_iter().filter(|&p| p != P::LoadSlope) {
+            assert!((f.parameter(p) - truth.parameter(p)).abs() < 1e-12, "{p}");
+        }
+    }
+
+    #[test]
+    fn a_smaller_structure_takes_over_what_it_shares_with_a_larger_one() {
+        let truth = friction(free().terms);
+        let layout = layout(&Structure { terms: free().terms.without(Term::Stribeck), ..Structure::default() });
+        let (_, f) = layout.decode(&layout.encode(&rigid(), &truth), &truth);
+        let mean = 0.5 * (truth.coulomb.positive + truth.coulomb.negative);
+        assert!((f.coulomb.positive - mean).abs() < 1e-12 && (f.coulomb.negative - mean).abs() < 1e-12);
+        assert!((f.viscous - truth.viscous).abs() < 1e-12);
+    }
+
+    #[test]
+    fn breakaway_friction_is_never_below_coulomb_friction() {
+        let mut weak = friction(free().terms);
+        weak.breakaway.positive = 0.0;
+        let layout = layout(&free());
+        let (_, f) = layout.decode(&layout.encode(&rigid(), &weak), &weak);
+        assert_eq!(f.breakaway.positive, f.coulomb.positive);
+    }
+
+    #[test]
+    fn harmonics_keep_away_from_the_frequency_of_gravity() {
+        let layout = layout(&free());
+        let column = layout.column_of(P::HarmonicFrequency).unwrap();
+        assert!(layout.columns[column].bounds.0 >= FREQUENCY_ABOVE_GRAVITY);
+    }
+}

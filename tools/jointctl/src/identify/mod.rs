@@ -1,0 +1,208 @@
+//! Identification of a joint: rigid part and physical friction from its train samples; host.
+//!
+//! 1. The rigid part is identified with viscous and Coulomb friction and an offset. Its effort is the theoretical torque of
+//!    every sample (`Samples::load`), frozen from then on: friction terms that depend on load never see the measured torque.
+//! 2. The terms of the chosen preset are identified, jointly with the rigid part once more.
+//!
+//! `observations` checks and thins the samples, `layout` maps parameters to the searched vector, `linear` and `nonlinear` fit,
+//! `grid` finds where to start, `selection` chooses the terms of `Preset::Full`, `estimates` adds standard errors.
+
+mod estimates;
+mod grid;
+mod layout;
+mod linear;
+mod nonlinear;
+mod observations;
+mod selection;
+
+pub use estimates::Estimated;
+pub use selection::TEMPERATURE_RANGE;
+
+use crate::friction_model::FrictionModel;
+use crate::friction_parameter::{FrictionParameter, Units};
+use crate::presets::Preset;
+use crate::rigid::{RigidModel, RigidParameters};
+use crate::samples::{Part, Samples};
+use nonlinear::{Fit, Problem};
+use observations::{Limits, Row, joint_state, rigid_state};
+
+/// Train samples below which nothing is identified.
+const MINIMUM_SAMPLES: usize = 200;
+
+/// Choices that the data do not make.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Units of the data set, for the units of the parameters.
+    pub units: Units,
+    /// T_ref, degrees Celsius; None: the mean over the train samples.
+    pub reference_temperature: Option<f64>,
+    /// k_a; None: sign(a) counts fully from a fifth of the acceleration's root mean square.
+    pub hysteresis_acceleration_slope: Option<f64>,
+    /// Evenly decimated train samples that searches use; the last descent uses all.
+    pub search_samples: usize,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            units: Units::default(),
+            reference_temperature: None,
+            hysteresis_acceleration_slope: None,
+            search_samples: 8_000,
+        }
+    }
+}
+
+/// Why nothing was identified.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum IdentifyError {
+    /// A column has another length than the others.
+    #[error("column {column} has {found} samples, the others have {expected}")]
+    Length {
+        /// The column.
+        column: &'static str,
+        /// Its length.
+        found: usize,
+        /// Length of the others.
+        expected: usize,
+    },
+    /// The rigid part needs a column that the data set does not have.
+    #[error("the rigid part needs the column {column}, which the data set does not have")]
+    MissingColumn {
+        /// The column.
+        column: &'static str,
+    },
+    /// A train or validation sample is not a number.
+    #[error("{column} of sample {index} is {value}")]
+    NotFinite {
+        /// The column.
+        column: &'static str,
+        /// Index of the sample.
+        index: usize,
+        /// Its value.
+        value: f64,
+    },
+    /// There are too few train samples.
+    #[error("{found} train samples; at least {needed} are needed")]
+    TooFewSamples {
+        /// Number of train samples.
+        found: usize,
+        /// Least number.
+        needed: usize,
+    },
+    /// The full model is reduced on validation samples, and there are none.
+    #[error("the full model needs validation samples to choose its terms; there are none")]
+    NoValidation,
+}
+
+/// An identified joint.
+#[derive(Clone, Debug)]
+pub struct Identified {
+    /// Preset that was asked for.
+    pub preset: Preset,
+    /// Rigid part, identified together with the friction.
+    pub rigid: RigidParameters,
+    /// Rigid part whose effort is the theoretical torque in `Samples::load`.
+    pub theoretical: RigidParameters,
+    /// Friction.
+    pub friction: FrictionModel,
+    /// All identified parameters, rigid ones first.
+    pub parameters: Vec<Estimated>,
+    /// Root mean square of effort - rigid - friction over the train samples.
+    pub train_rmse: f64,
+    /// The same over the validation samples; None where there are none.
+    pub validation_rmse: Option<f64>,
+    /// What was left out or could not be determined, and why.
+    pub notes: Vec<String>,
+}
+
+impl Identified {
+    /// Rigid part of the effort of one sample.
+    pub fn rigid_effort(&self, samples: &Samples, index: usize) -> f64 {
+        self.rigid.effort(&rigid_state(samples, index))
+    }
+
+    /// Friction of one sample, whose load must have been filled in by `identify`.
+    pub fn friction(&self, samples: &Samples, index: usize) -> f64 {
+        self.friction.friction(&joint_state(samples, index))
+    }
+}
+
+/// Identifies a joint from its train samples and fills in the theoretical torque (`load`) of all samples.
+///
+/// Validation samples are used to choose the terms of `Preset::Full` and for nothing else; test samples not at all.
+pub fn identify(
+    samples: &mut Samples,
+    rigid: &RigidModel,
+    preset: Preset,
+    options: &Options,
+) -> Result<Identified, IdentifyError> {
+    let problem = theoretical_torque(samples, rigid, options)?;
+    let (fit, mut notes) = match preset.structure(rigid) {
+        Some(structure) => (grid::search(&problem, &structure).polished(&problem), vec![]),
+        None if problem.validation.is_empty() => return Err(IdentifyError::NoValidation),
+        None => selection::select(&problem, rigid),
+    };
+    let (parameters, undetermined) = estimates::estimates(&fit, problem.train.len(), &options.units);
+    notes.extend(fit.candidate.notes.iter().cloned());
+    notes.extend(undetermined);
+    if fit.candidate.structure.holds_rigid() {
+        notes.push("the rigid part is held at the theoretical torque: a load slope cannot be told from it".into());
+    }
+    Ok(Identified {
+        preset,
+        rigid: fit.rigid,
+        theoretical: problem.theoretical,
+        train_rmse: fit.at.cost.sqrt(),
+        validation_rmse: fit.rmse(&problem.validation),
+        friction: fit.friction,
+        parameters,
+        notes,
+    })
+}
+
+/// Step 1: the rigid part with viscous and Coulomb friction; fills in the load of all samples.
+fn theoretical_torque(samples: &mut Samples, rigid: &RigidModel, options: &Options) -> Result<Problem, IdentifyError> {
+    observations::check(samples, rigid)?;
+    let train = observations::rows(samples, Part::Train);
+    if train.len() < MINIMUM_SAMPLES {
+        return Err(IdentifyError::TooFewSamples { found: train.len(), needed: MINIMUM_SAMPLES });
+    }
+    let mean = |value: fn(&Row) -> f64| train.iter().map(value).sum::<f64>() / train.len() as f64;
+    let reference_temperature = options.reference_temperature.unwrap_or_else(|| mean(|row| row.joint.temperature));
+    let limits = Limits::of(&train, reference_temperature);
+    let template = FrictionModel {
+        reference_temperature,
+        hysteresis_acceleration_slope: options
+            .hysteresis_acceleration_slope
+            .unwrap_or(5.0 / limits.acceleration_rms.max(f64::MIN_POSITIVE)),
+        ..FrictionModel::default()
+    };
+    let mut problem = Problem {
+        search: observations::decimated(&train, options.search_samples),
+        train,
+        validation: observations::rows(samples, Part::Validation),
+        limits,
+        regressors: rigid.regressors(),
+        theoretical: RigidParameters::default(),
+        template,
+    };
+    if let Some(structure) = Preset::CoulombViscous.structure(rigid) {
+        let first: Fit = grid::search(&problem, &structure).polished(&problem);
+        problem.theoretical = first.rigid;
+        problem.template.coulomb_slope = first.friction.parameter(FrictionParameter::CoulombSlope);
+    }
+    samples.load = (0..samples.len()).map(|i| problem.theoretical.effort(&rigid_state(samples, i))).collect();
+    for rows in [&mut problem.train, &mut problem.validation, &mut problem.search] {
+        rows.iter_mut().for_each(|row| row.joint.load = nonlinear::rigid_effort(&problem.theoretical, row));
+    }
+    problem.limits = Limits::of(&problem.train, reference_temperature);
+    Ok(problem)
+}
+
+#[cfg(test)]
+mod recovery_tests;
+#[cfg(test)]
+mod synthetic;
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,174 @@
+//! The samples as identification sees them: checked, train and validation rows only, and the limits that follow; host.
+
+use super::IdentifyError;
+use crate::friction_model::JointState;
+use crate::rigid::{RigidModel, RigidParameters, RigidState};
+use crate::samples::{Part, Samples};
+
+/// Intervals of position that must be visited for position harmonics to be considered.
+const POSITION_BINS: usize = 50;
+/// Fraction of these intervals that each direction of motion must have visited.
+const POSITION_COVERAGE: f64 = 0.8;
+/// Samples that make an interval visited.
+const POSITION_VISITS: usize = 5;
+
+/// One sample, ready for evaluation.
+#[derive(Clone, Copy, Debug)]
+pub struct Row {
+    /// What friction depends on.
+    pub joint: JointState,
+    /// Values of all regressors of the rigid part.
+    pub regressors: [f64; 6],
+    /// Measured effort.
+    pub effort: f64,
+}
+
+/// Limits of the train rows, from which bounds on the parameters follow.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits {
+    /// 99.9 % quantile of |velocity|.
+    pub velocity: f64,
+    /// Root mean square of the acceleration.
+    pub acceleration_rms: f64,
+    /// Largest |T - T_ref|, K.
+    pub warming: f64,
+    /// Difference between the highest and the lowest temperature, K.
+    pub temperature_range: f64,
+    /// Largest |theoretical torque|.
+    pub load: f64,
+    /// Largest |position|.
+    pub position: f64,
+    /// Difference between the largest and the smallest position.
+    pub position_range: f64,
+    /// Each direction of motion visits most of the position range.
+    pub position_covered: bool,
+}
+
+/// Reads what the rigid part depends on from the samples; mass and length are 0 where there are no such columns.
+pub fn rigid_state(samples: &Samples, index: usize) -> RigidState {
+    let extra = |name| samples.extra.get(name).map_or(0.0, |column| column[index]);
+    RigidState {
+        position: samples.position[index],
+        acceleration: samples.acceleration[index],
+        mass: extra("mass"),
+        length: extra("length"),
+    }
+}
+
+/// Reads what friction depends on from the samples; the load is 0 as long as the rigid body is not identified.
+pub fn joint_state(samples: &Samples, index: usize) -> JointState {
+    JointState {
+        position: samples.position[index],
+        velocity: samples.velocity[index],
+        acceleration: samples.acceleration[index],
+        load: samples.load.get(index).copied().unwrap_or(0.0),
+        temperature: samples.temperature[index],
+    }
+}
+
+/// Checks that all columns the model needs exist, are of one length and finite in the train and validation rows.
+pub fn check(samples: &Samples, rigid: &RigidModel) -> Result<(), IdentifyError> {
+    let expected = samples.part.len();
+    let mut columns = vec![
+        ("time", &samples.time),
+        ("position", &samples.position),
+        ("velocity", &samples.velocity),
+        ("acceleration", &samples.acceleration),
+        ("effort", &samples.effort),
+        ("temperature", &samples.temperature),
+    ];
+    if rigid.mass_and_length {
+        for name in ["mass", "length"] {
+            let column = samples.extra.get(name).ok_or(IdentifyError::MissingColumn { column: name })?;
+            columns.push((name, column));
+        }
+    }
+    for (column, values) in columns {
+        if values.len() != expected {
+            return Err(IdentifyError::Length { column, found: values.len(), expected });
+        }
+        let used = |i: &usize| matches!(samples.part[*i], Part::Train | Part::Validation);
+        if let Some(index) = (0..expected).filter(used).find(|&i| !values[i].is_finite()) {
+            return Err(IdentifyError::NotFinite { column, index, value: values[index] });
+        }
+    }
+    Ok(())
+}
+
+/// The rows of one part, in order, without a load.
+pub fn rows(samples: &Samples, part: Part) -> Vec<Row> {
+    let row = |i| Row {
+        joint: JointState { load: 0.0, ..joint_state(samples, i) },
+        regressors: RigidParameters::regressor_values(&rigid_state(samples, i)),
+        effort: samples.effort[i],
+    };
+    samples.indices(part).into_iter().map(row).collect()
+}
+
+/// Every n-th row, with the smallest n that leaves at most `limit`.
+pub fn decimated(rows: &[Row], limit: usize) -> Vec<Row> {
+    rows.iter().step_by(rows.len().div_ceil(limit.max(1)).max(1)).copied().collect()
+}
+
+impl Limits {
+    /// The limits of the given rows (at least one) around a reference temperature.
+    pub fn of(rows: &[Row], reference_temperature: f64) -> Self {
+        let mut speed: Vec<f64> = rows.iter().map(|row| row.joint.velocity.abs()).collect();
+        speed.sort_by(f64::total_cmp);
+        let range = |value: fn(&JointState) -> f64| {
+            rows.iter()
+                .map(|row| value(&row.joint))
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
+        };
+        let (coldest, warmest) = range(|s| s.temperature);
+        let (lowest, highest) = range(|s| s.position);
+        let (least, most) = range(|s| s.load);
+        let squares: f64 = rows.iter().map(|row| row.joint.acceleration * row.joint.acceleration).sum();
+        Self {
+            velocity: speed[(speed.len() - 1) * 999 / 1000],
+            acceleration_rms: (squares / rows.len() as f64).sqrt(),
+            warming: (warmest - reference_temperature).abs().max((coldest - reference_temperature).abs()),
+            temperature_range: warmest - coldest,
+            load: least.abs().max(most.abs()),
+            position: lowest.abs().max(highest.abs()),
+            position_range: highest - lowest,
+            position_covered: covers_positions(rows, lowest, highest),
+        }
+    }
+}
+
+fn covers_positions(rows: &[Row], lowest: f64, highest: f64) -> bool {
+    let mut visits = [[0; POSITION_BINS]; 2];
+    for row in rows {
+        let along = (row.joint.position - lowest) / (highest - lowest) * POSITION_BINS as f64;
+        visits[usize::from(row.joint.velocity < 0.0)][(along as usize).min(POSITION_BINS - 1)] += 1;
+    }
+    visits.iter().all(|bins| {
+        let visited = bins.iter().filter(|&&n| n >= POSITION_VISITS).count();
+        visited as f64 >= POSITION_COVERAGE * POSITION_BINS as f64
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(position: f64, velocity: f64) -> Row {
+        Row { joint: JointState { position, velocity, ..Default::default() }, regressors: [0.0; 6], effort: 0.0 }
+    }
+
+    #[test]
+    fn positions_are_covered_only_when_both_directions_visit_them() {
+        let there: Vec<Row> = (0..1000).map(|i| row(i as f64, 1.0)).collect();
+        let back: Vec<Row> = (0..1000).map(|i| row(i as f64, -1.0)).collect();
+        assert!(!Limits::of(&there, 25.0).position_covered);
+        assert!(Limits::of(&[there, back].concat(), 25.0).position_covered);
+    }
+
+    #[test]
+    fn decimation_keeps_at_most_the_limit_and_all_rows_below_it() {
+        let rows: Vec<Row> = (0..1001).map(|i| row(i as f64, 0.0)).collect();
+        assert_eq!(decimated(&rows, 500).len(), 334);
+        assert_eq!(decimated(&rows, 1001).len(), 1001);
+    }
+}

@@ -1,0 +1,108 @@
+//! Synthetic joints with known parameters, for the tests of the identification.
+
+use super::nonlinear::{Problem, rigid_effort};
+use super::observations::{Limits, decimated, joint_state, rigid_state, rows};
+use crate::friction_model::{Directional, FrictionModel, Terms};
+use crate::rigid::{Gravity, RigidModel, RigidParameters};
+use crate::samples::{MotionState, Part, Samples};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+use rand_distr::{Distribution, Normal};
+
+/// Inertia, and gravity of unknown direction.
+pub const RIGID: RigidModel = RigidModel { inertia: true, gravity: Gravity::SineAndCosine, mass_and_length: false };
+
+/// The rigid part that belongs to it.
+pub fn rigid() -> RigidParameters {
+    RigidParameters { inertia: 1.2, gravity_sine: 3.0, gravity_cosine: -1.5, ..RigidParameters::default() }
+}
+
+/// A friction whose parameters are all large enough to be found, with the given terms on.
+pub fn friction(terms: Terms) -> FrictionModel {
+    FrictionModel {
+        terms,
+        offset: 0.15,
+        position_slope: -0.12,
+        temperature_slope: 0.02,
+        load_slope: 0.08,
+        viscous: 0.9,
+        viscous_temperature: -0.02,
+        quadratic: 0.15,
+        coulomb: Directional { positive: 1.1, negative: 0.8 },
+        coulomb_temperature: -0.015,
+        coulomb_load: 0.09,
+        coulomb_slope: 40.0,
+        breakaway: Directional { positive: 1.8, negative: 1.3 },
+        stribeck_slope: 5.0,
+        hysteresis: 0.5,
+        hysteresis_velocity_slope: 3.0,
+        hysteresis_width: 0.9,
+        hysteresis_acceleration_slope: 2.0,
+        harmonic_frequency: 3.3,
+        harmonic_positive: [0.20, -0.12, 0.15, 0.10, -0.08],
+        harmonic_negative: [0.14, 0.11, -0.09, 0.12, 0.10],
+        rotor_inertia: 0.3,
+        reference_temperature: 30.0,
+    }
+}
+
+/// A motion of `count` samples at 100 Hz through all velocities, with many slow reversals, between 20 and 40 degrees;
+/// of every ten seconds six train, two validate, two test. No effort yet.
+pub fn motion(count: usize) -> Samples {
+    let waves = [(1.1, 0.31, 0.2), (0.35, 1.37, 1.0), (0.10, 4.3, 2.0), (0.02, 11.0, 0.5)];
+    let mut samples = Samples::default();
+    for i in 0..count {
+        let t = i as f64 * 0.01;
+        let sum = |f: fn(f64, f64, f64) -> f64| waves.iter().map(|&(a, w, p)| f(a, w, w * t + p)).sum::<f64>();
+        samples.time.push(t);
+        samples.position.push(sum(|a, _, x| a * x.sin()));
+        samples.velocity.push(sum(|a, w, x| a * w * x.cos()));
+        samples.acceleration.push(sum(|a, w, x| -a * w * w * x.sin()));
+        samples.temperature.push(30.0 + 10.0 * (0.11 * t).sin());
+        samples.effort.push(0.0);
+        samples.run.push(0);
+        samples.state.push(MotionState::default());
+        samples.part.push(match i / 200 % 5 {
+            0 | 2 | 4 => Part::Train,
+            1 => Part::Validation,
+            _ => Part::Test,
+        });
+    }
+    samples
+}
+
+/// Gives the samples the effort of a joint, with noise; load-dependent friction sees the true rigid part.
+pub fn drive(samples: &mut Samples, rigid: &RigidParameters, friction: &FrictionModel, noise: f64, seed: u64) {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let normal = Normal::new(0.0, noise).unwrap();
+    samples.load = (0..samples.len()).map(|i| rigid.effort(&rigid_state(samples, i))).collect();
+    for i in 0..samples.len() {
+        let lost = friction.friction(&joint_state(samples, i));
+        samples.effort[i] = samples.load[i] + lost + normal.sample(&mut random);
+    }
+    samples.load.clear();
+}
+
+/// The problem of identifying such a joint when its theoretical torque is known exactly.
+pub fn problem(samples: &Samples, model: &RigidModel, theoretical: RigidParameters, truth: &FrictionModel) -> Problem {
+    let load = |part| {
+        let mut rows = rows(samples, part);
+        rows.iter_mut().for_each(|row| row.joint.load = rigid_effort(&theoretical, row));
+        rows
+    };
+    let train = load(Part::Train);
+    Problem {
+        search: decimated(&train, 8_000),
+        limits: Limits::of(&train, truth.reference_temperature),
+        train,
+        validation: load(Part::Validation),
+        regressors: model.regressors(),
+        theoretical,
+        template: FrictionModel {
+            coulomb_slope: truth.coulomb_slope,
+            hysteresis_acceleration_slope: truth.hysteresis_acceleration_slope,
+            reference_temperature: truth.reference_temperature,
+            ..FrictionModel::default()
+        },
+    }
+}

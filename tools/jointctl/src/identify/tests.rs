@@ -1,0 +1,186 @@
+//! Tests of the identification as a whole.
+
+use super::synthetic::{RIGID, drive, friction, motion, rigid};
+use super::*;
+use crate::friction_model::{Term, Terms};
+use crate::rigid::Gravity;
+
+/// The friction of the joint that most tests identify.
+fn truth() -> FrictionModel {
+    friction(Terms::of(&[Term::Constant, Term::Viscous, Term::Coulomb, Term::Stribeck]))
+}
+
+/// A joint with asymmetric Coulomb, Stribeck and viscous friction and an offset.
+fn joint(count: usize) -> Samples {
+    let mut samples = motion(count);
+    drive(&mut samples, &rigid(), &truth(), 0.02, 42);
+    samples
+}
+
+fn of<'a>(found: &'a Identified, symbol: &str) -> &'a Estimated {
+    found.parameters.iter().find(|e| e.symbol == symbol).unwrap()
+}
+
+#[test]
+fn each_preset_identifies_exactly_the_parameters_of_its_paper() {
+    let harmonics = "b_1+ b_2+ b_3+ b_4+ b_5+ b_1- b_2- b_3- b_4- b_5-";
+    for (preset, expected) in [
+        (Preset::CoulombViscous, "I g_s g_c c_0 f_v F_c+ F_c- 1/v_c".to_string()),
+        (Preset::Linear, "I g_s g_c c_0 c_q c_T c_tau f_v".into()),
+        (Preset::Stribeck, "I g_s g_c f_v F_c+ F_c- 1/v_c F_brk+ F_brk- 1/v_st".into()),
+        (Preset::Nscf, "I g_s g_c c_0 f_v F_c+ F_c- 1/v_c".into()),
+        (Preset::Hysteresis, "I g_s g_c f_v b_h s z".into()),
+        (Preset::HysteresisHarmonics, format!("I g_s g_c c_q f_v b_h s z h {harmonics}")),
+    ] {
+        let found = identify(&mut joint(4_000), &RIGID, preset, &Options::default()).unwrap();
+        let symbols: Vec<&str> = found.parameters.iter().map(|e| e.symbol.as_str()).collect();
+        assert_eq!(symbols.join(" "), expected, "{preset}");
+        assert_eq!(found.friction.terms, preset.structure(&RIGID).unwrap().terms);
+    }
+    let no_inertia = RigidModel { inertia: false, ..RIGID };
+    let found = identify(&mut joint(4_000), &no_inertia, Preset::Nscf, &Options::default()).unwrap();
+    assert!(of(&found, "I_a").value > 1.0 && found.parameters.iter().all(|e| e.symbol != "I"));
+}
+
+#[test]
+fn the_stribeck_preset_couples_both_slopes_through_the_breakaway_velocity() {
+    let found = identify(&mut joint(4_000), &RIGID, Preset::Stribeck, &Options::default()).unwrap();
+    let ratio = found.friction.coulomb_slope / found.friction.stribeck_slope;
+    assert!((ratio - 10.0 * 2f64.sqrt()).abs() < 1e-9, "{ratio}");
+}
+
+#[test]
+fn the_load_of_every_sample_is_the_rigid_part_and_not_the_measured_effort() {
+    let mut samples = joint(4_000);
+    let found = identify(&mut samples, &RIGID, Preset::CoulombViscous, &Options::default()).unwrap();
+    assert_eq!(found.rigid, found.theoretical);
+    for i in 0..samples.len() {
+        assert_eq!(samples.load[i], found.theoretical.effort(&rigid_state(&samples, i)));
+    }
+    assert!((found.theoretical.inertia - rigid().inertia).abs() < 0.05, "{:?}", found.theoretical);
+}
+
+#[test]
+fn rigid_part_and_friction_of_the_samples_leave_the_reported_error() {
+    let mut samples = joint(4_000);
+    let found = identify(&mut samples, &RIGID, Preset::Nscf, &Options::default()).unwrap();
+    let rmse = |part| {
+        let indices = samples.indices(part);
+        let left = |i: usize| samples.effort[i] - found.rigid_effort(&samples, i) - found.friction(&samples, i);
+        (indices.iter().map(|&i| left(i).powi(2)).sum::<f64>() / indices.len() as f64).sqrt()
+    };
+    assert!((rmse(Part::Train) - found.train_rmse).abs() < 1e-9);
+    assert!((rmse(Part::Validation) - found.validation_rmse.unwrap()).abs() < 1e-9);
+}
+
+#[test]
+fn full_reaches_the_noise_and_never_loses_against_a_preset_on_validation() {
+    let mut samples = joint(6_000);
+    let full = identify(&mut samples, &RIGID, Preset::Full, &Options::default()).unwrap();
+    for preset in Preset::ALL {
+        let other = identify(&mut samples, &RIGID, preset, &Options::default()).unwrap();
+        assert!(full.validation_rmse <= other.validation_rmse, "{preset}");
+    }
+    assert!(full.friction.terms.contains(Term::Stribeck), "{:?}", full.notes);
+    let noise = |i: usize| {
+        let state = joint_state(&samples, i);
+        samples.effort[i] - rigid().effort(&rigid_state(&samples, i)) - truth().friction(&state)
+    };
+    let indices = samples.indices(Part::Validation);
+    let floor = (indices.iter().map(|&i| noise(i).powi(2)).sum::<f64>() / indices.len() as f64).sqrt();
+    assert!(full.validation_rmse.unwrap() < 1.01 * floor, "{:?} {floor}", full.validation_rmse);
+}
+
+#[test]
+fn full_considers_temperature_only_when_it_varied_enough() {
+    let mut samples = joint(4_000);
+    samples.temperature.iter_mut().for_each(|t| *t = 30.0 + 0.1 * (*t - 30.0));
+    let found = identify(&mut samples, &RIGID, Preset::Full, &Options::default()).unwrap();
+    assert!(!found.friction.terms.contains(Term::CoulombTemperature));
+    assert!(found.notes.iter().any(|note| note.contains("cover 2.0 K")), "{:?}", found.notes);
+}
+
+#[test]
+fn the_test_samples_are_never_looked_at() {
+    let mut clean = joint(3_000);
+    let mut corrupt = clean.clone();
+    for i in corrupt.indices(Part::Test) {
+        (corrupt.effort[i], corrupt.velocity[i], corrupt.temperature[i]) = (f64::NAN, 1e6, -300.0);
+    }
+    let found =
+        [&mut clean, &mut corrupt].map(|samples| identify(samples, &RIGID, Preset::Full, &Options::default()).unwrap());
+    assert_eq!(found[0].friction, found[1].friction);
+    assert_eq!(found[0].rigid, found[1].rigid);
+    assert_eq!(found[0].parameters, found[1].parameters);
+}
+
+#[test]
+fn the_result_does_not_depend_on_the_number_of_threads() {
+    let found = [1, 3].map(|threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| identify(&mut joint(6_000), &RIGID, Preset::Full, &Options::default()).unwrap())
+    });
+    assert_eq!(found[0].friction, found[1].friction);
+    assert_eq!(found[0].parameters, found[1].parameters);
+    assert_eq!(found[0].notes, found[1].notes);
+}
+
+#[test]
+fn gravity_that_was_never_seen_to_change_is_named_and_left_to_the_offset() {
+    let mut samples = joint(3_000);
+    samples.position.iter_mut().for_each(|q| *q = 0.4);
+    let found = identify(&mut samples, &RIGID, Preset::CoulombViscous, &Options::default()).unwrap();
+    let says = |what: &str| found.notes.iter().any(|note| note == what);
+    assert!(says("gravity, sine of position: cannot be told from offset; set to 0"), "{:?}", found.notes);
+    assert!(says("gravity, cosine of position: cannot be told from offset; set to 0"), "{:?}", found.notes);
+    assert_eq!((found.rigid.gravity_sine, found.rigid.gravity_cosine), (0.0, 0.0));
+    assert!(of(&found, "I").standard_error.is_some());
+}
+
+#[test]
+fn a_joint_that_never_moves_gives_no_friction_and_says_why() {
+    let mut samples = joint(3_000);
+    for column in [&mut samples.velocity, &mut samples.acceleration] {
+        column.iter_mut().for_each(|x| *x = 0.0);
+    }
+    let found = identify(&mut samples, &RIGID, Preset::CoulombViscous, &Options::default()).unwrap();
+    assert!(found.notes.contains(&"viscous coefficient: nothing in the train samples excites it; set to 0".into()));
+    assert_eq!(found.friction.viscous, 0.0);
+}
+
+#[test]
+fn a_known_load_splits_inertia_and_gravity() {
+    let mut samples = motion(6_000);
+    let run = |i: usize| i / 1_000;
+    let column = |values: [f64; 3]| (0..6_000).map(|i| values[run(i) % 3]).collect::<Vec<f64>>();
+    samples.extra.insert("mass".into(), column([0.5, 1.1, 1.7]));
+    samples.extra.insert("length".into(), column([0.20, 0.15, 0.10]));
+    let truth = RigidParameters { inertia: 0.02, load_inertia: 1.0, load_gravity_sine: 9.81, ..Default::default() };
+    drive(&mut samples, &truth, &friction(Terms::of(&[Term::Viscous, Term::Coulomb])), 0.01, 9);
+    let model = RigidModel { inertia: true, gravity: Gravity::Sine, mass_and_length: true };
+    let found = identify(&mut samples, &model, Preset::Nscf, &Options::default()).unwrap();
+    for (symbol, value) in [("I", 0.02), ("g_s", 0.0), ("I_ml2", 1.0), ("g_s,ml", 9.81)] {
+        let e = of(&found, symbol);
+        assert!((e.value - value).abs() < 3.0 * e.standard_error.unwrap(), "{e:?}");
+    }
+}
+
+#[test]
+fn data_that_cannot_be_used_are_refused_with_the_reason() {
+    let fails = |change: fn(&mut Samples), model: RigidModel, preset| {
+        let mut samples = joint(2_000);
+        change(&mut samples);
+        identify(&mut samples, &model, preset, &Options::default()).unwrap_err()
+    };
+    let cv = Preset::CoulombViscous;
+    let error = fails(|s| s.velocity[3] = f64::INFINITY, RIGID, cv);
+    assert_eq!(error, IdentifyError::NotFinite { column: "velocity", index: 3, value: f64::INFINITY });
+    let error = fails(|s| s.effort.truncate(1_999), RIGID, cv);
+    assert_eq!(error, IdentifyError::Length { column: "effort", found: 1_999, expected: 2_000 });
+    let error = fails(|_| (), RigidModel { mass_and_length: true, ..RIGID }, cv);
+    assert_eq!(error, IdentifyError::MissingColumn { column: "mass" });
+    let error = fails(|s| s.part.iter_mut().skip(50).for_each(|p| *p = Part::Unused), RIGID, cv);
+    assert_eq!(error, IdentifyError::TooFewSamples { found: 50, needed: 200 });
+    let no_validation = |s: &mut Samples| s.part.iter_mut().for_each(|p| *p = Part::Train);
+    assert_eq!(fails(no_validation, RIGID, Preset::Full), IdentifyError::NoValidation);
+}

@@ -1,0 +1,154 @@
+//! The friction of a joint as f64 and as the firmware's integers, evaluated over recorded samples; host.
+//!
+//! Every judged number of an image comes from [`fixed_point`], which calls the code that the board runs. [`FloatFriction`] is
+//! its twin in f64: what was trained, or what an image says without the rounding of its arithmetic.
+
+use crate::friction_model::{FrictionModel, JointState as FloatState};
+use crate::network::Network;
+use crate::quantize::QuantizeError;
+use crate::rigid::{RigidParameters, RigidState};
+use crate::samples::Samples;
+use joint_firmware::compensation::{Compensation, Request, Settings};
+use joint_firmware::friction::regime::Selector;
+use joint_firmware::friction::state::JointState;
+use joint_firmware::friction::{FrictionModel as FirmwareModel, FrictionParameters};
+use joint_firmware::quantity::{Acceleration, OutOfRange, Position, Temperature, Torque, Velocity};
+use rayon::prelude::*;
+
+/// A recorded sample that the firmware's quantities cannot hold.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{signal} of sample {index}: {source}")]
+pub struct StateError {
+    /// Name of the signal.
+    pub signal: &'static str,
+    /// Index of the sample.
+    pub index: usize,
+    /// The value and its limits.
+    pub source: OutOfRange,
+}
+
+/// Friction in f64: for each regime a physical model and perhaps a network.
+#[derive(Clone, Debug)]
+pub struct FloatFriction {
+    /// Parameter sets, in the order of the selector.
+    pub sets: Vec<(FrictionModel, Option<Network>)>,
+}
+
+impl FloatFriction {
+    /// The friction that an image's parameters stand for, without the rounding of the firmware's arithmetic.
+    pub fn of_image(parameters: &FrictionParameters) -> Result<Self, QuantizeError> {
+        let sets = parameters.sets.iter().take(parameters.selector.sets()).map(|set| {
+            let physical = crate::quantize::physical::dequantize(&set.physical, &parameters.domain);
+            let network = set.network.as_ref();
+            let network = network.map(|n| crate::quantize::network::dequantize(n, &parameters.domain)).transpose()?;
+            Ok((physical, network))
+        });
+        Ok(Self { sets: sets.collect::<Result<_, QuantizeError>>()? })
+    }
+
+    /// Physical friction and the network's share of one sample, by parameter set `set`.
+    pub fn parts(&self, set: usize, samples: &Samples, index: usize) -> (f64, f64) {
+        let Some((physical, network)) = self.sets.get(set) else { return (0.0, 0.0) };
+        let inputs = network_inputs(samples, index);
+        let network = network.as_ref().map_or(0.0, |network| network.evaluate(&inputs));
+        (physical.friction(&float_state(samples, index)), network)
+    }
+}
+
+/// The state of one sample in f64.
+pub fn float_state(samples: &Samples, index: usize) -> FloatState {
+    FloatState {
+        position: samples.position[index],
+        velocity: samples.velocity[index],
+        acceleration: samples.acceleration[index],
+        load: load(samples, index),
+        temperature: samples.temperature[index],
+    }
+}
+
+/// The inputs of a network for one sample: position, velocity, theoretical torque, measured torque, temperature.
+pub fn network_inputs(samples: &Samples, index: usize) -> [f64; 5] {
+    let (position, velocity) = (samples.position[index], samples.velocity[index]);
+    [position, velocity, load(samples, index), samples.effort[index], samples.temperature[index]]
+}
+
+/// The theoretical torque, zero before the rigid part is identified.
+fn load(samples: &Samples, index: usize) -> f64 {
+    samples.load.get(index).copied().unwrap_or(0.0)
+}
+
+/// What the rigid part depends on in one sample.
+pub fn rigid_state(samples: &Samples, index: usize) -> RigidState {
+    let extra = |name: &str| samples.extra.get(name).map_or(0.0, |column| column[index]);
+    RigidState {
+        position: samples.position[index],
+        acceleration: samples.acceleration[index],
+        mass: extra("mass"),
+        length: extra("length"),
+    }
+}
+
+/// The rigid part of the effort of every sample.
+pub fn rigid_efforts(rigid: &RigidParameters, samples: &Samples) -> Vec<f64> {
+    (0..samples.len()).map(|i| rigid.effort(&rigid_state(samples, i))).collect()
+}
+
+/// The state of every sample as the firmware's quantities.
+pub fn firmware_states(samples: &Samples) -> Result<Vec<JointState>, StateError> {
+    let state = |index: usize| {
+        let located = |signal: &'static str| move |source| StateError { signal, index, source };
+        Ok(JointState {
+            position: Position::from_f64(samples.position[index]).map_err(located("position"))?,
+            velocity: Velocity::from_f64(samples.velocity[index]).map_err(located("velocity"))?,
+            acceleration: Acceleration::from_f64(samples.acceleration[index]).map_err(located("acceleration"))?,
+            theoretical_torque: Torque::from_f64(load(samples, index)).map_err(located("theoretical torque"))?,
+            measured_torque: Torque::from_f64(samples.effort[index]).map_err(located("effort"))?,
+            temperature: Temperature::from_f64(samples.temperature[index]).map_err(located("temperature"))?,
+            coupled_velocity: Velocity::ZERO,
+        })
+    };
+    (0..samples.len()).into_par_iter().map(state).collect()
+}
+
+/// The parameter set that applies to each sample; every run begins anew.
+pub fn regimes(selector: &Selector, states: &[JointState], samples: &Samples) -> Vec<usize> {
+    let mut set = 0;
+    let mut sets = Vec::with_capacity(states.len());
+    for (i, state) in states.iter().enumerate() {
+        let previous = if i > 0 && samples.run[i] == samples.run[i - 1] { set } else { 0 };
+        set = selector.select(state, previous);
+        sets.push(set);
+    }
+    sets
+}
+
+/// Physical friction and the network's share of every sample, computed by the firmware.
+pub fn fixed_point(parameters: &FrictionParameters, states: &[JointState], sets: &[usize]) -> Vec<(f64, f64)> {
+    let model = FirmwareModel::new(parameters, 1);
+    let evaluate = |(state, set): (&JointState, &usize)| {
+        let estimate = model.evaluate(*set, state);
+        (estimate.physical.to_f64(), estimate.network.to_f64())
+    };
+    states.par_iter().zip(sets).with_min_len(4096).map(evaluate).collect()
+}
+
+/// Compensation torque of every sample, computed step by step as in the control loop: regimes with cross-fade, fades outside
+/// the trained box; full gain, no clamp, no slew limit. Every run begins anew.
+pub fn replay(parameters: &FrictionParameters, states: &[JointState], samples: &Samples) -> Vec<f64> {
+    let period = samples.time.windows(2).map(|pair| pair[1] - pair[0]).find(|period| *period > 0.0).unwrap_or(1.0);
+    let rate = (1.0 / period).round().max(1.0) as u32;
+    let model = FirmwareModel::new(parameters, rate);
+    // The widest settings are always in range.
+    let Ok(settings) = Settings::new(Request::PhysicalAndNetwork, 1 << 16, Torque::MAX, Torque::MAX, 1) else {
+        return vec![0.0; states.len()];
+    };
+    let mut compensation = Compensation::default();
+    let mut torques = Vec::with_capacity(states.len());
+    for (i, state) in states.iter().enumerate() {
+        if i > 0 && samples.run[i] != samples.run[i - 1] {
+            compensation = Compensation::default();
+        }
+        torques.push(compensation.step(Some(&model), &settings, state).torque.to_f64());
+    }
+    torques
+}

@@ -1,0 +1,72 @@
+//! The figures of the report, each one function from the report to one drawing; host.
+//!
+//! plotters lays out axes and marks, `svg` writes them, `ink` gives them meaning and colour.
+
+mod axis;
+mod bars;
+mod binning;
+mod chart;
+mod friction;
+mod ink;
+mod residuals;
+mod svg;
+mod time;
+mod training;
+
+use super::Report;
+pub use ink::style_sheet;
+use plotters::drawing::DrawingAreaErrorKind;
+use std::convert::Infallible;
+
+/// Why a figure could not be drawn: the layout or a font failed. The text is that of plotters.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot draw a figure: {0}")]
+pub struct FigureError(#[from] DrawingAreaErrorKind<Infallible>);
+
+/// One figure, as it is shown on the page and written to its own file.
+#[derive(Clone, Debug)]
+pub struct Figure {
+    /// File name without extension, and anchor on the page.
+    pub name: &'static str,
+    /// Heading.
+    pub title: &'static str,
+    /// One sentence that says how to read it.
+    pub caption: String,
+    /// It takes the whole width of the page.
+    pub wide: bool,
+    /// The `<svg>` element; its colours come from [`style_sheet`].
+    pub svg: String,
+}
+
+impl Figure {
+    /// The figure as a file on its own, with title, paper and style sheet.
+    pub fn standalone(&self) -> String {
+        let title = maud::html! { (self.title) }.into_string();
+        let inside = format!(
+            ">\n<title>{title}</title>\n<style>{}</style>\n<rect class=\"paper\" width=\"100%\" height=\"100%\"/>\n",
+            style_sheet()
+        );
+        let figure = self.svg.replacen(">\n", &inside, 1);
+        format!("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n{figure}")
+    }
+}
+
+/// All figures for which the report has data, in the order in which they are read.
+///
+/// # Errors
+/// [`FigureError`].
+pub fn figures(report: &Report) -> Result<Vec<Figure>, FigureError> {
+    let drawn = [
+        friction::against_velocity(report)?,
+        time::measured_and_predicted(report)?,
+        residuals::histogram(report)?,
+        friction::predicted_against_measured(report)?,
+        residuals::against_velocity(report)?,
+        residuals::against_position(report)?,
+        residuals::against_temperature(report)?,
+        bars::motion_states(report)?,
+        bars::candidates(report)?,
+        training::curves(report)?,
+    ];
+    Ok(drawn.into_iter().flatten().collect())
+}

@@ -1,0 +1,124 @@
+//! The program as a user meets it: exit codes, messages, files.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn jointctl(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_jointctl")).current_dir(folder).args(arguments).output().expect("jointctl starts")
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// A small demo: few samples and one network, for the tests' sake.
+fn demo(folder: &Path, out: &str) -> Output {
+    jointctl(folder, &["demo", "--out", out, "--samples", "2000", "--restarts", "2", "--patience", "10"])
+}
+
+#[test]
+fn the_demo_writes_an_image_its_twin_and_a_report_and_the_same_choices_give_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    for out in ["first", "second"] {
+        let output = demo(folder.path(), out);
+        assert!(output.status.success(), "{}", stderr(&output));
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        for row in ["nothing", "coulomb-viscous", "image, fixed point"] {
+            assert!(text.contains(row), "{text}");
+        }
+    }
+    for file in ["friction.img", "friction.toml", "log.csv", "report.html"] {
+        let read = |out: &str| std::fs::read(folder.path().join(out).join(file)).unwrap();
+        assert!(!read("first").is_empty());
+        assert!(read("first") == read("second"), "{file} differs between two runs");
+    }
+}
+
+#[test]
+fn an_image_survives_the_way_to_toml_and_back_and_a_damaged_one_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    assert!(demo(folder.path(), "demo").status.success());
+    let run = |arguments: &[&str]| jointctl(folder.path(), arguments);
+    let read = |file: &str| std::fs::read(folder.path().join(file)).unwrap();
+
+    assert!(run(&["image", "convert", "demo/friction.toml", "again.img"]).status.success());
+    assert!(run(&["image", "convert", "again.img", "again.toml"]).status.success());
+    assert_eq!(read("again.img"), read("demo/friction.img"));
+    assert_eq!(read("again.toml"), read("demo/friction.toml"));
+    assert!(run(&["image", "verify", "again.img"]).status.success());
+    let evaluated = run(&["evaluate", "again.img", "demo/dataset.toml", "--causal"]);
+    assert!(evaluated.status.success(), "{}", stderr(&evaluated));
+    assert!(String::from_utf8_lossy(&evaluated.stdout).contains("image, compensation"));
+
+    let mut damaged = read("again.img");
+    damaged[100] ^= 1;
+    std::fs::write(folder.path().join("damaged.img"), damaged).unwrap();
+    let refused = run(&["image", "verify", "damaged.img"]);
+    assert!(!refused.status.success() && stderr(&refused).contains("damaged.img: damaged: checksum"));
+
+    let text = String::from_utf8(read("again.toml")).unwrap();
+    for (edit, to, expected) in [
+        ("format = 1", "format = 2", "format is 2, this program reads format 1"),
+        ("version = 1", "version = 1\nflavour = 3", "flavour"),
+        ("effort = \"Nm\"", "effort = \"lbf\"", "known are Nm, N, A, V"),
+    ] {
+        std::fs::write(folder.path().join("edited.toml"), text.replacen(edit, to, 1)).unwrap();
+        let refused = run(&["image", "convert", "edited.toml", "again.img"]);
+        assert!(!refused.status.success() && stderr(&refused).contains(expected), "{}", stderr(&refused));
+    }
+    assert_eq!(read("again.img"), read("demo/friction.img"), "a refused conversion left its target as it was");
+
+    // A person changes a coefficient: the golden vectors no longer hold until they are computed anew.
+    let edited = text.replacen("margin = 0.5", "margin = 0.25", 1);
+    assert_ne!(edited, text);
+    let edited = edited.replacen("constant = ", "constant = 0.5 #", 1).replacen("viscous = ", "viscous = 1.0 #", 1);
+    std::fs::write(folder.path().join("edited.toml"), edited).unwrap();
+    let refused = run(&["image", "convert", "edited.toml", "edited.img"]);
+    assert!(!refused.status.success() && stderr(&refused).contains("golden vector 0"), "{}", stderr(&refused));
+    assert!(run(&["image", "convert", "edited.toml", "edited.img", "--recompute-golden"]).status.success());
+}
+
+#[test]
+fn a_fit_that_fails_says_why_and_leaves_earlier_results_as_they_were() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("joint");
+    std::fs::create_dir(&out).unwrap();
+    std::fs::write(out.join("friction.img"), b"earlier").unwrap();
+    std::fs::write(folder.path().join("joint.toml"), DESCRIPTION).unwrap();
+    std::fs::write(folder.path().join("log.csv"), "t,q,tau\n0,0,0\n0.01,0.1,x\n").unwrap();
+    let output = jointctl(folder.path(), &["fit", "joint.toml"]);
+    assert_eq!(output.status.code(), Some(1));
+    let text = stderr(&output);
+    assert!(
+        text.contains("log.csv") && text.contains("line 3") && text.contains("tau") && text.contains('x'),
+        "{text}"
+    );
+    assert_eq!(std::fs::read(out.join("friction.img")).unwrap(), b"earlier");
+    assert_eq!(std::fs::read_dir(&out).unwrap().count(), 1);
+}
+
+#[test]
+fn wrong_arguments_are_refused_with_their_limits() {
+    let folder = tempfile::tempdir().unwrap();
+    for (arguments, expected) in [
+        (&["fit", "nowhere.toml"] as &[&str], "nowhere.toml"),
+        (&["demo", "--equalise", "2"], "--equalise is 2, must be 0 to 1"),
+        (&["demo", "--preset", "stribek"], "stribeck"),
+        (&["image", "verify", "nowhere.img"], "cannot read nowhere.img"),
+    ] {
+        let output = jointctl(folder.path(), arguments);
+        assert!(!output.status.success());
+        assert!(stderr(&output).contains(expected), "{arguments:?}: {}", stderr(&output));
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "nothing is written on the way to an error");
+}
+
+const DESCRIPTION: &str = r#"
+name = "joint"
+[source]
+files = ["log.csv"]
+[columns]
+time = { column = "t" }
+position = { column = "q" }
+effort = { column = "tau", unit = "Nm" }
+"#;

@@ -1,0 +1,145 @@
+//! The joint: motor, gear, friction, load and heat, integrated in steps of at most [`MAXIMUM_STEP`].
+//!
+//! Velocity and bristles are solved together by the backward Euler rule, the position follows from the new velocity
+//! (semi-implicit Euler): a frictionless pendulum keeps its energy, and stiff bristles cannot make the joint
+//! unstable.
+
+use crate::error::{ParameterError, within};
+use crate::friction::{Bristles, Surroundings};
+use crate::parameters::JointParameters;
+use crate::thermal::Heat;
+
+/// Longest integration step, s.
+pub const MAXIMUM_STEP: f64 = 1e-4;
+
+/// Time constant with which the gear's torque becomes tooth load and so friction, s. Without it, friction and
+/// acceleration would define each other within one step.
+pub const GEAR_LOAD_LAG: f64 = 2e-3;
+
+/// The joint's true motion, torques and temperatures; none of it is measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct State {
+    /// Position of the link, rad; zero hangs straight down, not wrapped.
+    pub position: f64,
+    /// Velocity, rad/s.
+    pub velocity: f64,
+    /// Acceleration over the last step, rad/s².
+    pub acceleration: f64,
+    /// Torque of the motor at the link before friction, Nm.
+    pub motor_torque: f64,
+    /// Friction torque, Nm; opposes a motion of its own sign.
+    pub friction_torque: f64,
+    /// Gravity and external torque that the motor has to hold, Nm.
+    pub load_torque: f64,
+    /// Torque that the gear transmits to link and payload, after [`GEAR_LOAD_LAG`], Nm.
+    pub gear_torque: f64,
+    /// Heat that the friction makes, W; never negative.
+    pub friction_loss: f64,
+    /// Temperatures of winding and housing, °C.
+    pub heat: Heat,
+}
+
+/// A virtual joint in motion.
+#[derive(Clone, Debug)]
+pub struct Joint {
+    parameters: JointParameters,
+    bristles: Bristles,
+    state: State,
+}
+
+impl Joint {
+    /// A joint at rest with its link hanging down and `temperature` (°C, -40 to 150) throughout.
+    ///
+    /// # Errors
+    /// The first parameter, or the temperature, that is outside its range.
+    pub fn new(parameters: JointParameters, temperature: f64) -> Result<Self, ParameterError> {
+        parameters.validate()?;
+        within("temperature", temperature, -40.0, 150.0)?;
+        let state = State {
+            position: 0.0,
+            velocity: 0.0,
+            acceleration: 0.0,
+            motor_torque: 0.0,
+            friction_torque: 0.0,
+            load_torque: 0.0,
+            gear_torque: 0.0,
+            friction_loss: 0.0,
+            heat: Heat::uniform(temperature),
+        };
+        Ok(Self { parameters, bristles: Bristles::default(), state })
+    }
+
+    /// The same joint at `position` (rad) and `velocity` (rad/s), with unbent bristles.
+    #[must_use]
+    pub fn released_at(mut self, position: f64, velocity: f64) -> Self {
+        self.state.position = position;
+        self.state.velocity = velocity;
+        self.bristles = Bristles::default();
+        self
+    }
+
+    /// What this joint is.
+    #[must_use]
+    pub fn parameters(&self) -> &JointParameters {
+        &self.parameters
+    }
+
+    /// Where it is now.
+    #[must_use]
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
+    /// Kinetic, potential and bristle energy, J; zero when it hangs at rest.
+    #[must_use]
+    pub fn stored_energy(&self) -> f64 {
+        let kinetic = 0.5 * self.parameters.inertia() * self.state.velocity * self.state.velocity;
+        let potential = self.parameters.load.gravity_amplitude() * (1.0 - libm::cos(self.state.position));
+        kinetic + potential + self.bristles.energy(&self.parameters.friction)
+    }
+
+    /// Moves on by `duration` (s, above zero) while the torque-producing `current` (A, limited to the current limit)
+    /// and the `external_torque` (Nm at the link, positive pushes forward) stay the same.
+    pub fn advance(&mut self, current: f64, external_torque: f64, duration: f64) {
+        debug_assert!(duration > 0.0, "a joint advances by {duration} s");
+        let limit = self.parameters.motor.current_limit;
+        let current = current.clamp(-limit, limit);
+        let steps = (duration / MAXIMUM_STEP - 1e-9).ceil().max(1.0);
+        let step = duration / steps;
+        for _ in 0..steps as u64 {
+            self.step(current, external_torque, step);
+        }
+    }
+
+    fn step(&mut self, current: f64, external_torque: f64, step: f64) {
+        let parameters = &self.parameters;
+        let state = &mut self.state;
+        let inertia = parameters.inertia();
+        let before = state.velocity;
+
+        let surroundings =
+            Surroundings { position: state.position, gear_torque: state.gear_torque, temperature: state.heat.housing };
+        let friction = self.bristles.prepare(&parameters.friction, before, &surroundings, step);
+        let motor_torque = parameters.motor.torque_per_ampere() * current;
+        let load_torque = parameters.load.gravity_torque(state.position) - external_torque;
+
+        // The friction is a straight line over the new velocity, so the implicit step is one division.
+        let net_torque = motor_torque - load_torque - friction.torque(before);
+        state.velocity = before + step * net_torque / (inertia + step * friction.slope());
+        state.acceleration = (state.velocity - before) / step;
+        state.position += step * state.velocity;
+
+        let stored = self.bristles.energy(&parameters.friction);
+        state.friction_torque = self.bristles.advance(&friction, state.velocity);
+        let newly_stored = self.bristles.energy(&parameters.friction) - stored;
+        state.friction_loss = state.friction_torque * state.velocity - newly_stored / step;
+        state.motor_torque = motor_torque;
+        state.load_torque = load_torque;
+
+        let transmitted = load_torque + parameters.load.total_inertia() * state.acceleration;
+        state.gear_torque += (transmitted - state.gear_torque) * step / (step + GEAR_LOAD_LAG);
+
+        let copper_loss = parameters.motor.copper_loss(current);
+        state.heat.advance(&parameters.thermal, copper_loss, state.friction_loss, step);
+    }
+}
