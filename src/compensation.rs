@@ -105,7 +105,8 @@ impl core::fmt::Display for SettingsError {
 
 impl core::error::Error for SettingsError {}
 
-/// How much compensation is permitted.
+/// How much compensation is permitted. New settings take effect with the next step; a torque beyond a new, lower clamp comes down
+/// to it at the slew rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
     request: Request,
@@ -184,8 +185,10 @@ impl Compensation {
         let physical = weigh(estimate.physical.to_bits(), weights.physical);
         let network = weigh(estimate.network.to_bits(), weights.network);
         let full = self.permitted(physical.saturating_add(network), settings);
-        let network_acts = settings.request == Request::PhysicalAndNetwork && model.has_network(&self.memory);
-        let wanted = if network_acts { full } else { self.permitted(physical, settings) };
+        let wants_network = settings.request == Request::PhysicalAndNetwork;
+        // After a change-over to a set without a network, the old set's still fades out.
+        let network_acts = wants_network && (model.has_network(&self.memory) || estimate.network != Torque::ZERO);
+        let wanted = if wants_network { full } else { self.permitted(physical, settings) };
 
         let last = self.last.to_bits();
         let torque = wanted.torque.max(last.saturating_sub(settings.slew)).min(last.saturating_add(settings.slew));
@@ -199,7 +202,7 @@ impl Compensation {
         let reason = match weights.outside {
             Some(signal) if weights.physical < i32::MAX => Reason::FarOutsideTrainedBox(signal),
             Some(signal) if network_acts => Reason::OutsideTrainedBox(signal),
-            _ if settings.request == Request::PhysicalAndNetwork && !network_acts => Reason::NoNetwork,
+            _ if wants_network && !network_acts => Reason::NoNetwork,
             _ => Reason::AsRequested,
         };
         let limited = wanted.limited || torque != wanted.torque;
