@@ -54,7 +54,7 @@ pub fn run(bytes: &[u8]) -> Option<u32> {
             let wide = sequence.next() as i32;
             // Three states in four lie in and around the trained box, one anywhere.
             let width = (range.half_width() as i64 * 5 / 4).max(1);
-            let near = (range.centre() as i64 + (wide as i64 * width >> 31)).clamp(i32::MIN as i64, i32::MAX as i64);
+            let near = (range.centre() as i64 + ((wide as i64 * width) >> 31)).clamp(i32::MIN as i64, i32::MAX as i64);
             *signal = if n % 4 == 3 { wide } else { near as i32 };
         }
         let state = JointState::from_signals(signals);
