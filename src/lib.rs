@@ -7,5 +7,7 @@ pub mod compensation;
 pub mod dsp;
 
 pub mod friction;
+pub mod joint;
+pub mod motor;
 pub mod parameters;
 pub mod quantity;

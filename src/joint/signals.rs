@@ -1,0 +1,50 @@
+//! What the board measures for a control step, and what the control step tells the board to do; control step.
+//!
+//! These two types are the whole seam between the joint and a board, real, emulated or virtual.
+
+use crate::motor::phases::Phases;
+
+/// Everything that one control step knows about the outside world.
+///
+/// The board scales its codes to these units with nominal gains; offsets of the current sensors are the joint's business.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measurements {
+    /// Phase currents, A, positive into the motor, sampled at the centre of the PWM period.
+    pub phase_currents: Phases,
+    /// Voltage of the supply, V.
+    pub bus_voltage: f32,
+    /// Rotor angle as a fraction of a mechanical turn, 2^32 a turn, in the encoder's own direction and zero.
+    pub encoder: u32,
+    /// Whether the encoder answered, with a good parity or checksum where it has one.
+    pub encoder_valid: bool,
+    /// Temperature of the winding's sensor, °C; NaN where the board has none.
+    pub winding_temperature: f32,
+    /// Temperature of the bridge, °C; NaN where the board has none.
+    pub bridge_temperature: f32,
+    /// The gate driver or a comparator reports a fault.
+    pub bridge_fault: bool,
+}
+
+/// State of the three half bridges.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum BridgeState {
+    /// All six transistors are off: the phases float.
+    #[default]
+    Off,
+    /// Every half bridge switches with its duty.
+    Switching,
+}
+
+/// What the board is to do in the next PWM period.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bridge {
+    /// Whether the bridge switches at all.
+    pub state: BridgeState,
+    /// Fraction of the period that the high side conducts, 0 to 1; one half in every phase while the bridge is off.
+    pub duties: Phases,
+}
+
+impl Bridge {
+    /// All transistors off.
+    pub const OFF: Self = Self { state: BridgeState::Off, duties: Phases::uniform(0.5) };
+}
