@@ -3,11 +3,12 @@
 //! The recordings are others' and are not part of this repository: they are looked for in `$JOINT_DATA`, else in
 //! `../shared/data` beside it. Where they are absent every test here is reported as ignored, by name.
 
-use jointctl::dataset::prepare_with;
+use jointctl::dataset::{Prepared, prepare_with};
 use jointctl::filter::LowPassFilter;
 use jointctl::fit::{Options, fit};
 use jointctl::progress::Silent;
 use jointctl::report::Role;
+use jointctl::samples::Part;
 use libtest_mimic::{Arguments, Failed, Trial};
 use nalgebra::{DMatrix, DVector};
 use std::path::{Path, PathBuf};
@@ -44,11 +45,16 @@ fn main() {
             Trial::test(title, move || beats_baselines(name, baselines, &root)).with_ignored_flag(ignored)
         })
         .collect();
-    let emps = root.join("emps");
-    trials.push(
-        Trial::test("emps_published_protocol_is_reproduced", move || published_protocol(&emps))
-            .with_ignored_flag(ignored),
-    );
+    type Check = fn(&Path) -> Result<(), Failed>;
+    let checks: [(&str, Check); 3] = [
+        ("emps_published_protocol_is_reproduced", published_protocol),
+        ("every_shipped_description_prepares_its_recorded_joint", shipped_descriptions),
+        ("the_dirt_of_the_recorded_servo_is_found", dirt_of_the_servo),
+    ];
+    for (title, check) in checks {
+        let root = root.clone();
+        trials.push(Trial::test(title, move || check(&root)).with_ignored_flag(ignored));
+    }
     libtest_mimic::run(&arguments, trials).exit();
 }
 
@@ -59,11 +65,60 @@ fn data() -> Option<PathBuf> {
     folder.canonicalize().ok().filter(|folder| folder.join("emps").is_dir())
 }
 
-fn beats_baselines(name: &str, baselines: &[f64], root: &Path) -> Result<(), Failed> {
-    let description = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../tools/jointctl/datasets/{name}.toml"));
+/// The folder of the descriptions that come with the program.
+fn descriptions() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../tools/jointctl/datasets")
+}
+
+/// The samples of the data set `name` in `root`.
+fn prepared(name: &str, root: &Path) -> Result<Prepared, Failed> {
     let root = root.to_string_lossy().into_owned();
     let environment = |variable: &str| (variable == "JOINT_DATA").then(|| root.clone());
-    let mut prepared = prepare_with(&description, &environment)?;
+    Ok(prepare_with(&descriptions().join(format!("{name}.toml")), &environment)?)
+}
+
+fn shipped_descriptions(root: &Path) -> Result<(), Failed> {
+    let mut count = 0;
+    for entry in std::fs::read_dir(descriptions())? {
+        let path = entry?.path();
+        let name = path.file_stem().and_then(|stem| stem.to_str()).ok_or("a description without a name")?;
+        let samples = prepared(name, root)?.samples;
+        let sizes = [Part::Train, Part::Validation, Part::Test].map(|part| samples.indices(part).len());
+        if sizes.iter().any(|&size| size < 300) {
+            return Err(format!("{name}: {sizes:?} samples to train, validate and test with").into());
+        }
+        count += 1;
+    }
+    if count >= BASELINES.len() { Ok(()) } else { Err(format!("only {count} descriptions").into()) }
+}
+
+/// The figures are those of the data's own documentation.
+fn dirt_of_the_servo(root: &Path) -> Result<(), Failed> {
+    let prepared = prepared("sts3250", root)?;
+    let count = |what: &str| prepared.notes.iter().find(|note| note.what == what).map_or(0, |note| note.count);
+    for (what, expected) in [
+        ("rows read", 376_200),
+        ("runs", 627),
+        ("rows missing by a dropout rule", 83),
+        ("rows unused around a frozen read-out", 452),
+    ] {
+        if count(what) != expected {
+            return Err(format!("{what}: {}, expected {expected}", count(what)).into());
+        }
+    }
+    // Root mean square of the voltage in both test sets: what errors are to be compared with.
+    for (set, expected) in prepared.test_sets.iter().zip([3.588, 3.640]) {
+        let sum: f64 = set.indices.iter().map(|&i| prepared.samples.effort[i].powi(2)).sum();
+        let rms = (sum / set.indices.len() as f64).sqrt();
+        if (rms - expected).abs() >= 1e-3 {
+            return Err(format!("RMS of {} is {rms}, expected {expected}", set.name).into());
+        }
+    }
+    Ok(())
+}
+
+fn beats_baselines(name: &str, baselines: &[f64], root: &Path) -> Result<(), Failed> {
+    let mut prepared = prepared(name, root)?;
     let options = Options { reference: false, ..Options::default() };
     let fitted = fit(&mut prepared, &options, &Silent)?;
     let mut effort_rms = f64::INFINITY;
@@ -89,7 +144,8 @@ fn beats_baselines(name: &str, baselines: &[f64], root: &Path) -> Result<(), Fai
 ///
 /// Published: 4.0834 % on the training run and 5.9824 % on the run with pulses (symmetric friction), 3.1117 % on the training
 /// run (asymmetric friction).
-fn published_protocol(folder: &Path) -> Result<(), Failed> {
+fn published_protocol(root: &Path) -> Result<(), Failed> {
+    let folder = root.join("emps");
     for (asymmetric, published_train, most_on_pulses) in [(false, 4.0834, 6.1), (true, 3.1117, 5.5)] {
         let (regressors, force) = protocol_rows(&folder.join("emps_train.csv.gz"), asymmetric)?;
         let parameters = regressors.clone().svd(true, true).solve(&force, 1e-12)?;

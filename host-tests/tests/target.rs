@@ -15,6 +15,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::OnceLock;
 
 const TARGET: &str = "thumbv7em-none-eabihf";
 /// Images that the probe evaluates.
@@ -31,6 +32,8 @@ fn main() {
         Trial::test("friction_compensation_and_parameters_link_no_panic_and_no_float_library", links_little)
             .with_ignored_flag(!target),
         Trial::test("the_emulated_core_gives_the_same_bits_as_the_host", same_bits).with_ignored_flag(!emulator),
+        Trial::test("an_image_is_verified_within_its_instruction_budget_on_the_emulated_core", verification_cost)
+            .with_ignored_flag(!emulator),
     ];
     libtest_mimic::run(&arguments, trials).exit();
 }
@@ -59,10 +62,15 @@ fn images() -> Vec<Vec<u8>> {
     images
 }
 
-/// Builds the probe around the images; the program's path.
-fn build(name: &str) -> Result<PathBuf, Failed> {
+/// Builds the probe around the images, once; the program's path, or what the compiler said.
+fn build() -> Result<PathBuf, Failed> {
+    static BUILT: OnceLock<Result<PathBuf, String>> = OnceLock::new();
+    BUILT.get_or_init(|| build_probe().map_err(|error| format!("{error:?}"))).clone().map_err(Failed::from)
+}
+
+fn build_probe() -> Result<PathBuf, Failed> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("probe");
-    let target = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let target = Path::new(env!("CARGO_TARGET_TMPDIR")).join("probe");
     std::fs::create_dir_all(&target)?;
     let mut bytes = Vec::new();
     for image in images() {
@@ -87,7 +95,7 @@ fn build(name: &str) -> Result<PathBuf, Failed> {
 
 fn links_little() -> Result<(), Failed> {
     // That it links at all shows that no panic can be reached: see the probe's panic handler.
-    let bytes = std::fs::read(build("links")?)?;
+    let bytes = std::fs::read(build()?)?;
     let program = object::File::parse(&*bytes)?;
     let names: Vec<String> = program.symbols().filter_map(|symbol| symbol.name().ok().map(str::to_owned)).collect();
     let floating = |name: &str| name.starts_with("__aeabi_f") || name.starts_with("__aeabi_d") && !name.contains("div");
@@ -108,18 +116,50 @@ fn links_little() -> Result<(), Failed> {
     }
 }
 
-fn same_bits() -> Result<(), Failed> {
+/// What the probe prints when it runs: for each image the hash, and the ticks of its verification.
+fn printed() -> Result<Vec<(u32, u32)>, Failed> {
+    static PRINTED: OnceLock<Result<Vec<(u32, u32)>, String>> = OnceLock::new();
+    PRINTED.get_or_init(|| run_probe().map_err(|error| format!("{error:?}"))).clone().map_err(Failed::from)
+}
+
+fn run_probe() -> Result<Vec<(u32, u32)>, Failed> {
     let output = Command::new("qemu-system-arm")
         .args(["-M", "mps2-an386", "-nographic", "-monitor", "none", "-serial", "none"])
+        // One instruction takes 1 ns of emulated time, whatever the machine.
+        .args(["-icount", "shift=0"])
         .args(["-semihosting-config", "enable=on,target=native", "-kernel"])
-        .arg(build("bits")?)
+        .arg(build()?)
         .output()?;
     let text = format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
-    let emulated: Vec<u32> = text.lines().filter_map(|line| u32::from_str_radix(line.trim(), 16).ok()).collect();
+    let words: Vec<u32> = text.lines().filter_map(|line| u32::from_str_radix(line.trim(), 16).ok()).collect();
+    match words.len() == 2 * IMAGES {
+        true => Ok(words.chunks(2).map(|pair| (pair[0], pair[1])).collect()),
+        false => Err(format!("the probe printed {text:?}").into()),
+    }
+}
+
+fn same_bits() -> Result<(), Failed> {
+    let emulated: Vec<u32> = printed()?.into_iter().map(|(hash, _)| hash).collect();
     let host: Vec<u32> = images().iter().map(|image| sequence::run(image).unwrap_or(0)).collect();
     println!("{} images x {} states", host.len(), sequence::STATES);
     match emulated == host && host.iter().all(|sum| *sum != 0) {
         true => Ok(()),
         false => Err(format!("core {emulated:08x?}, host {host:08x?}").into()),
+    }
+}
+
+/// Emulated time of one tick of the system timer, ns: this machine's processor clock is 25 MHz.
+const TICK: u64 = 40;
+/// Most instructions that decoding, certificate and golden vectors of an image of four regimes may take.
+const VERIFICATION_BUDGET: u64 = 20_000_000;
+
+fn verification_cost() -> Result<(), Failed> {
+    let mut instructions: Vec<u64> = printed()?.into_iter().map(|(_, ticks)| TICK * u64::from(ticks)).collect();
+    instructions.sort_unstable();
+    let (least, median, most) = (instructions[0], instructions[IMAGES / 2], instructions[IMAGES - 1]);
+    println!("instructions to verify an image: {least} least, {median} median, {most} most of {IMAGES}");
+    match least > 0 && most <= VERIFICATION_BUDGET {
+        true => Ok(()),
+        false => Err(format!("{least} to {most} instructions, budget {VERIFICATION_BUDGET}").into()),
     }
 }

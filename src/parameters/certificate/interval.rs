@@ -53,14 +53,52 @@ impl Interval {
         if self == Self::ZERO || other == Self::ZERO {
             return Self::ZERO;
         }
+        // Ends of 32 bits, by far the most: one instruction a product on the board, where a saturating one takes fifty.
+        if let (Some((low, high)), Some((other_low, other_high))) = (self.narrow(), other.narrow()) {
+            return Self::hull(
+                low as i64 * other_low as i64,
+                low as i64 * other_high as i64,
+                high as i64 * other_low as i64,
+                high as i64 * other_high as i64,
+            );
+        }
         if !self.bounded() || !other.bounded() {
             return Self { low: i64::MIN, high: i64::MAX };
         }
-        let a = self.low.saturating_mul(other.low);
-        let b = self.low.saturating_mul(other.high);
-        let c = self.high.saturating_mul(other.low);
-        let d = self.high.saturating_mul(other.high);
+        Self::hull(
+            self.low.saturating_mul(other.low),
+            self.low.saturating_mul(other.high),
+            self.high.saturating_mul(other.low),
+            self.high.saturating_mul(other.high),
+        )
+    }
+
+    /// Both ends, where they fit 32 bits.
+    fn narrow(self) -> Option<(i32, i32)> {
+        let (low, high) = (self.low as i32, self.high as i32);
+        (low as i64 == self.low && high as i64 == self.high).then_some((low, high))
+    }
+
+    fn hull(a: i64, b: i64, c: i64, d: i64) -> Self {
         Self { low: a.min(b).min(c).min(d), high: a.max(b).max(c).max(d) }
+    }
+
+    /// All products with a share of one: an interval within 0 to 2^14.
+    pub(super) fn times_share(self, share: Self) -> Self {
+        const SMALL: i64 = 1 << 48;
+        if self.low <= -SMALL || self.high >= SMALL {
+            return self.times(share);
+        }
+        Self {
+            low: self.low * if self.low < 0 { share.high } else { share.low },
+            high: self.high * if self.high < 0 { share.low } else { share.high },
+        }
+    }
+
+    /// All products with one 16-bit factor, of an interval whose ends fit 32 bits.
+    pub(super) fn scaled(self, factor: i16) -> Self {
+        let (low, high) = (self.low * factor as i64, self.high * factor as i64);
+        if factor < 0 { Self { low: high, high: low } } else { Self { low, high } }
     }
 
     /// Division by a power of two, rounded outwards.
@@ -125,6 +163,13 @@ mod tests {
             let holds = |i: Interval, value: i128| {
                 (i.low == i64::MIN || i.low as i128 <= value) && (i.high == i64::MAX || value <= i.high as i128)
             };
+            let short = interval(a as i32 as i64, b as i32 as i64);
+            prop_assert_eq!(short.scaled(c as i16), short.times(Interval::point(c as i16 as i64)));
+            let share = interval(c & 0x3fff, d & 0x3fff);
+            prop_assert_eq!(interval(a >> 20, b >> 20).times_share(share), interval(a >> 20, b >> 20).times(share));
+            prop_assert_eq!(first.times_share(share), first.times(share));
+            let (small, factor) = (interval(a >> 33, b >> 33), interval(c >> 33, d >> 33));
+            prop_assert_eq!(small.times(factor).shift_left(20), small.shift_left(20).times(factor));
             prop_assert!(holds(first.add(second), x as i128 + y as i128));
             prop_assert!(holds(first.times(second), x as i128 * y as i128));
             prop_assert!(holds(first.shift_right(bits), x as i128 >> bits));

@@ -28,8 +28,17 @@ use crate::friction::state::Signal;
 use crate::quantity::Torque;
 use interval::Interval;
 
-/// How often the box is bisected: at most 2^MAX_DEPTH cells for each part of each set.
-pub const MAX_DEPTH: u32 = 9;
+/// How often the box is bisected: at most 2^MAX_DEPTH cells for each part of all sets together.
+pub const MAX_DEPTH: u32 = 8;
+
+/// How often the box of one of `sets` sets is bisected, so that more sets do not take more work.
+const fn depth(sets: usize) -> u32 {
+    match sets {
+        0 | 1 => MAX_DEPTH,
+        2 => MAX_DEPTH - 1,
+        _ => MAX_DEPTH - 2,
+    }
+}
 
 /// What an image may not exceed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -163,13 +172,17 @@ pub fn prove(parameters: &FrictionParameters) -> Result<Certificate, Refusal> {
     let domain = &parameters.domain;
     let velocity_shift = domain.shifts()[Signal::Velocity as usize];
     let mut proved: Option<Certificate> = None;
-    for (index, set) in parameters.sets.iter().enumerate().take(parameters.selector.sets()) {
-        let physical =
-            physical::bounds(&Physical::new(&set.physical, domain)).ok_or(Refusal::PhysicalOverflow { set: index })?;
+    let sets = parameters.selector.sets();
+    let depth = depth(sets);
+    for (index, set) in parameters.sets.iter().enumerate().take(sets) {
+        let physical = physical::bounds(&Physical::new(&set.physical, domain), depth)
+            .ok_or(Refusal::PhysicalOverflow { set: index })?;
         let network = match &set.network {
-            Some(network) => network::bounds(&Network::new(network, domain), network, domain).map_err(|sum| {
-                Refusal::NetworkOverflow { set: index, layer: sum.layer, neuron: sum.neuron, bound: sum.bound }
-            })?,
+            Some(network) => {
+                network::bounds(&Network::new(network, domain), network, domain, depth).map_err(|sum| {
+                    Refusal::NetworkOverflow { set: index, layer: sum.layer, neuron: sum.neuron, bound: sum.bound }
+                })?
+            }
             None => network::Bounds::default(),
         };
         let slope = physical.slope.per_unit(velocity_shift).add(network.velocity_slope);
@@ -221,11 +234,12 @@ impl Certificate {
     }
 }
 
-/// A bisection of a range of cells: keeps splitting while a cell can still raise the largest bound found.
+/// A bisection of a range of cells, `deepest` times (at most [`MAX_DEPTH`]): keeps splitting while a cell can still raise the largest bound found.
 ///
 /// `bound` returns what holds in a cell, `covers` says whether the second adds nothing to the first, `split` halves a cell.
 fn bisect<Cell: Copy, Bound: Copy>(
     root: Cell,
+    deepest: u32,
     bound: &impl Fn(&Cell) -> Bound,
     merge: &impl Fn(Bound, Bound) -> Bound,
     covers: &impl Fn(&Bound, &Bound) -> bool,
@@ -238,7 +252,7 @@ fn bisect<Cell: Copy, Bound: Copy>(
     while let Some((cell, depth)) = next {
         let here = bound(&cell);
         let covered = found.as_ref().is_some_and(|found| covers(found, &here));
-        let halves = if covered || depth == MAX_DEPTH { None } else { split(&cell) };
+        let halves = if covered || depth >= deepest { None } else { split(&cell) };
         next = match halves {
             Some((first, second)) => {
                 // One slot a level suffices, so this push cannot fail; if it did, the cell counts whole.

@@ -39,11 +39,17 @@ struct Cell {
 /// The bias' input, Q15.
 const ONE: i64 = 0x7fff;
 
-pub(super) fn bounds(network: &Network, parameters: &NetworkParameters, domain: &Domain) -> Result<Bounds, Overflow> {
+pub(super) fn bounds(
+    network: &Network,
+    parameters: &NetworkParameters,
+    domain: &Domain,
+    depth: u32,
+) -> Result<Bounds, Overflow> {
     let root = Cell { inputs: network.input_intervals() };
     check_sums(&root, parameters)?;
     let torque = bisect(
         root,
+        depth,
         &|cell| Layers::of(cell, parameters).output.map(|sum| to_torque(sum as i32, parameters.scale) as i64),
         &|a, b| a.union(b),
         &|found, new| found.contains(*new),
@@ -103,7 +109,7 @@ fn first_sums(cell: &Cell, parameters: &NetworkParameters) -> [Interval; NEURONS
 fn raw_sum(neuron: &Neuron, activations: &[Interval; NEURONS]) -> Interval {
     let mut sum = Interval::point(neuron.weights[NEURONS] as i64 * ONE);
     for (weight, activation) in neuron.weights.iter().zip(activations) {
-        sum = sum.add(activation.times(Interval::point(*weight as i64)));
+        sum = sum.add(activation.scaled(*weight));
     }
     sum
 }

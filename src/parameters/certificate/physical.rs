@@ -29,7 +29,7 @@ struct CellBounds {
 const ONE: Interval = Interval::point(1 << 16);
 
 /// Bounds, or nothing where the sum could leave the range of a torque.
-pub(super) fn bounds(physical: &Physical) -> Option<Bounds> {
+pub(super) fn bounds(physical: &Physical, depth: u32) -> Option<Bounds> {
     let box_ = scaled_box(physical);
     if !harmonics_fit(physical) {
         return None;
@@ -37,6 +37,7 @@ pub(super) fn bounds(physical: &Physical) -> Option<Bounds> {
     let velocity = box_[Signal::Velocity as usize];
     let found = bisect(
         velocity,
+        depth,
         &|cell: &Interval| cell_bounds(physical, &box_, *cell),
         &|a, b| CellBounds { sum: a.sum.union(b.sum), slope: a.slope.union(b.slope) },
         &|found, new| found.sum.contains(new.sum) && found.slope.contains(new.slope),

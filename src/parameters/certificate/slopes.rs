@@ -33,8 +33,9 @@ pub(super) fn over_input(
             let mut slope = Interval::ZERO;
             for ((before, behind), own) in before.iter().zip(behind).zip(tanh_1) {
                 let others = before.times(*behind).shift_right(FRACTION_BITS);
-                slope = slope.add(others.times(*own).shift_right(14));
+                slope = slope.add(others.times_share(*own));
             }
+            let slope = slope.shift_right(14);
             steepest = Some(steepest.map_or(slope, |steepest| steepest.union(slope)));
         }
     }
