@@ -191,6 +191,8 @@ pub struct Trained {
     pub curve: TrainingCurve,
     /// Seed of the run that it came from.
     pub seed: u64,
+    /// Seeds and curves of the runs that were worse, in the order of their seeds.
+    pub others: Vec<(u64, TrainingCurve)>,
 }
 
 impl Trained {
@@ -289,7 +291,12 @@ impl<'a> Recorder<'a> {
     fn finish(self, task: &Task, stop: Stop) -> Result<Trained, TrainError> {
         let network = task.network(&self.best)?;
         let Self { train_mse, validation_mse, best_epoch, seed, .. } = self;
-        Ok(Trained { network, curve: TrainingCurve { train_mse, validation_mse, best_epoch, stop }, seed })
+        Ok(Trained {
+            network,
+            curve: TrainingCurve { train_mse, validation_mse, best_epoch, stop },
+            seed,
+            others: vec![],
+        })
     }
 }
 
@@ -299,12 +306,20 @@ fn best_of_seeds(
     run: impl Fn(u64) -> Result<Trained, TrainError> + Sync,
 ) -> Result<Trained, TrainError> {
     let runs = seeds.par_iter().map(|&seed| run(seed)).collect::<Result<Vec<_>, _>>()?;
-    let better = |best: Trained, next: Trained| match next.validation_mse() < best.validation_mse() {
-        true => next,
-        false => best,
-    };
+    let better = |best: &Trained, next: &Trained| next.validation_mse() < best.validation_mse();
+    let mut runs = runs.into_iter();
     let none = TrainError::Option { option: "seeds", value: 0.0, range: "a list of at least one seed" };
-    runs.into_iter().reduce(better).ok_or(none)
+    let mut best = runs.next().ok_or(none)?;
+    let mut others = vec![];
+    for mut run in runs {
+        if better(&best, &run) {
+            std::mem::swap(&mut best, &mut run);
+        }
+        others.push((run.seed, run.curve));
+    }
+    others.sort_by_key(|(seed, _)| *seed);
+    best.others = others;
+    Ok(best)
 }
 
 /// Refuses an option outside its range.

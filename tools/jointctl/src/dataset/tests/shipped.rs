@@ -2,7 +2,6 @@
 
 use super::*;
 use crate::dataset::parse;
-use crate::samples::Part;
 use std::f64::consts::FRAC_PI_2;
 
 fn shipped() -> Vec<PathBuf> {
@@ -18,32 +17,6 @@ fn every_shipped_description_is_valid() {
     for path in shipped() {
         parse(&std::fs::read_to_string(&path).unwrap(), &path).unwrap();
     }
-}
-
-#[test]
-#[ignore = "needs the recorded joints: JOINT_DATA"]
-fn every_shipped_description_prepares_its_recorded_joint() {
-    for path in shipped() {
-        let prepared = crate::dataset::prepare(&path).unwrap();
-        assert!(prepared.samples.indices(Part::Train).len() > 1000, "{}", path.display());
-    }
-}
-
-#[test]
-#[ignore = "needs the recorded joints: JOINT_DATA"]
-fn the_dirt_of_the_recorded_servo_is_found() {
-    let prepared = crate::dataset::prepare(&shipped_folder().join("sts3250.toml")).unwrap();
-    let count = |what: &str| prepared.notes.iter().find(|note| note.what == what).map_or(0, |note| note.count);
-    assert_eq!((count("rows read"), count("runs")), (376_200, 627));
-    assert_eq!(count("rows missing by a dropout rule"), 83);
-    assert_eq!(count("rows unused around a frozen read-out"), 452);
-    // Root mean square of the voltage in both test sets: what errors are to be compared with.
-    let rms = |set: usize| {
-        let indices = &prepared.test_sets[set].indices;
-        let sum: f64 = indices.iter().map(|&i| prepared.samples.effort[i].powi(2)).sum();
-        (sum / indices.len() as f64).sqrt()
-    };
-    assert!((rms(0) - 3.588).abs() < 1e-3 && (rms(1) - 3.640).abs() < 1e-3, "{} {}", rms(0), rms(1));
 }
 
 /// The fenced blocks of a language in the reference.
