@@ -21,18 +21,6 @@ pub fn hash(hash: u32, word: u32) -> u32 {
     (hash ^ word).wrapping_mul(0x0100_0193)
 }
 
-/// What a joint does with an image before it uses it: decode, certificate, golden vectors. None where it is refused.
-pub fn verify(bytes: &[u8]) -> Option<u32> {
-    use joint_firmware::friction::FrictionModel;
-    use joint_firmware::parameters::certificate::certify;
-    use joint_firmware::parameters::image::Image;
-
-    let image = Image::decode(bytes).ok()?;
-    let certificate = certify(&image.friction, &image.limits).ok()?;
-    image.verify_golden(&FrictionModel::new(&image.friction, 20_000)).ok()?;
-    Some(certificate.output)
-}
-
 /// Decodes, certifies and verifies an image, then compensates along the sequence; the hash of every torque. None where the
 /// image is refused.
 pub fn run(bytes: &[u8]) -> Option<u32> {
