@@ -158,8 +158,12 @@ fn decimate(motion: &mut Motion, description: &Description, run: &str) -> Result
         let located = |error| located(error, "decimate", run, nyquist_hz);
         let filter = LowPassFilter::chebyshev(ANTI_ALIAS_ORDER, ANTI_ALIAS_RIPPLE, cutoff).map_err(located)?;
         let Motion { position, velocity, acceleration, effort, temperature, .. } = &mut *motion;
-        for column in [position, velocity, acceleration, effort].into_iter().chain(temperature) {
-            *column = filter.zero_phase(column).map_err(located)?;
+        *effort = filter.zero_phase(effort).map_err(located)?;
+        // A joint has no decimation, so a motion as it knows it is only thinned.
+        if !description.filter.causal_motion {
+            for column in [position, velocity, acceleration].into_iter().chain(temperature) {
+                *column = filter.zero_phase(column).map_err(located)?;
+            }
         }
     }
     let skip = match setting.keep {

@@ -119,7 +119,11 @@ pub enum FitError {
     #[error(transparent)]
     State(#[from] crate::joint_model::StateError),
     /// The image would be refused by the joint.
-    #[error("the certificate refuses the physical model: {0}")]
+    #[error(
+        "the certificate refuses every physical model that was asked for, the last one because {0}; a recording that does not \
+         determine a term makes it large: record more positions, speeds and loads, or ask for a model with fewer terms (--preset, \
+         --all tries every one)"
+    )]
     Refused(joint_firmware::parameters::certificate::Refusal),
     /// The image cannot be written.
     #[error(transparent)]
