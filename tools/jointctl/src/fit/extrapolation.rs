@@ -4,7 +4,7 @@
 //! them. On loads that it has not seen it does not.
 
 use super::FitError;
-use super::learn::{MINIMUM_SAMPLES, Problem};
+use super::problem::{MINIMUM_SAMPLES, Problem};
 use super::trainer::Trainer;
 use crate::evaluate::rmse;
 use crate::joint_model::network_inputs;

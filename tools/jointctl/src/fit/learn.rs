@@ -1,23 +1,20 @@
 //! Training a network on what the physical model leaves, and deciding on validation samples whether it stays.
 
 use super::extrapolation;
-use super::trainer::{Task, Trainer, curves};
+use super::problem::{MINIMUM_SAMPLES, Problem};
+use super::trainer::{Trainer, curves};
 use super::{FitError, Options, part_rmse};
 use crate::augment::augment;
 use crate::classify::Thresholds;
 use crate::equalise::{Equalise, draw};
 use crate::identify::Identified;
-use crate::joint_model::{FloatFriction, network_inputs, regimes};
+use crate::joint_model::{FloatFriction, regimes};
 use crate::network::{InputBox, Network};
-use crate::progress::Progress;
 use crate::report::{NetworkOutcome, TrainingCurve};
 use crate::samples::{Part, Samples};
 use crate::train::{TrainError, TrainingSet};
 use joint_firmware::friction::regime::{Criterion, MAX_CRITERIA, Measure, Selector};
-use joint_firmware::friction::state::JointState;
 
-/// Least number of training samples, and of validation samples, with which a network is trained.
-pub(super) const MINIMUM_SAMPLES: usize = 300;
 /// A temperature that varies less than this in training is no input, K: over a few kelvins it stands for time.
 const TEMPERATURE_RANGE: f64 = 10.0;
 /// Cross-fade between regimes, s.
@@ -82,38 +79,6 @@ pub fn inputs(samples: &Samples, static_load: bool) -> [bool; 5] {
     let temperatures = samples.indices(Part::Train).into_iter().map(|i| samples.temperature[i]);
     let (low, high) = temperatures.fold((f64::MAX, f64::MIN), |(low, high), t| (low.min(t), high.max(t)));
     [true, true, static_load, false, high - low >= TEMPERATURE_RANGE]
-}
-
-/// What a network is to learn: the part of the effort that the physical model leaves.
-pub(super) struct Problem<'a> {
-    pub samples: &'a Samples,
-    /// The firmware's view of every sample.
-    pub states: &'a [JointState],
-    pub physical: &'a Identified,
-    pub thresholds: &'a Thresholds,
-    /// Which of the network's inputs are used.
-    pub inputs: [bool; 5],
-    pub options: &'a Options,
-    pub progress: &'a dyn Progress,
-}
-
-impl Problem<'_> {
-    /// What rigid part and physical friction leave of the effort.
-    pub fn residual(&self, i: usize) -> f64 {
-        let Self { samples, physical, .. } = self;
-        samples.effort[i] - physical.rigid_effort(samples, i) - physical.friction(samples, i)
-    }
-
-    /// Inputs and targets of the samples `indices`.
-    pub fn targets(&self, indices: &[usize]) -> (Vec<[f64; 5]>, Vec<f64>) {
-        let inputs = indices.iter().map(|&i| network_inputs(self.samples, i)).collect();
-        (inputs, indices.iter().map(|&i| self.residual(i)).collect())
-    }
-
-    /// A network to be trained from these samples.
-    pub fn task(&self, train: TrainingSet, validation: TrainingSet, input_box: InputBox, restarts: usize) -> Task<'_> {
-        Task { train, validation, input_box, options: self.options, restarts, progress: self.progress }
-    }
 }
 
 /// Trains as the options say and keeps the network where it lowers the validation error enough.

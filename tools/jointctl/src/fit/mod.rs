@@ -6,12 +6,13 @@
 mod assemble;
 mod extrapolation;
 mod learn;
+mod problem;
 mod summary;
 mod trainer;
 
 use assemble::build_image;
 pub use learn::Learned;
-use learn::Problem;
+use problem::Problem;
 pub use trainer::Trainer;
 
 use crate::augment::Augment;
