@@ -2,6 +2,27 @@
 //!
 //! Single-precision floating point in SI units. The Cortex-M4F and the host both compute it by IEEE 754 without contraction,
 //! so the bits are the same as long as nothing calls a mathematics library: angles are 32-bit fractions of a turn, their sine
-//! and cosine come from the integer routine of `idsp`.
+//! and cosine come from the integer routine of `idsp`, square roots from [`number`].
+//!
+//! In the order of a control step:
+//!  - [`phases`]: one value for each of the three phases;
+//!  - [`angle`]: where the rotor's magnetic axis is, and its sine and cosine;
+//!  - [`transform`]: phases to the stationary frame to the rotor's frame, and back;
+//!  - [`current`]: from wanted to needed voltage in the rotor's frame;
+//!  - [`modulation`]: from a voltage to three duties;
+//!  - [`field_oriented`]: the four above put together, phase currents in and duties out.
+//!
+//! Beside it:
+//!  - [`setting`]: how a setting out of its range is refused; task, host;
+//!  - [`number`]: limits and roots that treat NaN the same everywhere.
 
+pub mod angle;
+pub mod current;
+pub mod field_oriented;
+pub mod modulation;
+pub mod number;
 pub mod phases;
+pub mod setting;
+pub mod transform;
+#[cfg(test)]
+mod virtual_motor;
