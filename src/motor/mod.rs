@@ -7,12 +7,14 @@
 //! In the order of a control step:
 //!  - [`phases`]: one value for each of the three phases;
 //!  - [`angle`]: where the rotor's magnetic axis is, and its sine and cosine;
+//!  - [`observer`]: position, velocity and acceleration from the encoder;
 //!  - [`transform`]: phases to the stationary frame to the rotor's frame, and back;
 //!  - [`current`]: from wanted to needed voltage in the rotor's frame;
 //!  - [`modulation`]: from a voltage to three duties;
-//!  - [`field_oriented`]: the four above put together, phase currents in and duties out.
+//!  - [`field_oriented`]: the five above put together, phase currents in and duties out.
 //!
 //! Beside it:
+//!  - [`thermal`]: how hot the winding is and how much current it bears; slow task;
 //!  - [`setting`]: how a setting out of its range is refused; task, host;
 //!  - [`number`]: limits and roots that treat NaN the same everywhere.
 
@@ -21,8 +23,10 @@ pub mod current;
 pub mod field_oriented;
 pub mod modulation;
 pub mod number;
+pub mod observer;
 pub mod phases;
 pub mod setting;
+pub mod thermal;
 pub mod transform;
 #[cfg(test)]
 mod virtual_motor;
