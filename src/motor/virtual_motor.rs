@@ -11,7 +11,7 @@ use core::f64::consts::TAU;
 
 /// Control steps a second.
 pub const RATE: f64 = 20_000.0;
-const SUBSTEPS: usize = 10;
+const SUBSTEPS: usize = 20;
 
 pub struct VirtualMotor {
     pub resistance: f64,
