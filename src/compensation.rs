@@ -158,7 +158,7 @@ pub struct Output {
 }
 
 /// Compensation of one joint, from one control step to the next.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Compensation {
     memory: Memory,
     last: Torque,

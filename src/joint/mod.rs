@@ -1,5 +1,371 @@
-//! One joint: measurements in, bridge and duty cycles out.
+//! One joint: measurements and demands in, bridge and duty cycles out.
+//!
+//! [`Joint::control_step`] runs once a PWM period in the board's highest-priority interrupt and, unchanged, on the host against a
+//! virtual joint. Everything it needs comes in: it reads no clock, no register and no global. In the order of a step:
+//!
+//!  - [`signals`]: what the board measures and what it is told;
+//!  - [`monitor`]: faults, and [`fault`]: what they lead to;
+//!  - [`state_machine`]: whether the joint may move;
+//!  - [`command`], [`motion_law`]: from a set-point to a torque within every limit;
+//!  - [`friction_feedforward`]: what friction will take of it;
+//!  - [`history`]: the last steps before a fault.
+//!
+//! Beside it, outside the interrupt: [`configuration`] what the joint is, [`active`] the same prepared for the step.
 
+pub mod active;
+pub mod command;
+pub mod configuration;
+pub mod fault;
+pub mod friction_feedforward;
+pub mod history;
+pub mod monitor;
+pub mod motion_law;
 mod signals;
+pub mod state_machine;
 
+pub use active::{Active, JointMotion};
+pub use command::{Command, Demand, Mode};
 pub use signals::{Bridge, BridgeState, Measurements};
+
+use crate::motor::field_oriented::{FieldOriented, FieldOrientedInput};
+use crate::motor::number::{limited, or_zero};
+use crate::motor::observer::Observer;
+use crate::motor::phases::Phases;
+use crate::motor::thermal::MeanSquareCurrent;
+use crate::motor::transform::Dq;
+use fault::{Faults, Reaction};
+use friction_feedforward::{Compensated, FrictionFeedforward};
+use history::{History, Snapshot};
+use monitor::{Loop, Monitor};
+use motion_law::{MotionLaw, Wanted};
+use state_machine::{Events, State, StateMachine};
+
+/// Control steps over which the current sensors' offsets are measured at the start.
+pub const OFFSET_STEPS: u32 = 1024;
+/// Largest offset that a sound current sensor has, as a part of the over-current limit.
+const LARGEST_OFFSET: f32 = 0.25;
+/// Speed below which a braking joint counts as standing, as a part of the velocity limit.
+const STANDING: f32 = 0.01;
+/// Control steps for which it must stand before the bridge switches off.
+const STANDING_STEPS: u32 = 400;
+
+/// What the slow task knows and the control step uses.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Slow {
+    /// Part of current and torque limit that the winding's temperature permits, 0 to 1.
+    pub derating: f32,
+    /// Temperature of the gear, °C: for friction.
+    pub gear_temperature: f32,
+}
+
+impl Default for Slow {
+    fn default() -> Self {
+        Self { derating: 1.0, gear_temperature: 25.0 }
+    }
+}
+
+/// What a control step found and did, for tasks that report it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Telemetry {
+    /// State after the step.
+    pub state: State,
+    /// Faults present in the step.
+    pub faults: Faults,
+    /// Motion of the joint.
+    pub motion: JointMotion,
+    /// What the command wanted.
+    pub wanted: Wanted,
+    /// What compensation added.
+    pub compensated: Compensated,
+    /// Torque of the measured current, Nm.
+    pub measured_torque: f32,
+    /// Wanted current, A.
+    pub reference: Dq,
+    /// Measured current, A.
+    pub current: Dq,
+    /// Supply, V.
+    pub bus_voltage: f32,
+}
+
+impl Telemetry {
+    /// The statusword, object 6041h: state, voltage present, and that the joint follows its commands.
+    pub fn statusword(&self) -> u16 {
+        let voltage = !self.faults.contains(fault::Fault::UnderVoltage) as u16;
+        let remote = 1 << 9;
+        self.state.statusword() | voltage << 4 | remote
+    }
+}
+
+/// A joint, from one control step to the next.
+#[derive(Clone, Debug, Default)]
+pub struct Joint {
+    offsets: Offsets,
+    observer: Observer,
+    monitor: Monitor,
+    machine: StateMachine,
+    law: MotionLaw,
+    friction: FrictionFeedforward,
+    field_oriented: FieldOriented,
+    last: Option<Loop>,
+    sequence: u32,
+    stale_steps: u32,
+    braking: Braking,
+    /// Faults since the last acknowledgement.
+    latched: Faults,
+    mean_square: MeanSquareCurrent,
+    history: History,
+    telemetry: Telemetry,
+}
+
+/// Offsets of the current sensors: the mean of the first steps, in which no current flows.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Offsets {
+    sum: Phases,
+    steps: u32,
+    mean: Phases,
+}
+
+/// How long a joint has been braking and standing.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Braking {
+    steps: u32,
+    standing: u32,
+}
+
+impl Offsets {
+    const fn are_known(&self) -> bool {
+        self.steps >= OFFSET_STEPS
+    }
+
+    /// Adds a step's currents; offsets beyond what a sound sensor has are not taken, and the start goes on.
+    fn add(&mut self, measured: Phases, largest: f32) {
+        let add = |sum: f32, value: f32| sum + or_zero(limited(value, 1e3));
+        self.sum =
+            Phases { a: add(self.sum.a, measured.a), b: add(self.sum.b, measured.b), c: add(self.sum.c, measured.c) };
+        self.steps += 1;
+        if self.steps < OFFSET_STEPS {
+            return;
+        }
+        const SHARE: f32 = 1.0 / OFFSET_STEPS as f32;
+        let mean = Phases { a: self.sum.a * SHARE, b: self.sum.b * SHARE, c: self.sum.c * SHARE };
+        let sound = |value: f32| value <= largest && value >= -largest;
+        if sound(mean.a) && sound(mean.b) && sound(mean.c) {
+            self.mean = mean;
+        } else {
+            *self = Self::default();
+        }
+    }
+}
+
+impl Joint {
+    /// A joint that starts: nothing moves before the offsets are known and somebody enables it.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// One control step. Whatever the measurements are, not numbers included, the duties lie within the modulation's limits, and
+    /// a fault of the kind [`Reaction::SwitchOff`] has the bridge off in the same step.
+    #[inline]
+    pub fn control_step(&mut self, active: &Active, demand: &Demand, slow: &Slow, measured: &Measurements) -> Bridge {
+        self.step::<true>(active, demand, slow, measured)
+    }
+
+    /// The same step built without compensation: what [`Joint::control_step`] is compared with.
+    #[doc(hidden)]
+    pub fn control_step_without_compensation(
+        &mut self,
+        active: &Active,
+        demand: &Demand,
+        slow: &Slow,
+        measured: &Measurements,
+    ) -> Bridge {
+        self.step::<false>(active, demand, slow, measured)
+    }
+
+    #[inline(always)]
+    fn step<const COMPENSATION: bool>(
+        &mut self,
+        active: &Active,
+        demand: &Demand,
+        slow: &Slow,
+        measured: &Measurements,
+    ) -> Bridge {
+        let currents = self.without_offsets(active, measured.phase_currents);
+        let sample = measured.encoder_valid.then_some(measured.encoder);
+        let observation = self.observer.step(&active.observer, sample, 0.0);
+        let motion = active.scales.joint(&observation.motion);
+
+        let faults = self.watch(active, demand, slow, measured, currents, &observation, &motion);
+        let state = self.decide(active, demand, faults, &motion);
+
+        let wanted = match state {
+            State::OperationEnabled => self.law.step(active, &demand.command, &motion, slow.derating),
+            State::QuickStopActive | State::FaultReactionActive => self.law.brake(active, &motion),
+            _ => Wanted::default(),
+        };
+        let measured_torque = or_zero(self.telemetry.current.q * active.scales.torque_per_current);
+        let compensated = if COMPENSATION && state == State::OperationEnabled {
+            self.friction.step(active, &motion, &wanted, measured_torque, slow.gear_temperature)
+        } else {
+            self.friction.reset();
+            Compensated::default()
+        };
+        let torque = match compensated.torque {
+            0.0 => wanted.torque,
+            compensation => limited(wanted.torque + compensation, active.limits.torque),
+        };
+
+        let speed = active.alignment.electrical_speed(observation.motion.velocity);
+        let limit = active.current_limit * slow.derating;
+        let reference = Dq { d: 0.0, q: limited(torque * active.scales.current_per_torque, limit) };
+        let switching = matches!(state, State::OperationEnabled | State::QuickStopActive | State::FaultReactionActive);
+        let (bridge, current) = if switching {
+            let input = FieldOrientedInput {
+                phase_currents: currents,
+                angle: active.alignment.electrical(observation.motion.angle()),
+                speed,
+                bus_voltage: measured.bus_voltage,
+                reference,
+            };
+            let output = self.field_oriented.step(&active.field_oriented, &input);
+            self.last = Some(Loop { reference, output, speed, bus_voltage: measured.bus_voltage });
+            self.mean_square.add(output.current);
+            (Bridge { state: BridgeState::Switching, duties: output.duties }, output.current)
+        } else {
+            self.field_oriented.reset();
+            self.law.reset();
+            self.monitor.loop_is_off();
+            self.last = None;
+            self.mean_square.add(Dq::default());
+            (Bridge::OFF, Dq::default())
+        };
+
+        self.telemetry = Telemetry {
+            state,
+            faults,
+            motion,
+            wanted,
+            compensated,
+            measured_torque,
+            reference: if switching { reference } else { Dq::default() },
+            current,
+            bus_voltage: measured.bus_voltage,
+        };
+        self.note();
+        bridge
+    }
+
+    /// What the last step found and did.
+    pub fn telemetry(&self) -> &Telemetry {
+        &self.telemetry
+    }
+
+    /// Faults since the last acknowledgement.
+    pub fn latched_faults(&self) -> Faults {
+        self.latched
+    }
+
+    /// The steps before the last fault.
+    pub fn history(&self) -> &History {
+        &self.history
+    }
+
+    /// Mean square of the current since the last call, A²: for the slow task's thermal model.
+    pub fn take_mean_square_current(&mut self) -> f32 {
+        self.mean_square.take()
+    }
+
+    #[inline(always)]
+    fn without_offsets(&mut self, active: &Active, measured: Phases) -> Phases {
+        if !self.offsets.are_known() {
+            self.offsets.add(measured, LARGEST_OFFSET * active.limits.over_current);
+        }
+        let mean = self.offsets.mean;
+        Phases { a: measured.a - mean.a, b: measured.b - mean.b, c: measured.c - mean.c }
+    }
+
+    #[inline(always)]
+    #[expect(clippy::too_many_arguments, reason = "everything that a step knows is watched")]
+    fn watch(
+        &mut self,
+        active: &Active,
+        demand: &Demand,
+        slow: &Slow,
+        measured: &Measurements,
+        currents: Phases,
+        observation: &crate::motor::observer::Observation,
+        motion: &JointMotion,
+    ) -> Faults {
+        if !self.offsets.are_known() {
+            return Faults::NONE;
+        }
+        let mut faults = self.monitor.measurements(active, measured, currents, observation);
+        let moving = !matches!(self.machine.state(), State::SwitchOnDisabled | State::Fault);
+        if demand.sequence != self.sequence {
+            self.sequence = demand.sequence;
+            self.stale_steps = 0;
+        } else if moving {
+            self.stale_steps = self.stale_steps.saturating_add(1);
+        } else {
+            self.stale_steps = 0;
+        }
+        if self.machine.state() == State::OperationEnabled {
+            faults = faults.union(self.monitor.motion(active, motion, self.stale_steps, slow.derating));
+        }
+        if let Some(last) = &self.last {
+            faults = faults.union(self.monitor.current_loop(active, last));
+        }
+        faults
+    }
+
+    /// The state from now on. A fault that must not be braked against goes straight through the reaction to "fault".
+    #[inline(always)]
+    fn decide(&mut self, active: &Active, demand: &Demand, faults: Faults, motion: &JointMotion) -> State {
+        let before = self.machine.state();
+        let started = self.offsets.are_known();
+        let mut events =
+            Events { started, fault: !faults.is_empty(), stopped: self.has_stopped(active, before, motion) };
+        let mut state = self.machine.step(demand.controlword, events);
+        let reaction = faults.union(self.latched).reaction();
+        if state == State::FaultReactionActive && reaction != Some(Reaction::Brake) {
+            events.stopped = true;
+            state = self.machine.step(demand.controlword, events);
+        }
+        if !faults.is_empty() {
+            self.latched = self.latched.union(faults);
+        } else if before == State::Fault && state != State::Fault {
+            self.latched = Faults::NONE;
+            self.history.release();
+        }
+        state
+    }
+
+    /// Whether braking is over: the joint stands, or it took too long.
+    #[inline(always)]
+    fn has_stopped(&mut self, active: &Active, state: State, motion: &JointMotion) -> bool {
+        if !matches!(state, State::QuickStopActive | State::FaultReactionActive) {
+            self.braking = Braking::default();
+            return false;
+        }
+        let standing = STANDING * active.limits.velocity;
+        let stands = motion.velocity <= standing && motion.velocity >= -standing && self.law.ramp_is_over();
+        self.braking.standing = if stands { self.braking.standing.saturating_add(1) } else { 0 };
+        self.braking.steps = self.braking.steps.saturating_add(1);
+        self.braking.standing >= STANDING_STEPS || self.braking.steps > active.motion.braking_steps
+    }
+
+    #[inline(always)]
+    fn note(&mut self) {
+        let t = &self.telemetry;
+        self.history.note(Snapshot {
+            state: t.state,
+            faults: t.faults,
+            position: t.motion.position,
+            velocity: t.motion.velocity,
+            commanded_torque: t.wanted.torque,
+            compensation_torque: t.compensated.torque,
+            current: t.current,
+            bus_voltage: t.bus_voltage,
+        });
+    }
+}

@@ -23,6 +23,8 @@ pub struct Measurements {
     pub bridge_temperature: f32,
     /// The gate driver or a comparator reports a fault.
     pub bridge_fault: bool,
+    /// The control step before took longer than its period.
+    pub overrun: bool,
 }
 
 /// State of the three half bridges.

@@ -1,0 +1,258 @@
+//! A configuration as the control step uses it: gains, limits and scales prepared, nothing left to divide; task, host.
+
+use super::configuration::{
+    BridgeConfiguration, Configuration, ConfigurationError, GearConfiguration, Limits, VelocitySource,
+};
+use crate::compensation::Settings;
+use crate::friction::FrictionModel;
+use crate::motor::angle::{Direction, EncoderAlignment, STEPS, TAU};
+use crate::motor::current::{CurrentSettings, MotorConstants};
+use crate::motor::field_oriented::FieldOrientedGains;
+use crate::motor::modulation::ModulationSettings;
+use crate::motor::observer::{Motion, ObserverGains, ObserverSettings};
+use crate::motor::thermal::ThermalSettings;
+use crate::quantity::Torque;
+
+/// Steps of the slow task a second, Hz.
+pub const SLOW_RATE: f32 = 100.0;
+/// Span over which the current is derated below the winding's limit, K.
+const DERATING: f32 = 20.0;
+/// Fastest rotor that the observer follows, beyond the velocity limit.
+const OBSERVER_RESERVE: f32 = 2.0;
+/// Highest rotor acceleration, rad/s²: a rotor of 1e-6 kg m² under 1 Nm.
+const HIGHEST_ACCELERATION: f32 = 1e6;
+
+/// Scales between rotor and joint.
+#[derive(Clone, Copy, Debug)]
+pub struct Scales {
+    /// Joint's rad for an encoder's turn, signed.
+    turn: f32,
+    /// Joint's rad for one 2^-32 of a turn.
+    fraction: f32,
+    /// Joint's rad/s for an encoder's rad/s.
+    velocity: f32,
+    zero: f32,
+    /// A of q current for Nm at the joint.
+    pub current_per_torque: f32,
+    /// Nm at the joint for A of q current.
+    pub torque_per_current: f32,
+}
+
+/// Motion of the joint.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct JointMotion {
+    /// rad.
+    pub position: f32,
+    /// rad/s.
+    pub velocity: f32,
+    /// rad/s².
+    pub acceleration: f32,
+}
+
+impl Scales {
+    fn new(gear: &GearConfiguration, alignment: &EncoderAlignment, torque_constant: f32) -> Self {
+        // A joint that turns forward with positive q current: the encoder's direction and the gear's sign.
+        let velocity = alignment.direction.sign() / gear.ratio;
+        let torque_per_current = torque_constant * gear.ratio;
+        Self {
+            turn: TAU * velocity,
+            fraction: TAU * velocity / STEPS,
+            velocity,
+            zero: gear.zero,
+            current_per_torque: 1.0 / torque_per_current,
+            torque_per_current,
+        }
+    }
+
+    /// The joint's motion from the rotor's. Whole turns and fraction are converted by themselves: together they have more digits than
+    /// a single-precision number.
+    #[inline(always)]
+    pub fn joint(&self, motion: &Motion) -> JointMotion {
+        let turns = (motion.position >> 32) as i32 as f32;
+        let fraction = motion.position as u32 as f32;
+        JointMotion {
+            position: self.zero + turns * self.turn + fraction * self.fraction,
+            velocity: motion.velocity * self.velocity,
+            acceleration: motion.acceleration * self.velocity,
+        }
+    }
+}
+
+/// How the joint follows commands, per control step.
+#[derive(Clone, Copy, Debug)]
+pub struct MotionGains {
+    /// s.
+    pub period: f32,
+    /// Nm/rad.
+    pub stiffness: f32,
+    /// Nm s/rad.
+    pub damping: f32,
+    /// Nm/rad of the velocity error's integral, times the period.
+    pub velocity_integral: f32,
+    /// Nm/(rad s), times the period.
+    pub position_integral: f32,
+    /// Change of a ramp in a step, rad/s.
+    pub velocity_step: f32,
+    /// rad/s².
+    pub acceleration: f32,
+    /// Change of the quick stop's ramp in a step, rad/s.
+    pub quick_stop_step: f32,
+    /// Steps that braking may take.
+    pub braking_steps: u32,
+}
+
+/// What compensation uses besides the friction model.
+#[derive(Clone, Copy, Debug)]
+pub struct CompensationGains {
+    /// Gain, clamp, slew.
+    pub settings: Settings,
+    /// Which velocity.
+    pub source: VelocitySource,
+    /// 1 / standstill velocity, s/rad.
+    pub inverse_standstill: f32,
+    /// rad/s.
+    pub standstill: f32,
+    /// Control steps a second, Hz.
+    pub rate: f32,
+}
+
+/// Everything prepared that the control step reads. It is replaced as a whole between two steps.
+#[derive(Clone, Debug)]
+pub struct Active {
+    /// Current loop and modulation.
+    pub field_oriented: FieldOrientedGains,
+    /// Observer.
+    pub observer: ObserverGains,
+    /// How the encoder sits on the motor.
+    pub alignment: EncoderAlignment,
+    /// Rotor to joint.
+    pub scales: Scales,
+    /// Limits.
+    pub limits: Limits,
+    /// Largest current, A.
+    pub current_limit: f32,
+    /// Largest sum of the phase currents, A.
+    pub current_sum_limit: f32,
+    /// Voltage that encoder and induced voltage may differ by, V.
+    pub implausible_voltage: f32,
+    /// Electrical constants for that check: resistance, Ω, and flux linkage, Wb.
+    pub resistance: f32,
+    /// Wb.
+    pub flux_linkage: f32,
+    /// Rotor's way, rad, that an innovation of the observer may have.
+    pub jump_limit: f32,
+    /// Control steps without a new command.
+    pub deadline_steps: u32,
+    /// Motion.
+    pub motion: MotionGains,
+    /// Compensation.
+    pub compensation: CompensationGains,
+    /// The bridge.
+    pub bridge: BridgeConfiguration,
+    /// The verified friction model; none: no compensation.
+    pub friction: Option<FrictionModel>,
+    /// For the slow task.
+    pub thermal: ThermalSettings,
+}
+
+impl Active {
+    pub(super) fn new(configuration: &Configuration, bridge: &BridgeConfiguration) -> Result<Self, ConfigurationError> {
+        let Configuration { motor, gear, limits, gains, compensation, thermal, .. } = configuration;
+        let rate = bridge.rate;
+        let period = 1.0 / rate;
+        let pole_pairs = motor.alignment.pole_pairs as f32;
+        // Torque is 3/2 times pole pairs times flux linkage times i_q.
+        let flux_linkage = motor.torque_constant / (1.5 * pole_pairs);
+        let constants = MotorConstants {
+            resistance: motor.resistance,
+            inductance_d: motor.inductance_d,
+            inductance_q: motor.inductance_q,
+            flux_linkage,
+        };
+        let (lowest_voltage, highest_voltage) = limits.bus_voltage;
+        let magnitude = if gear.ratio < 0.0 { -gear.ratio } else { gear.ratio };
+        let rotor_velocity = OBSERVER_RESERVE * limits.velocity * magnitude;
+        let scales = Scales::new(gear, &motor.alignment, motor.torque_constant);
+        let torque = |value: f32| Torque::from_bits((value * 65536.0) as i32);
+        Ok(Self {
+            field_oriented: FieldOrientedGains::new(
+                &CurrentSettings { motor: constants, bandwidth: gains.current_bandwidth, rate, highest_voltage },
+                &ModulationSettings {
+                    voltage_fraction: 1.0,
+                    minimum_duty: bridge.duty.0,
+                    maximum_duty: bridge.duty.1,
+                    dead_time: bridge.dead_time * rate,
+                    dead_time_band: bridge.dead_time_band,
+                    minimum_bus_voltage: 0.5 * lowest_voltage,
+                },
+            )?,
+            observer: ObserverGains::new(&ObserverSettings {
+                bandwidth: gains.observer_bandwidth,
+                rate,
+                latency: motor.encoder_latency,
+                highest_velocity: rotor_velocity,
+                highest_acceleration: HIGHEST_ACCELERATION,
+            })?,
+            alignment: motor.alignment,
+            scales,
+            limits: *limits,
+            current_limit: motor.current_limit,
+            current_sum_limit: 0.2 * limits.over_current,
+            implausible_voltage: 2.0 + 0.5 * motor.resistance * motor.current_limit,
+            resistance: motor.resistance,
+            flux_linkage,
+            // Half an electrical radian: with it the torque would already be a tenth less than commanded.
+            jump_limit: 0.5 / pole_pairs,
+            deadline_steps: (limits.command_deadline * rate) as u32,
+            motion: MotionGains {
+                period,
+                stiffness: gains.stiffness,
+                damping: gains.damping,
+                velocity_integral: gains.integral * period,
+                position_integral: 0.1 * gains.integral * period,
+                velocity_step: gains.acceleration * period,
+                acceleration: gains.acceleration,
+                quick_stop_step: gains.quick_stop_deceleration * period,
+                braking_steps: (gains.braking_time * rate) as u32,
+            },
+            compensation: CompensationGains {
+                settings: Settings::new(
+                    compensation.request,
+                    (compensation.gain * 65536.0) as u32,
+                    torque(compensation.clamp),
+                    torque(compensation.slew),
+                    rate as u32,
+                )?,
+                source: compensation.velocity_source,
+                inverse_standstill: 1.0 / compensation.standstill_velocity,
+                standstill: compensation.standstill_velocity,
+                rate,
+            },
+            bridge: *bridge,
+            friction: None,
+            thermal: ThermalSettings {
+                resistance: motor.resistance,
+                winding_capacity: thermal.winding_capacity,
+                housing_capacity: thermal.housing_capacity,
+                winding_to_housing: thermal.winding_to_housing,
+                housing_to_ambient: thermal.housing_to_ambient,
+                ambient: thermal.ambient,
+                correction_time: 60.0,
+                warning: limits.winding_temperature - DERATING,
+                limit: limits.winding_temperature,
+                rate: SLOW_RATE,
+            },
+        })
+    }
+
+    /// The same with a verified friction model.
+    pub fn with_friction(mut self, model: Option<FrictionModel>) -> Self {
+        self.friction = model;
+        self
+    }
+
+    /// The sign of the encoder against the rotor's.
+    pub const fn direction(&self) -> Direction {
+        self.alignment.direction
+    }
+}

@@ -1,0 +1,45 @@
+//! What the joint is asked to do; written by a task, read by the control step.
+
+use super::state_machine::Controlword;
+
+/// Modes of operation (object 6060h).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Mode {
+    /// The commanded torque, within all limits.
+    #[default]
+    Torque,
+    /// A velocity, reached along a ramp, held by damping and integral.
+    Velocity,
+    /// A position, reached with limited velocity and acceleration, held by stiffness, damping and a slow integral.
+    Position,
+    /// Stiffness and damping around a position and a velocity, and a torque, all of the command's own.
+    Impedance,
+}
+
+/// One set-point.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Command {
+    /// Which of the fields count.
+    pub mode: Mode,
+    /// rad; position and impedance mode.
+    pub position: f32,
+    /// rad/s; velocity and impedance mode.
+    pub velocity: f32,
+    /// Nm; torque mode, and added in every other one.
+    pub torque: f32,
+    /// Nm/rad; impedance mode, 0 to 1e5.
+    pub stiffness: f32,
+    /// Nm s/rad; impedance mode, 0 to 1e4.
+    pub damping: f32,
+}
+
+/// Everything that is asked of the joint in a control step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Demand {
+    /// For the state machine.
+    pub controlword: Controlword,
+    /// The newest set-point.
+    pub command: Command,
+    /// Changes with every set-point that arrives, also where its content is the same: the command deadline counts from here.
+    pub sequence: u32,
+}

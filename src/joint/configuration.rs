@@ -1,0 +1,243 @@
+//! What a joint is and may do: one record in SI units, checked as a whole and prepared for the control step; task, host.
+//!
+//! It is separate from the friction image: it changes when the joint is built or its limits are set, the image whenever the
+//! friction is learned anew.
+
+use super::active::Active;
+use crate::compensation::SettingsError;
+use crate::motor::angle::EncoderAlignment;
+use crate::motor::setting::{SettingError, check};
+
+/// Motor and encoder on its shaft.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotorConfiguration {
+    /// Resistance of a phase at 25 °C, Ω; 0.001 to 100.
+    pub resistance: f32,
+    /// Inductance along the magnet's flux, H; 1 µH to 0.1 H.
+    pub inductance_d: f32,
+    /// Inductance across the magnet's flux, H; 1 µH to 0.1 H.
+    pub inductance_q: f32,
+    /// Torque at the rotor by q current, Nm/A; 0.001 to 5.
+    pub torque_constant: f32,
+    /// Largest current, A; 0.1 to 200.
+    pub current_limit: f32,
+    /// How the encoder sits on the motor.
+    pub alignment: EncoderAlignment,
+    /// Age of an encoder sample when the control step sees it, s; 0 to 1 ms.
+    pub encoder_latency: f32,
+}
+
+/// Gear and joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GearConfiguration {
+    /// Rotor revolutions per revolution of the joint, 1 to 500; negative where a positive rotor turns the joint backwards.
+    pub ratio: f32,
+    /// Joint's position where the encoder's first sample reads zero, rad; -1000 to 1000.
+    pub zero: f32,
+}
+
+/// What the joint may never exceed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Torque at the joint, Nm; 0.01 to 2000.
+    pub torque: f32,
+    /// Velocity, rad/s; 0.1 to 200. A fault 20 % above it.
+    pub velocity: f32,
+    /// Lowest and highest position, rad; the second above the first. A fault when passed by more than the margin.
+    pub position: (f32, f32),
+    /// Margin beyond the position limits, rad; 0.001 to 10.
+    pub position_margin: f32,
+    /// Phase current at which the bridge switches off, A; above the motor's current limit.
+    pub over_current: f32,
+    /// Lowest and highest supply, V; 5 to 100.
+    pub bus_voltage: (f32, f32),
+    /// Bridge temperature, °C; 40 to 150.
+    pub bridge_temperature: f32,
+    /// Winding temperature, °C; 40 to 200. Current is derated over the last 20 K.
+    pub winding_temperature: f32,
+    /// Time without a command after which the joint brakes, s; 0.001 to 10.
+    pub command_deadline: f32,
+}
+
+/// How the joint follows its commands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gains {
+    /// Bandwidth of the current loop, Hz; 10 to an eighteenth of the control rate.
+    pub current_bandwidth: f32,
+    /// Bandwidth of the tracking observer, Hz; 1 to a tenth of the control rate.
+    pub observer_bandwidth: f32,
+    /// Stiffness of the position mode, Nm/rad; 0 to 1e5.
+    pub stiffness: f32,
+    /// Damping of position and velocity mode, Nm s/rad; 0 to 1e4.
+    pub damping: f32,
+    /// Integral of the velocity error in velocity mode, Nm/rad; 0 to 1e6. Position mode integrates at a tenth of it.
+    pub integral: f32,
+    /// Acceleration of ramps, rad/s²; 0.1 to 1e5.
+    pub acceleration: f32,
+    /// Deceleration of quick stop and fault reaction, rad/s²; 0.1 to 1e5.
+    pub quick_stop_deceleration: f32,
+    /// Longest time that braking may take before the bridge switches off, s; 0.01 to 10.
+    pub braking_time: f32,
+}
+
+/// Which velocity friction is computed for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum VelocitySource {
+    /// The command's velocity where the mode has one (velocity, position, impedance), the measured one in torque mode. The
+    /// compensation of the first three is then pure feedforward: no error of the model can destabilise the loop.
+    #[default]
+    Reference,
+    /// Always the measured velocity.
+    Measured,
+}
+
+/// How much compensation acts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CompensationConfiguration {
+    /// What is asked for.
+    pub request: crate::compensation::Request,
+    /// Share of the estimate that is added; 0 to 1.
+    pub gain: f32,
+    /// Largest compensation torque, Nm; 0 to the torque limit.
+    pub clamp: f32,
+    /// Largest change of the compensation torque, Nm/s.
+    pub slew: f32,
+    /// Which velocity friction is computed for.
+    pub velocity_source: VelocitySource,
+    /// Velocity below which compensation fades out in proportion, rad/s; 0.0001 to 10.
+    pub standstill_velocity: f32,
+}
+
+/// The bridge and its timing: what the board knows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BridgeConfiguration {
+    /// Control steps a second, Hz; 1 kHz to 100 kHz.
+    pub rate: f32,
+    /// Least and greatest duty of a high side that leaves room to sample the shunts; 0 to 0.4, 0.6 to 1.
+    pub duty: (f32, f32),
+    /// Dead time, s; 0 to 5 µs.
+    pub dead_time: f32,
+    /// Current below which dead-time compensation is in proportion to it, A; 0.001 to 100.
+    pub dead_time_band: f32,
+    /// The board measures the bridge's temperature: a reading out of range is a fault.
+    pub has_bridge_sensor: bool,
+    /// The motor has a temperature sensor: a reading out of range is a fault.
+    pub has_winding_sensor: bool,
+}
+
+/// Heat paths of the motor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ThermalConfiguration {
+    /// Heat capacity of the winding, J/K.
+    pub winding_capacity: f32,
+    /// Heat capacity of the housing, J/K.
+    pub housing_capacity: f32,
+    /// Thermal resistance from winding to housing, K/W.
+    pub winding_to_housing: f32,
+    /// Thermal resistance from housing to ambient, K/W.
+    pub housing_to_ambient: f32,
+    /// Temperature of the surroundings, °C.
+    pub ambient: f32,
+}
+
+/// Everything that a joint is and may do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Configuration {
+    /// Node on the CAN bus, 1 to 127; 255 where none is assigned yet.
+    pub node_id: u8,
+    /// Motor and encoder.
+    pub motor: MotorConfiguration,
+    /// Gear.
+    pub gear: GearConfiguration,
+    /// Limits.
+    pub limits: Limits,
+    /// Gains.
+    pub gains: Gains,
+    /// Compensation.
+    pub compensation: CompensationConfiguration,
+    /// Heat.
+    pub thermal: ThermalConfiguration,
+}
+
+/// Why a configuration is refused.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ConfigurationError {
+    /// A value is out of its range.
+    Setting(SettingError),
+    /// A compensation setting is out of its range.
+    Compensation(SettingsError),
+    /// The node id is neither 1 to 127 nor 255.
+    NodeId(u8),
+    /// The motor has no poles.
+    PolePairs(u32),
+}
+
+impl From<SettingError> for ConfigurationError {
+    fn from(error: SettingError) -> Self {
+        Self::Setting(error)
+    }
+}
+
+impl From<SettingsError> for ConfigurationError {
+    fn from(error: SettingsError) -> Self {
+        Self::Compensation(error)
+    }
+}
+
+impl core::fmt::Display for ConfigurationError {
+    fn fmt(&self, f: &mut core::fmt::Formatter) -> core::fmt::Result {
+        match self {
+            Self::Setting(error) => error.fmt(f),
+            Self::Compensation(error) => error.fmt(f),
+            Self::NodeId(id) => write!(f, "node id is {id}, must be 1 to 127, or 255 for none"),
+            Self::PolePairs(pairs) => write!(f, "motor has {pairs} pole pairs, must have 1 to 64"),
+        }
+    }
+}
+
+impl core::error::Error for ConfigurationError {}
+
+impl Configuration {
+    /// Checks the whole record and prepares it for the control step on a bridge.
+    pub fn prepare(&self, bridge: &BridgeConfiguration) -> Result<Active, ConfigurationError> {
+        if !matches!(self.node_id, 1..=127 | 255) {
+            return Err(ConfigurationError::NodeId(self.node_id));
+        }
+        if !(1..=64).contains(&self.motor.alignment.pole_pairs) {
+            return Err(ConfigurationError::PolePairs(self.motor.alignment.pole_pairs));
+        }
+        let Self { motor, gear, limits, gains, compensation, .. } = self;
+        check("control rate", "Hz", bridge.rate, 1e3, 100e3)?;
+        check("dead time", "s", bridge.dead_time, 0.0, 5e-6)?;
+        check("torque constant", "Nm/A", motor.torque_constant, 1e-3, 5.0)?;
+        check("current limit", "A", motor.current_limit, 0.1, 200.0)?;
+        check("encoder's latency", "s", motor.encoder_latency, 0.0, 1e-3)?;
+        let magnitude = if gear.ratio < 0.0 { -gear.ratio } else { gear.ratio };
+        check("gear ratio's magnitude", "", magnitude, 1.0, 500.0)?;
+        check("joint's zero", "rad", gear.zero, -1000.0, 1000.0)?;
+        check("torque limit", "Nm", limits.torque, 0.01, 2000.0)?;
+        check("velocity limit", "rad/s", limits.velocity, 0.1, 200.0)?;
+        let (low, high) = limits.position;
+        check("lowest position", "rad", low, -1000.0, 1000.0)?;
+        check("highest position", "rad", high, low + 1e-3, 1000.0)?;
+        check("margin beyond the position limits", "rad", limits.position_margin, 1e-3, 10.0)?;
+        check("over-current limit", "A", limits.over_current, 1.05 * motor.current_limit, 500.0)?;
+        let (low, high) = limits.bus_voltage;
+        check("lowest supply voltage", "V", low, 5.0, 100.0)?;
+        check("highest supply voltage", "V", high, low + 1.0, 100.0)?;
+        check("bridge temperature limit", "°C", limits.bridge_temperature, 40.0, 150.0)?;
+        check("winding temperature limit", "°C", limits.winding_temperature, 60.0, 200.0)?;
+        check("command deadline", "s", limits.command_deadline, 1e-3, 10.0)?;
+        check("stiffness", "Nm/rad", gains.stiffness, 0.0, 1e5)?;
+        check("damping", "Nm s/rad", gains.damping, 0.0, 1e4)?;
+        check("integral gain", "Nm/rad", gains.integral, 0.0, 1e6)?;
+        check("acceleration", "rad/s²", gains.acceleration, 0.1, 1e5)?;
+        check("quick-stop deceleration", "rad/s²", gains.quick_stop_deceleration, 0.1, 1e5)?;
+        check("braking time", "s", gains.braking_time, 0.01, 10.0)?;
+        check("compensation gain", "", compensation.gain, 0.0, 1.0)?;
+        check("compensation clamp", "Nm", compensation.clamp, 0.0, limits.torque)?;
+        check("compensation slew limit", "Nm/s", compensation.slew, 0.5, 32e3)?;
+        check("standstill velocity", "rad/s", compensation.standstill_velocity, 1e-4, 10.0)?;
+        Active::new(self, bridge)
+    }
+}

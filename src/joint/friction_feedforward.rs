@@ -1,0 +1,122 @@
+//! Friction compensation in the joint: which state the model sees, what holds it back near standstill, and the energy guard;
+//! control step.
+//!
+//! Two things keep compensation from moving a joint by itself. Where the command has a velocity, friction is computed for that
+//! velocity: a pure feedforward, which no error of the model can turn into an instability, and zero while nothing is asked for.
+//! Where there is none (torque mode), friction is computed for the measured velocity, and that is a positive feedback. It is held by the
+//! fade near standstill and by the guard: while the joint speeds up although its command does not push it that way, the
+//! compensation backs off within milliseconds, and it comes back only while the command pushes.
+
+use super::active::{Active, JointMotion};
+use super::configuration::VelocitySource;
+use super::motion_law::Wanted;
+use crate::compensation::{Compensation, Output};
+use crate::friction::state::JointState;
+use crate::motor::number::{greater, or_zero, within};
+use crate::quantity::{Acceleration, Position, Temperature, Torque, Velocity};
+
+/// Time in which the guard takes compensation away, s.
+const BACK_OFF: f32 = 0.005;
+/// Time in which it comes back, s.
+const RECOVERY: f32 = 0.1;
+/// Time over which the guard compares the speed, s.
+const MEMORY: f32 = 0.01;
+/// Growth of the speed over that time, as a fraction, from which the joint counts as speeding up.
+const GROWTH: f32 = 0.01;
+
+/// What compensation did in a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Compensated {
+    /// Torque to add, Nm.
+    pub torque: f32,
+    /// What the model said, and why.
+    pub output: Output,
+    /// Part that standstill and guard let through, 0 to 1.
+    pub permitted: f32,
+}
+
+/// Compensation, from one control step to the next.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FrictionFeedforward {
+    compensation: Compensation,
+    /// What the guard has taken away, 0 to 1.
+    withheld: f32,
+    /// Slow mean of the speed, rad/s.
+    speed: f32,
+}
+
+/// To Q16.16; held at the ends of the range, zero for what is not a number.
+fn q16(value: f32) -> i32 {
+    (value * 65536.0) as i32
+}
+
+impl FrictionFeedforward {
+    /// Forgets the past.
+    pub fn reset(&mut self) {
+        *self = Self::default();
+    }
+
+    /// One control step. `measured_torque` is the torque of the measured current, Nm; `temperature` the gear's, °C.
+    #[inline(always)]
+    pub fn step(
+        &mut self,
+        active: &Active,
+        motion: &JointMotion,
+        wanted: &Wanted,
+        measured_torque: f32,
+        temperature: f32,
+    ) -> Compensated {
+        let gains = &active.compensation;
+        let reference = match gains.source {
+            VelocitySource::Reference => wanted.velocity,
+            VelocitySource::Measured => None,
+        };
+        let velocity = reference.unwrap_or(motion.velocity);
+        let acceleration = match reference {
+            Some(_) => wanted.acceleration.unwrap_or(motion.acceleration),
+            None => motion.acceleration,
+        };
+        let state = JointState {
+            position: Position::from_bits(q16(motion.position)),
+            velocity: Velocity::from_bits(q16(velocity)),
+            acceleration: Acceleration::from_bits(q16(acceleration)),
+            theoretical_torque: Torque::from_bits(q16(wanted.torque)),
+            measured_torque: Torque::from_bits(q16(measured_torque)),
+            temperature: Temperature::from_bits(q16(temperature)),
+            coupled_velocity: Velocity::ZERO,
+        };
+        let output = self.compensation.step(active.friction.as_ref(), &gains.settings, &state);
+        let speed = if velocity < 0.0 { -velocity } else { velocity };
+        let standstill = within(speed * gains.inverse_standstill, 0.0, 1.0);
+        let guarded = match reference {
+            Some(_) => 1.0,
+            None => self.guard(active, motion, wanted.torque),
+        };
+        let permitted = or_zero(standstill * guarded);
+        // Where nothing is added, not even the sign of a zero changes.
+        let torque = output.torque.to_bits() as f32 * (1.0 / 65536.0) * permitted;
+        Compensated { torque, output, permitted }
+    }
+
+    /// Part of the compensation that the energy guard lets through.
+    fn guard(&mut self, active: &Active, motion: &JointMotion, commanded: f32) -> f32 {
+        let gains = &active.compensation;
+        let speed = if motion.velocity < 0.0 { -motion.velocity } else { motion.velocity };
+        let per_step = 1.0 / gains.rate;
+        let growing = speed > (1.0 + GROWTH) * self.speed && speed > gains.standstill;
+        self.speed += within(per_step / MEMORY, 0.0, 1.0) * (or_zero(speed) - self.speed);
+        let pushed = if motion.velocity < 0.0 { commanded < 0.0 } else { commanded > 0.0 };
+        if growing && !pushed {
+            self.withheld += per_step / BACK_OFF;
+        } else if pushed {
+            self.withheld -= per_step / RECOVERY;
+        }
+        self.withheld = within(self.withheld, 0.0, 1.0);
+        greater(1.0 - self.withheld, 0.0)
+    }
+
+    /// What the guard withholds, 0 to 1.
+    pub fn withheld(&self) -> f32 {
+        self.withheld
+    }
+}

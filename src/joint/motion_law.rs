@@ -1,0 +1,146 @@
+//! From a command to a torque: ramps, stiffness and damping, and the limits of torque, velocity and position; control step.
+
+use super::active::{Active, JointMotion};
+use super::command::{Command, Mode};
+use crate::motor::number::{greater, lesser, limited, or_zero, square_root};
+
+/// What a command wants in this step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Wanted {
+    /// Torque before friction compensation, within every limit, Nm.
+    pub torque: f32,
+    /// Velocity that the command asks for at this instant, rad/s; none in torque mode.
+    pub velocity: Option<f32>,
+    /// Acceleration of that velocity, rad/s², where a ramp makes it.
+    pub acceleration: Option<f32>,
+}
+
+/// Ramps and integrals, from one control step to the next.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MotionLaw {
+    mode: Option<Mode>,
+    /// Reference that ramps towards the command, rad.
+    position: f32,
+    /// rad/s.
+    velocity: f32,
+    /// Nm.
+    integral: f32,
+}
+
+impl MotionLaw {
+    /// Forgets the past: ramps start where the joint is.
+    pub fn reset(&mut self) {
+        *self = Self::default();
+    }
+
+    /// One step towards a command. `derating` is the part of the torque limit that is permitted, 0 to 1. What is not a number counts
+    /// as zero; the torque is always within the limit.
+    #[inline(always)]
+    pub fn step(&mut self, active: &Active, command: &Command, motion: &JointMotion, derating: f32) -> Wanted {
+        if self.mode != Some(command.mode) {
+            *self =
+                Self { mode: Some(command.mode), position: motion.position, velocity: motion.velocity, integral: 0.0 };
+        }
+        let gains = &active.motion;
+        let before = self.velocity;
+        let (torque, velocity) = match command.mode {
+            Mode::Torque => (0.0, None),
+            Mode::Velocity => {
+                self.ramp(limited(command.velocity, active.limits.velocity), gains.velocity_step);
+                let error = self.velocity - motion.velocity;
+                self.integral += gains.velocity_integral * error;
+                (gains.damping * error + self.integral, Some(self.velocity))
+            }
+            Mode::Position => {
+                self.follow(command.position, active);
+                let error = self.position - motion.position;
+                self.integral += gains.position_integral * error;
+                let damped = gains.damping * (self.velocity - motion.velocity);
+                (gains.stiffness * error + damped + self.integral, Some(self.velocity))
+            }
+            Mode::Impedance => {
+                let stiffness = limited(greater(command.stiffness, 0.0), 1e5);
+                let damping = limited(greater(command.damping, 0.0), 1e4);
+                let spring = stiffness * (command.position - motion.position);
+                (spring + damping * (command.velocity - motion.velocity), Some(or_zero(command.velocity)))
+            }
+        };
+        let limit = active.limits.torque * derating;
+        self.integral = limited(self.integral, limit);
+        let ramped = matches!(command.mode, Mode::Velocity | Mode::Position);
+        Wanted {
+            torque: bounded(or_zero(torque) + or_zero(command.torque), limit, active, motion),
+            velocity,
+            acceleration: ramped.then_some((self.velocity - before) / gains.period),
+        }
+    }
+
+    /// One step of braking: the velocity comes down along the quick stop's ramp.
+    #[inline(always)]
+    pub fn brake(&mut self, active: &Active, motion: &JointMotion) -> Wanted {
+        if self.mode.is_some() {
+            *self = Self { velocity: motion.velocity, ..Self::default() };
+        }
+        self.ramp(0.0, active.motion.quick_stop_step);
+        let error = self.velocity - motion.velocity;
+        self.integral = limited(self.integral + active.motion.velocity_integral * error, active.limits.torque);
+        let torque = limited(active.motion.damping * error + self.integral, active.limits.torque);
+        Wanted { torque, velocity: Some(self.velocity), acceleration: None }
+    }
+
+    /// Whether braking's ramp has come to its end.
+    pub fn ramp_is_over(&self) -> bool {
+        self.velocity == 0.0
+    }
+
+    fn ramp(&mut self, target: f32, step: f32) {
+        self.velocity += limited(target - self.velocity, step);
+    }
+
+    /// The fastest approach to `target` from which the ramp can still stop there (trapezoidal profile, in closed loop).
+    fn follow(&mut self, target: f32, active: &Active) {
+        let gains = &active.motion;
+        let (low, high) = active.limits.position;
+        let target = if target < low {
+            low
+        } else if target > high {
+            high
+        } else {
+            target
+        };
+        let way = or_zero(target - self.position);
+        let distance = if way < 0.0 { -way } else { way };
+        // Of the way that the next step needs anyway, nothing is left to brake on.
+        let speed = square_root(2.0 * gains.acceleration * distance);
+        let arrival = distance / gains.period;
+        let speed = lesser(lesser(speed, arrival), active.limits.velocity);
+        let wanted = if way < 0.0 { -speed } else { speed };
+        self.ramp(wanted, gains.velocity_step);
+        self.position += self.velocity * gains.period;
+    }
+}
+
+/// The torque within its limit, held back towards the velocity limit and, like a spring and a damper, beyond the position limits.
+#[inline(always)]
+fn bounded(torque: f32, limit: f32, active: &Active, motion: &JointMotion) -> f32 {
+    let gains = &active.motion;
+    let (low, high) = active.limits.position;
+    let speed = active.limits.velocity;
+    // What still may push up, and down: nothing at the limit, an opposite torque beyond it.
+    let up_position = gains.stiffness * (high - motion.position) - gains.damping * motion.velocity;
+    let down_position = gains.stiffness * (low - motion.position) - gains.damping * motion.velocity;
+    let up = limited(
+        lesser(up_position + limit_at(gains.stiffness, limit), gains.damping * (speed - motion.velocity)),
+        limit,
+    );
+    let down = limited(
+        greater(down_position - limit_at(gains.stiffness, limit), gains.damping * (-speed - motion.velocity)),
+        limit,
+    );
+    limited(greater(lesser(torque, up), down), limit)
+}
+
+/// Without stiffness there is no wall: the limit itself is permitted everywhere.
+fn limit_at(stiffness: f32, limit: f32) -> f32 {
+    if stiffness > 0.0 { 0.0 } else { limit }
+}
