@@ -4,7 +4,6 @@ use super::*;
 use crate::motor::angle::{Direction, ElectricalAngle};
 use crate::motor::modulation::{ModulationSettings, Modulator};
 use crate::motor::virtual_motor::{RATE, VirtualMotor};
-use proptest::prelude::*;
 
 const SETTINGS: CalibrationSettings = CalibrationSettings {
     rate: RATE as f32,
@@ -92,29 +91,27 @@ fn degrees(found: ElectricalAngle, exact: ElectricalAngle) -> f64 {
 #[test]
 fn a_motor_is_found_as_it_is_in_both_directions_of_the_encoder() {
     for direction in [Direction::Forward, Direction::Reverse] {
-        for (offset, position) in [(0.0, 0.0), (0.3, 0.021), (0.777, -0.034)] {
-            for dead_time in [0.0, 0.01] {
-                let current_offsets = Phases { a: 0.3, b: -0.2, c: 0.1 };
-                let mut motor = VirtualMotor {
-                    direction,
-                    encoder_offset: offset,
-                    position,
-                    dead_time,
-                    current_offsets,
-                    ..VirtualMotor::default()
-                };
-                let found = calibrated(&mut motor, &SETTINGS);
-                let exact = motor.alignment();
-                assert_eq!((found.alignment.direction, found.alignment.pole_pairs), (direction, 14));
-                let error = degrees(found.alignment.electrical_zero, exact.electrical_zero);
-                assert!(error.abs() < 0.5, "{error}°");
-                assert!((found.resistance / 0.12 - 1.0).abs() < 0.01, "{found:?}");
-                assert!((found.lost_voltage - dead_time as f32 * 24.0).abs() < 0.01, "{found:?}");
-                assert!((found.inductance_d / 60e-6 - 1.0).abs() < 0.01, "{found:?}");
-                assert!((found.inductance_q / 90e-6 - 1.0).abs() < 0.01, "{found:?}");
-                let offsets = found.current_offsets;
-                assert!((offsets.a - 0.3).abs() < 1e-3 && (offsets.b + 0.2).abs() < 1e-3, "{offsets:?}");
-            }
+        for (offset, position, dead_time) in [(0.0, 0.0, 0.0), (0.3, 0.021, 0.01), (0.777, -0.034, 0.01)] {
+            let current_offsets = Phases { a: 0.3, b: -0.2, c: 0.1 };
+            let mut motor = VirtualMotor {
+                direction,
+                encoder_offset: offset,
+                position,
+                dead_time,
+                current_offsets,
+                ..VirtualMotor::default()
+            };
+            let found = calibrated(&mut motor, &SETTINGS);
+            let exact = motor.alignment();
+            assert_eq!((found.alignment.direction, found.alignment.pole_pairs), (direction, 14));
+            let error = degrees(found.alignment.electrical_zero, exact.electrical_zero);
+            assert!(error.abs() < 0.5, "{error}°");
+            assert!((found.resistance / 0.12 - 1.0).abs() < 0.01, "{found:?}");
+            assert!((found.lost_voltage - dead_time as f32 * 24.0).abs() < 0.01, "{found:?}");
+            assert!((found.inductance_d / 60e-6 - 1.0).abs() < 0.01, "{found:?}");
+            assert!((found.inductance_q / 90e-6 - 1.0).abs() < 0.01, "{found:?}");
+            let offsets = found.current_offsets;
+            assert!((offsets.a - 0.3).abs() < 1e-3 && (offsets.b + 0.2).abs() < 1e-3, "{offsets:?}");
         }
     }
 }
@@ -351,41 +348,68 @@ fn settings_out_of_range_are_refused_by_name() {
     assert_eq!(refused(CalibrationSettings { expected_pole_pairs: Some(65), ..SETTINGS }), "expected pole pairs");
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(64))]
-    #[test]
-    fn whatever_is_measured_it_ends_in_time_and_never_asks_for_more_than_the_highest_voltage(
-        seed: u32, wildness in 0u32..4, factor in -3.0f32..3.0,
-    ) {
-        let settings = CalibrationSettings { turn_time: 0.1, settle_time: 0.05, electrical_turns: 1, ..SETTINGS };
+/// Marsaglia's xorshift, 32 bits.
+fn next(random: &mut u32) -> u32 {
+    *random ^= *random << 13;
+    *random ^= *random >> 17;
+    *random ^= *random << 5;
+    *random
+}
+
+#[test]
+fn whatever_is_measured_it_ends_in_time_and_never_asks_for_more_than_the_highest_voltage() {
+    let settings = CalibrationSettings {
+        turn_time: 0.1,
+        settle_time: 0.05,
+        electrical_turns: 1,
+        expected_pole_pairs: None,
+        ..SETTINGS
+    };
+    let (mut done, mut failed_late) = (0, 0);
+    for seed in 1..600u32 {
+        let mut random = seed.wrapping_mul(0x9e37_79b9);
+        // Something like a motor, with nonsense now and then: once in so many steps, from never to once in 3,000.
+        let rarity = [0, 100_000, 30_000, 3_000][seed as usize % 4];
+        let resistance = 0.1 + 0.1 * (seed % 5) as f32;
+        let pole_pairs = 1 + seed % 30;
         let mut sequence = CalibrationSequence::new(&settings).unwrap();
         let longest = (sequence.longest() * RATE as f32) as u32 + 1;
-        let mut random = seed | 1;
-        let mut voltage = AlphaBeta::ZERO;
-        let mut ended = false;
-        for n in 0..longest {
-            random ^= random << 13;
-            random ^= random >> 17;
-            random ^= random << 5;
-            // Something like a winding, with nonsense now and then.
-            let wild = wildness > 0 && random % (10_000 * 4u32.pow(wildness)) == 0;
-            let currents = (voltage * factor).to_phases();
+        let (mut current, mut position, mut last) = (AlphaBeta::ZERO, 0f64, 0f64);
+        let mut aligned = false;
+        for n in 0.. {
+            assert!(n <= longest, "{:?}", sequence.progress());
+            let wild = rarity > 0 && next(&mut random).is_multiple_of(rarity);
             let step = sequence.step(&CalibrationInput {
-                phase_currents: if wild { Phases::uniform(f32::from_bits(random)) } else { currents },
-                encoder: if wild { random } else { n.wrapping_mul(random % 3_000) },
-                encoder_valid: random % 7 != 0,
+                phase_currents: if wild && next(&mut random).is_multiple_of(2) {
+                    Phases { a: f32::from_bits(next(&mut random)), ..current.to_phases() }
+                } else {
+                    current.to_phases()
+                },
+                encoder: if wild { next(&mut random) } else { (position * 2f64.powi(32)) as i64 as u32 },
+                encoder_valid: !next(&mut random).is_multiple_of(7),
                 bus_voltage: 24.0,
             });
-            let Some(asked) = step.voltage else {
-                if let Progress::Done(_) | Progress::Failed(_) = step.progress {
-                    ended = true;
-                    break;
+            aligned |= step.progress == Progress::Alignment;
+            match step.progress {
+                Progress::Done(_) => done += 1,
+                Progress::Failed(_) if aligned => failed_late += 1,
+                Progress::Failed(_) => {}
+                _ => {
+                    let voltage = step.voltage.unwrap_or_default();
+                    assert!(voltage.alpha.hypot(voltage.beta) <= 3.0 * 1.0001, "{voltage:?}");
+                    current = current + (voltage * (1.0 / resistance) - current) * 0.3;
+                    // The rotor follows the field as far as it moves by less than an eighth of a turn.
+                    let field = (voltage.beta as f64).atan2(voltage.alpha as f64) / core::f64::consts::TAU;
+                    let moved = (field - last + 0.5).rem_euclid(1.0) - 0.5;
+                    if moved.abs() < 0.125 && voltage.alpha.hypot(voltage.beta) > 0.1 {
+                        position += moved / pole_pairs as f64;
+                    }
+                    last = field;
+                    continue;
                 }
-                continue;
-            };
-            voltage = asked;
-            prop_assert!(voltage.alpha.hypot(voltage.beta) <= 3.0 * 1.0001, "{voltage:?}");
+            }
+            break;
         }
-        prop_assert!(ended, "{:?}", sequence.progress());
     }
+    assert!(done > 100 && failed_late > 30, "{done} {failed_late}");
 }
