@@ -187,15 +187,20 @@ mod tests {
                 prop_assert!([a, b, c].iter().all(|duty| (0.0..=0.96).contains(duty)), "{a} {b} {c}");
                 input.bus_voltage = 24.0;
             }
-            input = FieldOrientedInput {
-                phase_currents: Phases::default(), speed: 0.0, reference: Dq::ZERO, ..input
-            };
-            // The integral leaves through settle at R / L, 2000/s, from at most 30 V.
-            for _ in 0..400 {
-                control.step(&gains, &input);
+            // From here on the measurements are a motor's, at rest.
+            let mut motor = VirtualMotor { held_speed: Some(0.0), ..VirtualMotor::default() };
+            for _ in 0..600 {
+                let input = FieldOrientedInput {
+                    phase_currents: motor.measured_currents(),
+                    angle: motor.alignment().electrical(motor.encoder()),
+                    speed: 0.0,
+                    bus_voltage: 24.0,
+                    reference: Dq { d: 0.0, q: 2.0 },
+                };
+                motor.period(Some(control.step(&gains, &input).duties), 24.0);
             }
-            let output = control.step(&gains, &input);
-            prop_assert!(output.voltage.norm().is_finite());
+            let Dq { d, q } = motor.current();
+            prop_assert!(d.abs() < 0.3 && (q - 2.0).abs() < 0.3, "{d} {q}");
         }
     }
 }
