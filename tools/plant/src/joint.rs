@@ -4,6 +4,7 @@
 //! (semi-implicit Euler): a frictionless pendulum keeps its energy, and stiff bristles cannot make the joint
 //! unstable.
 
+use crate::contact::Contact;
 use crate::error::{ParameterError, within};
 use crate::friction::{Bristles, Surroundings};
 use crate::parameters::JointParameters;
@@ -29,7 +30,7 @@ pub struct State {
     pub motor_torque: f64,
     /// Friction torque, Nm; opposes a motion of its own sign.
     pub friction_torque: f64,
-    /// Gravity and external torque that the motor has to hold, Nm.
+    /// Gravity, contact and external torque that the motor has to hold, Nm.
     pub load_torque: f64,
     /// Torque that the gear transmits to link and payload, after [`GEAR_LOAD_LAG`], Nm.
     pub gear_torque: f64,
@@ -44,6 +45,7 @@ pub struct State {
 pub struct Joint {
     parameters: JointParameters,
     bristles: Bristles,
+    contact: Option<Contact>,
     state: State,
 }
 
@@ -66,7 +68,7 @@ impl Joint {
             friction_loss: 0.0,
             heat: Heat::uniform(temperature),
         };
-        Ok(Self { parameters, bristles: Bristles::default(), state })
+        Ok(Self { parameters, bristles: Bristles::default(), contact: None, state })
     }
 
     /// The same joint at `position` (rad) and `velocity` (rad/s), with unbent bristles.
@@ -90,28 +92,57 @@ impl Joint {
         &self.state
     }
 
-    /// Kinetic, potential and bristle energy, J; zero when it hangs at rest.
+    /// Puts something into the link's way, or takes it out again.
+    ///
+    /// # Errors
+    /// The first parameter of the contact that is outside its range.
+    pub fn set_contact(&mut self, contact: Option<Contact>) -> Result<(), ParameterError> {
+        contact.map_or(Ok(()), |contact| contact.validate())?;
+        self.hold(contact);
+        Ok(())
+    }
+
+    /// As [`Self::set_contact`], for a contact that is known to be valid.
+    pub(crate) fn hold(&mut self, contact: Option<Contact>) {
+        self.contact = contact;
+    }
+
+    /// What is in the link's way.
+    #[must_use]
+    pub fn contact(&self) -> Option<&Contact> {
+        self.contact.as_ref()
+    }
+
+    /// Kinetic, potential, bristle and contact energy, J; zero when it hangs at rest.
     #[must_use]
     pub fn stored_energy(&self) -> f64 {
         let kinetic = 0.5 * self.parameters.inertia() * self.state.velocity * self.state.velocity;
         let potential = self.parameters.load.gravity_amplitude() * (1.0 - libm::cos(self.state.position));
-        kinetic + potential + self.bristles.energy(&self.parameters.friction)
+        let contact = self.contact.map_or(0.0, |contact| contact.energy(self.state.position));
+        kinetic + potential + self.bristles.energy(&self.parameters.friction) + contact
     }
 
     /// Moves on by `duration` (s, above zero) while the torque-producing `current` (A, limited to the current limit)
     /// and the `external_torque` (Nm at the link, positive pushes forward) stay the same.
     pub fn advance(&mut self, current: f64, external_torque: f64, duration: f64) {
-        debug_assert!(duration > 0.0, "a joint advances by {duration} s");
         let limit = self.parameters.motor.current_limit;
         let current = current.clamp(-limit, limit);
+        let motor_torque = self.parameters.motor.torque_per_ampere() * current;
+        self.drive(motor_torque, self.parameters.motor.copper_loss(current), external_torque, duration);
+    }
+
+    /// Moves on by `duration` (s, above zero) while a motor with windings of its own gives `motor_torque` (Nm at the
+    /// link, before friction) and loses `copper_loss` (W) in them; nothing is limited here.
+    pub fn drive(&mut self, motor_torque: f64, copper_loss: f64, external_torque: f64, duration: f64) {
+        debug_assert!(duration > 0.0, "a joint advances by {duration} s");
         let steps = (duration / MAXIMUM_STEP - 1e-9).ceil().max(1.0);
         let step = duration / steps;
         for _ in 0..steps as u64 {
-            self.step(current, external_torque, step);
+            self.step(motor_torque, copper_loss, external_torque, step);
         }
     }
 
-    fn step(&mut self, current: f64, external_torque: f64, step: f64) {
+    fn step(&mut self, motor_torque: f64, copper_loss: f64, external_torque: f64, step: f64) {
         let parameters = &self.parameters;
         let state = &mut self.state;
         let inertia = parameters.inertia();
@@ -120,12 +151,21 @@ impl Joint {
         let surroundings =
             Surroundings { position: state.position, gear_torque: state.gear_torque, temperature: state.heat.housing };
         let friction = self.bristles.prepare(&parameters.friction, before, &surroundings, step);
-        let motor_torque = parameters.motor.torque_per_ampere() * current;
-        let load_torque = parameters.load.gravity_torque(state.position) - external_torque;
+        let mut load_torque = parameters.load.gravity_torque(state.position) - external_torque;
 
         // The friction is a straight line over the new velocity, so the implicit step is one division.
         let net_torque = motor_torque - load_torque - friction.torque(before);
         state.velocity = before + step * net_torque / (inertia + step * friction.slope());
+        if let Some(contact) = &self.contact {
+            // The contact is another straight line; a wall that would have to pull is not touched.
+            let (pressed, slope) = contact.prepare(state.position, step);
+            let net_torque = net_torque - pressed - slope * before;
+            let held = before + step * net_torque / (inertia + step * (friction.slope() + slope));
+            if contact.gives(pressed + slope * held) {
+                state.velocity = held;
+                load_torque += pressed + slope * held;
+            }
+        }
         state.acceleration = (state.velocity - before) / step;
         state.position += step * state.velocity;
 
@@ -139,7 +179,6 @@ impl Joint {
         let transmitted = load_torque + parameters.load.total_inertia() * state.acceleration;
         state.gear_torque += (transmitted - state.gear_torque) * step / (step + GEAR_LOAD_LAG);
 
-        let copper_loss = parameters.motor.copper_loss(current);
         state.heat.advance(&parameters.thermal, copper_loss, state.friction_loss, step);
     }
 }

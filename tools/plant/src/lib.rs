@@ -22,10 +22,13 @@
 //! From the physics outwards:
 //!
 //! - [`friction`]: bristle friction, passive in every time step
+//! - [`friction_factors`]: the same friction with other numbers, for models that are wrong on purpose
 //! - [`load`]: the link as a pendulum
-//! - [`motor`]: current to torque and copper loss; where the electrical dynamics will plug in
+//! - [`motor`]: current to torque and copper loss
 //! - [`thermal`]: winding and housing
+//! - [`contact`]: what the link runs into
 //! - [`joint`]: all of these, integrated
+//! - [`actuator`]: the joint behind windings, bridge, supply and a drive's sensors, at the control rate; with faults
 //! - [`sensors`]: what the drive sees of it: counts, noise, offset, delay
 //! - [`drive`]: the recording drive's velocity filter and position controller
 //! - [`fourier`], [`excitation`]: the motions that are recorded
@@ -35,11 +38,14 @@
 
 #![forbid(unsafe_code)]
 
+pub mod actuator;
+pub mod contact;
 pub mod drive;
 pub mod error;
 pub mod excitation;
 pub mod fourier;
 pub mod friction;
+pub mod friction_factors;
 pub mod joint;
 pub mod load;
 pub mod motor;
@@ -51,6 +57,7 @@ pub mod thermal;
 
 mod noise;
 
+pub use actuator::{Actuator, ActuatorParameters};
 pub use error::ParameterError;
 pub use excitation::Excitation;
 pub use joint::Joint;

@@ -1,8 +1,8 @@
 //! The motor as an ideal torque source: the torque follows the current at once.
 //!
-//! This is the seam for the electrical dynamics. [`Joint::advance`](crate::Joint::advance) takes the
-//! torque-producing current; whatever produces it (here a division, later dq windings behind an inverter) stays on
-//! this side, and the mechanics do not change.
+//! [`Joint::advance`](crate::Joint::advance) takes this ideal current. At the control rate the windings of
+//! [`actuator`](crate::actuator) stand in its place and call [`Joint::drive`](crate::Joint::drive) with the torque that
+//! they really give; torque constant and resistance are these here in both cases.
 
 use crate::error::{ParameterError, within};
 
