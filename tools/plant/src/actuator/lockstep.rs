@@ -26,7 +26,8 @@ pub const LONGEST_DIODE_STEP: f64 = 5e-6;
 const LOWEST_SUPPLY: f64 = 5.0;
 
 /// Mean powers over the last period, W. Input = copper loss + bridge loss + mechanical + rise of the magnetic energy: to
-/// rounding while all legs are driven; where diodes decide, the implicit step loses some percent of the magnetic energy.
+/// rounding while all phases are driven; a step in which a diode starts or ends to conduct loses a little of the magnetic
+/// energy.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Powers {
     /// From the bus into the bridge; negative while the motor feeds the bus. Neither the board's idle power nor what a

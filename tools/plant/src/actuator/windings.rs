@@ -187,15 +187,12 @@ impl Windings {
     ) -> Flow {
         let legs = self.ordered(*legs);
         let total = resistance + outside;
-        let mean =
-            if let [Leg::Driven { voltage: a, .. }, Leg::Driven { voltage: b, .. }, Leg::Driven { voltage: c, .. }] =
-                legs
-            {
+        let mean = match legs {
+            [Leg::Driven { voltage: a, .. }, Leg::Driven { voltage: b, .. }, Leg::Driven { voltage: c, .. }] => {
                 self.driven(rotation.frame.dq([a, b, c]), rotation.velocity, total, step)
-            } else {
-                self.current = self.implicit(&legs, rails, rotation, total, step).solve();
-                self.current
-            };
+            }
+            _ => self.floating(&legs, rails, rotation, total, step),
+        };
         let [d, q] = mean;
         let (inductance_d, inductance_q) = (self.parameters.inductance_d, self.parameters.inductance_q);
         Flow {
@@ -226,6 +223,38 @@ impl Windings {
         let q = (right_q * diagonal_d - coupling_q * right_d) * scale;
         self.current = [2.0 * d - self.current[0], 2.0 * q - self.current[1]];
         [d, q]
+    }
+
+    /// Diodes and open leads; returns the mean current of the step. Half a step of backward Euler, continued to its end, is
+    /// the midpoint rule; it is taken where every phase conducts or floats throughout, and backward Euler elsewhere.
+    fn floating(
+        &mut self,
+        legs: &[Leg; 3],
+        rails: &Rails,
+        rotation: &Rotation,
+        resistance: f64,
+        step: f64,
+    ) -> [f64; 2] {
+        let frame = &rotation.frame;
+        let before = self.current;
+        let middle = self.implicit(legs, rails, rotation, resistance, 0.5 * step).solve();
+        let after = [2.0 * middle[0] - before[0], 2.0 * middle[1] - before[1]];
+        // The frame is that of the middle: seen from there, a phase that floats throughout starts with what the rotor's
+        // turn within half a step makes of the others' currents, and the continuation keeps that up in size.
+        let turned = 1e-9 + 4.0 * rotation.velocity.abs() * step * (before[0].abs() + before[1].abs());
+        let [first, mid, last] = [before, middle, after].map(|current| frame.phases(current));
+        let steady = (0..3).all(|k| match legs[k] {
+            Leg::Driven { .. } => true,
+            _ if mid[k].abs() < 1e-9 => first[k].abs() < turned,
+            _ => first[k] * mid[k] > 0.0 && mid[k] * last[k] > 0.0,
+        });
+        if steady && middle != [0.0; 2] {
+            self.current = after;
+            middle
+        } else {
+            self.current = self.implicit(legs, rails, rotation, resistance, step).solve();
+            self.current
+        }
     }
 
     /// Backward Euler; the coupling between d and q is taken at the beginning of the step.

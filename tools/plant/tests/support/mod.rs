@@ -35,10 +35,7 @@ impl CurrentController {
         let velocity = self.pole_pairs * state.rotor_velocity;
         let [d, q] = state.dq_current;
         let bandwidth = 0.1 / PERIOD;
-        let mut voltage = [
-            -velocity * self.inductance[1] * q,
-            velocity * (self.inductance[0] * d + self.flux),
-        ];
+        let mut voltage = [-velocity * self.inductance[1] * q, velocity * (self.inductance[0] * d + self.flux)];
         for (k, (wanted, is)) in wanted.into_iter().zip([d, q]).enumerate() {
             self.integral[k] += bandwidth * self.resistance * (wanted - is) * PERIOD;
             voltage[k] += bandwidth * self.inductance[k] * (wanted - is) + self.integral[k];
