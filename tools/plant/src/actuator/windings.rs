@@ -239,22 +239,31 @@ impl Windings {
         let before = self.current;
         let middle = self.implicit(legs, rails, rotation, resistance, 0.5 * step).solve();
         let after = [2.0 * middle[0] - before[0], 2.0 * middle[1] - before[1]];
-        // The frame is that of the middle: seen from there, a phase that floats throughout starts with what the rotor's
-        // turn within half a step makes of the others' currents, and the continuation keeps that up in size.
-        let turned = 1e-9 + 4.0 * rotation.velocity.abs() * step * (before[0].abs() + before[1].abs());
+        // Seen from the frame of the middle, a phase that floats throughout starts with what the rotor's turn within half a
+        // step makes of the others' currents.
+        let turned = 1e-9 + rotation.velocity.abs() * step * (before[0].abs() + before[1].abs());
         let [first, mid, last] = [before, middle, after].map(|current| frame.phases(current));
         let steady = (0..3).all(|k| match legs[k] {
             Leg::Driven { .. } => true,
             _ if mid[k].abs() < 1e-9 => first[k].abs() < turned,
             _ => first[k] * mid[k] > 0.0 && mid[k] * last[k] > 0.0,
         });
-        if steady && middle != [0.0; 2] {
-            self.current = after;
-            middle
+        let (mean, end) = if steady && middle != [0.0; 2] {
+            (middle, after)
         } else {
-            self.current = self.implicit(legs, rails, rotation, resistance, step).solve();
-            self.current
-        }
+            let end = self.implicit(legs, rails, rotation, resistance, step).solve();
+            (end, end)
+        };
+        // At the end of the step the line on which a phase carries nothing has turned on in dq.
+        let mean_phases = frame.phases(mean);
+        let floats = (0..3).find(|k| !matches!(legs[*k], Leg::Driven { .. }) && mean_phases[*k].abs() < 1e-9);
+        self.current = floats.map_or(end, |k| {
+            let [x, y] = frame.directions[k];
+            let along = -y * end[0] + x * end[1];
+            let turn = 0.5 * rotation.velocity * step;
+            [along * (-y + turn * x), along * (x + turn * y)]
+        });
+        mean
     }
 
     /// Backward Euler; the coupling between d and q is taken at the beginning of the step.

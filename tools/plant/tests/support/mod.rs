@@ -2,6 +2,7 @@
 #![allow(dead_code)] // Each test program uses its own part.
 
 use plant::actuator::frame::Frame;
+use plant::actuator::windings::PhaseOrder;
 use plant::actuator::{Actuator, ActuatorParameters};
 
 pub const PERIOD: f64 = 5e-5;
@@ -41,7 +42,12 @@ impl CurrentController {
             voltage[k] += bandwidth * self.inductance[k] * (wanted - is) + self.integral[k];
         }
         let angle = state.electrical_angle + velocity * PERIOD * (self.delay + 0.5);
-        duties(Frame::at(angle).phases(voltage), state.bus_voltage)
+        let [a, b, c] = Frame::at(angle).phases(voltage);
+        let voltages = match actuator.parameters().windings.phase_order {
+            PhaseOrder::Forward => [a, b, c],
+            PhaseOrder::Exchanged => [a, c, b],
+        };
+        duties(voltages, state.bus_voltage)
     }
 }
 
