@@ -4,9 +4,11 @@
 //! (backward Euler), so even a stop of steel leaves the joint stable.
 
 use crate::error::{ParameterError, within};
+use serde::{Deserialize, Serialize};
 
 /// Which motions a contact resists.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Side {
     /// A wall above the position: positions beyond it are pushed back, it never pulls.
     Above,
@@ -17,7 +19,8 @@ pub enum Side {
 }
 
 /// A spring and damper between link and ground.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
 pub struct Contact {
     /// Where the spring is unstressed, -1000 to 1000 rad.
     pub position: f64,

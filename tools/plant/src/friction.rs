@@ -15,12 +15,14 @@
 //! the micro-damping fades: sigma1(v) = sigma1 / (1 + sigma1 lambda / (4 sigma0)).
 
 use crate::error::{ParameterError, within};
+use serde::{Deserialize, Serialize};
 
 /// Temperature at which the friction parameters hold, °C.
 pub const REFERENCE_TEMPERATURE: f64 = 25.0;
 
 /// One value for each direction of motion.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
 pub struct Directional {
     /// At velocity zero and above.
     pub forward: f64,
@@ -37,7 +39,8 @@ impl Directional {
 }
 
 /// One periodic variation of the dry friction over the joint's position.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
 pub struct Ripple {
     /// Periods per revolution of the link, 1 to 2000: gear meshes at low orders, pole pairs times gear ratio at high.
     pub periods_per_revolution: f64,
@@ -48,7 +51,8 @@ pub struct Ripple {
 }
 
 /// The friction of one joint.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
 pub struct FrictionParameters {
     /// Coulomb torque F_c, 0.001 to 100 Nm.
     pub coulomb: Directional,

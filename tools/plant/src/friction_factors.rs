@@ -3,9 +3,11 @@
 use crate::error::{ParameterError, within};
 use crate::friction::{Directional, FrictionParameters};
 use crate::noise::Noise;
+use serde::{Deserialize, Serialize};
 
 /// A factor for every friction parameter, 0 to 10 each; the orders and phases of the ripple stay.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
 pub struct FrictionFactors {
     /// Coulomb torque.
     pub coulomb: Directional,

@@ -1,12 +1,14 @@
 //! The link as a pendulum: an inertia, and a mass on an arm.
 
 use crate::error::{ParameterError, within};
+use serde::{Deserialize, Serialize};
 
 /// Standard gravity, m/s².
 pub const GRAVITY: f64 = 9.80665;
 
 /// What hangs on the gear's output.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
 pub struct LoadParameters {
     /// Inertia of the link about the joint without the payload, 0 to 100 kg m².
     pub inertia: f64,

@@ -5,9 +5,11 @@
 //! they really give; torque constant and resistance are these here in both cases.
 
 use crate::error::{ParameterError, within};
+use serde::{Deserialize, Serialize};
 
 /// Motor and gear ratio.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
 pub struct MotorParameters {
     /// Torque constant K_t at the rotor, 0.001 to 5 Nm/A of torque-producing current.
     pub torque_constant: f64,

@@ -6,9 +6,11 @@ use crate::load::LoadParameters;
 use crate::motor::MotorParameters;
 use crate::sensors::SensorParameters;
 use crate::thermal::ThermalParameters;
+use serde::{Deserialize, Serialize};
 
 /// How far and how fast the joint may be moved when it is recorded.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
 pub struct Limits {
     /// Largest distance from hanging down, 0.05 to 6.3 rad.
     pub travel: f64,
@@ -17,7 +19,8 @@ pub struct Limits {
 }
 
 /// One virtual joint.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
 pub struct JointParameters {
     /// Motor and gear ratio.
     pub motor: MotorParameters,

@@ -4,6 +4,7 @@ use crate::error::{ParameterError, count_within, within};
 use crate::joint::State;
 use crate::motor::MotorParameters;
 use crate::noise::Noise;
+use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
@@ -11,7 +12,8 @@ use std::f64::consts::TAU;
 pub const MAXIMUM_DELAY: usize = 64;
 
 /// The joint's sensors. A sample is one cycle of the drive, see [`crate::drive::MAXIMUM_CYCLE`].
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
 pub struct SensorParameters {
     /// Encoder counts per revolution of the link, 16 to 2^26. An encoder on the rotor counts gear ratio times more.
     pub counts_per_revolution: f64,

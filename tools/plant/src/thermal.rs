@@ -4,9 +4,11 @@
 //! the backward Euler rule, so a long step is inaccurate but never unstable.
 
 use crate::error::{ParameterError, within};
+use serde::{Deserialize, Serialize};
 
 /// Capacities, resistances and surroundings of the two nodes.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
 pub struct ThermalParameters {
     /// Heat capacity of the winding, 0.1 to 1e4 J/K.
     pub winding_capacity: f64,

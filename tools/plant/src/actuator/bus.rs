@@ -4,9 +4,11 @@
 //! laboratory supply, an adapter) stops conducting when the motor brakes, and the capacitor's voltage rises.
 
 use crate::error::{ParameterError, within};
+use serde::{Deserialize, Serialize};
 
 /// Source and capacitor.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
 pub struct BusParameters {
     /// Voltage of the source without load, 5 to 400 V.
     pub source_voltage: f64,

@@ -2,9 +2,11 @@
 
 use super::delay::MAXIMUM_DELAY;
 use crate::error::{ParameterError, count_within, within};
+use serde::{Deserialize, Serialize};
 
 /// Shunts, amplifiers and converter.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
 pub struct CurrentSensorParameters {
     /// Current that each sensor reports at zero, -50 to 50 A.
     pub offset: [f64; 3],

@@ -1,9 +1,11 @@
 //! Every effect of the actuator by name, so that each can be switched off on its own.
 
 use super::parameters::ActuatorParameters;
+use serde::{Deserialize, Serialize};
 
 /// One thing that makes the actuator differ from an ideal one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Effect {
     /// Breakaway torque above the Coulomb torque.
     Stribeck,

@@ -2,9 +2,11 @@
 
 use super::legs::Phase;
 use crate::error::{ParameterError, within};
+use serde::{Deserialize, Serialize};
 
 /// A measured quantity; its unit is that of a [`Failure`]'s numbers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Channel {
     /// Current of phase A, A.
     CurrentA,
@@ -46,7 +48,8 @@ impl Channel {
 }
 
 /// How a sensor fails.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Failure {
     /// It repeats the last reading before the failure.
     Stuck,
@@ -63,7 +66,8 @@ pub enum Failure {
 }
 
 /// Something that goes wrong.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Fault {
     /// A sensor fails.
     Sensor(Channel, Failure),

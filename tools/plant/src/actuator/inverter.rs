@@ -9,9 +9,11 @@
 use super::delay::{Delay, MAXIMUM_DELAY};
 use super::legs::{Leg, Rails};
 use crate::error::{ParameterError, count_within, within};
+use serde::{Deserialize, Serialize};
 
 /// Bridge, timer and heat sink.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
 pub struct InverterParameters {
     /// Dead time at each edge, 0 to 5e-6 s.
     pub dead_time: f64,

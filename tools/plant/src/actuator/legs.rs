@@ -1,7 +1,10 @@
 //! What each motor phase is connected to.
 
+use serde::{Deserialize, Serialize};
+
 /// One of the three phases.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Phase {
     /// Phase A, or U.
     A,

@@ -9,10 +9,12 @@ use super::thermistor::ThermistorParameters;
 use super::windings::{COPPER_RISE, Cogging, PhaseOrder, WindingParameters};
 use crate::error::ParameterError;
 use crate::parameters::JointParameters;
+use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// One virtual actuator.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
 pub struct ActuatorParameters {
     /// Gear, load, friction, heat; its sensors are those of a recording drive and not used here, and its current limit
     /// is what the drive should keep, not what the windings do.

@@ -2,10 +2,12 @@
 
 use super::delay::MAXIMUM_DELAY;
 use crate::error::{ParameterError, count_within, within};
+use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 
 /// Encoder and how it is mounted.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
 pub struct EncoderParameters {
     /// Counts per turn of the rotor, 16 to 2^26.
     pub counts_per_turn: usize,

@@ -7,9 +7,11 @@ use super::rotor_encoder::EncoderParameters;
 use super::thermistor::ThermistorParameters;
 use crate::error::{ParameterError, within};
 use crate::noise::Noise;
+use serde::{Deserialize, Serialize};
 
 /// The divider that measures the bus voltage.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
 pub struct VoltageSensorParameters {
     /// Relative error of the gain, -0.2 to 0.2.
     pub gain_error: f64,
@@ -35,7 +37,8 @@ impl VoltageSensorParameters {
 }
 
 /// All sensors of the drive.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
 pub struct DriveSensorParameters {
     /// Phase currents.
     pub currents: CurrentSensorParameters,

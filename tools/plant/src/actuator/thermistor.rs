@@ -1,9 +1,11 @@
 //! A temperature sensor: slow, coarse, with a range whose ends are what a broken one reads.
 
 use crate::error::{ParameterError, within};
+use serde::{Deserialize, Serialize};
 
 /// A negative-temperature-coefficient resistor with its converter.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
 pub struct ThermistorParameters {
     /// Whether the board has this sensor; without, the reading is not a number.
     pub fitted: bool,

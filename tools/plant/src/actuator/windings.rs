@@ -15,6 +15,7 @@ use super::freewheel::ImplicitStep;
 use super::legs::{Leg, Rails};
 use crate::error::{ParameterError, count_within, within};
 use crate::motor::MotorParameters;
+use serde::{Deserialize, Serialize};
 
 /// Temperature at which the resistance holds, °C.
 pub const REFERENCE_TEMPERATURE: f64 = 25.0;
@@ -23,7 +24,8 @@ pub const REFERENCE_TEMPERATURE: f64 = 25.0;
 pub const COPPER_RISE: f64 = 3.85e-3;
 
 /// In which order the motor's phases are wired to the bridge.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum PhaseOrder {
     /// A current vector that turns forward turns the rotor forward.
     Forward,
@@ -32,7 +34,8 @@ pub enum PhaseOrder {
 }
 
 /// Torque between magnets and teeth.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
 pub struct Cogging {
     /// Amplitude at the rotor, 0 to 10 Nm.
     pub amplitude: f64,
@@ -55,7 +58,8 @@ impl Cogging {
 
 /// What the windings are beyond [`MotorParameters`]. Torque constant and resistance are there: the flux linkage is
 /// K_t / (3/2 p), and the resistance of a phase is two thirds of the one that turns i_q into copper loss.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
 pub struct WindingParameters {
     /// Pole pairs p, 1 to 64.
     pub pole_pairs: usize,
