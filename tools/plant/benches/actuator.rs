@@ -1,15 +1,21 @@
-//! Prints what a period of the virtual actuator costs, driven and freewheeling: `cargo bench -p plant --bench actuator`.
+//! Prints what a period of the virtual actuator costs, driven, coasting and with a broken lead: `cargo bench -p plant --bench actuator`.
 
+use plant::actuator::{Fault, Phase};
 use plant::{Actuator, ActuatorParameters};
 use std::time::Instant;
 
 const PERIODS: u32 = 400_000;
 
 fn main() {
-    for (name, rate, switching) in
-        [("driven", 20e3, true), ("driven", 40e3, true), ("bridge off, coasting", 20e3, false)]
-    {
+    let open = Some(Fault::PhaseOpen(Phase::A));
+    for (name, rate, switching, fault) in [
+        ("driven", 20e3, true, None),
+        ("driven", 40e3, true, None),
+        ("bridge off, coasting", 20e3, false, None),
+        ("driven with an open phase", 20e3, true, open),
+    ] {
         let mut actuator = Actuator::new(ActuatorParameters::reference(), 25.0, 1).expect("the reference is valid");
+        fault.into_iter().for_each(|fault| actuator.inject(fault).expect("no number to be out of range"));
         let mut seen = 0_u64;
         let start = Instant::now();
         for n in 0..PERIODS {
