@@ -34,6 +34,7 @@
 //! - [`fourier`], [`excitation`]: the motions that are recorded
 //! - [`mod@record`]: a joint and an excitation in, a log and its ground truth out
 //! - [`parameters`], [`randomised`]: everything that describes a joint, and joints drawn at random
+//! - [`virtual_joint`]: the firmware's own control step, closed over the actuator
 //! - [`error`]: what is refused, and the range that would not be
 
 #![forbid(unsafe_code)]
@@ -54,6 +55,7 @@ pub mod randomised;
 pub mod record;
 pub mod sensors;
 pub mod thermal;
+pub mod virtual_joint;
 
 mod noise;
 
@@ -63,3 +65,4 @@ pub use excitation::Excitation;
 pub use joint::Joint;
 pub use parameters::JointParameters;
 pub use record::{Log, Recording, Truth, record};
+pub use virtual_joint::VirtualJoint;

@@ -1,0 +1,232 @@
+//! The firmware's joint running on a virtual actuator: the same control step as in the board's interrupt, one call a PWM period.
+//!
+//! - [`setup`]: the configuration that a commissioned joint of given parameters would have
+//! - [`signals`]: the seam, in the types of both sides
+
+pub mod setup;
+mod signals;
+
+use crate::actuator::{Actuator, ActuatorParameters};
+use crate::error::ParameterError;
+use joint_firmware::friction::FrictionModel;
+use joint_firmware::joint::active::SLOW_RATE;
+use joint_firmware::joint::configuration::ConfigurationError;
+use joint_firmware::joint::state_machine::{Controlword, State};
+use joint_firmware::joint::{Active, Bridge, BridgeState, Command, Demand, Joint, Measurements, Slow, Telemetry};
+use joint_firmware::motor::thermal::WindingTemperature;
+pub use setup::Setup;
+
+/// Why a virtual joint cannot be made.
+#[derive(Clone, Debug, PartialEq)]
+pub enum VirtualJointError {
+    /// The plant refuses its parameters.
+    Plant(ParameterError),
+    /// The firmware refuses its configuration.
+    Configuration(ConfigurationError),
+    /// The joint did not reach "operation enabled"; the state it stayed in.
+    NotEnabled(State),
+}
+
+impl std::fmt::Display for VirtualJointError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Plant(error) => error.fmt(f),
+            Self::Configuration(error) => error.fmt(f),
+            Self::NotEnabled(state) => write!(f, "the joint cannot be enabled: it stays in {state:?}"),
+        }
+    }
+}
+
+impl std::error::Error for VirtualJointError {}
+
+impl From<ParameterError> for VirtualJointError {
+    fn from(error: ParameterError) -> Self {
+        Self::Plant(error)
+    }
+}
+
+impl From<ConfigurationError> for VirtualJointError {
+    fn from(error: ConfigurationError) -> Self {
+        Self::Configuration(error)
+    }
+}
+
+/// Which control step runs: the firmware's, or the one that was built without compensation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Build {
+    /// As flashed.
+    #[default]
+    Whole,
+    /// Without compensation.
+    WithoutCompensation,
+}
+
+/// Actuator and firmware in closed loop.
+#[derive(Clone, Debug)]
+pub struct VirtualJoint {
+    actuator: Actuator,
+    joint: Joint,
+    active: Active,
+    winding: WindingTemperature,
+    slow: Slow,
+    build: Build,
+    period: f64,
+    steps: u64,
+    slow_divider: u64,
+    overrun: bool,
+    measured: Measurements,
+    bridge: Bridge,
+}
+
+impl VirtualJoint {
+    /// A joint at rest at `temperature` (°C), switched off; the noise of its sensors follows from `seed`.
+    ///
+    /// # Errors
+    /// What plant or firmware refuse.
+    pub fn new(
+        parameters: ActuatorParameters,
+        setup: &Setup,
+        temperature: f64,
+        seed: u64,
+    ) -> Result<Self, VirtualJointError> {
+        let active = setup.configuration.prepare(&setup.bridge)?;
+        let winding = WindingTemperature::new(&active.thermal, temperature as f32).map_err(ConfigurationError::from)?;
+        let mut actuator = Actuator::new(parameters, temperature, seed)?;
+        let measured = signals::measurements(&actuator.measure(), false);
+        let rate = f64::from(setup.bridge.rate);
+        Ok(Self {
+            actuator,
+            joint: Joint::new(),
+            active,
+            winding,
+            slow: Slow { derating: 1.0, gear_temperature: temperature as f32 },
+            build: Build::Whole,
+            period: 1.0 / rate,
+            steps: 0,
+            slow_divider: (rate / f64::from(SLOW_RATE)).round() as u64,
+            overrun: false,
+            measured,
+            bridge: Bridge::OFF,
+        })
+    }
+
+    /// The same with another build of the control step.
+    #[must_use]
+    pub fn with_build(mut self, build: Build) -> Self {
+        self.build = build;
+        self
+    }
+
+    /// Changes the friction model between two control steps, as the firmware does after an upload.
+    pub fn set_friction(&mut self, model: Option<FrictionModel>) {
+        self.active.friction = model;
+    }
+
+    /// Replaces everything prepared between two control steps; the friction model stays.
+    pub fn set_active(&mut self, active: Active) {
+        self.active = active.with_friction(self.active.friction.take());
+    }
+
+    /// What the control step reads.
+    #[must_use]
+    pub fn active(&self) -> &Active {
+        &self.active
+    }
+
+    /// One control step, then one PWM period of physics with an external torque (Nm at the link).
+    pub fn step(&mut self, demand: &Demand, external_torque: f64) -> &Telemetry {
+        self.measured = signals::measurements(&self.actuator.measure(), self.overrun);
+        self.overrun = false;
+        let (active, slow, measured) = (&self.active, &self.slow, &self.measured);
+        self.bridge = match self.build {
+            Build::Whole => self.joint.control_step(active, demand, slow, measured),
+            Build::WithoutCompensation => self.joint.control_step_without_compensation(active, demand, slow, measured),
+        };
+        let duties = self.bridge.duties;
+        let duties = [duties.a, duties.b, duties.c].map(f64::from);
+        let switching = self.bridge.state == BridgeState::Switching;
+        self.actuator.advance(switching, duties, external_torque, self.period);
+        self.steps += 1;
+        if self.steps.is_multiple_of(self.slow_divider) {
+            self.winding.step(self.joint.take_mean_square_current(), self.measured.winding_temperature);
+            self.slow = Slow { derating: self.winding.derating(), gear_temperature: self.winding.housing() };
+        }
+        self.joint.telemetry()
+    }
+
+    /// Starts the joint and enables operation, in torque mode without torque.
+    ///
+    /// # Errors
+    /// The state in which it stays where a fault keeps it from being enabled.
+    pub fn enable(&mut self) -> Result<(), VirtualJointError> {
+        let words = [Controlword::SHUTDOWN, Controlword::SWITCH_ON, Controlword::ENABLE_OPERATION];
+        let mut sequence = 0;
+        let mut ask = |joint: &mut Self, controlword: Controlword| {
+            sequence += 1;
+            joint.step(&Demand { controlword, command: Command::default(), sequence }, 0.0).state
+        };
+        for _ in 0..=joint_firmware::joint::OFFSET_STEPS {
+            ask(self, Controlword::DISABLE_VOLTAGE);
+        }
+        let mut state = State::NotReadyToSwitchOn;
+        for word in words {
+            state = ask(self, word);
+        }
+        match state {
+            State::OperationEnabled => Ok(()),
+            state => Err(VirtualJointError::NotEnabled(state)),
+        }
+    }
+
+    /// Pretends that the next control step's predecessor took longer than its period.
+    pub fn overrun(&mut self) {
+        self.overrun = true;
+    }
+
+    /// Duration of a control step, s.
+    #[must_use]
+    pub fn period(&self) -> f64 {
+        self.period
+    }
+
+    /// Time since the start, s.
+    #[must_use]
+    pub fn time(&self) -> f64 {
+        self.steps as f64 * self.period
+    }
+
+    /// The firmware's side.
+    #[must_use]
+    pub fn joint(&self) -> &Joint {
+        &self.joint
+    }
+
+    /// The physics.
+    #[must_use]
+    pub fn actuator(&self) -> &Actuator {
+        &self.actuator
+    }
+
+    /// The physics, for faults and contacts.
+    pub fn actuator_mut(&mut self) -> &mut Actuator {
+        &mut self.actuator
+    }
+
+    /// What the last control step was told.
+    #[must_use]
+    pub fn measured(&self) -> &Measurements {
+        &self.measured
+    }
+
+    /// What it told the bridge.
+    #[must_use]
+    pub fn bridge(&self) -> &Bridge {
+        &self.bridge
+    }
+
+    /// What the slow task knows.
+    #[must_use]
+    pub fn slow(&self) -> &Slow {
+        &self.slow
+    }
+}

@@ -1,0 +1,113 @@
+//! The configuration of a commissioned joint: what its makers know of motor and gear, limits around what it can do, and gains from its
+//! inertia. Nothing here knows the friction.
+
+use crate::actuator::ActuatorParameters;
+use joint_firmware::compensation::Request;
+use joint_firmware::joint::configuration::{
+    BridgeConfiguration, CompensationConfiguration, Configuration, Gains, GearConfiguration, Limits,
+    MotorConfiguration, ThermalConfiguration, VelocitySource,
+};
+use joint_firmware::motor::angle::{Direction, ElectricalAngle, EncoderAlignment};
+use std::f64::consts::TAU;
+
+/// Control rate of the virtual joint, Hz.
+pub const RATE: f32 = 20_000.0;
+/// Bandwidth of the position loop, Hz.
+const POSITION_BANDWIDTH: f64 = 6.0;
+/// Damping ratio of the position loop.
+const DAMPING_RATIO: f64 = 1.0;
+
+/// A joint's configuration and its bridge's.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Setup {
+    /// Configuration.
+    pub configuration: Configuration,
+    /// The board's part.
+    pub bridge: BridgeConfiguration,
+}
+
+impl Setup {
+    /// The configuration of a joint with these parameters, [aligned](ActuatorParameters::aligned). Compensation is off.
+    #[must_use]
+    pub fn of(parameters: &ActuatorParameters) -> Self {
+        let joint = &parameters.joint;
+        let motor = &joint.motor;
+        let inertia = joint.inertia();
+        let bandwidth = TAU * POSITION_BANDWIDTH;
+        let stiffness = inertia * bandwidth * bandwidth;
+        let damping = 2.0 * DAMPING_RATIO * inertia * bandwidth;
+        let torque = motor.torque_limit();
+        let limits = Limits {
+            torque: torque as f32,
+            velocity: (1.5 * joint.limits.speed) as f32,
+            position: (-(joint.limits.travel + 0.5) as f32, (joint.limits.travel + 0.5) as f32),
+            position_margin: 0.3,
+            over_current: (1.4 * motor.current_limit) as f32,
+            bus_voltage: ((0.6 * parameters.bus.source_voltage) as f32, (1.3 * parameters.bus.source_voltage) as f32),
+            bridge_temperature: 110.0,
+            winding_temperature: 130.0,
+            command_deadline: 0.1,
+        };
+        let phase_resistance = motor.resistance / 1.5;
+        Self {
+            configuration: Configuration {
+                node_id: 1,
+                motor: MotorConfiguration {
+                    resistance: phase_resistance as f32,
+                    inductance_d: parameters.windings.inductance_d as f32,
+                    inductance_q: parameters.windings.inductance_q as f32,
+                    torque_constant: motor.torque_constant as f32,
+                    current_limit: motor.current_limit as f32,
+                    alignment: EncoderAlignment {
+                        pole_pairs: parameters.windings.pole_pairs as u32,
+                        direction: Direction::Forward,
+                        electrical_zero: ElectricalAngle(0),
+                    },
+                    encoder_latency: parameters.sensors.encoder.delay as f32 / RATE,
+                },
+                gear: GearConfiguration { ratio: motor.gear_ratio as f32, zero: 0.0 },
+                limits,
+                gains: Gains {
+                    current_bandwidth: 800.0,
+                    observer_bandwidth: 200.0,
+                    stiffness: stiffness as f32,
+                    damping: damping as f32,
+                    integral: (2.0 * stiffness) as f32,
+                    acceleration: (0.5 * joint.usable_acceleration()) as f32,
+                    quick_stop_deceleration: joint.usable_acceleration() as f32,
+                    braking_time: 1.0,
+                },
+                compensation: CompensationConfiguration {
+                    request: Request::Off,
+                    gain: 0.95,
+                    clamp: (0.5 * torque) as f32,
+                    slew: (50.0 * torque).min(30e3) as f32,
+                    velocity_source: VelocitySource::Reference,
+                    standstill_velocity: 0.01,
+                },
+                thermal: ThermalConfiguration {
+                    winding_capacity: joint.thermal.winding_capacity as f32,
+                    housing_capacity: joint.thermal.housing_capacity as f32,
+                    winding_to_housing: joint.thermal.winding_to_housing as f32,
+                    housing_to_ambient: joint.thermal.housing_to_ambient as f32,
+                    ambient: joint.thermal.ambient as f32,
+                },
+            },
+            bridge: BridgeConfiguration {
+                rate: RATE,
+                duty: (0.02, 0.95),
+                dead_time: parameters.inverter.dead_time as f32,
+                dead_time_band: (3.0 * parameters.inverter.clamping_current) as f32,
+                has_bridge_sensor: parameters.sensors.bridge.fitted,
+                has_winding_sensor: parameters.sensors.winding.fitted,
+            },
+        }
+    }
+
+    /// The same with compensation as requested.
+    #[must_use]
+    pub fn compensating(mut self, request: Request) -> Self {
+        self.configuration.compensation.request = request;
+        self
+    }
+}
