@@ -11,3 +11,5 @@ pub mod joint;
 pub mod motor;
 pub mod parameters;
 pub mod quantity;
+pub mod reset_record;
+pub mod sensors;

@@ -1,0 +1,315 @@
+//! ST B-G431B-ESC1 (MB1419, STM32G431CBU6): pins, timers, gains and limits.
+//!
+//! Sources: S = stm32duino variant and pin table; N = apache/nuttx board; F = SimpleFOC's current sense for this board; O = oxifoc
+//! hardware notes; R = Recoil .ioc; K = FOC-Stim board package. The pin functions agree with the chip database that embassy is
+//! generated from. **Nothing here has run on a board.** Marked facts:
+//! - *derived*: computed from parts that a source names;
+//! - *unconfirmed*: one source, or sources that contradict each other. Measure before relying on it.
+//!
+//! | function | pin, peripheral | source |
+//! |---|---|---|
+//! | U high, low | PA8 TIM1_CH1, PC13 TIM1_CH1N | S N O R |
+//! | V high, low | PA9 TIM1_CH2, PA12 TIM1_CH2N | S N O R |
+//! | W high, low | PA10 TIM1_CH3, PB15 TIM1_CH3N | S N O R |
+//! | current U | OPAMP1: PA1, bias PA3, to ADC1_IN13 | S N F O |
+//! | current V | OPAMP2: PA7, bias PA5, to ADC2_IN16 | S N F O |
+//! | current W | OPAMP3: PB0, bias PB2, to ADC2_IN18 | S N F O |
+//! | supply | PA0 ADC1_IN1 | N K R |
+//! | bridge NTC | PB14 ADC1_IN5 (network unconfirmed) | K O |
+//! | encoder A, B, index | PB6, PB7, PB8: TIM4_CH1, 2, 3 | S N R |
+//! | CAN receive, transmit | PA11, PB9: FDCAN1 | S N O |
+//! | CAN shutdown | PC11, low runs (O contradicts: unconfirmed) | S N |
+//! | CAN termination | PC14, high is 120 Ohm on | S N O |
+//! | button | PC10, low when pressed | S O R |
+//! | LED | PC6, lit when high (polarity unconfirmed) | S O R |
+//!
+//! The board has no usable over-current comparator (the comparators see 1.71 mV/A), so over-current is the joint's software
+//! check in every control step. TIM1's break input takes the chip's own alarms: core lock-up and SRAM parity.
+
+use super::adc::{self, FULL_SCALE, Sequence};
+use super::pwm::{self, TIMER_HZ, Timing};
+use super::{Led, Parts, Peripherals, StartError};
+use embassy_stm32::Config;
+use embassy_stm32::gpio::{Input, Level, Output, OutputType, Pull, Speed};
+use embassy_stm32::opamp::{OpAmp, OpAmpGain, OpAmpSpeed};
+use embassy_stm32::pac;
+use embassy_stm32::pac::adc::Adc;
+use embassy_stm32::pac::adc::vals::SampleTime;
+use embassy_stm32::pac::timer::vals::{Dir, FilterValue, Mms2, Ocm};
+use embassy_stm32::rcc;
+use embassy_stm32::time::Hertz;
+use embassy_stm32::timer::Channel;
+use embassy_stm32::timer::complementary_pwm::{BreakInputPolarity, ComplementaryPwm, ComplementaryPwmPin, Ossi, Ossr};
+use embassy_stm32::timer::low_level::CountingMode;
+use embassy_stm32::timer::qei;
+use embassy_stm32::timer::simple_pwm::PwmPin;
+use joint_firmware::joint::{Bridge, BridgeState, Measurements};
+use joint_firmware::motor::phases::Phases;
+use joint_firmware::sensors::incremental::Incremental;
+use joint_firmware::sensors::thermistor::Thermistor;
+
+/// Name of the board.
+pub const NAME: &str = "b-g431b-esc1";
+/// Frequency of the PWM and of the control step, Hz.
+pub const CONTROL_HZ: u32 = 20_000;
+/// Converter whose end of sequence is the control interrupt.
+pub const CONTROL_ADC: Adc = pac::ADC2;
+/// Address of the flash, and bytes of its only bank.
+pub const FLASH_START: u32 = 0x0800_0000;
+/// Bytes of a bank.
+pub const FLASH_BANK: u32 = 128 * 1024;
+
+/// Top of TIM1's counter.
+const TOP: u16 = pwm::top(CONTROL_HZ);
+/// Dead time, ns. Other firmware for this board uses 300 (K), 500 (N) and 800 to 847 (O, ST's kit). The longest is taken: too long a
+/// dead time distorts the voltage, which the joint compensates; too short a one shorts the supply. 1.6 % of a half period.
+const DEAD_TIME_NS: u32 = 800;
+/// The low sides conduct at least 2.5 µs around the top: dead time, settling of the amplifiers (unconfirmed), two conversions.
+const LARGEST_DUTY: f32 = 0.95;
+
+/// A code, A (derived: 3.3 V / 4096 / (3 mOhm * 64/7); F, O). Codes fall with a current into the motor: the sense resistor lies
+/// between the low side and ground, and the low side conducts when the current is sampled. The sign is unconfirmed.
+const AMPERES_PER_CODE: f32 = -0.029_38;
+/// Code without current (derived: about 2.06 V). The joint's calibration finds each phase's own.
+const CURRENT_ZERO: f32 = 2_557.0;
+/// Divider of the supply: 169 kOhm and 18 kOhm (N, K, R), V a code at a reference of 3.3 V.
+const VOLTS_PER_CODE: f32 = 3.3 / FULL_SCALE * (169.0 + 18.0) / 18.0;
+/// Thermistor of the bridge (K, O; the network is unconfirmed).
+const BRIDGE_NTC: Thermistor = Thermistor { nominal: 10_000.0, beta: 3_425.0, divider: 4_700.0 };
+
+/// TIM1_TRGO2 as the trigger of injected conversions of ADC1 and ADC2 (RM0440, table 166).
+const TRIGGER: u8 = 8;
+
+/// 170 MHz from the internal oscillator: whether a crystal is fitted, sources do not agree. FDCAN gets the same 170 MHz from PLLQ.
+pub fn chip_configuration() -> Config {
+    let mut config = Config::default();
+    config.rcc.hsi48 = None;
+    config.rcc.pll = Some(rcc::Pll {
+        source: rcc::PllSource::HSI,
+        prediv: rcc::PllPreDiv::DIV4,
+        mul: rcc::PllMul::MUL85,
+        divp: None,
+        divq: Some(rcc::PllQDiv::DIV2),
+        divr: Some(rcc::PllRDiv::DIV2),
+    });
+    config.rcc.sys = rcc::Sysclk::PLL1_R;
+    config.rcc.boost = true;
+    config.rcc.mux.fdcansel = rcc::mux::Fdcansel::PLL1_Q;
+    // USB-C's pull-downs would load the encoder's A line (PB6); this is the default, said because it matters here.
+    config.enable_ucpd1_dead_battery = false;
+    config
+}
+
+/// What the control interrupt measures with.
+pub struct Sensors {
+    encoder: Incremental,
+    counts_kept: bool,
+}
+
+/// Sets the peripherals up; everything but the PWM counter runs afterwards. The bridge stays off.
+pub fn start(p: Peripherals, encoder_counts: u16) -> Result<Parts, StartError> {
+    let encoder = Incremental::new(encoder_counts).ok_or(StartError::EncoderCounts(encoder_counts))?;
+    set_up_bridge(p.TIM1, (p.PA8, p.PC13), (p.PA9, p.PA12), (p.PA10, p.PB15));
+
+    // The amplifiers stay on: dropping an output would switch its amplifier off.
+    let (mut u, mut v, mut w) = (
+        OpAmp::new(p.OPAMP1, OpAmpSpeed::HighSpeed),
+        OpAmp::new(p.OPAMP2, OpAmpSpeed::HighSpeed),
+        OpAmp::new(p.OPAMP3, OpAmpSpeed::HighSpeed),
+    );
+    core::mem::forget(u.pga_biased_int(p.PA1, p.PA3, OpAmpGain::Mul16));
+    core::mem::forget(v.pga_biased_int(p.PA7, p.PA5, OpAmpGain::Mul16));
+    core::mem::forget(w.pga_biased_int(p.PB0, p.PB2, OpAmpGain::Mul16));
+    convert()?;
+
+    let counter = qei::Config {
+        ch1_pull: Pull::None,
+        ch2_pull: Pull::None,
+        mode: qei::QeiMode::Mode3,
+        auto_reload: encoder.counts_per_turn() - 1,
+    };
+    core::mem::forget(qei::Qei::new(p.TIM4, p.PB6, p.PB7, counter));
+    capture_index(p.PB8);
+
+    // Termination stays as the person who wired the bus wants it: off until a configuration says otherwise.
+    core::mem::forget(Output::new(p.PC14, Level::Low, Speed::Low));
+    core::mem::forget(Output::new(p.PC11, Level::Low, Speed::Low));
+    Ok(Parts {
+        sensors: Sensors { encoder, counts_kept: true },
+        led: Led { pin: Output::new(p.PC6, Level::Low, Speed::Low), lit_when_low: false },
+        button: Some(Input::new(p.PC10, Pull::Up)),
+        watchdog: p.IWDG,
+    })
+}
+
+type Pair<'a, H, L> = (embassy_stm32::Peri<'a, H>, embassy_stm32::Peri<'a, L>);
+
+/// Pins, time base, dead time and the instant of sampling. Outputs stay off: the driver enables them for an instant, with every
+/// channel still disabled.
+fn set_up_bridge(
+    tim1: embassy_stm32::Peri<'static, embassy_stm32::peripherals::TIM1>,
+    u: Pair<'static, embassy_stm32::peripherals::PA8, embassy_stm32::peripherals::PC13>,
+    v: Pair<'static, embassy_stm32::peripherals::PA9, embassy_stm32::peripherals::PA12>,
+    w: Pair<'static, embassy_stm32::peripherals::PA10, embassy_stm32::peripherals::PB15>,
+) {
+    let mut driver = ComplementaryPwm::new(
+        tim1,
+        Some(PwmPin::new(u.0, OutputType::PushPull)),
+        Some(ComplementaryPwmPin::new(u.1, OutputType::PushPull)),
+        Some(PwmPin::new(v.0, OutputType::PushPull)),
+        Some(ComplementaryPwmPin::new(v.1, OutputType::PushPull)),
+        Some(PwmPin::new(w.0, OutputType::PushPull)),
+        Some(ComplementaryPwmPin::new(w.1, OutputType::PushPull)),
+        None,
+        None,
+        Hertz(CONTROL_HZ),
+        CountingMode::CenterAlignedUpInterrupts,
+    );
+    driver.set_master_output_enable(false);
+    // With the outputs off the pins are driven low, which is off for the gate driver; not left floating.
+    driver.set_off_state_selection_idle(Ossi::IDLE_LEVEL);
+    driver.set_off_state_selection_run(Ossr::IDLE_LEVEL);
+    driver.set_dead_time((u64::from(DEAD_TIME_NS) * TIMER_HZ as u64).div_ceil(1_000_000_000) as u16);
+    // A break stays until the next switching on; nothing switches on by itself.
+    driver.set_automatic_output_enable(false);
+    // No pin breaks. The pin's input is enabled after reset and reads low, which the reset polarity takes for a break.
+    driver.set_break_input_pin_enable(false);
+    driver.set_break_polarity(BreakInputPolarity::ACTIVE_HIGH);
+    driver.set_break_enable(true);
+    pac::SYSCFG.cfgr2().modify(|w| {
+        w.set_cll(true);
+        w.set_spl(true);
+    });
+    driver.set_mms2(Mms2::COMPARE_OC4);
+    for channel in [Channel::Ch1, Channel::Ch2, Channel::Ch3] {
+        driver.enable(channel);
+    }
+    let tim = pac::TIM1;
+    tim.cr1().modify(|w| w.set_cen(false));
+    // A debugger that holds the core also stops the counter and, for this timer, switches the outputs off.
+    pac::DBGMCU.apb2fzr().modify(|w| w.set_tim1(true));
+    // The driver's period is a count short of the exact one.
+    tim.arr().write(|w| w.set_arr(TOP));
+    // Channel 4 has no pin: it rises one count before the top and starts the conversions.
+    tim.ccmr_output(1).modify(|w| w.set_ocm(1, Ocm::PWM_MODE2));
+    tim.ccr(3).write(|w| w.set_ccr(TOP - 1));
+    for phase in 0..3 {
+        tim.ccr(phase).write(|w| w.set_ccr(TOP / 2));
+    }
+    tim.cnt().write(|w| w.set_cnt(0));
+    tim.egr().write(|w| w.set_ug(true));
+    core::mem::forget(driver);
+}
+
+/// Currents U on ADC1, V and W on ADC2, at the same instant but for W, one conversion (0.6 µs) later. ADC1 goes on with the
+/// supply and the thermistor; the control interrupt comes after W and so finds theirs of the period before.
+fn convert() -> Result<(), StartError> {
+    pac::RCC.ahb2enr().modify(|w| w.set_adc12en(true));
+    pac::GPIOA.moder().modify(|w| w.set_moder(0, pac::gpio::vals::Moder::ANALOG));
+    pac::GPIOB.moder().modify(|w| w.set_moder(14, pac::gpio::vals::Moder::ANALOG));
+    adc::choose_clock(pac::ADC12_COMMON);
+    // The dividers' resistances are high and what buffers them is unconfirmed: a longer sampling time.
+    let (current, divider) = (SampleTime::CYCLES12_5, SampleTime::CYCLES47_5);
+    Sequence {
+        adc: pac::ADC1,
+        channels: &[(13, current), (1, divider), (5, divider)],
+        trigger: TRIGGER,
+        interrupt: false,
+    }
+    .arm()?;
+    Sequence { adc: pac::ADC2, channels: &[(16, current), (18, current)], trigger: TRIGGER, interrupt: true }.arm()
+}
+
+/// The index pulse captures TIM4's counter. embassy's counter driver knows A and B only.
+fn capture_index(_pin: embassy_stm32::Peri<'static, embassy_stm32::peripherals::PB8>) {
+    // Alternate function 2 is TIM4_CH3.
+    let block = pac::GPIOB;
+    block.afr(1).modify(|w| w.set_afr(0, 2));
+    block.moder().modify(|w| w.set_moder(8, pac::gpio::vals::Moder::ALTERNATE));
+
+    let tim = pac::TIM4;
+    tim.ccmr_input(1).modify(|w| {
+        w.set_ccs(0, pac::timer::vals::CcmrInputCcs::TI4);
+        w.set_icf(0, FilterValue::FCK_INT_N8);
+    });
+    // A motor is near: eight equal samples, 47 ns, before an edge counts.
+    tim.ccmr_input(0).modify(|w| {
+        w.set_icf(0, FilterValue::FCK_INT_N8);
+        w.set_icf(1, FilterValue::FCK_INT_N8);
+    });
+    tim.ccer().modify(|w| w.set_cce(2, true));
+}
+
+/// Starts the PWM counter, and with it the control interrupt.
+pub fn start_pwm() {
+    pac::TIM1.cr1().modify(|w| w.set_cen(true));
+}
+
+impl Sensors {
+    /// What is known now; temperatures are filled in by the caller.
+    #[inline(always)]
+    pub fn measure(&mut self) -> Measurements {
+        let tim = pac::TIM4;
+        let count = tim.cnt().read().cnt();
+        if tim.sr().read().ccif(2) {
+            // Reading the captured count clears the flag.
+            self.counts_kept = self.encoder.index(tim.ccr(2).read().ccr());
+        }
+        let current = |code: f32| (code - CURRENT_ZERO) * AMPERES_PER_CODE;
+        Measurements {
+            phase_currents: Phases {
+                a: current(adc::code::<0>(pac::ADC1)),
+                b: current(adc::code::<0>(pac::ADC2)),
+                c: current(adc::code::<1>(pac::ADC2)),
+            },
+            bus_voltage: adc::code::<1>(pac::ADC1) * VOLTS_PER_CODE,
+            encoder: self.encoder.angle(count),
+            encoder_valid: self.counts_kept,
+            winding_temperature: f32::NAN,
+            bridge_temperature: f32::NAN,
+            // A break has switched the outputs off.
+            bridge_fault: tim1_broke(),
+        }
+    }
+}
+
+/// Whether one of the chip's alarms has switched the outputs off.
+#[inline(always)]
+fn tim1_broke() -> bool {
+    pac::TIM1.sr().read().sbif()
+}
+
+/// Temperatures of bridge and winding, °C; NaN where the board has no sensor.
+pub fn temperatures() -> (f32, f32) {
+    (BRIDGE_NTC.temperature(adc::code::<2>(pac::ADC1) / FULL_SCALE), f32::NAN)
+}
+
+/// Sets the bridge for the next period.
+#[inline(always)]
+pub fn apply(bridge: &Bridge) -> Timing {
+    let tim = pac::TIM1;
+    let on = bridge.state == BridgeState::Switching;
+    if !on {
+        bridge_off();
+    }
+    tim.cr1().modify(|w| w.set_udis(true));
+    tim.ccr(0).write(|w| w.set_ccr(pwm::compare(bridge.duties.a, TOP, LARGEST_DUTY)));
+    tim.ccr(1).write(|w| w.set_ccr(pwm::compare(bridge.duties.b, TOP, LARGEST_DUTY)));
+    tim.ccr(2).write(|w| w.set_ccr(pwm::compare(bridge.duties.c, TOP, LARGEST_DUTY)));
+    tim.cr1().modify(|w| w.set_udis(false));
+    let timing = match tim.cr1().read().dir() {
+        Dir::DOWN => Timing::Prompt,
+        Dir::UP => Timing::Late,
+    };
+    if on && !tim.bdtr().read().moe() {
+        tim.bdtr().modify(|w| w.set_moe(true));
+    }
+    timing
+}
+
+/// Switches all transistors off, now. For fault handlers too: needs nothing initialised, takes no lock, cannot fail.
+#[inline(always)]
+pub fn bridge_off() {
+    // Without its clock the timer ignores this, but then its outputs have never been on.
+    pac::TIM1.bdtr().modify(|w| w.set_moe(false));
+}

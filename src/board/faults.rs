@@ -1,0 +1,172 @@
+//! Panic, HardFault, NMI and unexpected interrupts: bridge off first, then the reason into RAM that survives, then reset.
+//!
+//! None of this needs anything to be initialised: a fault may come before the first line of the program. On boards with TIM1 a
+//! lock-up of the core (a fault within these handlers) clears the timer's outputs in hardware; elsewhere the watchdog ends it.
+
+use core::mem::MaybeUninit;
+use core::panic::PanicInfo;
+use core::ptr::{addr_of, addr_of_mut};
+use core::sync::atomic::{AtomicU32, Ordering};
+use cortex_m::peripheral::SCB;
+use embassy_stm32::pac;
+use joint_firmware::reset_record::{Cause, Record, WORDS};
+
+/// The region PANIC of the board's memory: the startup code does not touch it.
+#[unsafe(link_section = ".panic")]
+static mut RECORD: MaybeUninit<[u32; WORDS]> = MaybeUninit::uninit();
+
+/// Configurable fault status register (ARM DDI 0403, B3.2.15).
+const CFSR: *const u32 = 0xe000_ed28 as *const u32;
+
+/// Words of the parameter slots that read with a double error: torn by a loss of power while they were written.
+static TORN_WORDS: AtomicU32 = AtomicU32::new(0);
+
+unsafe extern "C" {
+    static __parameters_start: u8;
+    static __parameters_end: u8;
+    static _stack_start: u32;
+    static _stack_end: u32;
+}
+
+fn words() -> [u32; WORDS] {
+    // SAFETY: plain words, any value of which is valid; nothing but this module's functions uses them, and they do not nest.
+    unsafe { addr_of!(RECORD).cast::<[u32; WORDS]>().read_volatile() }
+}
+
+fn store(words: [u32; WORDS]) {
+    // SAFETY: as in `words`.
+    unsafe { addr_of_mut!(RECORD).cast::<[u32; WORDS]>().write_volatile(words) };
+}
+
+/// Keeps the record, counted up from the one before, and resets.
+fn reset_with(record: Record) -> ! {
+    store(record.after(Record::decode(&words()).as_ref()).encode());
+    cortex_m::asm::dsb();
+    SCB::sys_reset()
+}
+
+/// Logs why the program started and, where it stopped by itself, why; once, at start.
+///
+/// The record is kept until [`forget`], so that stops in a row are counted.
+pub fn report() {
+    let flags = pac::RCC.csr().read();
+    pac::RCC.csr().modify(|w| w.set_rmvf(true));
+    defmt::info!(
+        "start: power {}, watchdog {}, window watchdog {}, software {}, pin {}, option bytes {}, low power {}",
+        flags.borrstf(),
+        flags.iwdgrstf(),
+        flags.wwdgrstf(),
+        flags.sftrstf(),
+        flags.pinrstf(),
+        flags.oblrstf(),
+        flags.lpwrrstf()
+    );
+    let Some(record) = Record::decode(&words()) else { return };
+    let cause = match record.cause {
+        Cause::Panic => "panic",
+        Cause::HardFault => "hard fault",
+        Cause::NonMaskable => "non-maskable interrupt",
+        Cause::Unexpected => "interrupt without a handler",
+    };
+    defmt::error!(
+        "stopped by {} at {:#010x}, detail {:#x} ({}) {}; {} in a row",
+        cause,
+        record.address,
+        record.detail,
+        record.detail,
+        record.place(),
+        record.repeats
+    );
+}
+
+/// Forgets the last stop: the program has run long enough since.
+pub fn forget() {
+    store([0; WORDS]);
+}
+
+/// Parameter words that were found torn since the start.
+pub fn torn_words() -> u32 {
+    TORN_WORDS.load(Ordering::Relaxed)
+}
+
+#[panic_handler]
+fn panic(info: &PanicInfo) -> ! {
+    super::bridge_off();
+    cortex_m::interrupt::disable();
+    let record = match info.location() {
+        Some(location) => Record::new(Cause::Panic, 0, location.line()).at(location.file()),
+        None => Record::new(Cause::Panic, 0, 0),
+    };
+    reset_with(record)
+}
+
+/// Entry of a HardFault: hands the stacked registers over, and a fresh stack where the old one has overflowed.
+#[unsafe(no_mangle)]
+#[unsafe(naked)]
+unsafe extern "C" fn HardFault() -> ! {
+    core::arch::naked_asm!(
+        "mov r0, sp",
+        "ldr r1, ={lowest}",
+        "cmp r0, r1",
+        "bhs 2f",
+        "ldr r1, ={highest}",
+        "mov sp, r1",
+        "movs r0, #0",
+        "2:",
+        "b {handler}",
+        lowest = sym _stack_end,
+        highest = sym _stack_start,
+        handler = sym hard_fault,
+    )
+}
+
+/// `frame`: r0 to r3, r12, lr, pc, xpsr as stacked by the core, or null.
+extern "C" fn hard_fault(frame: *const u32) -> ! {
+    super::bridge_off();
+    cortex_m::interrupt::disable();
+    // SAFETY: a frame above the stack's end lies in the stack; the program uses no other stack.
+    let address = if frame.is_null() { 0 } else { unsafe { frame.add(6).read_volatile() } };
+    // SAFETY: a register of the core that can always be read.
+    let status = unsafe { CFSR.read_volatile() };
+    reset_with(Record::new(Cause::HardFault, address, status))
+}
+
+/// Flash ECC, clock security or SRAM parity.
+///
+/// Reading a parameter word that a loss of power tore gives a double ECC error and so this interrupt. That is no reason to
+/// stop: the bridge goes off (parameters are read with the bridge off anyway), the flag is cleared, and the reader finds a
+/// slot with a bad checksum. ECCR gives the offset in the bank (RM0440, 5.7.6; that it counts bytes is unconfirmed).
+#[unsafe(no_mangle)]
+extern "C" fn NonMaskableInt() {
+    super::bridge_off();
+    let status = pac::FLASH.eccr().read();
+    let start = addr_of!(__parameters_start) as u32;
+    let end = addr_of!(__parameters_end) as u32;
+    let address = super::FLASH_START + status.addr_ecc() + if status.bk_ecc() { super::FLASH_BANK } else { 0 };
+    let parameters = !status.sysf_ecc() && address >= start && address < end;
+    if status.eccd() && parameters {
+        pac::FLASH.eccr().modify(|w| {
+            // Both flags clear where a one is written: only this one.
+            w.set_eccc(false);
+            w.set_eccd(true);
+        });
+        TORN_WORDS.fetch_add(1, Ordering::Relaxed);
+        return;
+    }
+    cortex_m::interrupt::disable();
+    reset_with(Record::new(Cause::NonMaskable, address, status.0))
+}
+
+/// Any interrupt that nobody handles.
+#[unsafe(no_mangle)]
+extern "C" fn DefaultHandler() -> ! {
+    super::bridge_off();
+    cortex_m::interrupt::disable();
+    let number = SCB::vect_active();
+    let number = match number {
+        cortex_m::peripheral::scb::VectActive::ThreadMode => 0,
+        cortex_m::peripheral::scb::VectActive::Exception(exception) => exception.irqn() as u32,
+        cortex_m::peripheral::scb::VectActive::Interrupt { irqn } => u32::from(irqn) + 16,
+    };
+    reset_with(Record::new(Cause::Unexpected, 0, number))
+}

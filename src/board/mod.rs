@@ -1,0 +1,84 @@
+//! The boards: everything that knows a pin or a register, and all unsafe code of the program.
+//!
+//! One file a board, all with the same items (`NAME`, `CONTROL_HZ`, `chip_configuration`, `start`, `Sensors`, `apply`, ...); the
+//! others are shared. Nothing of this has run on a board; facts that nobody confirmed are marked in the boards' files.
+//!
+//! embassy's drivers do the clocks, the pins, the timers' time bases, the operational amplifiers, the encoder counter, SPI
+//! outside the control interrupt, the independent watchdog and time. Registers are written directly where they are no choice:
+//! - in the control interrupt, because the drivers check their arguments and panic;
+//! - for injected conversions, because `Adc::new` knows only the asynchronous clock and enables the converter before another
+//!   can be chosen, and because its triggers do not take a timer's compare channel as the instant of sampling;
+//! - to switch off in a fault handler, which owns no driver.
+
+pub mod adc;
+pub mod control;
+mod critical_section;
+pub mod entry;
+pub mod faults;
+pub mod memory;
+pub mod pwm;
+pub mod watchdog;
+
+#[cfg(feature = "b-g431b-esc1")]
+mod b_g431b_esc1;
+#[cfg(feature = "b-g431b-esc1")]
+pub use b_g431b_esc1::*;
+
+#[cfg(feature = "moteus-r4")]
+mod drv8353;
+#[cfg(feature = "moteus-r4")]
+mod moteus_r4;
+#[cfg(feature = "moteus-r4")]
+pub use moteus_r4::*;
+
+pub use embassy_stm32::Peripherals;
+use embassy_stm32::gpio::{Input, Output};
+use embassy_stm32::peripherals::IWDG;
+
+/// What a started board hands to the program.
+pub struct Parts {
+    /// What the control interrupt measures with.
+    pub sensors: Sensors,
+    /// The light that a person sees.
+    pub led: Led,
+    /// The button, on boards that have one.
+    pub button: Option<Input<'static>>,
+    /// The independent watchdog, not started.
+    pub watchdog: embassy_stm32::Peri<'static, IWDG>,
+}
+
+/// A light with its polarity.
+pub struct Led {
+    pin: Output<'static>,
+    lit_when_low: bool,
+}
+
+impl Led {
+    /// Switches the light.
+    pub fn set(&mut self, lit: bool) {
+        self.pin.set_level((lit != self.lit_when_low).into());
+    }
+}
+
+/// Why a board does not start.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
+#[allow(dead_code, reason = "a board has some of these")]
+pub enum StartError {
+    /// An incremental encoder cannot have so few counts a turn.
+    EncoderCounts(u16),
+    /// A register of the gate driver does not hold what was written.
+    GateDriver {
+        /// Number of the register.
+        register: u16,
+        /// What was written.
+        written: u16,
+        /// What was read.
+        read: u16,
+    },
+    /// The bus to the gate driver failed.
+    GateDriverBus,
+    /// The bus to the encoder failed.
+    EncoderBus,
+    /// A converter did not get ready.
+    Converter,
+}

@@ -1,0 +1,286 @@
+//! mjbots moteus r4.11 (STM32G474CEU6): pins, timers, gains and limits.
+//!
+//! Sources: netlist of the controller r4.11 and the vendor's firmware (moteus_hw, moteus_controller, bldc_servo, drv8323), read not
+//! copied. The pin functions agree with the chip database that embassy is generated from. **Nothing here has run on a board.**
+//! Marked facts: *derived* from parts that a source names, *unconfirmed* by a second source.
+//!
+//! | function | pin, peripheral |
+//! |---|---|
+//! | PWM A, B, C | PA0, PA1, PA2: TIM2_CH1, 2, 3 to the DRV8353's INHA, B, C |
+//! | gate driver | SPI1: SCK PA5, MISO PA6, MOSI PA7, select PC4; enable PA3; HIZ PB7 (INLA to INLC, high switches); nFAULT PB6 |
+//! | current A, B, C | PB0 ADC3_IN12, PB1 ADC1_IN12, PB2 ADC2_IN12 |
+//! | supply | PB12 ADC1_IN11 |
+//! | bridge NTC, motor NTC | PA9 ADC5_IN2, PA8 ADC5_IN1 |
+//! | AS5047P | SPI2: SCK PB13, MISO PB14, MOSI PB15, select PB11 |
+//! | CAN receive, transmit | PA11, PA12: FDCAN1 |
+//! | LEDs | PF0 debug, PF1 power (lit when low: unconfirmed) |
+//!
+//! The vendor drives the same pins with TIM5, which cannot trigger the converters; TIM2 can trigger all of them at once. Neither has
+//! a break input: HIZ and enable switch off.
+
+use super::adc::{self, FULL_SCALE, Sequence};
+use super::drv8353::Drv8353;
+use super::pwm::{self, Timing};
+use super::{Led, Parts, Peripherals, StartError};
+use embassy_stm32::Config;
+use embassy_stm32::gpio::{Input, Level, Output, OutputType, Pull, Speed};
+use embassy_stm32::pac;
+use embassy_stm32::pac::adc::Adc;
+use embassy_stm32::pac::adc::vals::SampleTime;
+use embassy_stm32::pac::gpio::vals::Moder;
+use embassy_stm32::pac::timer::vals::{Dir, Mms, Ocm};
+use embassy_stm32::rcc;
+use embassy_stm32::spi::{self, Spi};
+use embassy_stm32::time::Hertz;
+use embassy_stm32::timer::low_level::CountingMode;
+use embassy_stm32::timer::simple_pwm::{PwmPin, SimplePwm};
+use joint_firmware::joint::{Bridge, BridgeState, Measurements};
+use joint_firmware::motor::phases::Phases;
+use joint_firmware::sensors::as5047p;
+use joint_firmware::sensors::thermistor::Thermistor;
+
+/// Name of the board.
+pub const NAME: &str = "moteus-r4";
+/// Frequency of the PWM and of the control step, Hz.
+pub const CONTROL_HZ: u32 = 40_000;
+/// Converter whose end of sequence is the control interrupt.
+pub const CONTROL_ADC: Adc = pac::ADC2;
+/// Address of the flash.
+pub const FLASH_START: u32 = 0x0800_0000;
+/// Bytes of a bank.
+pub const FLASH_BANK: u32 = 256 * 1024;
+
+/// Top of TIM2's counter.
+const TOP: u16 = pwm::top(CONTROL_HZ);
+/// The low sides conduct at least 2.5 µs around the top (unconfirmed): dead time, settling of the amplifiers, one conversion.
+const LARGEST_DUTY: f32 = 0.9;
+
+/// A code, A (derived: 3.3 V / 4096 / (0.5 mOhm * 20)). The amplifier's output rises with a current into the motor (derived from
+/// the driver's datasheet and the place of the resistors; sign unconfirmed).
+const AMPERES_PER_CODE: f32 = 0.0806;
+/// Code without current: half the reference. The joint's calibration finds each phase's own.
+const CURRENT_ZERO: f32 = 2_048.0;
+/// Divider of the supply: 100 kOhm and 4.7 kOhm, V a code.
+const VOLTS_PER_CODE: f32 = 0.017_947;
+/// Thermistor of the bridge.
+const BRIDGE_NTC: Thermistor = Thermistor { nominal: 47_000.0, beta: 4_050.0, divider: 10_000.0 };
+/// Thermistor of the motor, which the user fits: one like the bridge's is assumed.
+const WINDING_NTC: Thermistor = BRIDGE_NTC;
+
+/// TIM2_TRGO as the trigger of injected conversions, the same number for all converters (RM0440, tables 166 and 167).
+const TRIGGER: u8 = 2;
+/// Polls of the encoder's answer before it counts as lost. A frame takes 3 µs at 5.3 MHz, 510 cycles; a poll takes more than four.
+const ENCODER_POLLS: u32 = 200;
+
+/// 170 MHz from the internal oscillator: the crystal's pins drive LEDs. FDCAN gets the same 170 MHz from PLLQ.
+pub fn chip_configuration() -> Config {
+    let mut config = Config::default();
+    config.rcc.hsi48 = None;
+    config.rcc.pll = Some(rcc::Pll {
+        source: rcc::PllSource::HSI,
+        prediv: rcc::PllPreDiv::DIV4,
+        mul: rcc::PllMul::MUL85,
+        divp: None,
+        divq: Some(rcc::PllQDiv::DIV2),
+        divr: Some(rcc::PllRDiv::DIV2),
+    });
+    config.rcc.sys = rcc::Sysclk::PLL1_R;
+    config.rcc.boost = true;
+    config.rcc.mux.fdcansel = rcc::mux::Fdcansel::PLL1_Q;
+    config
+}
+
+/// What the control interrupt measures with.
+pub struct Sensors {
+    angle: u32,
+}
+
+/// Sets the peripherals up; everything but the PWM counter runs afterwards. The bridge stays off.
+///
+/// `_encoder_counts` is for boards with an incremental encoder.
+pub fn start(p: Peripherals, _encoder_counts: u16) -> Result<Parts, StartError> {
+    core::mem::forget(Output::new(p.PB7, Level::Low, Speed::Medium));
+    core::mem::forget(Output::new(p.PA3, Level::High, Speed::Low));
+    core::mem::forget(Input::new(p.PB6, Pull::Up));
+    // The driver is ready 1 ms after its enable.
+    cortex_m::asm::delay(2 * 170_000);
+    let mut bus = spi::Config::default();
+    bus.mode = spi::MODE_1;
+    bus.frequency = Hertz(1_000_000);
+    bus.miso_pull = Pull::Up;
+    Drv8353 {
+        spi: Spi::new_blocking(p.SPI1, p.PA5, p.PA7, p.PA6, bus),
+        select: Output::new(p.PC4, Level::High, Speed::Medium),
+    }
+    .configure()?;
+
+    // Set up by embassy, used by register in the control interrupt. 5.3 MHz: the next faster is over the encoder's 10 MHz.
+    let mut bus = spi::Config::default();
+    bus.mode = spi::MODE_1;
+    bus.frequency = Hertz(6_000_000);
+    let mut encoder = Spi::new_blocking(p.SPI2, p.PB13, p.PB15, p.PB14, bus);
+    core::mem::forget(Output::new(p.PB11, Level::High, Speed::VeryHigh));
+    // The first transfer leaves the bus enabled, with frames of 16 bits; its answer is thrown away.
+    encoder.blocking_transfer_in_place(&mut [as5047p::READ_ANGLE]).map_err(|_| StartError::EncoderBus)?;
+    core::mem::forget(encoder);
+    pac::SPI2.cr1().modify(|w| w.set_spe(true));
+
+    set_up_pwm(p.TIM2, p.PA0, p.PA1, p.PA2);
+    convert()?;
+    Ok(Parts {
+        sensors: Sensors { angle: 0 },
+        led: Led { pin: Output::new(p.PF0, Level::High, Speed::Low), lit_when_low: true },
+        button: None,
+        watchdog: p.IWDG,
+    })
+}
+
+/// Pins and time base; the conversions start one count before the top.
+fn set_up_pwm(
+    tim2: embassy_stm32::Peri<'static, embassy_stm32::peripherals::TIM2>,
+    a: embassy_stm32::Peri<'static, embassy_stm32::peripherals::PA0>,
+    b: embassy_stm32::Peri<'static, embassy_stm32::peripherals::PA1>,
+    c: embassy_stm32::Peri<'static, embassy_stm32::peripherals::PA2>,
+) {
+    let mut driver = SimplePwm::new(
+        tim2,
+        Some(PwmPin::new(a, OutputType::PushPull)),
+        Some(PwmPin::new(b, OutputType::PushPull)),
+        Some(PwmPin::new(c, OutputType::PushPull)),
+        None,
+        Hertz(CONTROL_HZ),
+        CountingMode::CenterAlignedUpInterrupts,
+    );
+    driver.ch1().enable();
+    driver.ch2().enable();
+    driver.ch3().enable();
+    core::mem::forget(driver);
+    let tim = pac::TIM2;
+    tim.cr1().modify(|w| w.set_cen(false));
+    // The driver's period is a count short of the exact one.
+    tim.arr().write_value(TOP.into());
+    tim.ccmr_output(1).modify(|w| w.set_ocm(1, Ocm::PWM_MODE2));
+    tim.ccr(3).write_value((TOP - 1).into());
+    for phase in 0..3 {
+        tim.ccr(phase).write_value((TOP / 2).into());
+    }
+    tim.cr2().modify(|w| w.set_mms(Mms::COMPARE_OC4));
+    tim.cnt().write_value(0);
+    tim.egr().write(|w| w.set_ug(true));
+}
+
+/// The three currents at the same instant on three converters; supply and thermistors follow, theirs are of the period before.
+fn convert() -> Result<(), StartError> {
+    pac::RCC.ahb2enr().modify(|w| {
+        w.set_adc12en(true);
+        w.set_adc345en(true);
+    });
+    for pin in [0, 1, 2, 12] {
+        pac::GPIOB.moder().modify(|w| w.set_moder(pin, Moder::ANALOG));
+    }
+    for pin in [8, 9] {
+        pac::GPIOA.moder().modify(|w| w.set_moder(pin, Moder::ANALOG));
+    }
+    adc::choose_clock(pac::ADC12_COMMON);
+    adc::choose_clock(pac::ADC345_COMMON);
+    let time = SampleTime::CYCLES12_5;
+    let arm =
+        |adc, channels: &[(u8, SampleTime)], interrupt| Sequence { adc, channels, trigger: TRIGGER, interrupt }.arm();
+    arm(pac::ADC1, &[(12, time), (11, time)], false)?;
+    arm(pac::ADC3, &[(12, time)], false)?;
+    arm(pac::ADC5, &[(2, time), (1, time)], false)?;
+    arm(pac::ADC2, &[(12, time)], true)
+}
+
+/// Starts the PWM counter, and with it the control interrupt.
+pub fn start_pwm() {
+    pac::TIM2.cr1().modify(|w| w.set_cen(true));
+}
+
+/// One frame with the encoder: the answer to the command of the frame before, with the angle of this instant's predecessor by a
+/// period. Its wait is bounded; none where it takes too long.
+#[inline(always)]
+fn encoder_frame(between: impl FnOnce()) -> Option<u16> {
+    let spi = pac::SPI2;
+    pac::GPIOB.bsrr().write(|w| w.set_br(11, true));
+    spi.dr16().write_value(as5047p::READ_ANGLE);
+    between();
+    let mut answer = None;
+    for _ in 0..ENCODER_POLLS {
+        if spi.sr().read().rxne() {
+            answer = Some(spi.dr16().read());
+            break;
+        }
+    }
+    pac::GPIOB.bsrr().write(|w| w.set_bs(11, true));
+    answer
+}
+
+impl Sensors {
+    /// What is known now; temperatures are filled in by the caller.
+    #[inline(always)]
+    pub fn measure(&mut self) -> Measurements {
+        let current = |code: f32| (code - CURRENT_ZERO) * AMPERES_PER_CODE;
+        let (mut phase_currents, mut bus_voltage) = (Phases::uniform(0.0), 0.0);
+        // The encoder's frame runs while the currents are read.
+        let frame = encoder_frame(|| {
+            phase_currents = Phases {
+                a: current(adc::code::<0>(pac::ADC3)),
+                b: current(adc::code::<0>(pac::ADC1)),
+                c: current(adc::code::<0>(pac::ADC2)),
+            };
+            bus_voltage = adc::code::<1>(pac::ADC1) * VOLTS_PER_CODE;
+        });
+        let angle = frame.and_then(as5047p::angle);
+        // The last good angle stands in: a jump to zero would be worse for whoever looks at the angle only.
+        self.angle = angle.unwrap_or(self.angle);
+        Measurements {
+            phase_currents,
+            bus_voltage,
+            encoder: self.angle,
+            encoder_valid: angle.is_some(),
+            winding_temperature: f32::NAN,
+            bridge_temperature: f32::NAN,
+            bridge_fault: pac::GPIOB.idr().read().idr(6) == pac::gpio::vals::Idr::LOW,
+        }
+    }
+}
+
+/// Temperatures of bridge and winding, °C; NaN where there is no sensor.
+pub fn temperatures() -> (f32, f32) {
+    let fraction = |code: f32| code / FULL_SCALE;
+    let bridge = BRIDGE_NTC.temperature(fraction(adc::code::<0>(pac::ADC5)));
+    (bridge, WINDING_NTC.temperature(fraction(adc::code::<1>(pac::ADC5))))
+}
+
+/// Sets the bridge for the next period.
+#[inline(always)]
+pub fn apply(bridge: &Bridge) -> Timing {
+    let tim = pac::TIM2;
+    let on = bridge.state == BridgeState::Switching;
+    if !on {
+        // HIZ only: a disabled driver would forget its configuration.
+        pac::GPIOB.bsrr().write(|w| w.set_br(7, true));
+    }
+    tim.cr1().modify(|w| w.set_udis(true));
+    tim.ccr(0).write_value(pwm::compare(bridge.duties.a, TOP, LARGEST_DUTY).into());
+    tim.ccr(1).write_value(pwm::compare(bridge.duties.b, TOP, LARGEST_DUTY).into());
+    tim.ccr(2).write_value(pwm::compare(bridge.duties.c, TOP, LARGEST_DUTY).into());
+    tim.cr1().modify(|w| w.set_udis(false));
+    if on {
+        pac::GPIOB.bsrr().write(|w| w.set_bs(7, true));
+    }
+    match tim.cr1().read().dir() {
+        Dir::DOWN => Timing::Prompt,
+        Dir::UP => Timing::Late,
+    }
+}
+
+/// Switches all transistors off, now, and disables the gate driver. For fault handlers: needs nothing initialised, takes no
+/// lock, cannot fail. The driver has lost its configuration afterwards.
+#[inline(always)]
+pub fn bridge_off() {
+    // Without their clocks the ports ignore this, but then these pins have never been outputs.
+    pac::GPIOB.bsrr().write(|w| w.set_br(7, true));
+    pac::GPIOA.bsrr().write(|w| w.set_br(3, true));
+}

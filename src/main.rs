@@ -1,0 +1,31 @@
+//! The board's program: what starts, what runs at which priority, and where the joint is made. No arithmetic.
+//!
+//! | priority | runs | does |
+//! |---|---|---|
+//! | 0 | control interrupt, every PWM period | measure, [`ControlStep::control_step`], set the bridge |
+//! | 8 | interrupt executor | every millisecond: temperatures, button |
+//! | 6 | interrupts of drivers and of time | |
+//! | thread | thread executor | LED, log, watchdog |
+//!
+//! Nothing has run on a board yet.
+#![cfg_attr(target_os = "none", no_std)]
+#![cfg_attr(target_os = "none", no_main)]
+#![deny(unsafe_code)]
+
+#[cfg(all(target_os = "none", feature = "b-g431b-esc1", feature = "moteus-r4"))]
+compile_error!("two boards are chosen: for the moteus r4 build with `--no-default-features --features moteus-r4`");
+#[cfg(all(target_os = "none", not(any(feature = "b-g431b-esc1", feature = "moteus-r4"))))]
+compile_error!("no board is chosen: build with `--features b-g431b-esc1` or `--features moteus-r4`");
+
+#[cfg(all(target_os = "none", any(feature = "b-g431b-esc1", feature = "moteus-r4")))]
+#[allow(unsafe_code)]
+mod board;
+#[cfg(all(target_os = "none", any(feature = "b-g431b-esc1", feature = "moteus-r4")))]
+mod tasks;
+
+#[cfg(not(target_os = "none"))]
+fn main() {
+    eprintln!("This is the program of the joint's board. It is flashed with");
+    eprintln!("cargo run --release --target thumbv7em-none-eabihf --features b-g431b-esc1");
+    std::process::exit(2);
+}
