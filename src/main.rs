@@ -2,9 +2,9 @@
 //!
 //! | priority | runs | does |
 //! |---|---|---|
-//! | 0 | control interrupt, every PWM period | measure, [`ControlStep::control_step`], set the bridge |
+//! | 0 | control interrupt, every PWM period | measure, one control step, set the bridge |
+//! | 6 | interrupts of drivers and of time | wake tasks |
 //! | 8 | interrupt executor | every millisecond: temperatures, button |
-//! | 6 | interrupts of drivers and of time | |
 //! | thread | thread executor | LED, log, watchdog |
 //!
 //! Nothing has run on a board yet.

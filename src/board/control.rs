@@ -89,14 +89,13 @@ pub fn start(sensors: Sensors, joint: Joint) {
     if STARTED.swap(true, Ordering::AcqRel) {
         return;
     }
-    super::memory::load_control_code();
     // SAFETY: the interrupt is not enabled yet and this runs once.
     unsafe { (*CONTROL.0.get()).write(Control { sensors, joint }) };
     // SAFETY: thread mode at start; nothing else uses these registers of the core.
     let mut core = unsafe { cortex_m::Peripherals::steal() };
     core.DCB.enable_trace();
     core.DWT.enable_cycle_counter();
-    // SAFETY: the handler's state is complete and its code is loaded.
+    // SAFETY: the handler's state is complete, and `main` has loaded its code.
     unsafe {
         core.NVIC.set_priority(Interrupt::ADC1_2, 0);
         NVIC::unmask(Interrupt::ADC1_2);

@@ -18,7 +18,7 @@ const REGISTERS: [(u16, u16); 6] = [
     // Low-side gates: faults clear cycle by cycle, 1,000 ns drive time, 50 mA and 100 mA.
     (4, 1 << 10 | 0b01 << 8),
     // Over-current: retry after 8 ms, which latched mode does not use; 200 ns dead time; latched; 4 µs deglitch; 500 mV.
-    (5, 0b10 << 8 | 0b00 << 6 | 0b10 << 4 | 0b1000),
+    (5, 0b10 << 8 | 0b10 << 4 | 0b1000),
     // Amplifiers: reference halved (both directions), gain 20, over-current at 500 mV.
     (6, 1 << 9 | 0b10 << 6 | 0b01),
     // Calibration as on the DRV8323.

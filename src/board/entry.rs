@@ -19,6 +19,7 @@ unsafe fn CRS() {
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
+    super::memory::load_control_code();
     super::bridge_off();
     lower_all_priorities();
     let peripherals = embassy_stm32::init(super::chip_configuration());
