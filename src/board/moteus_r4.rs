@@ -72,6 +72,9 @@ const TRIGGER: u8 = 2;
 /// Polls of the encoder's answer before it counts as lost. A frame takes 3 µs at 5.3 MHz, 510 cycles; a poll takes more than four.
 const ENCODER_POLLS: u32 = 200;
 
+/// Core cycles in 350 ns.
+const SELECT_CYCLES: u32 = 60;
+
 /// 170 MHz from the internal oscillator: the crystal's pins drive LEDs. FDCAN gets the same 170 MHz from PLLQ.
 pub fn chip_configuration() -> Config {
     let mut config = Config::default();
@@ -203,8 +206,10 @@ pub fn start_pwm() {
 fn encoder_frame(between: impl FnOnce()) -> Option<u16> {
     let spi = pac::SPI2;
     pac::GPIOB.bsrr().write(|w| w.set_br(11, true));
-    spi.dr16().write_value(as5047p::READ_ANGLE);
+    // The first edge of the clock may come 350 ns after the select (AS5047P datasheet, t_L).
     between();
+    cortex_m::asm::delay(SELECT_CYCLES);
+    spi.dr16().write_value(as5047p::READ_ANGLE);
     let mut answer = None;
     for _ in 0..ENCODER_POLLS {
         if spi.sr().read().rxne() {
@@ -222,7 +227,7 @@ impl Sensors {
     pub fn measure(&mut self) -> Measurements {
         let current = |code: f32| (code - CURRENT_ZERO) * AMPERES_PER_CODE;
         let (mut phase_currents, mut bus_voltage) = (Phases::uniform(0.0), 0.0);
-        // The encoder's frame runs while the currents are read.
+        // The currents are read while the encoder notices that it is selected.
         let frame = encoder_frame(|| {
             phase_currents = Phases {
                 a: current(adc::code::<0>(pac::ADC3)),
