@@ -2,6 +2,7 @@
 //! arithmetic too wide to overflow, and images as bytes.
 
 pub mod image_bytes;
+pub mod informed;
 pub mod parameters;
 pub mod states;
 pub mod wide;

@@ -21,6 +21,8 @@ const BACK_OFF: f32 = 0.005;
 const RECOVERY: f32 = 0.1;
 /// Time over which the guard compares the speed, s.
 const MEMORY: f32 = 0.01;
+/// Time over which the reference's acceleration is taken, s: several commands of a bus at 1 kHz.
+const DERIVATIVE: f32 = 0.004;
 /// Growth of the speed over that time, as a fraction, from which the joint counts as speeding up.
 const GROWTH: f32 = 0.01;
 
@@ -43,6 +45,8 @@ pub struct FrictionFeedforward {
     withheld: f32,
     /// Slow mean of the speed, rad/s.
     speed: f32,
+    /// Reference velocity, rad/s, as a first-order lag follows it; what it lacks is its acceleration.
+    reference: Option<f32>,
 }
 
 /// To Q16.16; held at the ends of the range, zero for what is not a number.
@@ -72,10 +76,7 @@ impl FrictionFeedforward {
             VelocitySource::Measured => None,
         };
         let velocity = reference.unwrap_or(motion.velocity);
-        let acceleration = match reference {
-            Some(_) => wanted.acceleration.unwrap_or(motion.acceleration),
-            None => motion.acceleration,
-        };
+        let acceleration = self.acceleration(gains.rate, reference, motion);
         let state = JointState {
             position: Position::from_bits(q16(motion.position)),
             velocity: Velocity::from_bits(q16(velocity)),
@@ -90,7 +91,7 @@ impl FrictionFeedforward {
         let standstill = within(speed * gains.inverse_standstill, 0.0, 1.0);
         let guarded = match reference {
             Some(_) => 1.0,
-            None => self.guard(active, motion, wanted.torque),
+            None => self.guard(active, motion, wanted.velocity.unwrap_or(wanted.torque)),
         };
         let permitted = or_zero(standstill * guarded);
         // Where nothing is added, not even the sign of a zero changes.
@@ -98,7 +99,22 @@ impl FrictionFeedforward {
         Compensated { torque, output, permitted }
     }
 
-    /// Part of the compensation that the energy guard lets through.
+    /// Acceleration for the model, rad/s²: the reference's, where there is one. The measured one is mostly noise, and a sign of noise
+    /// switches the friction of a hysteresis back and forth.
+    fn acceleration(&mut self, rate: f32, reference: Option<f32>, motion: &JointMotion) -> f32 {
+        let Some(velocity) = reference else {
+            self.reference = None;
+            return motion.acceleration;
+        };
+        let lagging = self.reference.unwrap_or(velocity);
+        let acceleration = (velocity - lagging) * (1.0 / DERIVATIVE);
+        self.reference = Some(or_zero(lagging + acceleration / rate));
+        acceleration
+    }
+
+    /// Part of the compensation that the energy guard lets through. `commanded` says by its sign which way the command pushes: the
+    /// velocity that it asks for, or in torque mode its torque. A spring's torque does not count: around a held position
+    /// it pushes back and forth, and too much compensation makes it hunt.
     fn guard(&mut self, active: &Active, motion: &JointMotion, commanded: f32) -> f32 {
         let gains = &active.compensation;
         let speed = if motion.velocity < 0.0 { -motion.velocity } else { motion.velocity };

@@ -79,6 +79,8 @@ pub struct Telemetry {
     pub compensated: Compensated,
     /// Torque of the measured current, Nm.
     pub measured_torque: f32,
+    /// Temperature that friction was computed for, °C.
+    pub gear_temperature: f32,
     /// Wanted current, A.
     pub reference: Dq,
     /// Measured current, A.
@@ -247,6 +249,7 @@ impl Joint {
             wanted,
             compensated,
             measured_torque,
+            gear_temperature: slow.gear_temperature,
             reference: if switching { reference } else { Dq::default() },
             current,
             bus_voltage: measured.bus_voltage,

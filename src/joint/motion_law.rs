@@ -11,8 +11,6 @@ pub struct Wanted {
     pub torque: f32,
     /// Velocity that the command asks for at this instant, rad/s; none in torque mode.
     pub velocity: Option<f32>,
-    /// Acceleration of that velocity, rad/s², where a ramp makes it.
-    pub acceleration: Option<f32>,
 }
 
 /// Ramps and integrals, from one control step to the next.
@@ -42,7 +40,6 @@ impl MotionLaw {
                 Self { mode: Some(command.mode), position: motion.position, velocity: motion.velocity, integral: 0.0 };
         }
         let gains = &active.motion;
-        let before = self.velocity;
         let (torque, velocity) = match command.mode {
             Mode::Torque => (0.0, None),
             Mode::Velocity => {
@@ -67,12 +64,7 @@ impl MotionLaw {
         };
         let limit = active.limits.torque * derating;
         self.integral = limited(self.integral, limit);
-        let ramped = matches!(command.mode, Mode::Velocity | Mode::Position);
-        Wanted {
-            torque: bounded(or_zero(torque) + or_zero(command.torque), limit, active, motion),
-            velocity,
-            acceleration: ramped.then_some((self.velocity - before) / gains.period),
-        }
+        Wanted { torque: bounded(or_zero(torque) + or_zero(command.torque), limit, active, motion), velocity }
     }
 
     /// One step of braking: the velocity comes down along the quick stop's ramp.
@@ -85,7 +77,7 @@ impl MotionLaw {
         let error = self.velocity - motion.velocity;
         self.integral = limited(self.integral + active.motion.velocity_integral * error, active.limits.torque);
         let torque = limited(active.motion.damping * error + self.integral, active.limits.torque);
-        Wanted { torque, velocity: Some(self.velocity), acceleration: None }
+        Wanted { torque, velocity: Some(self.velocity) }
     }
 
     /// Whether braking's ramp has come to its end.

@@ -3,7 +3,7 @@
 use super::extrapolation;
 use super::problem::{MINIMUM_SAMPLES, Problem};
 use super::trainer::{Trainer, curves};
-use super::{FitError, Options, part_rmse};
+use super::{FitError, part_rmse};
 use crate::augment::augment;
 use crate::classify::Thresholds;
 use crate::equalise::{Equalise, draw};

@@ -79,7 +79,7 @@ impl Setup {
                 },
                 compensation: CompensationConfiguration {
                     request: Request::Off,
-                    gain: 0.95,
+                    gain: 0.98,
                     clamp: (0.5 * torque) as f32,
                     slew: (50.0 * torque).min(30e3) as f32,
                     velocity_source: VelocitySource::Reference,
