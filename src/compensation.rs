@@ -172,12 +172,13 @@ fn weigh(torque: i32, weight: i32) -> i32 {
 }
 
 impl Compensation {
-    /// One control step. Without a model, or switched off, the torque is zero and the past is forgotten.
+    /// One control step. Without a model, or switched off, the torque goes to zero at the slew rate, stays there exactly, and the past
+    /// is forgotten.
     #[inline]
     pub fn step(&mut self, model: Option<&FrictionModel>, settings: &Settings, state: &JointState) -> Output {
         let model = match (settings.request, model) {
-            (Request::Off, _) => return self.reset(Reason::Off),
-            (_, None) => return self.reset(Reason::NoModel),
+            (Request::Off, _) => return self.fade_out(settings, Reason::Off),
+            (_, None) => return self.fade_out(settings, Reason::NoModel),
             (_, Some(model)) => model,
         };
         let estimate = model.step(state, &mut self.memory);
@@ -217,9 +218,12 @@ impl Compensation {
         Permitted { torque, limited: torque != scaled }
     }
 
-    fn reset(&mut self, reason: Reason) -> Output {
-        *self = Self::default();
-        Output { reason, ..Default::default() }
+    /// Brings what is left of the torque to zero at the slew rate; from then on the past is forgotten.
+    fn fade_out(&mut self, settings: &Settings, reason: Reason) -> Output {
+        let last = self.last.to_bits();
+        let torque = last.saturating_sub(last.max(settings.slew.saturating_neg()).min(settings.slew));
+        *self = Self { last: Torque::from_bits(torque), ..Self::default() };
+        Output { torque: self.last, reason, limited: torque != 0, ..Output::default() }
     }
 }
 
