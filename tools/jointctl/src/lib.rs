@@ -3,6 +3,9 @@
 //! Data flows one way: a data set is described and loaded, cleaned, filtered and differentiated, classified and
 //! split; the rigid body and the physical friction are identified, a network is trained on what is left, the better
 //! model on validation data is quantised, certified and judged by the same `no_std` code that the board runs.
+//!
+//! Beside it, [`simulation`] closes the firmware's control step over a simulated actuator, [`joint_text`] is a joint's configuration
+//! as a file, and [`excite`] finds motions that identify a joint.
 
 pub mod augment;
 pub mod certificate_search;
@@ -13,6 +16,7 @@ pub mod dataset;
 pub mod differentiate;
 pub mod equalise;
 pub mod evaluate;
+pub mod excite;
 pub mod filter;
 pub mod fit;
 pub mod friction_model;
@@ -20,6 +24,7 @@ pub mod friction_parameter;
 pub mod identify;
 pub mod image_text;
 pub mod joint_model;
+pub mod joint_text;
 pub mod levenberg_marquardt;
 pub mod metrics;
 pub mod network;
@@ -30,5 +35,6 @@ pub mod quantize;
 pub mod report;
 pub mod rigid;
 pub mod samples;
+pub mod simulation;
 pub mod split;
 pub mod train;

@@ -86,7 +86,8 @@ impl FourierSeries {
 }
 
 /// Value, slope and curvature of the fifth-order polynomial from (0, 0) to (1, 1) with flat ends.
-fn smooth_step(x: f64) -> (f64, f64, f64) {
+#[must_use]
+pub fn smooth_step(x: f64) -> (f64, f64, f64) {
     let x = x.clamp(0.0, 1.0);
     let value = x * x * x * (10.0 + x * (6.0 * x - 15.0));
     let slope = 30.0 * x * x * (1.0 - x) * (1.0 - x);

@@ -2,8 +2,11 @@
 
 pub mod demo;
 pub mod evaluate;
+pub mod excite;
 pub mod fit;
 pub mod image;
+pub mod joint;
+pub mod sim;
 
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
@@ -29,6 +32,10 @@ pub enum Command {
     /// Inspect, verify or convert a parameter image
     #[command(subcommand)]
     Image(image::ImageCommand),
+    /// Run the firmware's joint against a simulated actuator, without and with compensation
+    Sim(sim::Sim),
+    /// Write a motion that identifies a joint, or check one
+    Excite(excite::Excite),
 }
 
 /// Anything that ends a command.
@@ -49,6 +56,40 @@ pub enum CommandError {
     /// The virtual joint.
     #[error("virtual joint: {0}")]
     Plant(#[from] plant::ParameterError),
+    /// The parameters of a virtual actuator that cannot be used.
+    #[error("{}: {reason}", path.display())]
+    PlantFile {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// The configuration of a joint.
+    #[error(transparent)]
+    Joint(#[from] crate::joint_text::JointTextError),
+    /// The simulation.
+    #[error("virtual joint: {0}")]
+    Simulation(#[from] crate::simulation::SimulationError),
+    /// A figure.
+    #[error(transparent)]
+    Figure(#[from] crate::report::FigureError),
+    /// A number that TOML cannot hold.
+    #[error("cannot write parameters as TOML: {0}")]
+    Toml(#[from] toml::ser::Error),
+    /// The search for an excitation.
+    #[error("excitation: {0}")]
+    Excite(#[from] crate::excite::ExciteError),
+    /// A file with an excitation.
+    #[error(transparent)]
+    ExcitationFile(#[from] crate::excite::file::ExcitationFileError),
+    /// An excitation that must not be run.
+    #[error("{}: {defects}", path.display())]
+    Excitation {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        defects: String,
+    },
     /// A file that cannot be read.
     #[error("cannot read {}: {source}", path.display())]
     Read {
@@ -77,5 +118,7 @@ pub fn run(arguments: Arguments) -> Result<(), CommandError> {
         Command::Fit(fit) => fit.run(),
         Command::Evaluate(evaluate) => evaluate.run(),
         Command::Image(image) => image.run(),
+        Command::Sim(sim) => sim.run(),
+        Command::Excite(excite) => excite.run(),
     }
 }

@@ -16,10 +16,8 @@ struct Section {
     contents: Markup,
 }
 
-/// The whole page.
-pub fn page(report: &Report, figures: &[Figure]) -> String {
-    let sections: Vec<Section> = sections(report, figures).into_iter().flatten().collect();
-    let verdict = verdict(report);
+/// A page that needs nothing but itself.
+pub fn document(title: &str, body: &Markup) -> String {
     html! {
         (DOCTYPE)
         html lang="en" {
@@ -27,32 +25,40 @@ pub fn page(report: &Report, figures: &[Figure]) -> String {
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 meta name="color-scheme" content="light dark";
-                title { (report.title) }
+                title { (title) }
                 style { (PreEscaped(PAGE_STYLE)) (PreEscaped(style_sheet())) }
             }
-            body {
-                header {
-                    h1 { (report.title) }
-                    p.subtitle {
-                        "Data set " b { (report.data_set) }
-                        @if !report.provenance.created.is_empty() { " · " (report.provenance.created) }
-                    }
-                }
-                p class=(if verdict.good { "verdict good" } else { "verdict bad" }) { (verdict.sentence) }
-                (cards(report))
-                nav aria-label="Contents" {
-                    ol { @for section in &sections { li { a href={ "#" (section.anchor) } { (section.heading) } } } }
-                }
-                main {
-                    @for section in &sections {
-                        section id=(section.anchor) { h2 { (section.heading) } (section.contents) }
-                    }
-                }
-                footer { "Made by jointctl " (report.provenance.tool_version) ". All numbers: report.json. All figures: figures/*.svg." }
-            }
+            body { (body) }
         }
     }
     .into_string()
+}
+
+/// The whole page.
+pub fn page(report: &Report, figures: &[Figure]) -> String {
+    let sections: Vec<Section> = sections(report, figures).into_iter().flatten().collect();
+    let verdict = verdict(report);
+    let body = html! {
+        header {
+            h1 { (report.title) }
+            p.subtitle {
+                "Data set " b { (report.data_set) }
+                @if !report.provenance.created.is_empty() { " · " (report.provenance.created) }
+            }
+        }
+        p class=(if verdict.good { "verdict good" } else { "verdict bad" }) { (verdict.sentence) }
+        (cards(report))
+        nav aria-label="Contents" {
+            ol { @for section in &sections { li { a href={ "#" (section.anchor) } { (section.heading) } } } }
+        }
+        main {
+            @for section in &sections {
+                section id=(section.anchor) { h2 { (section.heading) } (section.contents) }
+            }
+        }
+        footer { "Made by jointctl " (report.provenance.tool_version) ". All numbers: report.json. All figures: figures/*.svg." }
+    };
+    document(&report.title, &body)
 }
 
 fn sections(report: &Report, figures: &[Figure]) -> Vec<Option<Section>> {
@@ -85,7 +91,8 @@ fn sections(report: &Report, figures: &[Figure]) -> Vec<Option<Section>> {
     ]
 }
 
-fn gallery(figures: &[&Figure]) -> Markup {
+/// Figures side by side where there is room.
+pub fn gallery(figures: &[&Figure]) -> Markup {
     html! {
         div.gallery {
             @for figure in figures {

@@ -7,11 +7,12 @@
 pub mod console;
 mod figures;
 mod html;
-mod number;
+pub(crate) mod number;
 mod summary;
 mod tables;
 
-pub use figures::{Figure, FigureError, figures, style_sheet};
+pub use figures::{Curve, Figure, FigureError, Ink, Plot, figures, over_time, style_sheet};
+pub(crate) use html::{document, gallery};
 pub use summary::{Verdict, verdict};
 
 use crate::metrics::{ByState, Metrics};

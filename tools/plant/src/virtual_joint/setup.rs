@@ -13,7 +13,7 @@ use std::f64::consts::TAU;
 /// Control rate of the virtual joint, Hz.
 pub const RATE: f32 = 20_000.0;
 /// Bandwidth of the position loop, Hz.
-const POSITION_BANDWIDTH: f64 = 6.0;
+pub const POSITION_BANDWIDTH: f64 = 6.0;
 /// Damping ratio of the position loop.
 const DAMPING_RATIO: f64 = 1.0;
 

@@ -8,13 +8,15 @@ mod binning;
 mod chart;
 mod friction;
 mod ink;
+mod lines;
 mod residuals;
 mod svg;
 mod time;
 mod training;
 
 use super::Report;
-pub use ink::style_sheet;
+pub use ink::{Ink, style_sheet};
+pub use lines::{Curve, Plot, over_time};
 use plotters::drawing::DrawingAreaErrorKind;
 use std::convert::Infallible;
 

@@ -1,0 +1,182 @@
+//! `jointctl sim`: the firmware's joint in closed loop with the simulated actuator, without and with compensation.
+
+use super::CommandError;
+use super::image::{read, verify};
+use super::joint::JointChoice;
+use crate::joint_text;
+use crate::output::{OutputFile, write_directory};
+use crate::progress::{Progress, Terminal};
+use crate::simulation::page::{Shown, page};
+use crate::simulation::table::{Line, table};
+use crate::simulation::{Choices, Ending, Log, Part, Run, Scenario, SimulationError, judge, log, run};
+use clap::Args;
+use joint_firmware::compensation::Request;
+use joint_firmware::friction::FrictionModel;
+use plant::record::USUAL_SAMPLE_PERIOD;
+use plant::virtual_joint::Setup;
+use rayon::prelude::*;
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// Arguments of `sim`.
+#[derive(Debug, Args)]
+pub struct Sim {
+    /// The joint.
+    #[command(flatten)]
+    joint: JointChoice,
+    /// Parameter image of its friction, binary or TOML; with one, every scenario is run with compensation too
+    #[arg(long, value_name = "FILE")]
+    image: Option<PathBuf>,
+    /// What the joint is put through; repeatable [default: every scenario]
+    #[arg(long, value_name = "NAME", value_enum)]
+    scenario: Vec<Scenario>,
+    /// Seed of the sensors' noise
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Time between two rows of a log, s
+    #[arg(long, value_name = "S", default_value_t = USUAL_SAMPLE_PERIOD)]
+    sample_period: f64,
+    /// Folder for logs, page, and the files that describe joint and actuator
+    #[arg(long, value_name = "DIR", default_value = "sim")]
+    out: PathBuf,
+}
+
+/// A part of a scenario that is run once.
+struct Task {
+    scenario: Scenario,
+    compensated: bool,
+    part: Part,
+}
+
+/// What came of it, and the time that it took, s.
+struct Done {
+    run: Run,
+    elapsed: f64,
+}
+
+impl Sim {
+    /// Runs the command.
+    pub fn run(&self) -> Result<(), CommandError> {
+        let progress = Terminal::new();
+        if !(1e-4..=0.1).contains(&self.sample_period) {
+            let text = format!("--sample-period is {} s, must lie in 0.0001 to 0.1 s", self.sample_period);
+            return Err(CommandError::Arguments(text));
+        }
+        let (plant, setup) = self.joint.read()?;
+        let friction = self.friction(&setup)?;
+        let mut scenarios = if self.scenario.is_empty() { Scenario::ALL.to_vec() } else { self.scenario.clone() };
+        // A scenario that is named twice is run once.
+        let mut seen = Vec::new();
+        scenarios.retain(|scenario| {
+            !seen.contains(scenario) && {
+                seen.push(*scenario);
+                true
+            }
+        });
+
+        progress.stage("simulate");
+        let mut tasks = Vec::new();
+        for &scenario in &scenarios {
+            let parts = scenario.parts(&plant, self.seed)?;
+            for compensated in [false, true].into_iter().take(if friction.is_some() { 2 } else { 1 }) {
+                tasks.extend(parts.iter().cloned().map(|part| Task { scenario, compensated, part }));
+            }
+        }
+        let choices = Choices { seed: self.seed, sample_period: self.sample_period };
+        let done = tasks
+            .par_iter()
+            .map(|task| {
+                let request = match (task.compensated, setup.configuration.compensation.request) {
+                    (false, _) => Request::Off,
+                    (true, Request::Off) => Request::PhysicalAndNetwork,
+                    (true, request) => request,
+                };
+                let start = Instant::now();
+                let model = friction.as_ref().filter(|_| task.compensated);
+                let run = run(&task.part, &setup.compensating(request), model, &choices)?;
+                Ok(Done { run, elapsed: start.elapsed().as_secs_f64() })
+            })
+            .collect::<Result<Vec<Done>, SimulationError>>()?;
+
+        progress.stage("judge");
+        let standstill = f64::from(setup.configuration.compensation.standstill_velocity);
+        let lines = lines(&scenarios, &tasks, &done, standstill)?;
+        let simulated: f64 = done.iter().map(|done| done.run.simulated).sum();
+        let elapsed: f64 = done.iter().map(|done| done.elapsed).sum();
+        let speed = format!(
+            "{simulated:.1} s simulated at {:.0} Hz, {:.0} times faster than real time on one core",
+            setup.bridge.rate,
+            simulated / elapsed.max(1e-9)
+        );
+
+        progress.stage("write");
+        let joint = joint_text::to_text(&setup.configuration)?;
+        let actuator = toml::to_string(&plant)?;
+        let mut files = vec![OutputFile::new("joint.toml", joint), OutputFile::new("plant.toml", actuator)];
+        let mut shown = Vec::new();
+        for &scenario in &scenarios {
+            let logs = |compensated| logs(scenario, compensated, &tasks, &done);
+            for (compensated, name) in [(false, "off"), (true, "on")] {
+                let logs = logs(compensated);
+                if !logs.is_empty() {
+                    let table = log::csv(logs.iter().copied());
+                    files.push(OutputFile::new(format!("{}-{name}.csv", scenario.name()), table));
+                }
+            }
+            let [off, on] =
+                [false, true].map(|compensated| logs(compensated).into_iter().map(|(_, log)| log).collect());
+            shown.push(Shown { name: scenario.name(), off, on });
+        }
+        let page = page("Simulated joint", &lines, &format!("{speed}."), &shown)?;
+        files.push(OutputFile::new("sim.html", page));
+        write_directory(&self.out, &files)?;
+        progress.finish();
+        print!("{}", table(&lines));
+        if friction.is_none() {
+            println!("Without --image there is no friction model: compensation stays off.");
+        }
+        println!("{speed}. Written: {}", self.out.join("sim.html").display());
+        Ok(())
+    }
+
+    /// The friction model of the image, checked as a joint would.
+    fn friction(&self, setup: &Setup) -> Result<Option<FrictionModel>, CommandError> {
+        let Some(path) = &self.image else { return Ok(None) };
+        let image = read(path)?;
+        verify(&image, path)?;
+        if image.effort.symbol() != "Nm" {
+            let reason = format!("its effort is in {}, compensation needs Nm at the joint", image.effort.symbol());
+            return Err(CommandError::Image { path: path.clone(), reason });
+        }
+        Ok(Some(FrictionModel::new(&image.friction, setup.bridge.rate as u32)))
+    }
+}
+
+/// The logs of one scenario, with their parts' names.
+fn logs<'a>(scenario: Scenario, compensated: bool, tasks: &[Task], done: &'a [Done]) -> Vec<(&'static str, &'a Log)> {
+    let belongs = |task: &Task| task.scenario == scenario && task.compensated == compensated;
+    let both = tasks.iter().zip(done).filter(|(task, _)| belongs(task));
+    both.map(|(task, done)| (task.part.name, &done.run.log)).collect()
+}
+
+/// A row of the table for each scenario, without and with compensation.
+fn lines(scenarios: &[Scenario], tasks: &[Task], done: &[Done], standstill: f64) -> Result<Vec<Line>, SimulationError> {
+    let mut lines = Vec::new();
+    for &scenario in scenarios {
+        for compensated in [false, true] {
+            let of: Vec<(&Task, &Done)> = tasks
+                .iter()
+                .zip(done)
+                .filter(|(task, _)| task.scenario == scenario && task.compensated == compensated)
+                .collect();
+            if of.is_empty() {
+                continue;
+            }
+            let judgement = judge(of.iter().map(|(task, done)| (task.part.tracks, &done.run.log)), standstill)?;
+            let stopped = of.iter().find(|(_, done)| done.run.ending != Ending::Whole);
+            let stopped = stopped.map(|(task, done)| (task.part.name, done.run.ending));
+            lines.push(Line { scenario: scenario.name(), compensated, judgement, stopped });
+        }
+    }
+    Ok(lines)
+}

@@ -1,0 +1,165 @@
+//! What each key of `joint.toml` means, in which unit and within which range; host.
+//!
+//! The ranges are those of `Configuration` in the firmware, which is what checks them; a test holds both together.
+
+/// One key.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Field {
+    /// Table that it stands in; empty at the top.
+    pub table: &'static str,
+    /// Key.
+    pub key: &'static str,
+    /// Meaning, with what else limits it.
+    pub meaning: &'static str,
+    /// Unit; empty for a ratio, a number of things or a choice.
+    pub unit: &'static str,
+    /// Lowest and highest value where these are fixed numbers; of each entry, where there are two.
+    pub range: Option<(f32, f32)>,
+}
+
+impl Field {
+    /// The comment above the key.
+    #[must_use]
+    pub fn comment(&self) -> String {
+        let mut text = self.meaning.to_owned();
+        if !self.unit.is_empty() {
+            text += &format!(", {}", self.unit);
+        }
+        if let Some((low, high)) = self.range {
+            text += &format!("; {low} to {high}");
+        }
+        text
+    }
+}
+
+const fn field(
+    table: &'static str,
+    key: &'static str,
+    unit: &'static str,
+    range: Option<(f32, f32)>,
+    meaning: &'static str,
+) -> Field {
+    Field { table, key, meaning, unit, range }
+}
+
+/// All keys.
+pub const FIELDS: [Field; 40] = [
+    field("", "node_id", "", None, "Node on the CAN bus, 1 to 127; 255 where none is assigned yet"),
+    field("motor", "resistance", "Ohm", Some((1e-3, 100.0)), "Resistance of a phase at 25 °C"),
+    field("motor", "inductance_d", "H", Some((1e-6, 0.1)), "Inductance along the magnet's flux"),
+    field("motor", "inductance_q", "H", Some((1e-6, 0.1)), "Inductance across the magnet's flux"),
+    field("motor", "torque_constant", "Nm/A", Some((1e-3, 5.0)), "Torque at the rotor by q current"),
+    field("motor", "current_limit", "A", Some((0.1, 200.0)), "Largest current"),
+    field("motor", "encoder_latency", "s", Some((0.0, 1e-3)), "Age of an encoder sample when it is used"),
+    field("motor.alignment", "pole_pairs", "", Some((1.0, 64.0)), "Electrical turns in a mechanical one"),
+    field("motor.alignment", "direction", "", None, "The encoder counts \"forward\" with the field, or in \"reverse\""),
+    field(
+        "motor.alignment",
+        "electrical_zero",
+        "turns",
+        None,
+        "Electrical angle where the d axis lies on phase A, 0 to below 1",
+    ),
+    field(
+        "gear",
+        "ratio",
+        "",
+        None,
+        "Rotor revolutions per revolution of the joint, 1 to 500; negative where it turns backwards",
+    ),
+    field(
+        "gear",
+        "zero",
+        "rad",
+        Some((-1000.0, 1000.0)),
+        "Joint's position where the encoder's first sample reads zero",
+    ),
+    field("limits", "torque", "Nm", Some((0.01, 2000.0)), "Largest torque at the joint"),
+    field("limits", "velocity", "rad/s", Some((0.1, 200.0)), "Largest velocity; a fault 20 % above it"),
+    field("limits", "position", "rad", Some((-1000.0, 1000.0)), "Lowest and highest position"),
+    field(
+        "limits",
+        "position_margin",
+        "rad",
+        Some((1e-3, 10.0)),
+        "Distance beyond the position limits that is a fault",
+    ),
+    field(
+        "limits",
+        "over_current",
+        "A",
+        None,
+        "Phase current that switches the bridge off; 1.05 times the current limit to 500",
+    ),
+    field("limits", "bus_voltage", "V", Some((5.0, 100.0)), "Lowest and highest supply"),
+    field("limits", "bridge_temperature", "°C", Some((40.0, 150.0)), "Highest temperature of the bridge"),
+    field(
+        "limits",
+        "winding_temperature",
+        "°C",
+        Some((60.0, 200.0)),
+        "Highest temperature of the winding; derated over the last 20 K",
+    ),
+    field("limits", "command_deadline", "s", Some((1e-3, 10.0)), "Time without a command after which the joint brakes"),
+    field(
+        "gains",
+        "current_bandwidth",
+        "Hz",
+        None,
+        "Bandwidth of the current loop; 10 to an eighteenth of the control rate",
+    ),
+    field(
+        "gains",
+        "observer_bandwidth",
+        "Hz",
+        None,
+        "Bandwidth of the tracking observer; 1 to a tenth of the control rate",
+    ),
+    field("gains", "stiffness", "Nm/rad", Some((0.0, 1e5)), "Stiffness of the position mode"),
+    field("gains", "damping", "Nm s/rad", Some((0.0, 1e4)), "Damping of position and velocity mode"),
+    field(
+        "gains",
+        "integral",
+        "Nm/rad",
+        Some((0.0, 1e6)),
+        "Integral of the velocity error; a tenth of it in position mode",
+    ),
+    field("gains", "acceleration", "rad/s^2", Some((0.1, 1e5)), "Acceleration of ramps"),
+    field(
+        "gains",
+        "quick_stop_deceleration",
+        "rad/s^2",
+        Some((0.1, 1e5)),
+        "Deceleration of quick stop and fault reaction",
+    ),
+    field("gains", "braking_time", "s", Some((0.01, 10.0)), "Longest time of braking before the bridge switches off"),
+    field(
+        "compensation",
+        "request",
+        "",
+        None,
+        "\"off\", \"physical\", \"physical-and-network\" or \"network-in-shadow\"",
+    ),
+    field("compensation", "gain", "", Some((0.0, 1.0)), "Share of the estimated friction that is added"),
+    field("compensation", "clamp", "Nm", None, "Largest compensation torque; 0 to the torque limit"),
+    field("compensation", "slew", "Nm/s", Some((0.5, 32e3)), "Largest change of the compensation torque"),
+    field(
+        "compensation",
+        "velocity_source",
+        "",
+        None,
+        "Friction is computed for the \"reference\" velocity or the \"measured\" one",
+    ),
+    field(
+        "compensation",
+        "standstill_velocity",
+        "rad/s",
+        Some((1e-4, 10.0)),
+        "Velocity below which compensation fades out",
+    ),
+    field("thermal", "winding_capacity", "J/K", None, "Heat capacity of the winding; to 10000"),
+    field("thermal", "housing_capacity", "J/K", None, "Heat capacity of the housing; to 100000"),
+    field("thermal", "winding_to_housing", "K/W", Some((0.01, 100.0)), "Thermal resistance from winding to housing"),
+    field("thermal", "housing_to_ambient", "K/W", Some((0.01, 100.0)), "Thermal resistance from housing to ambient"),
+    field("thermal", "ambient", "°C", Some((-40.0, 85.0)), "Temperature of the surroundings"),
+];

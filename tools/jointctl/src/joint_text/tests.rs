@@ -1,0 +1,109 @@
+use super::*;
+use joint_firmware::compensation::Request;
+use joint_firmware::joint::configuration::VelocitySource;
+use joint_firmware::motor::angle::{Direction, ElectricalAngle};
+use plant::ActuatorParameters;
+use plant::virtual_joint::Setup;
+
+fn setup(seed: u64) -> Setup {
+    Setup::of(&ActuatorParameters::randomised(seed).aligned())
+}
+
+fn refusal(text: &str) -> String {
+    from_text(text, Path::new("elbow.toml"), &setup(1).bridge).unwrap_err().to_string()
+}
+
+#[test]
+fn a_configuration_comes_back_from_its_text_bit_by_bit() {
+    for seed in 0..40 {
+        let Setup { mut configuration, bridge } = setup(seed);
+        configuration.motor.alignment.electrical_zero = ElectricalAngle((seed as u32).wrapping_mul(0x9e37_79b9));
+        configuration.motor.alignment.direction = if seed % 2 == 0 { Direction::Forward } else { Direction::Reverse };
+        configuration.compensation.velocity_source =
+            if seed % 3 == 0 { VelocitySource::Measured } else { VelocitySource::Reference };
+        configuration.compensation.request =
+            [Request::Off, Request::Physical, Request::PhysicalAndNetwork, Request::NetworkInShadow][seed as usize % 4];
+        configuration.gear.ratio *= if seed % 5 == 0 { -1.0 } else { 1.0 };
+        let text = to_text(&configuration).unwrap();
+        assert_eq!(from_text(&text, Path::new("joint.toml"), &bridge).unwrap(), configuration, "{text}");
+    }
+}
+
+#[test]
+fn every_key_is_explained_and_every_explanation_has_its_key() {
+    let text = to_text(&setup(1).configuration).unwrap();
+    let lines: Vec<&str> = text.lines().collect();
+    let keys = lines.iter().filter(|line| line.contains(" = ") && !line.starts_with('#')).count();
+    assert_eq!(keys, FIELDS.len(), "{text}");
+    for pair in lines.windows(2).filter(|pair| pair[1].contains(" = ") && !pair[1].starts_with('#')) {
+        assert!(pair[0].starts_with("# "), "{}", pair[1]);
+    }
+}
+
+/// The text of a good configuration with another value for one field.
+fn with(field: &fields::Field, value: &str) -> String {
+    let good = to_text(&setup(1).configuration).unwrap();
+    let mut table = "";
+    let changed: Vec<String> = good
+        .lines()
+        .map(|line| {
+            if let Some(name) = line.strip_prefix('[').and_then(|line| line.strip_suffix(']')) {
+                table = name;
+            }
+            match line.split_once(" = ") {
+                Some((key, _)) if table == field.table && key == field.key => format!("{key} = {value}"),
+                _ => line.to_owned(),
+            }
+        })
+        .collect();
+    changed.join("\n")
+}
+
+#[test]
+fn what_lies_outside_a_stated_range_is_refused() {
+    for field in FIELDS {
+        let Some((low, high)) = field.range else { continue };
+        let below = if low == 0.0 { -1e-3 } else { low - 1e-3 * low.abs() };
+        let above = high + 1e-3 * high;
+        for value in [below, above] {
+            let value = match field.key {
+                "pole_pairs" if value < low => "0".to_owned(),
+                "pole_pairs" => "65".to_owned(),
+                "position" | "bus_voltage" if value < low => format!("[{value}, 50.0]"),
+                "position" | "bus_voltage" => format!("[10.0, {value}]"),
+                _ => format!("{value:?}"),
+            };
+            let text = with(&field, &value);
+            let refused = from_text(&text, Path::new("elbow.toml"), &setup(1).bridge);
+            let Err(JointTextError::Refused { source, .. }) = &refused else {
+                panic!("{}.{} = {value}: {refused:?}", field.table, field.key);
+            };
+            let shown = source.to_string();
+            assert!(shown.contains("must"), "{shown}");
+        }
+    }
+}
+
+#[test]
+fn a_misspelt_or_missing_key_and_a_wrong_choice_are_named() {
+    let good = to_text(&setup(1).configuration).unwrap();
+    let misspelt = refusal(&good.replacen("stiffness = ", "stifness = ", 1));
+    assert!(misspelt.contains("elbow.toml") && misspelt.contains("stifness"), "{misspelt}");
+    let missing: Vec<&str> = good.lines().filter(|line| !line.starts_with("command_deadline")).collect();
+    let missing = refusal(&missing.join("\n"));
+    assert!(missing.contains("missing field `command_deadline`"), "{missing}");
+    let choice = refusal(&good.replacen("request = \"off\"", "request = \"full\"", 1));
+    assert!(choice.contains("physical-and-network") && choice.contains("line"), "{choice}");
+    let turns = refusal(&good.replacen("electrical_zero = 0.0", "electrical_zero = 1.0", 1));
+    assert!(turns.contains("0 to below 1"), "{turns}");
+    let unreadable = read(Path::new("nowhere.toml"), &setup(1).bridge).unwrap_err().to_string();
+    assert!(unreadable.contains("nowhere.toml: cannot be read"), "{unreadable}");
+}
+
+#[test]
+fn limits_that_contradict_each_other_are_refused_with_what_is_possible() {
+    let mut configuration = setup(1).configuration;
+    configuration.limits.over_current = configuration.motor.current_limit;
+    let shown = refusal(&to_text(&configuration).unwrap());
+    assert!(shown.contains("over-current limit is") && shown.contains("must lie in"), "{shown}");
+}

@@ -1,0 +1,42 @@
+//! The firmware's joint in closed loop with the simulated actuator: what `jointctl sim` runs; host.
+//!
+//! - [`motion`]: what a joint is asked to do over time
+//! - [`scenario`]: the named scenarios, each in one or several parts
+//! - [`mod@run`]: a part run at the control rate, commanded as over a bus, recorded
+//! - [`log`]: what is recorded
+//! - [`mod@judge`]: how well the joint did
+//! - [`table`], [`page`]: the judgements for a terminal, the runs as a page with figures
+
+pub mod judge;
+pub mod log;
+pub mod motion;
+pub mod page;
+pub mod run;
+pub mod scenario;
+pub mod table;
+
+pub use judge::{Judgement, judge};
+pub use log::{Log, Row};
+pub use motion::Motion;
+pub use run::{Choices, Ending, Run, run};
+pub use scenario::{Part, Scenario};
+
+/// Why nothing was simulated.
+#[derive(Debug, thiserror::Error)]
+pub enum SimulationError {
+    /// Plant, configuration or the joint's start.
+    #[error(transparent)]
+    Joint(#[from] plant::virtual_joint::VirtualJointError),
+    /// A number of the scenario that the plant refuses.
+    #[error(transparent)]
+    Plant(#[from] plant::ParameterError),
+    /// No excitation within the joint's limits.
+    #[error(transparent)]
+    Excitation(#[from] crate::excite::ExciteError),
+    /// A torque that is not a number.
+    #[error(transparent)]
+    Metrics(#[from] crate::metrics::MetricsError),
+}
+
+#[cfg(test)]
+mod tests;

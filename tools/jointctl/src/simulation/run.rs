@@ -1,0 +1,154 @@
+//! One part of a scenario, run at the control rate; host.
+//!
+//! Commands come once a millisecond, as over a bus, and hold in between; each is the set-point of the middle of its
+//! millisecond, so that holding it delays nothing on average. What is recorded follows from the seed alone.
+
+use super::SimulationError;
+use super::log::{Log, Row};
+use super::motion::Controller;
+use super::scenario::Part;
+use joint_firmware::friction::FrictionModel;
+use joint_firmware::joint::Demand;
+use joint_firmware::joint::fault::{Fault, Faults};
+use joint_firmware::joint::state_machine::{Controlword, State};
+use plant::VirtualJoint;
+use plant::record::USUAL_SAMPLE_PERIOD;
+use plant::virtual_joint::Setup;
+
+/// Commands a second.
+pub const COMMAND_RATE: f64 = 1000.0;
+
+/// How a part is run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Choices {
+    /// Seed of the sensors' noise.
+    pub seed: u64,
+    /// Time between two rows of the log, s; at least a control period.
+    pub sample_period: f64,
+}
+
+impl Default for Choices {
+    fn default() -> Self {
+        Self { seed: 1, sample_period: USUAL_SAMPLE_PERIOD }
+    }
+}
+
+/// How a run ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Ending {
+    /// The motion was run to its end.
+    Whole,
+    /// The joint left "operation enabled".
+    Stopped {
+        /// When, s since the motion started.
+        time: f64,
+        /// The state that it went to.
+        state: State,
+        /// Why.
+        faults: Faults,
+    },
+}
+
+impl std::fmt::Display for Ending {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Whole => f.write_str("run to its end"),
+            Self::Stopped { time, faults, .. } => {
+                let names: Vec<String> = faults.iter().map(|fault: Fault| fault.to_string()).collect();
+                write!(f, "stopped after {time:.4} s: {}", names.join(", "))
+            }
+        }
+    }
+}
+
+/// What came of a run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Run {
+    /// What was recorded until it ended.
+    pub log: Log,
+    /// How it ended.
+    pub ending: Ending,
+    /// Time that was simulated, with the joint's start, s.
+    pub simulated: f64,
+}
+
+/// Runs a part with `friction` as the joint's friction model.
+///
+/// # Errors
+/// What plant or firmware refuse, and a joint that cannot be enabled. A fault in motion is no error: the run ends with it.
+pub fn run(
+    part: &Part,
+    setup: &Setup,
+    friction: Option<&FrictionModel>,
+    choices: &Choices,
+) -> Result<Run, SimulationError> {
+    let mut joint = VirtualJoint::new(part.plant, setup, part.temperature, choices.seed)?;
+    joint.actuator_mut().set_contact(part.contact)?;
+    joint.set_friction(friction.cloned());
+    joint.enable()?;
+    let gains = &setup.configuration.gains;
+    // Half the frequency needs a quarter of the stiffness and half of the damping.
+    let controller = Controller {
+        stiffness: part.softness * part.softness * f64::from(gains.stiffness),
+        damping: part.softness * f64::from(gains.damping),
+    };
+
+    let period = joint.period();
+    let every = |time: f64| (time / period).round().max(1.0) as u64;
+    let (per_command, per_row) = (every(1.0 / COMMAND_RATE), every(choices.sample_period));
+    let steps = (part.motion.duration() / period).round() as u64;
+    let mut demand = Demand { controlword: Controlword::ENABLE_OPERATION, ..Demand::default() };
+    let mut log = Log { rows: Vec::with_capacity((steps / per_row + 1) as usize) };
+    let mut ramp = f64::from(joint.joint().telemetry().motion.position);
+    let mut ending = Ending::Whole;
+    for step in 0..steps {
+        if step % per_command == 0 {
+            let time = step as f64 * period + 0.5 / COMMAND_RATE;
+            let position = f64::from(joint.joint().telemetry().motion.position);
+            demand.command = part.motion.command(time, position, &part.plant.joint, &controller);
+            // Zero is what the joint has seen before.
+            demand.sequence = demand.sequence.wrapping_add(1);
+        }
+        let telemetry = joint.step(&demand, 0.0);
+        let (state, velocity) = (telemetry.state, telemetry.wanted.velocity);
+        ramp += f64::from(velocity.unwrap_or(0.0)) * period;
+        let time = (step + 1) as f64 * period;
+        if (step + 1) % per_row == 0 {
+            let (position, velocity) = match part.motion.reference(time) {
+                Some(reference) => (reference.position, reference.velocity),
+                None => (ramp, f64::from(velocity.unwrap_or(0.0))),
+            };
+            log.rows.push(Row { time, reference_position: position, reference_velocity: velocity, ..row(&joint) });
+        }
+        if state != State::OperationEnabled {
+            ending = Ending::Stopped { time, state, faults: joint.joint().latched_faults() };
+            break;
+        }
+    }
+    Ok(Run { log, ending, simulated: joint.time() })
+}
+
+/// What the joint knows and what is true, after a control step.
+fn row(joint: &VirtualJoint) -> Row {
+    let (telemetry, truth) = (joint.joint().telemetry(), &joint.actuator().state().joint);
+    let value = f64::from;
+    Row {
+        position: value(telemetry.motion.position),
+        velocity: value(telemetry.motion.velocity),
+        commanded_torque: value(telemetry.wanted.torque),
+        compensation_torque: value(telemetry.compensated.torque),
+        measured_torque: value(telemetry.measured_torque),
+        current_d: value(telemetry.current.d),
+        current_q: value(telemetry.current.q),
+        bus_voltage: value(telemetry.bus_voltage),
+        winding_temperature: value(joint.measured().winding_temperature),
+        gear_temperature: value(joint.slow().gear_temperature),
+        true_position: truth.position,
+        true_velocity: truth.velocity,
+        true_motor_torque: truth.motor_torque,
+        true_friction_torque: truth.friction_torque,
+        true_load_torque: truth.load_torque,
+        true_gear_temperature: truth.heat.housing,
+        ..Row::default()
+    }
+}
