@@ -97,6 +97,86 @@ fn a_fit_that_fails_says_why_and_leaves_earlier_results_as_they_were() {
     assert_eq!(std::fs::read_dir(&out).unwrap().count(), 1);
 }
 
+/// The cells of a row of a table that is printed.
+fn row<'a>(text: &'a str, first: &str, second: &str) -> Vec<&'a str> {
+    let cells = |line: &'a str| line.split_whitespace().collect::<Vec<_>>();
+    let found = text.lines().map(cells).find(|cells| cells.len() > 2 && cells[0] == first && cells[1] == second);
+    found.unwrap_or_else(|| panic!("no row {first} {second} in {text}"))
+}
+
+#[test]
+fn a_simulation_shows_the_joint_without_and_with_its_image_and_repeats_itself_from_the_files_that_it_wrote() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| {
+        let output = jointctl(folder.path(), arguments);
+        assert!(output.status.success(), "{}", stderr(&output));
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    };
+    let read = |file: &str| std::fs::read(folder.path().join(file)).unwrap();
+    assert!(demo(folder.path(), "demo").status.success());
+    let text = run(&["sim", "--image", "demo/friction.img", "--scenario", "sine-sweep", "--scenario", "hot-and-cold"]);
+    assert!(text.contains("times faster than real time"), "{text}");
+    for scenario in ["sine-sweep", "hot-and-cold"] {
+        let number =
+            |compensation, column: usize| -> f64 { row(&text, scenario, compensation)[column].parse().unwrap() };
+        assert!(number("on", 2) < number("off", 2), "position error of {scenario}: {text}");
+        assert!(number("on", 5) < number("off", 5), "torque error of {scenario}: {text}");
+    }
+    let page = String::from_utf8(read("sim/sim.html")).unwrap();
+    assert!(page.contains("<svg") && page.contains("sine-sweep") && !page.contains("stopped after"));
+    let log = String::from_utf8(read("sim/hot-and-cold-on.csv")).unwrap();
+    assert!(log.contains("\ncold,") && log.contains("\nhot,"));
+
+    run(&[
+        "sim",
+        "--config",
+        "sim/joint.toml",
+        "--plant",
+        "sim/plant.toml",
+        "--scenario",
+        "sine-sweep",
+        "--out",
+        "again",
+    ]);
+    for file in ["joint.toml", "plant.toml", "sine-sweep-off.csv"] {
+        assert!(read(&format!("again/{file}")) == read(&format!("sim/{file}")), "{file} differs");
+    }
+    assert!(!folder.path().join("again/sine-sweep-on.csv").exists(), "there was no image");
+
+    let good = String::from_utf8(read("sim/joint.toml")).unwrap();
+    for (edit, to, expected) in [
+        ("stiffness = ", "stifness = ", "unknown field `stifness`"),
+        ("command_deadline = ", "# ", "missing field `command_deadline`"),
+        ("ratio = 50.0", "ratio = 0.5", "gear ratio's magnitude is 0.5, must lie in 1 to 500"),
+    ] {
+        std::fs::write(folder.path().join("broken.toml"), good.replacen(edit, to, 1)).unwrap();
+        let refused = jointctl(folder.path(), &["sim", "--config", "broken.toml", "--out", "never"]);
+        let shown = stderr(&refused);
+        assert!(!refused.status.success() && shown.contains("broken.toml") && shown.contains(expected), "{shown}");
+    }
+    assert!(!folder.path().join("never").exists());
+}
+
+#[test]
+fn an_excitation_is_found_within_the_limits_passes_its_check_and_fails_that_of_a_slower_joint() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| jointctl(folder.path(), arguments);
+    let output = run(&["excite", "--out", "motion.csv"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    let last = text.lines().find(|line| line.starts_with("median of")).unwrap();
+    let number = |text: &str| -> f64 { text.rsplit(": ").next().unwrap().parse().unwrap() };
+    let (random, found) = last.split_once(';').unwrap();
+    assert!(number(found) < 0.8 * number(random), "{text}");
+    for file in ["motion.csv", "motion.toml"] {
+        let checked = run(&["excite", "--check", file]);
+        assert!(checked.status.success(), "{}", stderr(&checked));
+        let refused = run(&["excite", "--check", file, "--velocity", "0.5"]);
+        let shown = stderr(&refused);
+        assert!(!refused.status.success() && shown.contains(file) && shown.contains("permitted are 0.5"), "{shown}");
+    }
+}
+
 #[test]
 fn wrong_arguments_are_refused_with_their_limits() {
     let folder = tempfile::tempdir().unwrap();
@@ -105,6 +185,13 @@ fn wrong_arguments_are_refused_with_their_limits() {
         (&["demo", "--equalise", "2"], "--equalise is 2, must be 0 to 1"),
         (&["demo", "--preset", "stribek"], "stribeck"),
         (&["image", "verify", "nowhere.img"], "cannot read nowhere.img"),
+        (&["sim", "--config", "nowhere.toml"], "nowhere.toml: cannot be read"),
+        (&["sim", "--plant", "nowhere.toml"], "cannot read nowhere.toml"),
+        (&["sim", "--scenario", "dance"], "slow-reversal"),
+        (&["sim", "--sample-period", "1"], "must lie in 0.0001 to 0.1 s"),
+        (&["excite", "--velocity", "0"], "velocity is 0, must lie in 0.001 to 200 rad/s"),
+        (&["excite", "--out", "motion.toml"], "--out is motion.toml"),
+        (&["excite", "--check", "nowhere.csv"], "nowhere.csv: cannot be read"),
     ] {
         let output = jointctl(folder.path(), arguments);
         assert!(!output.status.success());

@@ -1,8 +1,8 @@
 //! The configuration of a joint as text, `joint.toml`; host.
 //!
 //! Every value stands in the file, none has a default: what a joint is and may do is nothing to be guessed. Unknown keys are
-//! refused, missing ones named, and the whole is checked by the same [`Configuration::prepare`] that a joint calls before
-//! it uses it. Reading and writing lose no bit.
+//! refused, missing ones named, and the whole is checked by the same [`Configuration::prepare`] and the same thermal model that
+//! a joint starts with. Reading and writing lose no bit.
 //!
 //! - [`fields`]: what each key means, its unit and its range, as the file's comments say it
 //! - [`mirror`]: the record's form in the file
@@ -12,6 +12,7 @@ mod mirror;
 
 use fields::FIELDS;
 use joint_firmware::joint::configuration::{BridgeConfiguration, Configuration, ConfigurationError};
+use joint_firmware::motor::thermal::WindingTemperature;
 use mirror::Text;
 use std::path::{Path, PathBuf};
 
@@ -63,8 +64,15 @@ pub fn from_text(text: &str, file: &Path, bridge: &BridgeConfiguration) -> Resul
         file: file.to_owned(),
         message: error.to_string().trim_end().to_owned(),
     })?;
-    configuration.prepare(bridge).map_err(|source| JointTextError::Refused { file: file.to_owned(), source })?;
+    check(&configuration, bridge).map_err(|source| JointTextError::Refused { file: file.to_owned(), source })?;
     Ok(configuration)
+}
+
+/// What a joint checks when it starts: the record as a whole, and its thermal model, which the slow task makes of it.
+fn check(configuration: &Configuration, bridge: &BridgeConfiguration) -> Result<(), ConfigurationError> {
+    let active = configuration.prepare(bridge)?;
+    WindingTemperature::new(&active.thermal, configuration.thermal.ambient)?;
+    Ok(())
 }
 
 /// The configuration as text, each key below a comment with its meaning, unit and range.
