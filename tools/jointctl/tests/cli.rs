@@ -116,7 +116,7 @@ fn a_simulation_shows_the_joint_without_and_with_its_image_and_repeats_itself_fr
     assert!(demo(folder.path(), "demo").status.success());
     let text = run(&["sim", "--image", "demo/friction.img", "--scenario", "sine-sweep", "--scenario", "hot-and-cold"]);
     assert!(text.contains("times faster than real time"), "{text}");
-    for scenario in ["sine-sweep", "hot-and-cold"] {
+    for scenario in ["sine-sweep", "hot-and-cold/cold", "hot-and-cold/warm"] {
         let number =
             |compensation, column: usize| -> f64 { row(&text, scenario, compensation)[column].parse().unwrap() };
         assert!(number("on", 2) < number("off", 2), "position error of {scenario}: {text}");
@@ -171,6 +171,11 @@ fn an_excitation_is_found_within_the_limits_passes_its_check_and_fails_that_of_a
     for file in ["motion.csv", "motion.toml"] {
         let checked = run(&["excite", "--check", file]);
         assert!(checked.status.success(), "{}", stderr(&checked));
+        let simulated = run(&["sim", "--scenario", "excitation", "--excitation", file]);
+        assert!(simulated.status.success(), "{}", stderr(&simulated));
+        let log = std::fs::read_to_string(folder.path().join("sim/excitation-off.csv")).unwrap();
+        // Ten seconds and the move to the middle of the positions, every 4 ms.
+        assert_eq!(log.lines().count(), 2626, "{file}");
         let refused = run(&["excite", "--check", file, "--velocity", "0.5"]);
         let shown = stderr(&refused);
         assert!(!refused.status.success() && shown.contains(file) && shown.contains("permitted are 0.5"), "{shown}");

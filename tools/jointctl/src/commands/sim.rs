@@ -3,12 +3,13 @@
 use super::CommandError;
 use super::image::{read, verify};
 use super::joint::JointChoice;
+use crate::excite::file as excitation;
 use crate::joint_text;
 use crate::output::{OutputFile, write_directory};
 use crate::progress::{Progress, Terminal};
 use crate::simulation::page::{Shown, page};
 use crate::simulation::table::{Line, table};
-use crate::simulation::{Choices, Ending, Log, Part, Run, Scenario, SimulationError, judge, log, run};
+use crate::simulation::{Choices, Log, Part, Run, Scenario, SimulationError, judge, log, run};
 use clap::Args;
 use joint_firmware::compensation::Request;
 use joint_firmware::friction::FrictionModel;
@@ -30,6 +31,9 @@ pub struct Sim {
     /// What the joint is put through; repeatable [default: every scenario]
     #[arg(long, value_name = "NAME", value_enum)]
     scenario: Vec<Scenario>,
+    /// Motion of the scenario "excitation", as `excite` writes it: a table, or with the ending .toml its coefficients
+    #[arg(long, value_name = "FILE")]
+    excitation: Option<PathBuf>,
     /// Seed of the sensors' noise
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
@@ -64,6 +68,7 @@ impl Sim {
         }
         let (plant, setup) = self.joint.read()?;
         let friction = self.friction(&setup)?;
+        let samples = self.excitation.as_deref().map(excitation::read).transpose()?;
         let mut scenarios = if self.scenario.is_empty() { Scenario::ALL.to_vec() } else { self.scenario.clone() };
         // A scenario that is named twice is run once.
         let mut seen = Vec::new();
@@ -77,9 +82,11 @@ impl Sim {
         progress.stage("simulate");
         let mut tasks = Vec::new();
         for &scenario in &scenarios {
-            let parts = scenario.parts(&plant, self.seed)?;
-            for compensated in [false, true].into_iter().take(if friction.is_some() { 2 } else { 1 }) {
-                tasks.extend(parts.iter().cloned().map(|part| Task { scenario, compensated, part }));
+            for part in scenario.parts(&plant, self.seed, samples.as_ref())? {
+                if friction.is_some() {
+                    tasks.push(Task { scenario, compensated: false, part: part.clone() });
+                }
+                tasks.push(Task { scenario, compensated: friction.is_some(), part });
             }
         }
         let choices = Choices { seed: self.seed, sample_period: self.sample_period };
@@ -100,7 +107,7 @@ impl Sim {
 
         progress.stage("judge");
         let standstill = f64::from(setup.configuration.compensation.standstill_velocity);
-        let lines = lines(&scenarios, &tasks, &done, standstill)?;
+        let lines = lines(&tasks, &done, standstill)?;
         let simulated: f64 = done.iter().map(|done| done.run.simulated).sum();
         let elapsed: f64 = done.iter().map(|done| done.elapsed).sum();
         let speed = format!(
@@ -159,24 +166,17 @@ fn logs<'a>(scenario: Scenario, compensated: bool, tasks: &[Task], done: &'a [Do
     both.map(|(task, done)| (task.part.name, &done.run.log)).collect()
 }
 
-/// A row of the table for each scenario, without and with compensation.
-fn lines(scenarios: &[Scenario], tasks: &[Task], done: &[Done], standstill: f64) -> Result<Vec<Line>, SimulationError> {
-    let mut lines = Vec::new();
-    for &scenario in scenarios {
-        for compensated in [false, true] {
-            let of: Vec<(&Task, &Done)> = tasks
-                .iter()
-                .zip(done)
-                .filter(|(task, _)| task.scenario == scenario && task.compensated == compensated)
-                .collect();
-            if of.is_empty() {
-                continue;
-            }
-            let judgement = judge(of.iter().map(|(task, done)| (task.part.tracks, &done.run.log)), standstill)?;
-            let stopped = of.iter().find(|(_, done)| done.run.ending != Ending::Whole);
-            let stopped = stopped.map(|(task, done)| (task.part.name, done.run.ending));
-            lines.push(Line { scenario: scenario.name(), compensated, judgement, stopped });
-        }
-    }
-    Ok(lines)
+/// A row of the table for each part, without and with compensation.
+fn lines(tasks: &[Task], done: &[Done], standstill: f64) -> Result<Vec<Line>, SimulationError> {
+    let several = |scenario| {
+        let parts = tasks.iter().filter(|task| task.scenario == scenario && !task.compensated);
+        parts.count() > 1
+    };
+    let line = |(task, done): (&Task, &Done)| {
+        let judgement = judge([(task.part.tracks, &done.run.log)], standstill)?;
+        let part = several(task.scenario).then_some(task.part.name);
+        let (scenario, ending) = (task.scenario.name(), done.run.ending);
+        Ok(Line { scenario, part, compensated: task.compensated, judgement, ending })
+    };
+    tasks.iter().zip(done).map(line).collect()
 }

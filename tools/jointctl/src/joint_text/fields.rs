@@ -21,14 +21,13 @@ impl Field {
     /// The comment above the key.
     #[must_use]
     pub fn comment(&self) -> String {
-        let mut text = self.meaning.to_owned();
-        if !self.unit.is_empty() {
-            text += &format!(", {}", self.unit);
+        let range = self.range.map(|(low, high)| format!("{low} to {high}"));
+        let unit = (!self.unit.is_empty()).then(|| self.unit.to_owned());
+        let limits: Vec<String> = unit.into_iter().chain(range).collect();
+        match limits.is_empty() {
+            true => self.meaning.to_owned(),
+            false => format!("{} [{}]", self.meaning, limits.join(", ")),
         }
-        if let Some((low, high)) = self.range {
-            text += &format!("; {low} to {high}");
-        }
-        text
     }
 }
 

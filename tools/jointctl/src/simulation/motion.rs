@@ -4,6 +4,7 @@
 //! rigid body needs for it, at a stiffness and damping. Targets are reached in position mode, where the joint makes its own
 //! ramp. Either way the controller knows inertia and gravity of the joint, and nothing of its friction.
 
+use crate::excite::file::Samples;
 use joint_firmware::joint::{Command, Mode};
 use plant::JointParameters;
 use plant::excitation::{Reference, Trajectory};
@@ -13,6 +14,9 @@ use std::f64::consts::TAU;
 /// Time over which a sweep fades in and out, s.
 pub const SWEEP_FADE: f64 = 1.0;
 
+/// Shortest move to where samples begin, s.
+const SHORTEST_LEAD: f64 = 0.5;
+
 /// A motion that starts at rest at position zero.
 #[derive(Clone, Debug)]
 pub enum Motion {
@@ -20,8 +24,18 @@ pub enum Motion {
     Trajectory(Trajectory),
     /// A sine of rising frequency.
     Sweep(Sweep),
+    /// A motion from a file, after a move to where it begins.
+    Samples(Led),
     /// Positions that are asked for at once.
     Targets(Targets),
+}
+
+/// Samples with a move to their first position before them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Led {
+    samples: Samples,
+    /// Duration of the move, s.
+    lead: f64,
 }
 
 /// A sine whose frequency rises exponentially: each octave takes the same time.
@@ -51,6 +65,61 @@ pub struct Controller {
     pub stiffness: f64,
     /// Impedance mode's damping, Nm s/rad.
     pub damping: f64,
+}
+
+impl Led {
+    /// At least two samples, in time; the move before them stays below `speed` (rad/s, above zero).
+    #[must_use]
+    pub fn new(samples: Samples, speed: f64) -> Self {
+        let way = samples.motion.first().map_or(0.0, |first| first.position.abs());
+        // The steepest slope of the smooth step is 15/8.
+        Self { samples, lead: (1.875 * way / speed).max(SHORTEST_LEAD) }
+    }
+
+    fn duration(&self) -> f64 {
+        let time = &self.samples.time;
+        self.lead + time.last().copied().unwrap_or(0.0) - time.first().copied().unwrap_or(0.0)
+    }
+
+    fn at(&self, time: f64) -> Reference {
+        let (times, motion) = (&self.samples.time, &self.samples.motion);
+        let (Some(first), Some(last)) = (motion.first(), motion.last()) else { return Reference::default() };
+        if time < self.lead {
+            let (level, slope, curvature) = smooth_step(time / self.lead);
+            return Reference {
+                position: level * first.position,
+                velocity: slope / self.lead * first.position,
+                acceleration: curvature / (self.lead * self.lead) * first.position,
+            };
+        }
+        let time = time - self.lead + times.first().copied().unwrap_or(0.0);
+        let after = times.partition_point(|&sample| sample <= time);
+        if after == 0 {
+            return *first;
+        }
+        match (motion.get(after - 1), motion.get(after)) {
+            (Some(before), Some(next)) => {
+                between(before, next, time - times[after - 1], times[after] - times[after - 1])
+            }
+            _ => Reference { position: last.position, ..Reference::default() },
+        }
+    }
+}
+
+/// The cubic through two samples `step` (s) apart that has their velocities, `time` after the first.
+fn between(before: &Reference, next: &Reference, time: f64, step: f64) -> Reference {
+    let x = time / step;
+    let way = next.position - before.position;
+    let (bend, twist) = (
+        3.0 * way - step * (2.0 * before.velocity + next.velocity),
+        step * (before.velocity + next.velocity) - 2.0 * way,
+    );
+    Reference {
+        position: before.position + x * (step * before.velocity + x * (bend + x * twist)),
+        velocity: before.velocity + x * (2.0 * bend + 3.0 * x * twist) / step,
+        // Of a table's decimals, the second derivative of its positions keeps few: the table has it.
+        acceleration: before.acceleration + x * (next.acceleration - before.acceleration),
+    }
 }
 
 impl Sweep {
@@ -85,6 +154,7 @@ impl Motion {
         match self {
             Self::Trajectory(trajectory) => trajectory.duration(),
             Self::Sweep(sweep) => sweep.duration,
+            Self::Samples(led) => led.duration(),
             Self::Targets(targets) => targets.interval * targets.positions.len() as f64,
         }
     }
@@ -95,6 +165,7 @@ impl Motion {
         match self {
             Self::Trajectory(trajectory) => Some(trajectory.at(time)),
             Self::Sweep(sweep) => Some(sweep.at(time)),
+            Self::Samples(led) => Some(led.at(time)),
             Self::Targets(_) => None,
         }
     }
@@ -148,6 +219,34 @@ mod tests {
             let rest = at(end);
             assert!(rest.position.abs() + rest.velocity.abs() + rest.acceleration.abs() < 1e-9, "{rest:?}");
         }
+    }
+
+    #[test]
+    fn samples_are_met_after_the_move_to_the_first_and_joined_smoothly() {
+        let period = 0.01;
+        let wave = |time: f64| Reference {
+            position: 0.7 + 0.2 * (3.0 * time).cos(),
+            velocity: -0.6 * (3.0 * time).sin(),
+            acceleration: -1.8 * (3.0 * time).cos(),
+        };
+        let time: Vec<f64> = (0..=100).map(|n| 5.0 + period * f64::from(n)).collect();
+        let motion = time.iter().map(|time| wave(time - 5.0)).collect();
+        let led = Led::new(Samples { time, motion }, 1.0);
+        let lead = led.lead;
+        assert_eq!(lead, 1.875 * 0.9);
+        let motion = Motion::Samples(led);
+        let at = |time| motion.reference(time).unwrap();
+        assert_eq!(motion.duration(), lead + 1.0);
+        assert_eq!((at(0.0).position, at(0.0).velocity), (0.0, 0.0));
+        assert!((at(0.5 * lead).position - 0.45).abs() < 1e-12 && (at(0.5 * lead).velocity - 1.0).abs() < 1e-12);
+        for n in 0..=999 {
+            let time = 1e-3 * f64::from(n) + 2e-4;
+            let (found, exact) = (at(lead + time), wave(time));
+            assert!((found.position - exact.position).abs() < 1e-7, "{time}: {found:?} {exact:?}");
+            assert!((found.velocity - exact.velocity).abs() < 1e-4, "{time}: {found:?} {exact:?}");
+            assert!((found.acceleration - exact.acceleration).abs() < 1e-3, "{time}: {found:?} {exact:?}");
+        }
+        assert_eq!(at(99.0), Reference { position: wave(1.0).position, ..Reference::default() });
     }
 
     #[test]

@@ -36,9 +36,7 @@ pub fn page(title: &str, lines: &[Line], speed: &str, scenarios: &[Shown]) -> Re
                         @for (column, cell) in line.cells().iter().enumerate() { td.number[column > 1] { (cell) } }
                     } } }
                 } }
-                @for line in lines { @if let Some((part, ending)) = &line.stopped {
-                    p.verdict.bad { (line.scenario) ", part " (part) ": " (ending) }
-                } }
+                @for stop in lines.iter().filter_map(Line::stop) { p.verdict.bad { (stop) } }
                 p { "Position error: reference less true position. Relative torque error: |asked - arrived| / |asked|, "
                     "where \"asked\" is the torque before compensation and \"arrived\" what the motor gives less what "
                     "friction takes; torques below a tenth of the RMS count in no quotient." }

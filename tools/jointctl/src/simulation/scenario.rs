@@ -3,7 +3,8 @@
 //! All sizes follow from the joint's own limits of travel and speed, so that every joint has its version of each scenario.
 
 use super::SimulationError;
-use super::motion::{Motion, Sweep, Targets};
+use super::motion::{Led, Motion, Sweep, Targets};
+use crate::excite::file::Samples;
 use crate::excite::{Bounds, Effort, optimise};
 use plant::ActuatorParameters;
 use plant::contact::{Contact, Side};
@@ -20,11 +21,11 @@ pub enum Scenario {
     PointToPoint,
     /// Softly against a wall and back, in impedance mode
     ImpedanceContact,
-    /// The same motions at ambient temperature and 35 K warmer
+    /// The same motions at ambient temperature, 20 K warmer (as warm as a careful recording gets) and 35 K warmer
     HotAndCold,
     /// The same motions with the whole payload, half and a quarter of it
     PayloadChange,
-    /// A Fourier series optimised for identification
+    /// A motion for identification: a Fourier series optimised for it, or that of a file
     Excitation,
 }
 
@@ -89,11 +90,16 @@ impl Scenario {
         }
     }
 
-    /// Its parts on an actuator; `seed` draws the excitation.
+    /// Its parts on an actuator. The excitation is `samples`, or else a series that `seed` draws.
     ///
     /// # Errors
     /// A number that is outside its range, which follows from limits that no joint has.
-    pub fn parts(self, plant: &ActuatorParameters, seed: u64) -> Result<Vec<Part>, SimulationError> {
+    pub fn parts(
+        self,
+        plant: &ActuatorParameters,
+        seed: u64,
+        samples: Option<&Samples>,
+    ) -> Result<Vec<Part>, SimulationError> {
         let joint = &plant.joint;
         let (travel, speed) = (joint.limits.travel, joint.limits.speed);
         let acceleration = (0.5 * joint.usable_acceleration()).min(GENTLE_ACCELERATION);
@@ -126,8 +132,9 @@ impl Scenario {
             Self::HotAndCold => {
                 let motion = trajectory(repeated(speed, travel, acceleration))?;
                 let cold = Part::new("cold", plant, motion);
-                let hot = Part { name: "hot", temperature: cold.temperature + 35.0, ..cold.clone() };
-                vec![cold, hot]
+                let warmer = |name, by| Part { name, temperature: cold.temperature + by, ..cold.clone() };
+                let (warm, hot) = (warmer("warm", 20.0), warmer("hot", 35.0));
+                vec![cold, warm, hot]
             }
             Self::PayloadChange => {
                 let motion = trajectory(repeated(speed, travel, acceleration))?;
@@ -139,6 +146,9 @@ impl Scenario {
                 vec![with("whole", 1.0), with("half", 0.5), with("quarter", 0.25)]
             }
             Self::Excitation => {
+                if let Some(samples) = samples {
+                    return Ok(one("file", Motion::Samples(Led::new(samples.clone(), 0.25 * speed))));
+                }
                 let bounds = Bounds { position: (-0.9 * travel, 0.9 * travel), velocity: 0.9 * speed, acceleration };
                 let found = optimise(&bounds, &Effort { seed, ..Effort::QUICK })?;
                 let duration = found.excitation.duration;

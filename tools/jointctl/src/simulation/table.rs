@@ -1,22 +1,44 @@
-//! Judgements of scenarios as a table for a terminal: plain text, aligned, one row without and one with compensation; host.
+//! Judgements as a table for a terminal: plain text, aligned, for each part of a scenario one row without and one with
+//! compensation; host.
 
 use super::{Ending, Judgement};
 use crate::report::number::{optional, percent};
 
-/// One row: a scenario, with or without compensation.
+/// One row: a part of a scenario, with or without compensation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Line {
     /// The scenario.
     pub scenario: &'static str,
+    /// Its part, where it has several.
+    pub part: Option<&'static str>,
     /// Whether compensation acted.
     pub compensated: bool,
     /// How well the joint did.
     pub judgement: Judgement,
-    /// The first run that did not come to its end, with the name of its part.
-    pub stopped: Option<(&'static str, Ending)>,
+    /// How the run ended.
+    pub ending: Ending,
 }
 
 impl Line {
+    /// The scenario, with its part where it has several.
+    #[must_use]
+    pub fn name(&self) -> String {
+        self.part.map_or_else(|| self.scenario.to_owned(), |part| format!("{}/{part}", self.scenario))
+    }
+
+    /// "on" or "off".
+    #[must_use]
+    pub const fn compensation(&self) -> &'static str {
+        if self.compensated { "on" } else { "off" }
+    }
+
+    /// Why the run did not come to its end, in a sentence.
+    #[must_use]
+    pub fn stop(&self) -> Option<String> {
+        (self.ending != Ending::Whole)
+            .then(|| format!("{}, compensation {}: {}", self.name(), self.compensation(), self.ending))
+    }
+
     /// The cells, in the order of [`HEADING`].
     #[must_use]
     pub fn cells(&self) -> [String; 6] {
@@ -26,8 +48,8 @@ impl Line {
             percent(metrics.as_ref().and_then(|metrics| metrics.relative_torque_error))
         };
         [
-            self.scenario.to_owned(),
-            if self.compensated { "on" } else { "off" }.to_owned(),
+            self.name(),
+            self.compensation().to_owned(),
             milli(judged.position_rms),
             milli(judged.position_max),
             relative(&judged.torque),
@@ -68,11 +90,9 @@ pub fn table(lines: &[Line]) -> String {
             text.push('\n');
         }
     }
-    for line in lines {
-        if let Some((part, ending)) = &line.stopped {
-            let compensation = if line.compensated { "on" } else { "off" };
-            text += &format!("{}, part {part}, compensation {compensation}: {ending}\n", line.scenario);
-        }
+    for stop in lines.iter().filter_map(Line::stop) {
+        text += &stop;
+        text.push('\n');
     }
     text
 }
