@@ -51,6 +51,16 @@ impl Controlword {
         self.0 & bits == bits
     }
 
+    /// "Enable operation".
+    pub const fn enables_operation(self) -> bool {
+        self.has(0x0f) && self.commands()
+    }
+
+    /// Not a fault reset, with which nothing else counts: every command of the profile has bit 7 clear.
+    const fn commands(self) -> bool {
+        !self.has(1 << 7)
+    }
+
     const fn enables_voltage(self) -> bool {
         self.has(1 << 1)
     }
@@ -102,13 +112,13 @@ impl StateMachine {
             NotReadyToSwitchOn | SwitchOnDisabled | ReadyToSwitchOn | SwitchedOn if faulty => Fault,
             _ if faulty => FaultReactionActive,
             NotReadyToSwitchOn if events.started => SwitchOnDisabled,
-            SwitchOnDisabled if word.keeps_running() && !word.has(1) => ReadyToSwitchOn,
+            SwitchOnDisabled if word.commands() && word.keeps_running() && !word.has(1) => ReadyToSwitchOn,
             ReadyToSwitchOn if !word.keeps_running() => SwitchOnDisabled,
-            ReadyToSwitchOn if word.has(1) => SwitchedOn,
+            ReadyToSwitchOn if word.commands() && word.has(1) => SwitchedOn,
             SwitchedOn | OperationEnabled if !word.enables_voltage() => SwitchOnDisabled,
             SwitchedOn if word.asks_quick_stop() => SwitchOnDisabled,
             SwitchedOn | OperationEnabled if word.keeps_running() && !word.has(1) => ReadyToSwitchOn,
-            SwitchedOn if word.has(1 << 3) => OperationEnabled,
+            SwitchedOn if word.enables_operation() => OperationEnabled,
             OperationEnabled if word.asks_quick_stop() => QuickStopActive,
             OperationEnabled if !word.has(1 << 3) => SwitchedOn,
             QuickStopActive if !word.enables_voltage() || events.stopped => SwitchOnDisabled,
@@ -181,6 +191,111 @@ mod tests {
             (Controlword::ENABLE_OPERATION, OperationEnabled),
         ] {
             assert_eq!(enabled().step(word, QUIET), state, "{word:?}");
+        }
+    }
+
+    /// A machine in each state that the controlword leads to.
+    fn in_state(state: State) -> StateMachine {
+        let mut machine = enabled();
+        match state {
+            SwitchOnDisabled => machine.step(Controlword::DISABLE_VOLTAGE, QUIET),
+            ReadyToSwitchOn => machine.step(Controlword::SHUTDOWN, QUIET),
+            SwitchedOn => machine.step(Controlword::SWITCH_ON, QUIET),
+            QuickStopActive => machine.step(Controlword::QUICK_STOP, QUIET),
+            FaultReactionActive => machine.step(Controlword::ENABLE_OPERATION, Events { fault: true, ..QUIET }),
+            Fault => {
+                machine.step(Controlword::ENABLE_OPERATION, Events { fault: true, ..QUIET });
+                machine.step(Controlword::ENABLE_OPERATION, Events { fault: true, stopped: true, ..QUIET })
+            }
+            _ => OperationEnabled,
+        };
+        assert_eq!(machine.state(), state);
+        machine
+    }
+
+    #[test]
+    fn every_command_leads_from_every_state_to_the_one_that_the_profile_names() {
+        // Columns: shutdown, switch on, enable operation, disable voltage, quick stop, fault reset.
+        let table = [
+            (
+                SwitchOnDisabled,
+                [
+                    ReadyToSwitchOn,
+                    SwitchOnDisabled,
+                    SwitchOnDisabled,
+                    SwitchOnDisabled,
+                    SwitchOnDisabled,
+                    SwitchOnDisabled,
+                ],
+            ),
+            (
+                ReadyToSwitchOn,
+                [ReadyToSwitchOn, SwitchedOn, SwitchedOn, SwitchOnDisabled, SwitchOnDisabled, SwitchOnDisabled],
+            ),
+            (
+                SwitchedOn,
+                [ReadyToSwitchOn, SwitchedOn, OperationEnabled, SwitchOnDisabled, SwitchOnDisabled, SwitchOnDisabled],
+            ),
+            (
+                OperationEnabled,
+                [ReadyToSwitchOn, SwitchedOn, OperationEnabled, SwitchOnDisabled, QuickStopActive, SwitchOnDisabled],
+            ),
+            (
+                QuickStopActive,
+                [
+                    QuickStopActive,
+                    QuickStopActive,
+                    QuickStopActive,
+                    SwitchOnDisabled,
+                    QuickStopActive,
+                    SwitchOnDisabled,
+                ],
+            ),
+            (FaultReactionActive, [FaultReactionActive; 6]),
+            (Fault, [Fault, Fault, Fault, Fault, Fault, SwitchOnDisabled]),
+        ];
+        let words = [
+            Controlword::SHUTDOWN,
+            Controlword::SWITCH_ON,
+            Controlword::ENABLE_OPERATION,
+            Controlword::DISABLE_VOLTAGE,
+            Controlword::QUICK_STOP,
+            Controlword::FAULT_RESET,
+        ];
+        for (from, to) in table {
+            for (word, to) in words.into_iter().zip(to) {
+                assert_eq!(in_state(from).step(word, QUIET), to, "{word:?} in {from:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_is_switched_on_by_a_word_that_also_resets_faults() {
+        for (state, command) in [
+            (SwitchOnDisabled, Controlword::SHUTDOWN),
+            (ReadyToSwitchOn, Controlword::SWITCH_ON),
+            (SwitchedOn, Controlword::ENABLE_OPERATION),
+        ] {
+            let mut machine = in_state(state);
+            let word = Controlword(command.0 | Controlword::FAULT_RESET.0);
+            assert_eq!((machine.step(word, QUIET), machine.step(word, QUIET)), (state, state));
+        }
+    }
+
+    #[test]
+    fn the_statusword_tells_every_state_by_the_masks_of_the_profile() {
+        // Bits 0 to 3 and 6; where the profile leaves the quick stop's bit 5 open, it does not count.
+        for (state, mask, value) in [
+            (NotReadyToSwitchOn, 0x4f, 0x00),
+            (SwitchOnDisabled, 0x4f, 0x40),
+            (ReadyToSwitchOn, 0x6f, 0x21),
+            (SwitchedOn, 0x6f, 0x23),
+            (OperationEnabled, 0x6f, 0x27),
+            (QuickStopActive, 0x6f, 0x07),
+            (FaultReactionActive, 0x4f, 0x0f),
+            (Fault, 0x4f, 0x08),
+        ] {
+            assert_eq!(state.statusword() & mask, value, "{state:?}");
         }
     }
 
