@@ -81,17 +81,17 @@ impl Fault {
         }
     }
 
-    /// Error code of object 603Fh (CiA 402-2, table of error codes; manufacturer-specific ones from FF00h).
+    /// Error code of object 603Fh, of the profile's table (CiA 402-2, error codes): the entry that comes nearest.
     pub const fn error_code(self) -> u16 {
         match self {
             Self::OverCurrent => 0x2310,
             Self::CurrentSensor => 0x5210,
-            Self::CurrentNotFollowed => 0x3331,
+            Self::CurrentNotFollowed => 0x3321,
             Self::OverVoltage => 0x3210,
             Self::UnderVoltage => 0x3220,
             Self::EncoderLost => 0x7305,
-            Self::EncoderJump => 0x7310,
-            Self::EncoderImplausible => 0x8611,
+            Self::EncoderJump => 0x7320,
+            Self::EncoderImplausible => 0x7122,
             Self::OverSpeed => 0x8400,
             Self::PositionLimit => 0x8612,
             Self::BridgeTemperature => 0x4210,
@@ -99,7 +99,7 @@ impl Fault {
             Self::TemperatureSensor => 0x4300,
             Self::StaleCommand => 0x8100,
             Self::Overrun => 0x6100,
-            Self::BridgeDriver => 0x5440,
+            Self::BridgeDriver => 0x5410,
         }
     }
 
@@ -155,6 +155,11 @@ impl Faults {
     /// Whether a fault is in the set.
     pub const fn contains(self, fault: Fault) -> bool {
         self.0 & fault.bit() != 0
+    }
+
+    /// What is in both sets.
+    pub const fn intersection(self, other: Self) -> Self {
+        Self(self.0 & other.0)
     }
 
     /// Both sets.

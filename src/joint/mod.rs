@@ -27,13 +27,14 @@ pub use active::{Active, JointMotion};
 pub use command::{Command, Demand, Mode};
 pub use signals::{Bridge, BridgeState, Measurements};
 
+use crate::motor::angle::{STEPS, TAU};
 use crate::motor::field_oriented::{FieldOriented, FieldOrientedInput};
-use crate::motor::number::{limited, or_zero};
+use crate::motor::number::{limited, or_zero, within};
 use crate::motor::observer::Observer;
 use crate::motor::phases::Phases;
 use crate::motor::thermal::MeanSquareCurrent;
 use crate::motor::transform::Dq;
-use fault::{Faults, Reaction};
+use fault::{Fault, Faults, Reaction};
 use friction_feedforward::{Compensated, FrictionFeedforward};
 use history::{History, Snapshot};
 use monitor::{Loop, Monitor};
@@ -92,7 +93,9 @@ pub struct Telemetry {
 impl Telemetry {
     /// The statusword, object 6041h: state, voltage present, and that the joint follows its commands.
     pub fn statusword(&self) -> u16 {
-        let voltage = !self.faults.contains(fault::Fault::UnderVoltage) as u16;
+        // Before the start is complete nobody has looked at the supply.
+        let started = self.state != State::NotReadyToSwitchOn;
+        let voltage = (started && !self.faults.contains(Fault::UnderVoltage)) as u16;
         let remote = 1 << 9;
         self.state.statusword() | voltage << 4 | remote
     }
@@ -109,6 +112,8 @@ pub struct Joint {
     friction: FrictionFeedforward,
     field_oriented: FieldOriented,
     last: Option<Loop>,
+    /// The last valid reading of the encoder.
+    encoder: u32,
     sequence: u32,
     stale_steps: u32,
     braking: Braking,
@@ -125,6 +130,8 @@ struct Offsets {
     sum: Phases,
     steps: u32,
     mean: Phases,
+    /// The last mean was beyond what a sound sensor has.
+    refused: bool,
 }
 
 /// How long a joint has been braking and standing.
@@ -139,7 +146,7 @@ impl Offsets {
         self.steps >= OFFSET_STEPS
     }
 
-    /// Adds a step's currents; offsets beyond what a sound sensor has are not taken, and the start goes on.
+    /// Adds a step's currents; offsets beyond what a sound sensor has are not taken, and the measurement begins anew.
     fn add(&mut self, measured: Phases, largest: f32) {
         let add = |sum: f32, value: f32| sum + or_zero(limited(value, 1e3));
         self.sum =
@@ -153,8 +160,9 @@ impl Offsets {
         let sound = |value: f32| value <= largest && value >= -largest;
         if sound(mean.a) && sound(mean.b) && sound(mean.c) {
             self.mean = mean;
+            self.refused = false;
         } else {
-            *self = Self::default();
+            *self = Self { refused: true, ..Self::default() };
         }
     }
 }
@@ -193,15 +201,18 @@ impl Joint {
         measured: &Measurements,
     ) -> Bridge {
         let currents = self.without_offsets(active, measured.phase_currents);
-        let sample = measured.encoder_valid.then_some(measured.encoder);
+        let before = self.encoder;
+        let sample = self.encoder_sample(measured);
+        let way = self.encoder.wrapping_sub(before) as i32 as f32;
         let observation = self.observer.step(&active.observer, sample, 0.0);
         let motion = active.scales.joint(&observation.motion);
 
-        let faults = self.watch(active, demand, slow, measured, currents, &observation, &motion);
+        let derating = within(slow.derating, 0.0, 1.0);
+        let faults = self.watch(active, demand, derating, measured, currents, &observation, &motion);
         let state = self.decide(active, demand, faults, &motion);
 
         let wanted = match state {
-            State::OperationEnabled => self.law.step(active, &demand.command, &motion, slow.derating),
+            State::OperationEnabled => self.law.step(active, &demand.command, &motion, derating),
             State::QuickStopActive | State::FaultReactionActive => self.law.brake(active, &motion),
             _ => Wanted::default(),
         };
@@ -218,7 +229,11 @@ impl Joint {
         };
 
         let speed = active.alignment.electrical_speed(observation.motion.velocity);
-        let limit = active.current_limit * slow.derating;
+        // A hot winding bears the current of braking for as long as braking may take; a joint that coasts into somebody is worse.
+        let limit = match state {
+            State::OperationEnabled => active.current_limit * derating,
+            _ => active.current_limit,
+        };
         let reference = Dq { d: 0.0, q: limited(torque * active.scales.current_per_torque, limit) };
         let switching = matches!(state, State::OperationEnabled | State::QuickStopActive | State::FaultReactionActive);
         let (bridge, current) = if switching {
@@ -230,7 +245,8 @@ impl Joint {
                 reference,
             };
             let output = self.field_oriented.step(&active.field_oriented, &input);
-            self.last = Some(Loop { reference, output, speed, bus_voltage: measured.bus_voltage });
+            let speed = active.alignment.electrical_speed(way * (TAU / STEPS) * active.bridge.rate);
+            self.last = Some(Loop { reference, output, speed });
             self.mean_square.add(output.current);
             (Bridge { state: BridgeState::Switching, duties: output.duties }, output.current)
         } else {
@@ -287,38 +303,65 @@ impl Joint {
         Phases { a: measured.a - mean.a, b: measured.b - mean.b, c: measured.c - mean.c }
     }
 
+    /// What the observer is given. A few missing samples it bridges with its prediction; a lost encoder counts as standing where it was
+    /// last seen, because a prediction that nothing corrects runs away.
+    #[inline(always)]
+    fn encoder_sample(&mut self, measured: &Measurements) -> Option<u32> {
+        if measured.encoder_valid {
+            self.encoder = measured.encoder;
+        }
+        let lost = self.monitor.encoder_is_lost(measured.encoder_valid);
+        (measured.encoder_valid || lost).then_some(self.encoder)
+    }
+
     #[inline(always)]
     #[expect(clippy::too_many_arguments, reason = "everything that a step knows is watched")]
     fn watch(
         &mut self,
         active: &Active,
         demand: &Demand,
-        slow: &Slow,
+        derating: f32,
         measured: &Measurements,
         currents: Phases,
         observation: &crate::motor::observer::Observation,
         motion: &JointMotion,
     ) -> Faults {
+        let state = self.machine.state();
+        self.count_stale_steps(demand, state);
         if !self.offsets.are_known() {
-            return Faults::NONE;
+            let mut faults = Faults::NONE;
+            faults.set(Fault::CurrentSensor, self.offsets.refused);
+            return faults;
         }
         let mut faults = self.monitor.measurements(active, measured, currents, observation);
-        let moving = !matches!(self.machine.state(), State::SwitchOnDisabled | State::Fault);
-        if demand.sequence != self.sequence {
-            self.sequence = demand.sequence;
-            self.stale_steps = 0;
-        } else if moving {
-            self.stale_steps = self.stale_steps.saturating_add(1);
-        } else {
-            self.stale_steps = 0;
-        }
-        if self.machine.state() == State::OperationEnabled {
-            faults = faults.union(self.monitor.motion(active, motion, self.stale_steps, slow.derating));
+        // What an encoder that is lost or jumps says of the motion counts for nothing.
+        if !faults.contains(Fault::EncoderLost) && !faults.contains(Fault::EncoderJump) {
+            let moving = self.monitor.motion(active, motion, self.stale_steps, derating);
+            faults = faults.union(match state {
+                State::OperationEnabled | State::QuickStopActive | State::FaultReactionActive => moving,
+                // Refused before it gives torque.
+                State::SwitchedOn if demand.controlword.enables_operation() => moving,
+                // By hand the joint may be moved anywhere; but what caused a fault must be gone before its reset.
+                State::Fault => moving.intersection(self.latched),
+                _ => Faults::NONE,
+            });
         }
         if let Some(last) = &self.last {
             faults = faults.union(self.monitor.current_loop(active, last));
         }
         faults
+    }
+
+    /// Counts the steps without a new set-point from "ready to switch on" on. In "fault" a count that has led there stays until one comes.
+    #[inline(always)]
+    fn count_stale_steps(&mut self, demand: &Demand, state: State) {
+        self.stale_steps = match state {
+            _ if demand.sequence != self.sequence => 0,
+            State::NotReadyToSwitchOn | State::SwitchOnDisabled => 0,
+            State::Fault => self.stale_steps,
+            _ => self.stale_steps.saturating_add(1),
+        };
+        self.sequence = demand.sequence;
     }
 
     /// The state from now on. A fault that must not be braked against goes straight through the reaction to "fault".

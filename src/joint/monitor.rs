@@ -1,14 +1,20 @@
 //! Watches measurements and loop for faults; control step.
 //!
-//! Every check answers in the step in which its signal shows the fault. Four signals cannot be told from noise or from an ordinary transient
-//! in one step; for them the number of steps is a constant here.
+//! Every check answers in the step in which its signal shows the fault. Three signals cannot be told from noise or from an ordinary
+//! transient in one step; for them the number of steps is a constant here. What each check takes until the bridge is off
+//! stands in docs/faults.md, measured.
+//!
+//! The current loop is watched by the motor's own equations (see [`crate::motor::current`]): of the voltage that the bridge applied,
+//! resistance, inductance and induced voltage explain all but the errors of the constants. What is left shows an encoder that
+//! no longer tells where the rotor is, because the voltage that the rotor really induces is missing in the equations, and a phase
+//! without current, because the loop raises the voltage and nothing follows. In the second case the current misses its reference.
 
 use super::JointMotion;
 use super::active::Active;
 use super::fault::{Fault, Faults};
 use super::signals::Measurements;
 use crate::motor::field_oriented::FieldOrientedOutput;
-use crate::motor::number::greater;
+use crate::motor::number::{limited, or_zero};
 use crate::motor::observer::Observation;
 use crate::motor::phases::Phases;
 use crate::motor::transform::Dq;
@@ -17,23 +23,74 @@ use crate::motor::transform::Dq;
 pub const ENCODER_STEPS: u32 = 5;
 /// Steps for which the phase currents must fail to add up to zero: a fast current is not sampled in all phases at once.
 pub const CURRENT_SUM_STEPS: u32 = 3;
-/// Steps for which the current must miss its reference: many times the current loop's settling time.
-pub const FOLLOW_STEPS: u32 = 200;
-/// Steps for which encoder and induced voltage must contradict each other: longer than a step of the reference.
-pub const IMPLAUSIBLE_STEPS: u32 = 40;
+/// Steps for which the voltage must be unexplained: longer than the current loop takes for a step of its reference.
+pub const UNEXPLAINED_STEPS: u32 = 30;
+/// Part of a step's voltage that goes into the filter: a time constant of 8 steps.
+const FILTER: f32 = 0.125;
+/// Error of the resistance that counts as explained: copper 100 K above the temperature that the constants hold for has 39 % more.
+const RESISTANCE_ERROR: f32 = 0.5;
+/// Error of what the rotor's turning induces that counts as explained: a saturated or hot magnet, and an electrical angle that is a
+/// few degrees off, which turns it from one axis to the other.
+const INDUCED_ERROR: f32 = 0.3;
+/// The current misses its reference by this part of the current limit and ...
+const MISSED_LIMIT: f32 = 0.02;
+/// ... this part of the reference.
+const MISSED_REFERENCE: f32 = 0.25;
 /// A velocity this much above its limit is a fault.
 const OVER_SPEED: f32 = 1.2;
-/// Part of the current limit by which the current may miss its reference.
-const FOLLOW_ERROR: f32 = 0.25;
 /// Temperatures outside these are an open or shorted sensor, °C.
 const SENSOR_RANGE: (f32, f32) = (-40.0, 180.0);
 
-/// Counters of the checks that take several steps.
+/// Counts bad steps twice and good ones once against them, so that what is bad every other step is found too. A fault stays until
+/// as many good steps have come as the bad ones count.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Bucket {
+    level: u32,
+    full: bool,
+}
+
+impl Bucket {
+    /// Whether it is full after one more step: after `steps` bad ones in a row.
+    #[inline(always)]
+    fn step(&mut self, bad: bool, steps: u32) -> bool {
+        let full = steps.saturating_mul(2);
+        if bad {
+            self.level = self.level.saturating_add(2);
+            if self.level >= full {
+                self.level = full;
+                self.full = true;
+            }
+        } else {
+            self.level = self.level.saturating_sub(1);
+            self.full = self.full && self.level > 0;
+        }
+        self.full
+    }
+}
+
+/// What the checks that take several steps remember.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Monitor {
-    current_sum: u32,
-    follow: u32,
-    implausible: u32,
+    current_sum: Bucket,
+    encoder: Bucket,
+    voltage: Voltage,
+}
+
+/// Filtered signals of the current loop.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Voltage {
+    /// Voltage less what resistance and the rotor's turning explain, V.
+    unexplained: Dq,
+    /// What the rotor's turning explains, V.
+    induced: Dq,
+    /// A.
+    current: Dq,
+    /// Reference less current, A.
+    error: Dq,
+    /// Too much is unexplained.
+    steps: Bucket,
+    /// Of these steps, those in which the current missed its reference less the others.
+    missed: i32,
 }
 
 /// What the current loop did in the last step in which the bridge switched.
@@ -43,10 +100,9 @@ pub struct Loop {
     pub reference: Dq,
     /// Result.
     pub output: FieldOrientedOutput,
-    /// Electrical speed, rad/s.
+    /// Electrical speed by the encoder's last two readings, rad/s. The observer's takes some milliseconds to see a rotor stopped by
+    /// an obstacle, and what its estimate then induces would look like a fault.
     pub speed: f32,
-    /// Supply, V.
-    pub bus_voltage: f32,
 }
 
 fn magnitude(value: f32) -> f32 {
@@ -63,13 +119,20 @@ fn beyond(value: f32, limit: f32) -> bool {
     !within(value, -limit, limit)
 }
 
-/// Counts steps in a row.
-fn count(counter: &mut u32, condition: bool) -> u32 {
-    *counter = if condition { counter.saturating_add(1) } else { 0 };
-    *counter
+/// One step of a first-order filter; what is not a number counts as zero.
+#[inline(always)]
+fn filter(state: &mut Dq, value: Dq) {
+    let step = |state: f32, value: f32| state + FILTER * (limited(value, 1e4) - state);
+    *state = Dq { d: step(state.d, value.d), q: step(state.q, value.q) };
 }
 
 impl Monitor {
+    /// Whether the encoder is lost: it did not answer in several steps. Also at the start, when nothing else is watched.
+    #[inline(always)]
+    pub fn encoder_is_lost(&mut self, valid: bool) -> bool {
+        self.encoder.step(!valid, ENCODER_STEPS + 1)
+    }
+
     /// Faults of the measurements themselves, whether or not the bridge switches. `currents` are without offsets.
     #[inline(always)]
     pub fn measurements(
@@ -84,14 +147,15 @@ impl Monitor {
         let Phases { a, b, c } = currents;
         faults.set(Fault::OverCurrent, [a, b, c].iter().any(|current| beyond(*current, limits.over_current)));
         let unbalanced = beyond(a + b + c, active.current_sum_limit);
-        faults.set(Fault::CurrentSensor, count(&mut self.current_sum, unbalanced) >= CURRENT_SUM_STEPS);
+        faults.set(Fault::CurrentSensor, self.current_sum.step(unbalanced, CURRENT_SUM_STEPS));
 
         let (lowest, highest) = limits.bus_voltage;
         faults.set(Fault::OverVoltage, !within(measured.bus_voltage, 0.0, highest));
         faults.set(Fault::UnderVoltage, !within(measured.bus_voltage, lowest, f32::INFINITY));
 
-        faults.set(Fault::EncoderLost, observation.held > ENCODER_STEPS);
-        faults.set(Fault::EncoderJump, beyond(observation.innovation, active.jump_limit));
+        let lost = self.encoder.full;
+        faults.set(Fault::EncoderLost, lost);
+        faults.set(Fault::EncoderJump, !lost && beyond(observation.innovation, active.jump_limit));
 
         let implausible = |sensor: bool, value: f32| sensor && !within(value, SENSOR_RANGE.0, SENSOR_RANGE.1);
         let bridge = implausible(active.bridge.has_bridge_sensor, measured.bridge_temperature);
@@ -105,14 +169,14 @@ impl Monitor {
 
     /// Faults that only a joint in motion, or meant to be, can have.
     #[inline(always)]
-    pub fn motion(&mut self, active: &Active, motion: &JointMotion, stale_steps: u32, winding_derating: f32) -> Faults {
+    pub fn motion(&mut self, active: &Active, motion: &JointMotion, stale_steps: u32, derating: f32) -> Faults {
         let limits = &active.limits;
         let mut faults = Faults::NONE;
         faults.set(Fault::OverSpeed, beyond(motion.velocity, OVER_SPEED * limits.velocity));
         let (low, high) = limits.position;
         let margin = limits.position_margin;
         faults.set(Fault::PositionLimit, !within(motion.position, low - margin, high + margin));
-        faults.set(Fault::WindingTemperature, winding_derating <= 0.0);
+        faults.set(Fault::WindingTemperature, derating <= 0.0);
         faults.set(Fault::StaleCommand, stale_steps > active.deadline_steps);
         faults
     }
@@ -120,27 +184,72 @@ impl Monitor {
     /// Faults that the current loop's last step shows.
     #[inline(always)]
     pub fn current_loop(&mut self, active: &Active, last: &Loop) -> Faults {
-        let mut faults = Faults::NONE;
-        let Loop { reference, output, speed, bus_voltage } = last;
+        let Loop { reference, output, speed } = last;
         let (current, voltage) = (output.current, output.voltage);
+        let (resistance, inductance) = (active.resistance, active.inductance);
+        let induced = Dq { d: -inductance.q * current.q, q: inductance.d * current.d + active.flux_linkage } * *speed;
 
-        // At a speed whose induced voltage takes most of what the supply gives, a current below its reference is no fault.
-        let reach = active.field_oriented.modulator.reach(*bus_voltage);
-        let induced = speed * active.flux_linkage;
-        let has_voltage = magnitude(induced) < 0.7 * reach;
-        let error = greater(magnitude(reference.q - current.q), magnitude(reference.d - current.d));
-        let lost = has_voltage && beyond(error, FOLLOW_ERROR * active.current_limit);
-        faults.set(Fault::CurrentNotFollowed, count(&mut self.follow, lost) >= FOLLOW_STEPS);
+        let memory = &mut self.voltage;
+        filter(&mut memory.unexplained, voltage - current * resistance - induced);
+        filter(&mut memory.induced, induced);
+        filter(&mut memory.current, current);
+        filter(&mut memory.error, *reference - current);
 
-        let unexplained = voltage.q - active.resistance * current.q - induced;
-        let contradicts = !output.limited && beyond(unexplained, active.implausible_voltage);
-        faults.set(Fault::EncoderImplausible, count(&mut self.implausible, contradicts) >= IMPLAUSIBLE_STEPS);
+        // The filtered slope of the current is its distance from the filtered current over the filter's time constant.
+        let slope = FILTER * active.bridge.rate;
+        let left = Dq {
+            d: memory.unexplained.d - inductance.d * slope * (or_zero(current.d) - memory.current.d),
+            q: memory.unexplained.q - inductance.q * slope * (or_zero(current.q) - memory.current.q),
+        };
+        // A wrong resistance shows along the current only: across it the bound is close.
+        let turning = INDUCED_ERROR * (magnitude(memory.induced.d) + magnitude(memory.induced.q));
+        let bound =
+            |current: f32| active.implausible_voltage + turning + RESISTANCE_ERROR * resistance * magnitude(current);
+        let contradicts = beyond(left.d, bound(memory.current.d)) || beyond(left.q, bound(memory.current.q));
+        let found = memory.steps.step(contradicts, UNEXPLAINED_STEPS);
+
+        let permitted = MISSED_LIMIT * active.current_limit + MISSED_REFERENCE * magnitude(reference.q);
+        let missed = memory.error.norm_squared() > permitted * permitted;
+        memory.missed = match (contradicts, missed) {
+            (true, true) => memory.missed.saturating_add(1),
+            (true, false) => memory.missed.saturating_sub(1),
+            (false, _) if memory.steps.level == 0 => 0,
+            (false, _) => memory.missed,
+        };
+        let mut faults = Faults::NONE;
+        faults.set(Fault::CurrentNotFollowed, found && memory.missed > 0);
+        faults.set(Fault::EncoderImplausible, found && memory.missed <= 0);
         faults
     }
 
     /// The bridge is off: the current loop's checks start anew.
     pub fn loop_is_off(&mut self) {
-        self.follow = 0;
-        self.implausible = 0;
+        self.voltage = Voltage::default();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bucket_fills_in_a_row_or_every_other_step_and_empties_in_twice_the_time() {
+        let mut row = Bucket::default();
+        assert_eq!([true; 4].map(|bad| row.step(bad, 3)), [false, false, true, true]);
+        let good: Vec<bool> = (0..8).map(|_| row.step(false, 3)).collect();
+        assert_eq!(good, [true, true, true, true, true, false, false, false]);
+
+        let mut flickering = Bucket::default();
+        let found = (1..100).find(|n| flickering.step(n % 2 == 1, 3));
+        assert_eq!(found, Some(9));
+        let mut rare = Bucket::default();
+        assert!((1..1000).all(|n| !rare.step(n % 3 == 0, 3)), "one in three is not enough");
+    }
+
+    #[test]
+    fn a_lost_encoder_shows_at_the_step_after_those_that_are_bridged() {
+        let mut monitor = Monitor::default();
+        let lost = (1..100).find(|_| monitor.encoder_is_lost(false));
+        assert_eq!(lost, Some(ENCODER_STEPS + 1));
     }
 }
