@@ -64,7 +64,9 @@ impl MotionLaw {
         };
         let limit = active.limits.torque * derating;
         self.integral = limited(self.integral, limit);
-        Wanted { torque: bounded(or_zero(torque) + or_zero(command.torque), limit, active, motion), velocity }
+        // Two opposite infinities add up to no number.
+        let torque = or_zero(or_zero(torque) + or_zero(command.torque));
+        Wanted { torque: bounded(torque, limit, active, motion), velocity }
     }
 
     /// One step of braking: the velocity comes down along the quick stop's ramp.
