@@ -20,11 +20,13 @@ pub mod friction_feedforward;
 pub mod history;
 pub mod monitor;
 pub mod motion_law;
+mod offsets;
 mod signals;
 pub mod state_machine;
 
 pub use active::{Active, JointMotion};
 pub use command::{Command, Demand, Mode};
+pub use offsets::OFFSET_STEPS;
 pub use signals::{Bridge, BridgeState, Measurements};
 
 use crate::motor::angle::{STEPS, TAU};
@@ -39,12 +41,9 @@ use friction_feedforward::{Compensated, FrictionFeedforward};
 use history::{History, Snapshot};
 use monitor::{Loop, Monitor};
 use motion_law::{MotionLaw, Wanted};
+use offsets::Offsets;
 use state_machine::{Events, State, StateMachine};
 
-/// Control steps over which the current sensors' offsets are measured at the start.
-pub const OFFSET_STEPS: u32 = 1024;
-/// Largest offset that a sound current sensor has, as a part of the over-current limit.
-const LARGEST_OFFSET: f32 = 0.25;
 /// Speed below which a braking joint counts as standing, as a part of the velocity limit.
 const STANDING: f32 = 0.01;
 /// Control steps for which it must stand before the bridge switches off.
@@ -124,47 +123,11 @@ pub struct Joint {
     telemetry: Telemetry,
 }
 
-/// Offsets of the current sensors: the mean of the first steps, in which no current flows.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Offsets {
-    sum: Phases,
-    steps: u32,
-    mean: Phases,
-    /// The last mean was beyond what a sound sensor has.
-    refused: bool,
-}
-
 /// How long a joint has been braking and standing.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Braking {
     steps: u32,
     standing: u32,
-}
-
-impl Offsets {
-    const fn are_known(&self) -> bool {
-        self.steps >= OFFSET_STEPS
-    }
-
-    /// Adds a step's currents; offsets beyond what a sound sensor has are not taken, and the measurement begins anew.
-    fn add(&mut self, measured: Phases, largest: f32) {
-        let add = |sum: f32, value: f32| sum + or_zero(limited(value, 1e3));
-        self.sum =
-            Phases { a: add(self.sum.a, measured.a), b: add(self.sum.b, measured.b), c: add(self.sum.c, measured.c) };
-        self.steps += 1;
-        if self.steps < OFFSET_STEPS {
-            return;
-        }
-        const SHARE: f32 = 1.0 / OFFSET_STEPS as f32;
-        let mean = Phases { a: self.sum.a * SHARE, b: self.sum.b * SHARE, c: self.sum.c * SHARE };
-        let sound = |value: f32| value <= largest && value >= -largest;
-        if sound(mean.a) && sound(mean.b) && sound(mean.c) {
-            self.mean = mean;
-            self.refused = false;
-        } else {
-            *self = Self { refused: true, ..Self::default() };
-        }
-    }
 }
 
 impl Joint {
@@ -297,10 +260,9 @@ impl Joint {
     #[inline(always)]
     fn without_offsets(&mut self, active: &Active, measured: Phases) -> Phases {
         if !self.offsets.are_known() {
-            self.offsets.add(measured, LARGEST_OFFSET * active.limits.over_current);
+            self.offsets.add(measured, active.limits.over_current);
         }
-        let mean = self.offsets.mean;
-        Phases { a: measured.a - mean.a, b: measured.b - mean.b, c: measured.c - mean.c }
+        self.offsets.taken_from(measured)
     }
 
     /// What the observer is given. A few missing samples it bridges with its prediction; a lost encoder counts as standing where it was
@@ -330,7 +292,7 @@ impl Joint {
         self.count_stale_steps(demand, state);
         if !self.offsets.are_known() {
             let mut faults = Faults::NONE;
-            faults.set(Fault::CurrentSensor, self.offsets.refused);
+            faults.set(Fault::CurrentSensor, self.offsets.are_refused());
             return faults;
         }
         let mut faults = self.monitor.measurements(active, measured, currents, observation);

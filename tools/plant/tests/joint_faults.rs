@@ -9,7 +9,7 @@ use joint_firmware::joint::state_machine::{Controlword, State};
 use plant::actuator::{Channel, Failure, Fault as Broken, Phase};
 use plant::virtual_joint::Setup;
 use rig::table::{Reset, documented, documented_faults};
-use rig::{Rig, position, reference, torque, velocity};
+use rig::{Rig, break_down, mend, position, reference, reset, torque, velocity};
 
 /// What the motor's torque may exceed its limit by: gain errors of the current sensors and overshoot of the current loop.
 const TORQUE_TOLERANCE: f64 = 1.05;
@@ -36,14 +36,6 @@ fn limited(change: impl Fn(&mut Limits)) -> Rig {
     let mut rig = Rig::enabled(parameters, &setup);
     rig.follow(torque(0.0), 0.05);
     rig
-}
-
-fn break_down(rig: &mut Rig, what: Broken) {
-    rig.joint.actuator_mut().inject(what).unwrap();
-}
-
-fn mend(rig: &mut Rig) {
-    rig.joint.actuator_mut().clear_faults();
 }
 
 /// A fault from its cause to the joint's return into service. `shows` tells whether the signals of the last step show the cause.
@@ -105,14 +97,6 @@ fn runs_its_course(
     rig.silent = false;
     rig.enable();
     rig.follow(torque(0.0), 0.05);
-}
-
-fn reset(rig: &mut Rig) {
-    rig.demand.controlword = Controlword::DISABLE_VOLTAGE;
-    rig.step();
-    rig.demand.controlword = Controlword::FAULT_RESET;
-    rig.step();
-    rig.demand.controlword = Controlword::DISABLE_VOLTAGE;
 }
 
 /// A fault that `what` causes from the next step on, in every motion.
@@ -214,15 +198,6 @@ fn encoder_lost() {
 }
 
 #[test]
-fn an_encoder_that_never_answers_is_lost_before_anything_can_be_enabled() {
-    let parameters = reference();
-    let mut rig = Rig::off(parameters, &Setup::of(&parameters));
-    break_down(&mut rig, Broken::Sensor(Channel::Encoder, Failure::Open));
-    rig.run(0.1);
-    assert_eq!((rig.state(), rig.latched()), (State::Fault, vec![Fault::EncoderLost]));
-}
-
-#[test]
 fn encoder_jump() {
     is_caused_in_motion_and_at_rest(Fault::EncoderJump, Broken::Sensor(Channel::Encoder, Failure::Offset(0.1)));
 }
@@ -311,16 +286,6 @@ fn winding_temperature() {
 }
 
 #[test]
-fn a_joint_whose_winding_is_too_hot_is_refused_before_it_gives_torque() {
-    let parameters = reference();
-    let mut setup = Setup::of(&parameters);
-    setup.configuration.limits.bridge_temperature = 150.0;
-    let mut rig = Rig::off_at(parameters, &setup, 140.0);
-    assert!(rig.joint.enable().is_err());
-    assert_eq!((rig.state(), rig.latched()), (State::Fault, vec![Fault::WindingTemperature]));
-}
-
-#[test]
 fn temperature_sensor() {
     for channel in [Channel::WindingTemperature, Channel::BridgeTemperature] {
         is_caused_in_motion_and_at_rest(Fault::TemperatureSensor, Broken::Sensor(channel, Failure::Open));
@@ -334,19 +299,6 @@ fn stale_command() {
         let silence = |rig: &mut Rig| rig.silent = true;
         runs_its_course(rig, Fault::StaleCommand, silence, late, |rig| rig.silent = false);
     }
-}
-
-#[test]
-fn a_joint_without_set_points_is_refused_before_it_gives_torque() {
-    let parameters = reference();
-    let mut rig = Rig::enabled(parameters, &Setup::of(&parameters));
-    rig.demand.controlword = Controlword::SWITCH_ON;
-    rig.demand.command = torque(50.0);
-    rig.silent = true;
-    rig.run(0.2);
-    assert_eq!(rig.state(), State::SwitchedOn);
-    rig.demand.controlword = Controlword::ENABLE_OPERATION;
-    assert_eq!((rig.step(), rig.latched()), (State::Fault, vec![Fault::StaleCommand]));
 }
 
 #[test]

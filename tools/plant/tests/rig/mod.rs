@@ -7,7 +7,7 @@ use joint_firmware::joint::fault::{Fault, Faults};
 use joint_firmware::joint::state_machine::{Controlword, State};
 use joint_firmware::joint::{BridgeState, Command, Demand, Mode};
 use plant::VirtualJoint;
-use plant::actuator::ActuatorParameters;
+use plant::actuator::{ActuatorParameters, Fault as Broken};
 use plant::virtual_joint::Setup;
 
 /// Control steps between two set-points: 1 ms.
@@ -169,4 +169,23 @@ impl Rig {
             !self.latched_set().is_empty()
         })
     }
+}
+
+/// Something breaks, and stays so.
+pub fn break_down(rig: &mut Rig, what: Broken) {
+    rig.joint.actuator_mut().inject(what).unwrap();
+}
+
+/// Everything is in order again.
+pub fn mend(rig: &mut Rig) {
+    rig.joint.actuator_mut().clear_faults();
+}
+
+/// Acknowledges a fault.
+pub fn reset(rig: &mut Rig) {
+    rig.demand.controlword = Controlword::DISABLE_VOLTAGE;
+    rig.step();
+    rig.demand.controlword = Controlword::FAULT_RESET;
+    rig.step();
+    rig.demand.controlword = Controlword::DISABLE_VOLTAGE;
 }
