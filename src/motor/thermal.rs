@@ -9,8 +9,9 @@
 //! R(T)        = R_25 (1 + 0.00393 (T - 25 °C))                      copper
 //! ```
 //!
-//! A sensor on the winding, where the board has one, pulls both nodes towards it slowly: it corrects what the model has wrong, start and
-//! surroundings first of all, and the model gives what the sensor is too slow for. The hotter of the two counts.
+//! A sensor on the winding, where the board has one, pulls both nodes up towards it slowly: it corrects what the model has too cold, start and
+//! surroundings first of all, and the model gives what the sensor is too slow for. The hotter of the two counts. It never pulls them
+//! down: a sensor that sticks while the motor is cold looks just like good cooling, and would take the protection away.
 
 use super::number::{greater, or_zero, within};
 use super::setting::{SettingError, check};
@@ -148,7 +149,7 @@ impl WindingTemperature {
         let plausible = sensor >= PLAUSIBLE_SENSOR.0 && sensor <= PLAUSIBLE_SENSOR.1;
         self.sensor = plausible.then_some(sensor);
         let correction = match self.sensor {
-            Some(sensor) => self.period / s.correction_time * (sensor - self.winding.temperature),
+            Some(sensor) => self.period / s.correction_time * greater(sensor - self.winding.temperature, 0.0),
             None => 0.0,
         };
         self.winding.add(self.period * (loss - into_housing) / s.winding_capacity + correction);
@@ -246,6 +247,14 @@ mod tests {
         assert!((wrong.temperature() - 25.0).abs() < 0.1, "{wrong:?}");
         for broken in [-273.0, 1000.0, f32::INFINITY] {
             assert_eq!(after(10, 25.0, 0.0, broken), after(10, 25.0, 0.0, f32::NAN));
+        }
+    }
+
+    #[test]
+    fn a_sensor_that_sticks_cold_takes_no_protection_away() {
+        for seconds in [10, 60, 600] {
+            let (stuck, none) = (after(seconds, 25.0, 100.0, 25.0), after(seconds, 25.0, 100.0, f32::NAN));
+            assert_eq!((stuck.temperature(), stuck.derating()), (none.temperature(), none.derating()));
         }
     }
 
