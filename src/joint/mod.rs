@@ -4,6 +4,7 @@
 //! virtual joint. Everything it needs comes in: it reads no clock, no register and no global. In the order of a step:
 //!
 //!  - [`signals`]: what the board measures and what it is told;
+//!  - `offsets`: the current sensors' offsets, from the first steps;
 //!  - [`monitor`]: faults, and [`fault`]: what they lead to;
 //!  - [`state_machine`]: whether the joint may move;
 //!  - [`command`], [`motion_law`]: from a set-point to a torque within every limit;

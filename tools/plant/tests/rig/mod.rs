@@ -138,6 +138,10 @@ impl Rig {
         self.joint.actuator().state().joint.motor_torque
     }
 
+    pub fn position(&self) -> f64 {
+        self.joint.actuator().state().joint.position
+    }
+
     pub fn velocity(&self) -> f64 {
         self.joint.actuator().state().joint.velocity
     }
