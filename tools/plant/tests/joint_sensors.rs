@@ -153,6 +153,26 @@ fn a_joint_whose_encoder_stuck_at_rest_stays_within_one_and_a_half_electrical_tu
     }
 }
 
+/// Half the speed limit, then the encoder sticks. Which of the two names it gets depends on how well the current follows.
+#[test]
+fn an_encoder_that_sticks_in_motion_is_found_on_random_joints() {
+    let mut steps = vec![];
+    for seed in 0..40 {
+        let parameters = ActuatorParameters::randomised(seed).aligned();
+        let mut rig = Rig::enabled(parameters, &Setup::of(&parameters));
+        rig.follow(velocity(0.5 * parameters.joint.limits.speed as f32), 0.3);
+        rig.worst_torque = 0.0;
+        break_down(&mut rig, Broken::Sensor(Channel::Encoder, Failure::Stuck));
+        steps.extend(rig.steps_to_fault(8_000));
+        let known = [Fault::EncoderImplausible, Fault::CurrentNotFollowed];
+        assert!(rig.latched().iter().all(|fault| known.contains(fault)), "seed {seed}: {:?}", rig.latched());
+        assert!(rig.worst_torque < 1.3 * rig.torque_limit(), "seed {seed}: {} Nm", rig.worst_torque);
+    }
+    steps.sort_unstable();
+    println!("{steps:?}");
+    assert!(steps.len() >= 39 && steps[20] <= 40 && steps[36] <= 150, "{steps:?}");
+}
+
 #[test]
 fn a_current_sensor_that_stuck_at_rest_is_found_with_the_first_motion() {
     for channel in [Channel::CurrentA, Channel::CurrentB, Channel::CurrentC] {
