@@ -3,7 +3,7 @@
 //! [`Joint::control_step`] runs once a PWM period in the board's highest-priority interrupt and, unchanged, on the host against a
 //! virtual joint. Everything it needs comes in: it reads no clock, no register and no global. In the order of a step:
 //!
-//!  - [`signals`]: what the board measures and what it is told;
+//!  - `signals`: what the board measures and what it is told;
 //!  - `offsets`: the current sensors' offsets, from the first steps;
 //!  - [`monitor`]: faults, and [`fault`]: what they lead to;
 //!  - [`state_machine`]: whether the joint may move;
