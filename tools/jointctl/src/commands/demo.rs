@@ -1,4 +1,4 @@
-//! `jointctl demo`: the whole pipeline on a virtual joint that nobody has to own.
+//! `jointctl demo`: the whole round on a virtual joint that nobody has to own: excite, record, fit, and move with the image.
 
 use super::CommandError;
 use super::fit::{Choices, print_summary, write};
@@ -6,19 +6,25 @@ use crate::dataset::prepare;
 use crate::fit::fit;
 use crate::output::{OutputFile, write_directory};
 use crate::progress::{Progress, Terminal};
+use crate::simulation::page::{Shown, page};
+use crate::simulation::recording::{DESCRIPTION, record};
+use crate::simulation::table::{Line, table};
+use crate::simulation::{self, Choices as RunChoices, Run, Scenario, SimulationError, judge};
 use clap::Args;
-use plant::record::USUAL_SAMPLE_PERIOD;
-use plant::{Excitation, JointParameters, Log, record};
-use std::fmt::Write;
+use joint_firmware::compensation::Request;
+use joint_firmware::friction::FrictionModel;
+use plant::ActuatorParameters;
+use plant::virtual_joint::Setup;
+use rayon::prelude::*;
 use std::path::PathBuf;
 
-/// Describes the log as a user would describe his own.
-const DESCRIPTION: &str = include_str!("demo.toml");
+/// What the joint is put through before and after.
+const SCENARIOS: [Scenario; 2] = [Scenario::SlowReversal, Scenario::PayloadChange];
 
 /// Arguments of `demo`.
 #[derive(Debug, Args)]
 pub struct Demo {
-    /// Folder for the log, its description, image, report and figures
+    /// Folder for the log, its description, image, reports and figures
     #[arg(long, value_name = "DIR", default_value = "demo")]
     out: PathBuf,
     /// Draw the joint at random, from this seed, instead of the reference joint
@@ -34,31 +40,76 @@ impl Demo {
     pub fn run(&self) -> Result<(), CommandError> {
         let options = self.choices.options()?;
         let progress = Terminal::new();
-        progress.stage("record the virtual joint");
-        let joint = self.joint.map_or_else(JointParameters::reference, JointParameters::randomised);
-        let excitation = Excitation::for_joint(&joint, options.seed)?;
-        let recording = record(&joint, &excitation, options.seed, USUAL_SAMPLE_PERIOD)?;
-        let files = [OutputFile::new("log.csv", csv(&recording.log)), OutputFile::new("dataset.toml", DESCRIPTION)];
-        write_directory(&self.out, &files)?;
+        progress.stage("excite the virtual joint and record it");
+        let plant = self.joint.map_or_else(ActuatorParameters::reference, ActuatorParameters::randomised).aligned();
+        let setup = Setup::of(&plant);
+        let log = record(&plant, &setup, options.seed)?;
+        write_directory(&self.out, &[OutputFile::new("log.csv", log), OutputFile::new("dataset.toml", DESCRIPTION)])?;
         progress.stage("load and clean");
         let mut prepared = prepare(&self.out.join("dataset.toml"))?;
         let fitted = fit(&mut prepared, &options, &progress)?;
+        progress.stage("move without and with the image");
+        let model = FrictionModel::new(&fitted.image.friction, setup.bridge.rate as u32);
+        let moved = moved(&plant, &setup, &model, options.seed)?;
+        let lines: Vec<Line> = moved.iter().map(|moved| moved.line.clone()).collect();
         progress.stage("write");
         write(&fitted, &self.out)?;
+        let shown: Vec<Shown> = SCENARIOS.iter().map(|&scenario| shown(scenario, &moved)).collect();
+        let page = page("The virtual joint without and with compensation", &lines, "", &shown)?;
+        write_directory(&self.out, &[OutputFile::new("loop.html", page)])?;
         progress.finish();
         print_summary(&prepared, &fitted, &self.out);
+        println!("\nIn the loop, without and with the image:");
+        print!("{}", table(&lines));
+        println!("Written: {}", self.out.join("loop.html").display());
         Ok(())
     }
 }
 
-/// The log as a table, with the digits that a drive would send.
-fn csv(log: &Log) -> String {
-    let mut text = String::from("run,t_s,position_rad,velocity_rad_s,torque_Nm,temperature_C\n");
-    for i in 0..log.len() {
-        let (run, time, temperature) = (log.run[i], log.time[i], log.temperature[i]);
-        let (position, velocity, torque) = (log.position[i], log.velocity[i], log.measured_torque[i]);
-        // Writing to a string cannot fail.
-        let _ = writeln!(text, "{run},{time:.4},{position:.6},{velocity:.5},{torque:.4},{temperature:.1}");
+/// A part of a scenario that was run.
+struct Moved {
+    scenario: Scenario,
+    line: Line,
+    run: Run,
+}
+
+/// Every part of every scenario, without and with the model.
+fn moved(
+    plant: &ActuatorParameters,
+    setup: &Setup,
+    model: &FrictionModel,
+    seed: u64,
+) -> Result<Vec<Moved>, SimulationError> {
+    let standstill = f64::from(setup.configuration.compensation.standstill_velocity);
+    let mut tasks = Vec::new();
+    for scenario in SCENARIOS {
+        let parts = scenario.parts(plant, seed, None)?;
+        let several = parts.len() > 1;
+        for part in parts {
+            for (request, model) in [(Request::Off, None), (Request::PhysicalAndNetwork, Some(model))] {
+                tasks.push((scenario, several, part.clone(), request, model));
+            }
+        }
     }
-    text
+    let one = |(scenario, several, part, request, model): &(Scenario, bool, simulation::Part, _, Option<_>)| {
+        let choices = RunChoices { seed, ..RunChoices::default() };
+        let run = simulation::run(part, &setup.compensating(*request), *model, &choices)?;
+        let line = Line {
+            scenario: scenario.name(),
+            part: several.then_some(part.name),
+            compensated: model.is_some(),
+            judgement: judge([(part.tracks, &run.log)], standstill)?,
+            ending: run.ending,
+        };
+        Ok(Moved { scenario: *scenario, line, run })
+    };
+    tasks.par_iter().map(one).collect()
+}
+
+fn shown(scenario: Scenario, moved: &[Moved]) -> Shown<'_> {
+    let logs = |compensated: bool| {
+        let of_it = moved.iter().filter(|moved| moved.scenario == scenario && moved.line.compensated == compensated);
+        of_it.map(|moved| &moved.run.log).collect()
+    };
+    Shown { name: scenario.name(), off: logs(false), on: logs(true) }
 }

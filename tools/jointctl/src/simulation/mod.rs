@@ -3,6 +3,7 @@
 //! - [`motion`]: what a joint is asked to do over time
 //! - [`scenario`]: the named scenarios, each in one or several parts
 //! - [`mod@run`]: a part run at the control rate, commanded as over a bus, recorded
+//! - [`recording`]: the log that a user would record, for identification
 //! - [`log`]: what is recorded
 //! - [`mod@judge`]: how well the joint did
 //! - [`table`], [`page`]: the judgements for a terminal, the runs as a page with figures
@@ -11,6 +12,7 @@ pub mod judge;
 pub mod log;
 pub mod motion;
 pub mod page;
+pub mod recording;
 pub mod run;
 pub mod scenario;
 pub mod table;
@@ -33,6 +35,14 @@ pub enum SimulationError {
     /// No excitation within the joint's limits.
     #[error(transparent)]
     Excitation(#[from] crate::excite::ExciteError),
+    /// A recording that a fault ended.
+    #[error("run {run} of the recording {reason}")]
+    Recording {
+        /// Number of the run, from 0.
+        run: usize,
+        /// When, and which fault.
+        reason: String,
+    },
     /// A torque that is not a number.
     #[error(transparent)]
     Metrics(#[from] crate::metrics::MetricsError),

@@ -82,7 +82,40 @@ pub fn run(
     friction: Option<&FrictionModel>,
     choices: &Choices,
 ) -> Result<Run, SimulationError> {
-    let mut joint = VirtualJoint::new(part.plant, setup, part.temperature, choices.seed)?;
+    let mut log = Log::default();
+    let mut ramp = None;
+    let (ending, simulated) = drive(part, setup, friction, choices.seed, |joint, step| {
+        let period = joint.period();
+        let telemetry = joint.joint().telemetry();
+        let velocity = f64::from(telemetry.wanted.velocity.unwrap_or(0.0));
+        let ramped = ramp.get_or_insert(f64::from(telemetry.motion.position));
+        *ramped += velocity * period;
+        let per_row = every(choices.sample_period, period);
+        if (step + 1) % per_row == 0 {
+            let time = (step + 1) as f64 * period;
+            let (position, velocity) = match part.motion.reference(time) {
+                Some(reference) => (reference.position, reference.velocity),
+                None => (*ramped, velocity),
+            };
+            log.rows.push(Row { time, reference_position: position, reference_velocity: velocity, ..row(joint) });
+        }
+    })?;
+    Ok(Run { log, ending, simulated })
+}
+
+/// Drives a joint through a part; `look` sees it after every control step, counted from 0. How it ended, and the time that was
+/// simulated, with the joint's start, s.
+///
+/// # Errors
+/// What plant or firmware refuse, and a joint that cannot be enabled.
+pub fn drive(
+    part: &Part,
+    setup: &Setup,
+    friction: Option<&FrictionModel>,
+    seed: u64,
+    mut look: impl FnMut(&VirtualJoint, u64),
+) -> Result<(Ending, f64), SimulationError> {
+    let mut joint = VirtualJoint::new(part.plant, setup, part.temperature, seed)?;
     joint.actuator_mut().set_contact(part.contact)?;
     joint.set_friction(friction.cloned());
     joint.enable()?;
@@ -92,15 +125,10 @@ pub fn run(
         stiffness: part.softness * part.softness * f64::from(gains.stiffness),
         damping: part.softness * f64::from(gains.damping),
     };
-
     let period = joint.period();
-    let every = |time: f64| (time / period).round().max(1.0) as u64;
-    let (per_command, per_row) = (every(1.0 / COMMAND_RATE), every(choices.sample_period));
+    let per_command = every(1.0 / COMMAND_RATE, period);
     let steps = (part.motion.duration() / period).round() as u64;
     let mut demand = Demand { controlword: Controlword::ENABLE_OPERATION, ..Demand::default() };
-    let mut log = Log { rows: Vec::with_capacity((steps / per_row + 1) as usize) };
-    let mut ramp = f64::from(joint.joint().telemetry().motion.position);
-    let mut ending = Ending::Whole;
     for step in 0..steps {
         if step % per_command == 0 {
             let time = step as f64 * period + 0.5 / COMMAND_RATE;
@@ -109,23 +137,20 @@ pub fn run(
             // Zero is what the joint has seen before.
             demand.sequence = demand.sequence.wrapping_add(1);
         }
-        let telemetry = joint.step(&demand, 0.0);
-        let (state, velocity) = (telemetry.state, telemetry.wanted.velocity);
-        ramp += f64::from(velocity.unwrap_or(0.0)) * period;
-        let time = (step + 1) as f64 * period;
-        if (step + 1) % per_row == 0 {
-            let (position, velocity) = match part.motion.reference(time) {
-                Some(reference) => (reference.position, reference.velocity),
-                None => (ramp, f64::from(velocity.unwrap_or(0.0))),
-            };
-            log.rows.push(Row { time, reference_position: position, reference_velocity: velocity, ..row(&joint) });
-        }
+        let state = joint.step(&demand, 0.0).state;
+        look(&joint, step);
         if state != State::OperationEnabled {
-            ending = Ending::Stopped { time, state, faults: joint.joint().latched_faults() };
-            break;
+            let time = (step + 1) as f64 * period;
+            let ending = Ending::Stopped { time, state, faults: joint.joint().latched_faults() };
+            return Ok((ending, joint.time()));
         }
     }
-    Ok(Run { log, ending, simulated: joint.time() })
+    Ok((Ending::Whole, joint.time()))
+}
+
+/// Control steps in a time, at least one.
+pub(super) fn every(time: f64, period: f64) -> u64 {
+    (time / period).round().max(1.0) as u64
 }
 
 /// What the joint knows and what is true, after a control step.
