@@ -22,7 +22,8 @@ pub struct JointChoice {
 }
 
 impl JointChoice {
-    /// Reads what is named. Without a configuration, the encoder is taken as aligned; with one, what it says of the encoder counts.
+    /// Reads what is named. Without a configuration, the encoder is taken as aligned; with one, what it says of the
+    /// encoder counts.
     pub fn read(&self) -> Result<(ActuatorParameters, Setup), CommandError> {
         let plant = match (&self.plant, self.joint) {
             (Some(path), _) => read_plant(path)?,

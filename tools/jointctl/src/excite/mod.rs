@@ -1,12 +1,12 @@
-//! Excitation for identification: a finite Fourier series whose samples tell inertia, gravity and friction apart as well as the
-//! joint's limits permit; host.
+//! Excitation for identification: a finite Fourier series whose samples tell inertia, gravity and friction apart as
+//! well as the joint's limits permit; host.
 //!
-//! The form of the series is that of the non-symmetric-Coulomb paper (002, section III-B), see [`plant::fourier`]; it fades in and
-//! out, so that it begins and ends at rest. It is about the middle of the position limits.
+//! The form of the series is that of the non-symmetric-Coulomb paper (002, section III-B), see [`plant::fourier`]; it
+//! fades in and out, so that it begins and ends at rest. It is about the middle of the position limits.
 //!
 //! - [`regressor`]: what the samples tell apart, as a condition number
-//! - [`mod@optimise`]: the search for a series
-//! - [`file`]: a series as coefficients and as a table of samples
+//! - `optimise`: the search for a series
+//! - [`mod@file`]: a series as coefficients and as a table of samples
 //! - [`check`]: whether a table keeps the limits, and its condition number
 
 pub mod check;

@@ -1,9 +1,9 @@
 //! The search for a series: the best of many drawn at random, each improved by a pattern search; host.
 //!
-//! The condition number has many minima and kinks (Coulomb friction has a sign), so nothing is differentiated: coefficients are
-//! changed one at a time by a step that halves when no change helps (Hooke and Jeeves, "Direct search", J. ACM 8(2), 1961, its
-//! exploratory moves). After every change the series is scaled to touch its tightest bound. There is no claim that the minimum
-//! is global.
+//! The condition number has many minima and kinks (Coulomb friction has a sign), so nothing is differentiated:
+//! coefficients are changed one at a time by a step that halves when no change helps (Hooke and Jeeves, "Direct
+//! search", J. ACM 8(2), 1961, its exploratory moves). After every change the series is scaled to touch its tightest
+//! bound. There is no claim that the minimum is global.
 
 use super::{Bounds, Excitation, ExciteError, regressor::Regressor, within};
 use plant::excitation::Reference;

@@ -1,9 +1,10 @@
 //! What samples tell apart: the regressor of the joint's linear model and its condition number; host.
 //!
-//! torque = inertia a + gravity_s sin q + gravity_c cos q + Coulomb sign(v) + viscous v + offset. Each column is measured in
-//! units of its bound (acceleration over the largest acceleration, velocity over the largest velocity), so that the condition
-//! number has no unit and a timid motion counts as a worse one. With singular values s, the error of a parameter from noise in
-//! the torque is at most in proportion to 1 / s_min; the condition number is s_max / s_min.
+//! torque = inertia a + gravity_s sin q + gravity_c cos q + Coulomb sign(v) + viscous v + offset. Each column is
+//! measured in units of its bound (acceleration over the largest acceleration, velocity over the largest velocity), so
+//! that the condition number has no unit and a timid motion counts as a worse one. With singular values s, the error
+//! of a parameter from noise in the torque is at most in proportion to 1 / s_min; the condition number is s_max /
+//! s_min.
 
 use super::Bounds;
 use nalgebra::SMatrix;
@@ -44,8 +45,8 @@ impl Regressor {
         }
     }
 
-    /// Condition number of the regressor; infinite where the samples leave a parameter undetermined. Exact up to 1e7: it is the
-    /// root of that of the Gram matrix.
+    /// Condition number of the regressor; infinite where the samples leave a parameter undetermined. Exact up to 1e7:
+    /// it is the root of that of the Gram matrix.
     #[must_use]
     pub fn condition_number(&self) -> f64 {
         let mut gram = self.gram;

@@ -1,7 +1,7 @@
 //! The configuration's form in a file: the firmware's own records, key by key; host.
 //!
-//! The firmware knows nothing of files, so serde is told here what its records look like; a field that is added to one of
-//! them and not here does not compile.
+//! The firmware knows nothing of files, so serde is told here what its records look like; a field that is added to one
+//! of them and not here does not compile.
 
 use joint_firmware::compensation::Request;
 use joint_firmware::joint::configuration::{

@@ -1,11 +1,11 @@
 //! The configuration of a joint as text, `joint.toml`; host.
 //!
-//! Every value stands in the file, none has a default: what a joint is and may do is nothing to be guessed. Unknown keys are
-//! refused, missing ones named, and the whole is checked by the same [`Configuration::prepare`] and the same thermal model that
-//! a joint starts with. Reading and writing lose no bit.
+//! Every value stands in the file, none has a default: what a joint is and may do is nothing to be guessed. Unknown
+//! keys are refused, missing ones named, and the whole is checked by the same [`Configuration::prepare`] and the same
+//! thermal model that a joint starts with. Reading and writing lose no bit.
 //!
 //! - [`fields`]: what each key means, its unit and its range, as the file's comments say it
-//! - [`mirror`]: the record's form in the file
+//! - `mirror`: the record's form in the file
 
 pub mod fields;
 mod mirror;

@@ -1,9 +1,9 @@
-//! How well a joint did: where it was against where it should have been, and the torque that arrived against the torque that was
-//! asked for; host.
+//! How well a joint did: where it was against where it should have been, and the torque that arrived against the
+//! torque that was asked for; host.
 //!
-//! The relative torque error is equation 11 of the mobile-robot paper (001), in the loop: |asked - arrived| / |asked|, where
-//! "asked" is the command before compensation and "arrived" is what the motor gives less what friction takes. As offline
-//! ([`crate::metrics`]), samples below a tenth of the RMS of what was asked count in no quotient.
+//! The relative torque error is equation 11 of the mobile-robot paper (001), in the loop: |asked - arrived| / |asked|,
+//! where "asked" is the command before compensation and "arrived" is what the motor gives less what friction takes. As
+//! offline ([`crate::metrics`]), samples below a tenth of the RMS of what was asked count in no quotient.
 
 use super::log::Log;
 use crate::metrics::{Metrics, MetricsError, RELATIVE_FLOOR, metrics, relative_floor};
@@ -21,8 +21,8 @@ pub struct Judgement {
     pub torque_in_motion: Option<Metrics>,
 }
 
-/// Judges runs together. A run with `tracks` false has a reference that cannot be reached, because something is in its way.
-/// The joint was to move where the reference is faster than `standstill` (rad/s).
+/// Judges runs together. A run with `tracks` false has a reference that cannot be reached, because something is in its
+/// way. The joint was to move where the reference is faster than `standstill` (rad/s).
 ///
 /// # Errors
 /// A torque that is not a number.

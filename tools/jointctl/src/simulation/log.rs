@@ -95,8 +95,8 @@ pub struct Log {
     pub rows: Vec<Row>,
 }
 
-/// Several logs as one table of comma-separated values; the first column says which part a row belongs to. What is not a
-/// number is left empty.
+/// Several logs as one table of comma-separated values; the first column says which part a row belongs to. What is not
+/// a number is left empty.
 #[must_use]
 pub fn csv<'a>(parts: impl IntoIterator<Item = (&'a str, &'a Log)>) -> String {
     let mut text = String::from("part");

@@ -1,6 +1,7 @@
 //! The named scenarios: which motions a joint runs, at which temperature, with which payload, against what; host.
 //!
-//! All sizes follow from the joint's own limits of travel and speed, so that every joint has its version of each scenario.
+//! All sizes follow from the joint's own limits of travel and speed, so that every joint has its version of each
+//! scenario.
 
 use super::SimulationError;
 use super::motion::{Led, Motion, Sweep, Targets};

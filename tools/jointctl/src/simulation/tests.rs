@@ -25,7 +25,7 @@ fn plain() -> ActuatorParameters {
     plant
 }
 
-/// Coulomb, viscous and Stribeck friction as that joint has them.
+/// Coulomb and viscous friction as that joint has them.
 fn its_friction(plant: &ActuatorParameters) -> FrictionModel {
     let friction = &plant.joint.friction;
     let both = |value| Directional { positive: value, negative: value };
@@ -46,7 +46,7 @@ fn its_friction(plant: &ActuatorParameters) -> FrictionModel {
     FrictionModel::new(&FrictionParameters { domain, selector, sets }, 20_000)
 }
 
-/// Half a second of a sweep that reverses a few times.
+/// Two seconds of a sweep that reverses a few times.
 fn short(plant: &ActuatorParameters) -> Part {
     Part::new("short", plant, Motion::Sweep(Sweep { amplitude: 0.1, frequency: (0.5, 2.0), duration: 2.0 }))
 }
@@ -124,7 +124,7 @@ fn compensation_by_the_right_model_brings_the_joint_and_the_torque_closer() {
 fn a_joint_that_is_configured_wrongly_stops_and_says_why() {
     let plant = plain();
     let mut setup = Setup::of(&plant);
-    // A quarter of an electrical turn: current makes no torque, and the joint falls behind its current or the voltage.
+    // Half an electrical turn: every torque pushes the other way.
     setup.configuration.motor.alignment.electrical_zero = ElectricalAngle(1 << 31);
     let done = run(&short(&plant), &setup, None, &Choices::default()).unwrap();
     let Ending::Stopped { time, faults, .. } = done.ending else { panic!("{:?}", done.ending) };
