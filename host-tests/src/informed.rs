@@ -10,6 +10,9 @@ use plant::friction::{FrictionParameters as Plant, REFERENCE_TEMPERATURE};
 
 /// Width of the model's Coulomb edge, as a part of the plant's Stribeck velocity.
 const EDGE: f64 = 0.5;
+/// Stribeck velocity of the model, as a part of the plant's: the model's bump rises from zero and falls later than the plant's, which
+/// starts at its peak; with this they meet at one and a third of the plant's.
+const STRIBECK: f64 = 0.75;
 
 /// The model whose Coulomb, breakaway, viscous, Stribeck, load and temperature terms are those of `friction`; it has no bristle, and no
 /// ripple over position.
@@ -37,10 +40,9 @@ pub fn informed(actuator: &ActuatorParameters, friction: &Plant) -> FrictionPara
         "coulomb_temperature" => -friction.coulomb_thinning,
         "coulomb_load" => friction.gear_loss / coulomb,
         "coulomb_slope" => 1.0 / (EDGE * friction.stribeck_velocity),
-        // Stored is the Stribeck term's own amplitude, the excess over the Coulomb level.
         "breakaway_positive" => friction.breakaway.forward,
         "breakaway_negative" => friction.breakaway.backward,
-        "stribeck_slope" => 1.0 / friction.stribeck_velocity,
+        "stribeck_slope" => 1.0 / (STRIBECK * friction.stribeck_velocity),
         _ => 0.0,
     });
     let terms = [

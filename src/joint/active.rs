@@ -10,12 +10,14 @@ use crate::motor::current::{CurrentSettings, MotorConstants};
 use crate::motor::field_oriented::FieldOrientedGains;
 use crate::motor::modulation::ModulationSettings;
 use crate::motor::observer::{Motion, ObserverGains, ObserverSettings};
-use crate::motor::thermal::ThermalSettings;
+use crate::motor::thermal::{ThermalSettings, WindingTemperature};
 use crate::motor::transform::Dq;
 use crate::quantity::Torque;
 
 /// Steps of the slow task a second, Hz.
 pub const SLOW_RATE: f32 = 100.0;
+/// Temperature at which the heat paths are checked, °C.
+const REFERENCE_TEMPERATURE: f32 = 25.0;
 /// Span over which the current is derated below the winding's limit, K.
 const DERATING: f32 = 20.0;
 /// Fastest rotor that the observer follows, beyond the velocity limit.
@@ -182,6 +184,19 @@ impl Active {
         let rotor_velocity = OBSERVER_RESERVE * limits.velocity * magnitude;
         let scales = Scales::new(gear, &motor.alignment, motor.torque_constant);
         let torque = |value: f32| Torque::from_bits((value * 65536.0) as i32);
+        let heat = ThermalSettings {
+            resistance: motor.resistance,
+            winding_capacity: thermal.winding_capacity,
+            housing_capacity: thermal.housing_capacity,
+            winding_to_housing: thermal.winding_to_housing,
+            housing_to_ambient: thermal.housing_to_ambient,
+            ambient: thermal.ambient,
+            correction_time: 60.0,
+            warning: limits.winding_temperature - DERATING,
+            limit: limits.winding_temperature,
+            rate: SLOW_RATE,
+        };
+        WindingTemperature::new(&heat, REFERENCE_TEMPERATURE)?;
         Ok(Self {
             field_oriented: FieldOrientedGains::new(
                 &CurrentSettings { motor: constants, bandwidth: gains.current_bandwidth, rate, highest_voltage },
@@ -239,18 +254,7 @@ impl Active {
             },
             bridge: *bridge,
             friction: None,
-            thermal: ThermalSettings {
-                resistance: motor.resistance,
-                winding_capacity: thermal.winding_capacity,
-                housing_capacity: thermal.housing_capacity,
-                winding_to_housing: thermal.winding_to_housing,
-                housing_to_ambient: thermal.housing_to_ambient,
-                ambient: thermal.ambient,
-                correction_time: 60.0,
-                warning: limits.winding_temperature - DERATING,
-                limit: limits.winding_temperature,
-                rate: SLOW_RATE,
-            },
+            thermal: heat,
         })
     }
 

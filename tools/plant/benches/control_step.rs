@@ -1,0 +1,126 @@
+//! What a control step costs on the host, whole and by its parts, and how many times faster than real time the closed loop runs.
+
+use divan::{Bencher, black_box};
+use joint_firmware::friction::domain::{Domain, Range};
+use joint_firmware::friction::network::{NetworkParameters, Neuron};
+use joint_firmware::friction::physical::{Coefficients, PhysicalParameters, Terms};
+use joint_firmware::friction::regime::Selector;
+use joint_firmware::friction::state::{JointState, SIGNALS};
+use joint_firmware::friction::{FrictionModel, FrictionParameters, ParameterSet};
+use joint_firmware::joint::state_machine::Controlword;
+use joint_firmware::joint::{Command, Demand, Joint, Mode};
+use joint_firmware::motor::angle::ElectricalAngle;
+use joint_firmware::motor::field_oriented::{FieldOriented, FieldOrientedInput};
+use joint_firmware::motor::observer::Observer;
+use joint_firmware::motor::phases::Phases;
+use joint_firmware::motor::transform::{AlphaBeta, Dq};
+use plant::actuator::ActuatorParameters;
+use plant::virtual_joint::Setup;
+use plant::{VirtualJoint, actuator::Actuator};
+
+fn main() {
+    divan::main();
+}
+
+/// Every term, and a network with no weight zero.
+fn friction() -> FrictionModel {
+    let range = Range { low: -(64 << 16), high: 64 << 16 };
+    let neuron = Neuron { weights: [3000, -7000, 5000, 900, -4000, 1500], fraction: 13 };
+    let network = NetworkParameters {
+        first: [[9 << 24, 20 << 26, -(7 << 24), 3 << 24, 5 << 24, 1 << 22]; 5],
+        hidden: [[neuron; 5]; 2],
+        output: neuron,
+        scale: 2 << 16,
+    };
+    let coefficients = Coefficients::from_array(std::array::from_fn(|i| 4000 + 97 * i as i32));
+    let set = ParameterSet { physical: PhysicalParameters { terms: Terms::ALL, coefficients }, network: Some(network) };
+    let parameters = FrictionParameters {
+        domain: Domain { ranges: [range; SIGNALS], margin: 1 << 15, reference_temperature: 0 },
+        selector: Selector::default(),
+        sets: [set, ParameterSet::default(), ParameterSet::default(), ParameterSet::default()],
+    };
+    FrictionModel::new(&parameters, 20_000)
+}
+
+fn moving() -> (VirtualJoint, Demand) {
+    let parameters = ActuatorParameters::reference().aligned();
+    let setup = Setup::of(&parameters).compensating(joint_firmware::compensation::Request::PhysicalAndNetwork);
+    let mut joint = VirtualJoint::new(parameters, &setup, 25.0, 1).expect("the reference joint");
+    joint.set_friction(Some(friction()));
+    joint.enable().expect("a sound joint");
+    let command = Command { mode: Mode::Velocity, velocity: 0.1, ..Command::default() };
+    (joint, Demand { controlword: Controlword::ENABLE_OPERATION, command, sequence: 0 })
+}
+
+#[divan::bench]
+fn transforms(bencher: Bencher) {
+    let currents = Phases { a: 1.0, b: -0.4, c: -0.6 };
+    bencher.bench_local(|| {
+        let sin_cos = black_box(ElectricalAngle(123_456_789)).sin_cos();
+        AlphaBeta::from_phases(black_box(currents)).to_rotor(sin_cos).to_stationary(sin_cos).to_phases()
+    });
+}
+
+#[divan::bench]
+fn observer(bencher: Bencher) {
+    let (joint, _) = moving();
+    let mut observer = Observer::default();
+    let mut angle = 0u32;
+    bencher.bench_local(|| {
+        angle = angle.wrapping_add(100_000);
+        observer.step(&joint.active().observer, Some(angle), 0.0)
+    });
+}
+
+#[divan::bench]
+fn current_control(bencher: Bencher) {
+    let (joint, _) = moving();
+    let mut control = FieldOriented::default();
+    let input = FieldOrientedInput {
+        phase_currents: Phases { a: 1.0, b: -0.4, c: -0.6 },
+        angle: ElectricalAngle(123_456_789),
+        speed: 100.0,
+        bus_voltage: 36.0,
+        reference: Dq { d: 0.0, q: 2.0 },
+    };
+    bencher.bench_local(|| control.step(&joint.active().field_oriented, black_box(&input)));
+}
+
+#[divan::bench]
+fn friction_model(bencher: Bencher) {
+    let model = friction();
+    let state = JointState::from_signals([1 << 16, 1 << 15, 3 << 16, 3 << 16, 30 << 16, 1 << 14]);
+    bencher.bench_local(|| model.evaluate(0, black_box(&state)));
+}
+
+#[divan::bench]
+fn control_step(bencher: Bencher) {
+    let (virtual_joint, mut demand) = moving();
+    let (active, slow, measured) = (virtual_joint.active().clone(), *virtual_joint.slow(), *virtual_joint.measured());
+    let mut joint: Joint = virtual_joint.joint().clone();
+    bencher.bench_local(|| {
+        demand.sequence = demand.sequence.wrapping_add(1);
+        joint.control_step(&active, &demand, &slow, black_box(&measured))
+    });
+}
+
+#[divan::bench]
+fn plant_period(bencher: Bencher) {
+    let mut actuator = Actuator::new(ActuatorParameters::reference().aligned(), 25.0, 1).expect("the reference joint");
+    bencher.bench_local(|| {
+        actuator.advance(true, black_box([0.5, 0.51, 0.49]), 0.0, 5e-5);
+        actuator.measure()
+    });
+}
+
+/// One period of the closed loop; 50 µs of joint time.
+#[divan::bench]
+fn closed_loop(bencher: Bencher) {
+    let (mut joint, mut demand) = moving();
+    bencher.bench_local(|| {
+        demand.sequence = demand.sequence.wrapping_add(1);
+        // Back and forth, so that it never reaches a limit.
+        demand.command.velocity = if demand.sequence % 40_000 < 20_000 { 0.1 } else { -0.1 };
+        joint.step(&demand, 0.0).state
+    });
+}
