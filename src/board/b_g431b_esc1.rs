@@ -246,7 +246,7 @@ pub fn start_pwm() {
 }
 
 impl Sensors {
-    /// What is known now; temperatures are filled in by the caller.
+    /// What is known now; temperatures and overrun are filled in by the caller.
     #[inline(always)]
     pub fn measure(&mut self) -> Measurements {
         let tim = pac::TIM4;
@@ -269,6 +269,7 @@ impl Sensors {
             bridge_temperature: f32::NAN,
             // A break has switched the outputs off.
             bridge_fault: tim1_broke(),
+            overrun: false,
         }
     }
 }

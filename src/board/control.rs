@@ -17,6 +17,8 @@ use joint_firmware::joint::{Bridge, BridgeState};
 struct Control {
     sensors: Sensors,
     joint: Joint,
+    /// The step before had not ended when this one should have begun.
+    overrun: bool,
 }
 
 struct Owned(UnsafeCell<MaybeUninit<Control>>);
@@ -90,7 +92,7 @@ pub fn start(sensors: Sensors, joint: Joint) {
         return;
     }
     // SAFETY: the interrupt is not enabled yet and this runs once.
-    unsafe { (*CONTROL.0.get()).write(Control { sensors, joint }) };
+    unsafe { (*CONTROL.0.get()).write(Control { sensors, joint, overrun: false }) };
     // SAFETY: thread mode at start; nothing else uses these registers of the core.
     let mut core = unsafe { cortex_m::Peripherals::steal() };
     core.DCB.enable_trace();
@@ -116,6 +118,7 @@ extern "C" fn ADC1_2() {
     let mut measurements = control.sensors.measure();
     BRIDGE_FAULT.store(measurements.bridge_fault, Ordering::Relaxed);
     measurements.bridge_fault |= stopped;
+    measurements.overrun = control.overrun;
     measurements.bridge_temperature = f32::from_bits(BRIDGE_TEMPERATURE.load(Ordering::Relaxed));
     measurements.winding_temperature = f32::from_bits(WINDING_TEMPERATURE.load(Ordering::Relaxed));
 
@@ -129,7 +132,8 @@ extern "C" fn ADC1_2() {
         counter.store(counter.load(Ordering::Relaxed).wrapping_add(yes.into()), Ordering::Relaxed);
     };
     count(&LATE, timing == Timing::Late);
-    count(&OVERRUNS, adc::ended(super::CONTROL_ADC));
+    control.overrun = adc::ended(super::CONTROL_ADC);
+    count(&OVERRUNS, control.overrun);
     count(&STEPS, true);
     let cycles = DWT::cycle_count().wrapping_sub(begin);
     LAST.store(cycles, Ordering::Relaxed);

@@ -222,7 +222,7 @@ fn encoder_frame(between: impl FnOnce()) -> Option<u16> {
 }
 
 impl Sensors {
-    /// What is known now; temperatures are filled in by the caller.
+    /// What is known now; temperatures and overrun are filled in by the caller.
     #[inline(always)]
     pub fn measure(&mut self) -> Measurements {
         let current = |code: f32| (code - CURRENT_ZERO) * AMPERES_PER_CODE;
@@ -247,6 +247,7 @@ impl Sensors {
             winding_temperature: f32::NAN,
             bridge_temperature: f32::NAN,
             bridge_fault: pac::GPIOB.idr().read().idr(6) == pac::gpio::vals::Idr::LOW,
+            overrun: false,
         }
     }
 }
