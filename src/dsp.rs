@@ -81,7 +81,9 @@ pub fn narrow(sum: i64) -> i32 {
 /// The nearest 32-bit value.
 #[inline(always)]
 pub fn saturate(value: i64) -> i32 {
-    value.clamp(i32::MIN as i64, i32::MAX as i64) as i32
+    // Three instructions where `clamp` takes ten: the upper word must be the lower one's sign.
+    let low = value as i32;
+    if value == low as i64 { low } else { (value >> 63) as i32 ^ i32::MAX }
 }
 
 #[cfg(test)]

@@ -145,13 +145,18 @@ impl Fade {
 
     /// The weights in a state.
     #[inline]
+    #[expect(clippy::needless_range_loop, reason = "optimised for size, `zip` copies and calls")]
     pub fn weights(&self, signals: &[i32; SIGNALS]) -> Weights {
         let mut weights = Weights { network: i32::MAX, physical: i32::MAX, outside: None };
-        for ((edge, value), signal) in self.edges.iter().zip(signals).zip(Signal::ALL) {
-            let (first, second) = edge.crossed(*value);
+        for i in 0..SIGNALS {
+            // Within the range, where signals are as a rule, nothing fades.
+            if self.edges[i].range.nearest(signals[i]) == signals[i] {
+                continue;
+            }
+            let (first, second) = self.edges[i].crossed(signals[i]);
             let (network, physical) = (i32::MAX - first, i32::MAX - second);
             if network < weights.network || physical < weights.physical {
-                weights.outside = Some(signal);
+                weights.outside = Signal::at(i);
             }
             weights.network = weights.network.min(network);
             weights.physical = weights.physical.min(physical);

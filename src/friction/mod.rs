@@ -13,8 +13,8 @@ pub mod state;
 
 use crate::quantity::Torque;
 use domain::{Domain, Fade};
-use network::{Network, NetworkParameters};
-use physical::{Physical, PhysicalParameters};
+use network::{Inputs, Layers, NetworkParameters};
+use physical::{PhysicalParameters, PreparedTerms, Scaling};
 use regime::{MAX_SETS, Memory, Selector};
 use state::JointState;
 
@@ -59,7 +59,9 @@ impl Estimate {
 pub struct FrictionModel {
     fade: Fade,
     selector: Selector,
-    sets: [(Physical, Option<Network>); MAX_SETS],
+    scaling: Scaling,
+    inputs: Inputs,
+    sets: [(PreparedTerms, Option<Layers>); MAX_SETS],
     /// Cross-fade per control step, Q31.
     fade_decrement: i32,
 }
@@ -77,9 +79,11 @@ impl FrictionModel {
         Self {
             fade: Fade::new(&domain),
             selector: parameters.selector,
-            sets: parameters.sets.map(|set| {
-                (Physical::new(&set.physical, &domain), set.network.map(|network| Network::new(&network, &domain)))
-            }),
+            scaling: Scaling::new(&domain),
+            inputs: Inputs::new(&domain),
+            sets: parameters
+                .sets
+                .map(|set| (PreparedTerms::new(&set.physical), set.network.map(|network| Layers::new(&network)))),
             fade_decrement,
         }
     }
@@ -108,13 +112,16 @@ impl FrictionModel {
         let signals = state.signals();
         let (physical, network) = self.set(set);
         Estimate {
-            physical: physical.evaluate(&signals),
-            network: network.as_ref().map_or(Torque::ZERO, |network| network.evaluate(&signals)),
+            physical: physical.evaluate(&self.scaling.apply(&signals)),
+            network: match network {
+                Some(network) => network.evaluate(&self.inputs.apply(&signals)),
+                None => Torque::ZERO,
+            },
         }
     }
 
     #[inline(always)]
-    fn set(&self, index: usize) -> &(Physical, Option<Network>) {
+    fn set(&self, index: usize) -> &(PreparedTerms, Option<Layers>) {
         &self.sets[index % MAX_SETS]
     }
 }

@@ -79,10 +79,20 @@ impl InputScale {
     }
 }
 
-/// The network ready to be evaluated: weights packed in pairs, scales looked up.
+/// How every input is scaled: the same for every network of an image.
+#[derive(Clone, Copy, Debug)]
+pub struct Inputs([InputScale; INPUTS]);
+
+/// A network with its inputs' scales.
 #[derive(Clone, Copy, Debug)]
 pub struct Network {
-    inputs: [InputScale; INPUTS],
+    inputs: Inputs,
+    layers: Layers,
+}
+
+/// The network ready to be evaluated: weights packed in pairs.
+#[derive(Clone, Copy, Debug)]
+pub struct Layers {
     first: [[i32; INPUTS + 1]; NEURONS],
     hidden: [[PackedNeuron; NEURONS]; 2],
     output: PackedNeuron,
@@ -116,17 +126,51 @@ impl PackedNeuron {
 const ONE: i32 = 0x7fff_0000;
 
 #[inline(always)]
-fn activate(sums: [i32; NEURONS]) -> [u32; 3] {
-    let [a, b, c, d, e] = sums.map(tanh);
+fn activate(mut sums: [i32; NEURONS]) -> [u32; 3] {
+    for sum in &mut sums {
+        *sum = tanh(*sum);
+    }
+    let [a, b, c, d, e] = sums;
     [pkhtb(a, b), pkhtb(c, d), pkhtb(e, ONE)]
+}
+
+impl Inputs {
+    /// Prepares the scales for `domain`.
+    pub fn new(domain: &Domain) -> Self {
+        let [q, v, theoretical, measured, temperature, _] = domain.ranges;
+        Self([q, v, theoretical, measured, temperature].map(InputScale::new))
+    }
+
+    /// The scaled inputs, Q31. `signals` in Q16.16, in the order of [`Signal`](super::state::Signal); each is clamped to its trained
+    /// range.
+    #[inline(always)]
+    pub fn apply(&self, signals: &[i32; super::state::SIGNALS]) -> [i32; INPUTS] {
+        let [s0, s1, s2, s3, s4] = &self.0;
+        [s0.apply(signals[0]), s1.apply(signals[1]), s2.apply(signals[2]), s3.apply(signals[3]), s4.apply(signals[4])]
+    }
 }
 
 impl Network {
     /// Prepares a network for evaluation in `domain`.
     pub fn new(parameters: &NetworkParameters, domain: &Domain) -> Self {
-        let [q, v, theoretical, measured, temperature, _] = domain.ranges;
+        Self { inputs: Inputs::new(domain), layers: Layers::new(parameters) }
+    }
+
+    /// How each input is scaled.
+    pub(crate) const fn inputs(&self) -> &[InputScale; INPUTS] {
+        &self.inputs.0
+    }
+
+    /// The network's torque. `signals` in Q16.16, in the order of [`Signal`](super::state::Signal).
+    pub fn evaluate(&self, signals: &[i32; super::state::SIGNALS]) -> Torque {
+        self.layers.evaluate(&self.inputs.apply(signals))
+    }
+}
+
+impl Layers {
+    /// Prepares the weights.
+    pub fn new(parameters: &NetworkParameters) -> Self {
         Self {
-            inputs: [q, v, theoretical, measured, temperature].map(InputScale::new),
             first: parameters.first,
             hidden: parameters.hidden.map(|layer| layer.map(|neuron| PackedNeuron::new(&neuron))),
             output: PackedNeuron::new(&parameters.output),
@@ -134,29 +178,22 @@ impl Network {
         }
     }
 
-    /// How each input is scaled.
-    pub(crate) const fn inputs(&self) -> &[InputScale; INPUTS] {
-        &self.inputs
-    }
-
-    /// The network's torque. `signals` in Q16.16, in the order of [`Signal`](super::state::Signal); each is clamped to its trained
-    /// range.
+    /// The network's torque for inputs [scaled](Inputs::apply).
     #[inline]
-    pub fn evaluate(&self, signals: &[i32; super::state::SIGNALS]) -> Torque {
-        let [s0, s1, s2, s3, s4] = &self.inputs;
-        let x = [
-            s0.apply(signals[0]),
-            s1.apply(signals[1]),
-            s2.apply(signals[2]),
-            s3.apply(signals[3]),
-            s4.apply(signals[4]),
-        ];
-        let sums = self.first.map(|[w0, w1, w2, w3, w4, bias]| {
-            smmla(w4, x[4], smmla(w3, x[3], smmla(w2, x[2], smmla(w1, x[1], smmla(w0, x[0], bias)))))
-        });
-        let activations = activate(sums);
-        let activations = activate(self.hidden[0].map(|neuron| neuron.sum(activations)));
-        let activations = activate(self.hidden[1].map(|neuron| neuron.sum(activations)));
+    #[expect(clippy::needless_range_loop, reason = "optimised for size, `zip` and `map` copy and call")]
+    pub fn evaluate(&self, x: &[i32; INPUTS]) -> Torque {
+        let mut sums = [0; NEURONS];
+        for i in 0..NEURONS {
+            let [w0, w1, w2, w3, w4, bias] = self.first[i];
+            sums[i] = smmla(w4, x[4], smmla(w3, x[3], smmla(w2, x[2], smmla(w1, x[1], smmla(w0, x[0], bias)))));
+        }
+        let mut activations = activate(sums);
+        for layer in &self.hidden {
+            for i in 0..NEURONS {
+                sums[i] = layer[i].sum(activations);
+            }
+            activations = activate(sums);
+        }
         Torque::from_bits(to_torque(self.output.sum(activations), self.scale))
     }
 }

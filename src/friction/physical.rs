@@ -224,14 +224,39 @@ impl Directional {
     }
 }
 
-/// The physical model ready to be evaluated: coefficients of absent terms are zero, products of constants are formed.
+/// How signals reach Q31 of full scale, prepared from a domain: the same for every parameter set of an image.
 #[derive(Clone, Copy, Debug)]
-pub struct Physical {
-    pub(crate) terms: Terms,
+pub struct Scaling {
     pub(crate) ranges: [Range; SIGNALS],
-    pub(crate) shifts: [u32; SIGNALS],
-    pub(crate) reference_temperature: i32,
-    pub(crate) coefficients: Coefficients,
+    shifts: [u32; SIGNALS],
+    reference_temperature: i32,
+}
+
+/// The coefficients that are used as they are; see [`Coefficients`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Factors {
+    pub(crate) constant: i32,
+    pub(crate) position: i32,
+    pub(crate) temperature: i32,
+    pub(crate) load: i32,
+    pub(crate) viscous: i32,
+    pub(crate) viscous_temperature: i32,
+    pub(crate) quadratic: i32,
+    pub(crate) coulomb_slope: i32,
+    pub(crate) coulomb_temperature: i32,
+    pub(crate) coulomb_load: i32,
+    pub(crate) stribeck_slope: i32,
+    pub(crate) hysteresis_velocity_slope: i32,
+    pub(crate) hysteresis_width: i32,
+    pub(crate) hysteresis_acceleration_slope: i32,
+    pub(crate) rotor_inertia: i32,
+}
+
+/// One parameter set ready to be evaluated: coefficients of absent terms are zero, products of constants are formed.
+#[derive(Clone, Copy, Debug)]
+pub struct PreparedTerms {
+    pub(crate) terms: Terms,
+    pub(crate) coefficients: Factors,
     pub(crate) coulomb: Directional,
     /// F_brk - F_c.
     pub(crate) stribeck: Directional,
@@ -243,6 +268,13 @@ pub struct Physical {
     pub(crate) harmonic_mean: [i32; HARMONICS],
     /// 4 / (pi (2j - 1)) times half their difference.
     pub(crate) harmonic_difference: [i32; HARMONICS],
+}
+
+/// The physical model of one parameter set, with its scaling.
+#[derive(Clone, Copy, Debug)]
+pub struct Physical {
+    pub(crate) scaling: Scaling,
+    pub(crate) terms: PreparedTerms,
 }
 
 /// One, Q16.16.
@@ -266,9 +298,41 @@ pub(crate) fn times(coefficient: i32, factor: i32) -> i32 {
     saturate((coefficient as i64 * factor as i64 + (1 << 15)) >> 16)
 }
 
+impl Scaling {
+    /// Prepares the scaling of `domain`.
+    pub fn new(domain: &Domain) -> Self {
+        Self { ranges: domain.widened(), shifts: domain.shifts(), reference_temperature: domain.reference_temperature }
+    }
+
+    /// The signals clamped to the widened box and scaled to Q31 of full scale; temperature as difference from the reference.
+    #[inline(always)]
+    pub fn apply(&self, signals: &[i32; SIGNALS]) -> [i32; SIGNALS] {
+        let mut scaled = [0; SIGNALS];
+        for i in 0..SIGNALS {
+            let range = self.ranges[i];
+            let clamped = range.nearest(signals[i]);
+            let origin = if i == Signal::Temperature as usize { self.reference_temperature } else { 0 };
+            scaled[i] = clamped.saturating_sub(origin).wrapping_shl(self.shifts[i]);
+        }
+        scaled
+    }
+}
+
 impl Physical {
     /// Prepares a model for evaluation in `domain`.
     pub fn new(parameters: &PhysicalParameters, domain: &Domain) -> Self {
+        Self { scaling: Scaling::new(domain), terms: PreparedTerms::new(parameters) }
+    }
+
+    /// The model's torque. `signals` in Q16.16, in the order of [`Signal`]; each is clamped to the widened box.
+    pub fn evaluate(&self, signals: &[i32; SIGNALS]) -> Torque {
+        self.terms.evaluate(&self.scaling.apply(signals))
+    }
+}
+
+impl PreparedTerms {
+    /// Prepares a parameter set.
+    pub fn new(parameters: &PhysicalParameters) -> Self {
         let c = parameters.coefficients;
         let on = |terms: Terms, value: i32| if parameters.terms.contains(terms) { value } else { 0 };
         let coulomb = Directional {
@@ -292,7 +356,7 @@ impl Physical {
             }
             amplitudes
         };
-        let coefficients = Coefficients {
+        let coefficients = Factors {
             constant: on(Terms::CONSTANT, c.constant),
             position: on(Terms::POSITION, c.position),
             temperature: on(Terms::TEMPERATURE, c.temperature),
@@ -300,16 +364,17 @@ impl Physical {
             viscous: on(Terms::VISCOUS, c.viscous),
             viscous_temperature: on(Terms::VISCOUS_TEMPERATURE, c.viscous_temperature),
             quadratic: on(Terms::QUADRATIC, c.quadratic),
+            coulomb_slope: c.coulomb_slope,
             coulomb_temperature: on(Terms::COULOMB_TEMPERATURE, c.coulomb_temperature),
             coulomb_load: on(Terms::COULOMB_LOAD, c.coulomb_load),
+            stribeck_slope: c.stribeck_slope,
+            hysteresis_velocity_slope: c.hysteresis_velocity_slope,
+            hysteresis_width: c.hysteresis_width,
+            hysteresis_acceleration_slope: c.hysteresis_acceleration_slope,
             rotor_inertia: on(Terms::ROTOR_INERTIA, c.rotor_inertia),
-            ..c
         };
         Self {
             terms: parameters.terms,
-            ranges: domain.widened(),
-            shifts: domain.shifts(),
-            reference_temperature: domain.reference_temperature,
             coefficients,
             coulomb,
             stribeck: Directional {
@@ -325,23 +390,10 @@ impl Physical {
         }
     }
 
-    /// The signals clamped to the widened box and scaled to Q31 of full scale; temperature as difference from the reference.
-    #[inline(always)]
-    pub(crate) fn scale(&self, signals: &[i32; SIGNALS]) -> [i32; SIGNALS] {
-        let mut scaled = [0; SIGNALS];
-        for i in 0..SIGNALS {
-            let range = self.ranges[i];
-            let clamped = range.nearest(signals[i]);
-            let origin = if i == Signal::Temperature as usize { self.reference_temperature } else { 0 };
-            scaled[i] = clamped.saturating_sub(origin).wrapping_shl(self.shifts[i]);
-        }
-        scaled
-    }
-
-    /// The model's torque. `signals` in Q16.16, in the order of [`Signal`]; each is clamped to the widened box.
+    /// The torque for signals [scaled](Scaling::apply).
     #[inline]
-    pub fn evaluate(&self, signals: &[i32; SIGNALS]) -> Torque {
-        let [q, v, load, _, th, a] = self.scale(signals);
+    pub fn evaluate(&self, scaled: &[i32; SIGNALS]) -> Torque {
+        let [q, v, load, _, th, a] = *scaled;
         let c = &self.coefficients;
         let speed = v.saturating_abs();
 
@@ -386,13 +438,14 @@ impl Physical {
 
     /// The sum of the harmonics, Q16.16.
     #[inline(always)]
+    #[expect(clippy::needless_range_loop, reason = "optimised for size, `zip` copies and calls")]
     fn harmonic_amplitude(&self, q: i32, direction: i32) -> i32 {
         let phase = ((self.harmonic_turns as i64 * q as i64) >> 15) as u32;
         let sines = odd_sines(phase);
         let (mut mean, mut difference) = (0i64, 0i64);
-        for ((sine, m), d) in sines.into_iter().zip(self.harmonic_mean).zip(self.harmonic_difference) {
-            mean = mean.wrapping_add(m as i64 * sine as i64);
-            difference = difference.wrapping_add(d as i64 * sine as i64);
+        for j in 0..HARMONICS {
+            mean = mean.wrapping_add(self.harmonic_mean[j] as i64 * sines[j] as i64);
+            difference = difference.wrapping_add(self.harmonic_difference[j] as i64 * sines[j] as i64);
         }
         let round = |sum: i64| saturate((sum >> 30).wrapping_add((sum >> 29) & 1));
         round(mean).saturating_add(narrow(round(difference) as i64 * direction as i64))

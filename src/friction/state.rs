@@ -53,6 +53,20 @@ impl Signal {
         Self::Acceleration,
     ];
 
+    /// The signal at a place of [`Signal::ALL`], without a table to look it up in.
+    #[inline(always)]
+    pub(crate) const fn at(place: usize) -> Option<Self> {
+        Some(match place {
+            0 => Self::Position,
+            1 => Self::Velocity,
+            2 => Self::TheoreticalTorque,
+            3 => Self::MeasuredTorque,
+            4 => Self::Temperature,
+            5 => Self::Acceleration,
+            _ => return None,
+        })
+    }
+
     /// The signal's name in text formats and messages.
     pub const fn name(self) -> &'static str {
         match self {
@@ -98,6 +112,14 @@ impl JointState {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_signal_is_at_its_place() {
+        for (place, signal) in Signal::ALL.into_iter().enumerate() {
+            assert_eq!((Signal::at(place), signal as usize), (Some(signal), place));
+        }
+        assert_eq!(Signal::at(SIGNALS), None);
+    }
 
     #[test]
     fn signals_and_state_convert_both_ways() {

@@ -3,7 +3,7 @@
 use super::bisect;
 use super::interval::Interval;
 use crate::dsp::{narrow, saturate};
-use crate::friction::physical::{Directional, Physical, Terms, times};
+use crate::friction::physical::{Directional, Physical, PreparedTerms, Scaling, Terms, times};
 use crate::friction::smooth::{STRIBECK, TANH, atan, stribeck, tanh};
 use crate::friction::state::{SIGNALS, Signal};
 
@@ -30,7 +30,7 @@ const ONE: Interval = Interval::point(1 << 16);
 
 /// Bounds, or nothing where the sum could leave the range of a torque.
 pub(super) fn bounds(physical: &Physical, depth: u32) -> Option<Bounds> {
-    let box_ = scaled_box(physical);
+    let (physical, box_) = (&physical.terms, scaled_box(&physical.scaling));
     if !harmonics_fit(physical) {
         return None;
     }
@@ -58,9 +58,9 @@ pub(super) fn bounds(physical: &Physical, depth: u32) -> Option<Bounds> {
 }
 
 /// The widened box in Q31 of full scale.
-fn scaled_box(physical: &Physical) -> [Interval; SIGNALS] {
-    let low = physical.scale(&physical.ranges.map(|range| range.low));
-    let high = physical.scale(&physical.ranges.map(|range| range.high));
+fn scaled_box(scaling: &Scaling) -> [Interval; SIGNALS] {
+    let low = scaling.apply(&scaling.ranges.map(|range| range.low));
+    let high = scaling.apply(&scaling.ranges.map(|range| range.high));
     let mut scaled = [Interval::ZERO; SIGNALS];
     for (place, (low, high)) in scaled.iter_mut().zip(low.into_iter().zip(high)) {
         *place = Interval { low: low as i64, high: high as i64 };
@@ -69,7 +69,7 @@ fn scaled_box(physical: &Physical) -> [Interval; SIGNALS] {
 }
 
 /// Whether the harmonics' own sums stay in 64 bits.
-fn harmonics_fit(physical: &Physical) -> bool {
+fn harmonics_fit(physical: &PreparedTerms) -> bool {
     let total = |amplitudes: &[i32]| amplitudes.iter().map(|a| (*a as i64).abs()).sum::<i64>();
     total(&physical.harmonic_mean) < 1 << 31 && total(&physical.harmonic_difference) < 1 << 31
 }
@@ -105,7 +105,7 @@ fn clip(interval: Interval) -> Interval {
 }
 
 /// The Coulomb levels, with their factor, that a velocity interval can select, Q16.16.
-fn coulomb_levels(physical: &Physical, box_: &[Interval; SIGNALS], velocity: Interval) -> Interval {
+fn coulomb_levels(physical: &PreparedTerms, box_: &[Interval; SIGNALS], velocity: Interval) -> Interval {
     let [_, _, load, _, th, _] = *box_;
     let c = &physical.coefficients;
     let factor =
@@ -113,7 +113,7 @@ fn coulomb_levels(physical: &Physical, box_: &[Interval; SIGNALS], velocity: Int
     rounded_times(level(physical.coulomb, velocity), factor)
 }
 
-fn cell_bounds(physical: &Physical, box_: &[Interval; SIGNALS], v: Interval) -> CellBounds {
+fn cell_bounds(physical: &PreparedTerms, box_: &[Interval; SIGNALS], v: Interval) -> CellBounds {
     let [q, _, load, _, th, a] = *box_;
     let c = &physical.coefficients;
 
@@ -218,7 +218,7 @@ fn atan_slopes(argument: Interval) -> Interval {
 }
 
 /// Worst departure from the smooth model whose slopes are bounded, Q16.16.
-fn resolution(physical: &Physical, box_: &[Interval; SIGNALS]) -> u32 {
+fn resolution(physical: &PreparedTerms, box_: &[Interval; SIGNALS]) -> u32 {
     let coulomb = coulomb_levels(physical, box_, box_[Signal::Velocity as usize]).abs().high;
     let stribeck = level(physical.stribeck, box_[Signal::Velocity as usize]).abs().high;
     let harmonics: i64 = physical.harmonic_difference.iter().map(|a| (*a as i64).abs()).sum();
