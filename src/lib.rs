@@ -6,6 +6,7 @@ pub mod compensation;
 #[allow(unsafe_code)]
 pub mod dsp;
 
+pub mod exchange;
 pub mod friction;
 pub mod joint;
 pub mod motor;
