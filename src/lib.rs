@@ -3,6 +3,7 @@
 #![deny(unsafe_code)]
 
 pub mod compensation;
+pub mod default_configuration;
 #[allow(unsafe_code)]
 pub mod dsp;
 
