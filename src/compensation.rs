@@ -219,6 +219,7 @@ impl Compensation {
     }
 
     /// Brings what is left of the torque to zero at the slew rate; from then on the past is forgotten.
+    #[inline(never)]
     fn fade_out(&mut self, settings: &Settings, reason: Reason) -> Output {
         let last = self.last.to_bits();
         let torque = last.saturating_sub(last.max(settings.slew.saturating_neg()).min(settings.slew));

@@ -142,9 +142,7 @@ impl Faults {
     /// Adds a fault where a condition holds.
     #[inline(always)]
     pub fn set(&mut self, fault: Fault, present: bool) {
-        if present {
-            self.0 |= fault.bit();
-        }
+        self.0 |= (present as u32) << fault as u32;
     }
 
     /// Whether there is none.

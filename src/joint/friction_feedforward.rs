@@ -115,6 +115,7 @@ impl FrictionFeedforward {
     /// Part of the compensation that the energy guard lets through. `commanded` says by its sign which way the command pushes: the
     /// velocity that it asks for, or in torque mode its torque. A spring's torque does not count: around a held position
     /// it pushes back and forth, and too much compensation makes it hunt.
+    #[inline(never)]
     fn guard(&mut self, active: &Active, motion: &JointMotion, commanded: f32) -> f32 {
         let gains = &active.compensation;
         let speed = if motion.velocity < 0.0 { -motion.velocity } else { motion.velocity };

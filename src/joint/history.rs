@@ -39,8 +39,24 @@ pub struct History {
 
 impl Default for History {
     fn default() -> Self {
-        Self { ring: [Snapshot::default(); LENGTH], next: 0, frozen: false }
+        // A constant: made step by step, the ring would lie on the stack of whoever makes a joint.
+        const EMPTY: History = History { ring: [Snapshot::NONE; LENGTH], next: 0, frozen: false };
+        EMPTY
     }
+}
+
+impl Snapshot {
+    /// Before the first step.
+    const NONE: Self = Self {
+        state: State::NotReadyToSwitchOn,
+        faults: Faults::NONE,
+        position: 0.0,
+        velocity: 0.0,
+        commanded_torque: 0.0,
+        compensation_torque: 0.0,
+        current: Dq { d: 0.0, q: 0.0 },
+        bus_voltage: 0.0,
+    };
 }
 
 impl History {

@@ -328,7 +328,7 @@ impl Joint {
     }
 
     /// The state from now on. A fault that must not be braked against goes straight through the reaction to "fault".
-    #[inline(always)]
+    #[inline(never)]
     fn decide(&mut self, active: &Active, demand: &Demand, faults: Faults, motion: &JointMotion) -> State {
         let before = self.machine.state();
         let started = self.offsets.are_known();

@@ -70,7 +70,7 @@ impl MotionLaw {
     }
 
     /// One step of braking: the velocity comes down along the quick stop's ramp.
-    #[inline(always)]
+    #[inline(never)]
     pub fn brake(&mut self, active: &Active, motion: &JointMotion) -> Wanted {
         if self.mode.is_some() {
             *self = Self { velocity: motion.velocity, ..Self::default() };
@@ -92,6 +92,7 @@ impl MotionLaw {
     }
 
     /// The fastest approach to `target` from which the ramp can still stop there (trapezoidal profile, in closed loop).
+    #[inline(never)]
     fn follow(&mut self, target: f32, active: &Active) {
         let gains = &active.motion;
         let (low, high) = active.limits.position;

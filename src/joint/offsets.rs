@@ -32,6 +32,7 @@ impl Offsets {
 
     /// Adds a step's currents, A, of sensors whose over-current limit is `over_current`. What a sound sensor without current cannot
     /// read begins the measurement anew: a single disturbance in the mean would be there for good.
+    #[inline(never)]
     pub fn add(&mut self, measured: Phases, over_current: f32) {
         let largest = LARGEST_OFFSET * over_current;
         let sound = |value: f32| value <= largest && value >= -largest;
