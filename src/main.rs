@@ -3,8 +3,9 @@
 //! | priority | runs | does |
 //! |---|---|---|
 //! | 0 | control interrupt, every PWM period | measure, one control step, set the bridge |
+//! | 0 | PWM timer's update, twice a period | write the duties of the step |
 //! | 6 | interrupts of drivers and of time | wake tasks |
-//! | 8 | interrupt executor | every millisecond: temperatures, button |
+//! | 8 | interrupt executor | every millisecond: temperatures, button, command; at 100 Hz: thermal model |
 //! | thread | thread executor | LED, log, watchdog |
 //!
 //! Nothing has run on a board yet.

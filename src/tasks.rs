@@ -1,10 +1,16 @@
 //! Start of the board's program and its tasks; thread mode and the interrupt executor.
 
-use crate::board::{self, Led, Peripherals, control, faults, watchdog};
+use crate::board::{self, Led, Offering, Peripherals, Publisher, control, faults, watchdog};
+use defmt::{Debug2Format, Display2Format};
 use embassy_executor::{SendSpawner, Spawner};
 use embassy_stm32::gpio::Input;
 use embassy_time::{Duration, Instant, Ticker};
-use joint_firmware::joint::{Bridge, Measurements};
+use joint_firmware::joint::active::SLOW_RATE;
+use joint_firmware::joint::configuration::ConfigurationError;
+use joint_firmware::joint::state_machine::Controlword;
+use joint_firmware::joint::{Active, Demand, Slow};
+use joint_firmware::motor::setting::SettingError;
+use joint_firmware::motor::thermal::{PLAUSIBLE_SENSOR, WindingTemperature};
 
 /// Counts a turn of the incremental encoder, on boards that have one: 1,000 lines, until a configuration says otherwise.
 const ENCODER_COUNTS: u16 = 4_000;
@@ -12,24 +18,6 @@ const ENCODER_COUNTS: u16 = 4_000;
 const HEALTHY: Duration = Duration::from_secs(10);
 /// A button counts as pressed after so many milliseconds: contacts bounce.
 const DEBOUNCE_MS: u32 = 20;
-
-/// What the control interrupt calls.
-pub struct Joint;
-
-impl Joint {
-    /// **The joint is made here**, once, before the control interrupt starts.
-    ///
-    /// There is none yet: this one keeps the bridge off, whatever is measured.
-    fn new() -> Self {
-        Self
-    }
-
-    /// One control step.
-    #[inline]
-    pub fn control_step(&mut self, _measurements: &Measurements) -> Bridge {
-        Bridge::OFF
-    }
-}
 
 /// Starts everything; called once in thread mode. `medium` starts the interrupt executor.
 pub fn start(slow: Spawner, medium: impl FnOnce() -> SendSpawner, peripherals: Peripherals) {
@@ -43,17 +31,64 @@ pub fn start(slow: Spawner, medium: impl FnOnce() -> SendSpawner, peripherals: P
             return;
         }
     };
-    control::start(parts.sensors, Joint::new());
-    defmt::info!("{}: control steps at {} Hz, bridge off", board::NAME, board::CONTROL_HZ);
+    // Started once, so the exchange is new and empty.
+    let (mut commands, ends) = defmt::unwrap!(control::exchange());
+    let winding = match configure(&mut commands.active) {
+        Ok(winding) => winding,
+        Err(error) => return refuse(&error),
+    };
+    control::start(parts.sensors, ends);
+    defmt::info!("{}: control steps at {} Hz, not commissioned", board::NAME, board::CONTROL_HZ);
     // Each task is spawned once, so its only place is free.
-    medium().spawn(defmt::unwrap!(supervise(parts.button)));
+    let medium = medium();
+    medium.spawn(defmt::unwrap!(supervise(parts.button, commands.demand)));
+    medium.spawn(defmt::unwrap!(keep_cool(winding)));
     slow.spawn(defmt::unwrap!(watch(watchdog::new(parts.watchdog))));
     slow.spawn(defmt::unwrap!(show(parts.led)));
 }
 
-/// Every millisecond: temperatures for the control step, and the button, which stops the bridge until the next reset.
+/// Says why the board's own configuration is refused; without the control interrupt the bridge stays off.
+fn refuse(error: &ConfigurationError) {
+    let what = match error {
+        ConfigurationError::Setting(SettingError { name, .. }) => name,
+        ConfigurationError::Compensation(_) => "compensation",
+        ConfigurationError::NodeId(_) => "node id",
+        ConfigurationError::PolePairs(_) => "pole pairs",
+    };
+    defmt::error!("{} does not start: {} out of range in its configuration", board::NAME, what);
+}
+
+/// Prepares and offers the board's own configuration. Returns its thermal model, at the sensor's temperature or, as nobody knows
+/// how hot the motor was when the power went, where derating begins.
+fn configure(active: &mut Offering<Active>) -> Result<WindingTemperature, ConfigurationError> {
+    let board::BoardConfiguration { bridge, joint } = &board::CONFIGURATION;
+    let prepared = defmt::unwrap!(active.prepare(|| joint.prepare(bridge)))?;
+    let thermal = &prepared.value().thermal;
+    let (_, sensor) = board::temperatures();
+    let plausible = sensor >= PLAUSIBLE_SENSOR.0 && sensor <= PLAUSIBLE_SENSOR.1;
+    let winding = WindingTemperature::new(thermal, if plausible { sensor } else { thermal.warning })?;
+    prepared.offer();
+    Ok(winding)
+}
+
+/// At the thermal model's rate: how much current the winding bears, and how warm the gear is.
 #[embassy_executor::task]
-async fn supervise(button: Option<Input<'static>>) {
+async fn keep_cool(mut winding: WindingTemperature) {
+    let mut ticker = Ticker::every(Duration::from_hz(SLOW_RATE as u64));
+    loop {
+        ticker.next().await;
+        let (_, sensor) = board::temperatures();
+        winding.step(control::mean_square_current(), sensor);
+        // The gear has no sensor; it is bolted to the motor's housing.
+        control::set_slow(&Slow { derating: winding.derating(), gear_temperature: winding.housing() });
+    }
+}
+
+/// Every millisecond: temperatures for the control step; the button, which stops the bridge until the next reset; and the command,
+/// which is "disable voltage" as long as there is no bus to take another from.
+#[embassy_executor::task]
+async fn supervise(button: Option<Input<'static>>, mut commands: Publisher<Demand>) {
+    let mut sequence = 0u32;
     let mut ticker = Ticker::every(Duration::from_millis(1));
     let mut pressed_ms = 0u32;
     loop {
@@ -68,6 +103,8 @@ async fn supervise(button: Option<Input<'static>>) {
             control::stop();
             defmt::warn!("button: the bridge stays off until the next reset");
         }
+        sequence = sequence.wrapping_add(1);
+        commands.publish(&Demand { controlword: Controlword::DISABLE_VOLTAGE, sequence, ..Demand::default() });
         watchdog::medium_is_alive();
     }
 }
@@ -97,6 +134,22 @@ async fn watch(watchdog: &'static mut watchdog::Watchdog) {
                 winding,
                 torn
             );
+            if let Some(report) = control::report() {
+                let telemetry = report.telemetry;
+                defmt::info!(
+                    "joint: {}, statusword {:#06x}, supply {} V, position {} rad, currents {} {} {} A",
+                    Debug2Format(&telemetry.state),
+                    telemetry.statusword(),
+                    telemetry.bus_voltage,
+                    telemetry.motion.position,
+                    report.phase_currents.a,
+                    report.phase_currents.b,
+                    report.phase_currents.c
+                );
+                for fault in report.latched.iter() {
+                    defmt::warn!("fault: {}", Display2Format(&fault));
+                }
+            }
         }
     }
 }
@@ -110,7 +163,8 @@ async fn show(mut led: Led) {
         ticker.next().await;
         tenth = (tenth + 1) % 10;
         let state = control::statistics();
-        led.set(match (state.bridge_fault || state.stopped, state.switching) {
+        let fault = control::report().is_some_and(|report| !report.latched.is_empty());
+        led.set(match (fault || state.stopped, state.switching) {
             (true, _) => tenth.is_multiple_of(2),
             (false, true) => true,
             (false, false) => tenth == 0,

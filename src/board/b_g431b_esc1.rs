@@ -27,7 +27,7 @@
 //! check in every control step. TIM1's break input takes the chip's own alarms: core lock-up and SRAM parity.
 
 use super::adc::{self, FULL_SCALE, Sequence};
-use super::pwm::{self, TIMER_HZ, Timing};
+use super::pwm::{self, TIMER_HZ};
 use super::{Led, Parts, Peripherals, StartError};
 use embassy_stm32::Config;
 use embassy_stm32::gpio::{Input, Level, Output, OutputType, Pull, Speed};
@@ -43,6 +43,7 @@ use embassy_stm32::timer::complementary_pwm::{BreakInputPolarity, ComplementaryP
 use embassy_stm32::timer::low_level::CountingMode;
 use embassy_stm32::timer::qei;
 use embassy_stm32::timer::simple_pwm::PwmPin;
+use joint_firmware::default_configuration::{self, BoardConfiguration};
 use joint_firmware::joint::{Bridge, BridgeState, Measurements};
 use joint_firmware::motor::phases::Phases;
 use joint_firmware::sensors::incremental::Incremental;
@@ -50,8 +51,12 @@ use joint_firmware::sensors::thermistor::Thermistor;
 
 /// Name of the board.
 pub const NAME: &str = "b-g431b-esc1";
+/// The board's part of a configuration, and the joint that it is until it is commissioned.
+pub const CONFIGURATION: BoardConfiguration = default_configuration::B_G431B_ESC1;
 /// Frequency of the PWM and of the control step, Hz.
-pub const CONTROL_HZ: u32 = 20_000;
+pub const CONTROL_HZ: u32 = CONFIGURATION.bridge.rate as u32;
+/// Interrupt of the PWM timer's update.
+pub const PWM_INTERRUPT: pac::Interrupt = pac::Interrupt::TIM1_UP_TIM16;
 /// Converter whose end of sequence is the control interrupt.
 pub const CONTROL_ADC: Adc = pac::ADC2;
 /// Address of the flash, and bytes of its only bank.
@@ -63,9 +68,9 @@ pub const FLASH_BANK: u32 = 128 * 1024;
 const TOP: u16 = pwm::top(CONTROL_HZ);
 /// Dead time, ns. Other firmware for this board uses 300 (K), 500 (N) and 800 to 847 (O, ST's kit). The longest is taken: too long a
 /// dead time distorts the voltage, which the joint compensates; too short a one shorts the supply. 1.6 % of a half period.
-const DEAD_TIME_NS: u32 = 800;
-/// The low sides conduct at least 2.5 µs around the top: dead time, settling of the amplifiers (unconfirmed), two conversions.
-const LARGEST_DUTY: f32 = 0.95;
+const DEAD_TIME_NS: u32 = (CONFIGURATION.bridge.dead_time * 1e9 + 0.5) as u32;
+/// The low sides conduct at least 2.5 µs around the top; that the amplifiers settle in that time is unconfirmed.
+const LARGEST_DUTY: f32 = CONFIGURATION.bridge.duty.1;
 
 /// A code, A (derived: 3.3 V / 4096 / (3 mOhm * 64/7); F, O). Codes fall with a current into the motor: the sense resistor lies
 /// between the low side and ground, and the low side conducts when the current is sampled. The sign is unconfirmed.
@@ -242,6 +247,7 @@ fn capture_index(_pin: embassy_stm32::Peri<'static, embassy_stm32::peripherals::
 
 /// Starts the PWM counter, and with it the control interrupt.
 pub fn start_pwm() {
+    pac::TIM1.dier().modify(|w| w.set_uie(true));
     pac::TIM1.cr1().modify(|w| w.set_cen(true));
 }
 
@@ -285,27 +291,37 @@ pub fn temperatures() -> (f32, f32) {
     (BRIDGE_NTC.temperature(adc::code::<2>(pac::ADC1) / FULL_SCALE), f32::NAN)
 }
 
-/// Sets the bridge for the next period.
+/// Sets the bridge: off at once, or switching with the duties held for the next period.
 #[inline(always)]
-pub fn apply(bridge: &Bridge) -> Timing {
+pub fn apply(bridge: &Bridge) {
+    pwm::hold(bridge.duties, TOP, LARGEST_DUTY);
     let tim = pac::TIM1;
-    let on = bridge.state == BridgeState::Switching;
-    if !on {
-        bridge_off();
+    match bridge.state {
+        BridgeState::Off => bridge_off(),
+        BridgeState::Switching if !tim.bdtr().read().moe() => tim.bdtr().modify(|w| w.set_moe(true)),
+        BridgeState::Switching => {}
     }
+}
+
+/// Bottom and top of TIM1's counter: writes the duties on the way up. See `pwm`.
+#[unsafe(no_mangle)]
+#[unsafe(link_section = ".ccm.control")]
+extern "C" fn TIM1_UP_TIM16() {
+    let tim = pac::TIM1;
+    // Flags clear where a zero is written.
+    tim.sr().write(|w| {
+        w.0 = u32::MAX;
+        w.set_uif(false);
+    });
+    if tim.cr1().read().dir() == Dir::DOWN {
+        return;
+    }
+    let [u, v, w] = pwm::held();
     tim.cr1().modify(|w| w.set_udis(true));
-    tim.ccr(0).write(|w| w.set_ccr(pwm::compare(bridge.duties.a, TOP, LARGEST_DUTY)));
-    tim.ccr(1).write(|w| w.set_ccr(pwm::compare(bridge.duties.b, TOP, LARGEST_DUTY)));
-    tim.ccr(2).write(|w| w.set_ccr(pwm::compare(bridge.duties.c, TOP, LARGEST_DUTY)));
+    tim.ccr(0).write(|register| register.set_ccr(u));
+    tim.ccr(1).write(|register| register.set_ccr(v));
+    tim.ccr(2).write(|register| register.set_ccr(w));
     tim.cr1().modify(|w| w.set_udis(false));
-    let timing = match tim.cr1().read().dir() {
-        Dir::DOWN => Timing::Prompt,
-        Dir::UP => Timing::Late,
-    };
-    if on && !tim.bdtr().read().moe() {
-        tim.bdtr().modify(|w| w.set_moe(true));
-    }
-    timing
 }
 
 /// Switches all transistors off, now. For fault handlers too: needs nothing initialised, takes no lock, cannot fail.

@@ -1,24 +1,43 @@
 //! The control interrupt: measure, one control step, set the bridge; the highest priority, every PWM period.
 //!
 //! It runs from CCM SRAM, uses no critical section, no log and no waker, and nothing else of the program touches its state
-//! after [`start`]. What tasks have to know, or to tell it, goes through the atomics below.
+//! after [`start`]. What tasks have to know, or to tell it, goes through the exchanges and atomics below.
 
-use super::pwm::Timing;
+use super::shared::{InUse, Newest, Offering, Publisher, Replaced, Subscriber};
 use super::{Sensors, adc};
-use crate::tasks::Joint;
-use core::cell::UnsafeCell;
+use core::cell::{RefCell, UnsafeCell};
 use core::mem::MaybeUninit;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use cortex_m::peripheral::{DWT, NVIC};
+use critical_section::Mutex;
 use embassy_stm32::pac::Interrupt;
-use joint_firmware::joint::{Bridge, BridgeState};
+use joint_firmware::joint::fault::Faults;
+use joint_firmware::joint::state_machine::Controlword;
+use joint_firmware::joint::{Active, Bridge, BridgeState, Command, Demand, Joint, Mode, Slow, Telemetry};
+use joint_firmware::motor::phases::Phases;
 
 /// Everything that the control interrupt owns.
 struct Control {
     sensors: Sensors,
     joint: Joint,
+    ends: Ends,
     /// The step before had not ended when this one should have begun.
     overrun: bool,
+}
+
+/// What tasks command the joint with; each of the two has one owner.
+pub struct Commands {
+    /// Set-points and the controlword: the newest counts, from the next control step on.
+    pub demand: Publisher<Demand>,
+    /// Configuration and friction model, prepared: swapped between two control steps.
+    pub active: Offering<Active>,
+}
+
+/// The control interrupt's ends of the exchanges.
+pub struct Ends {
+    active: InUse<Active>,
+    demand: Subscriber<Demand>,
+    report: Publisher<Option<Report>>,
 }
 
 struct Owned(UnsafeCell<MaybeUninit<Control>>);
@@ -26,17 +45,79 @@ struct Owned(UnsafeCell<MaybeUninit<Control>>);
 unsafe impl Sync for Owned {}
 static CONTROL: Owned = Owned(UnsafeCell::new(MaybeUninit::uninit()));
 
-static STEPS: AtomicU32 = AtomicU32::new(0);
-static LAST: AtomicU32 = AtomicU32::new(0);
-static LONGEST: AtomicU32 = AtomicU32::new(0);
-static LATE: AtomicU32 = AtomicU32::new(0);
-static OVERRUNS: AtomicU32 = AtomicU32::new(0);
-static SWITCHING: AtomicBool = AtomicBool::new(false);
-static BRIDGE_FAULT: AtomicBool = AtomicBool::new(false);
-/// Somebody wants the bridge off until the next reset.
-static STOPPED: AtomicBool = AtomicBool::new(false);
-static BRIDGE_TEMPERATURE: AtomicU32 = AtomicU32::new(f32::NAN.to_bits());
-static WINDING_TEMPERATURE: AtomicU32 = AtomicU32::new(f32::NAN.to_bits());
+/// What control interrupt and tasks tell each other in single words; in one place, so that the interrupt needs one address.
+struct Words {
+    steps: AtomicU32,
+    last_cycles: AtomicU32,
+    longest_cycles: AtomicU32,
+    overruns: AtomicU32,
+    switching: AtomicBool,
+    /// Somebody wants the bridge off until the next reset.
+    stopped: AtomicBool,
+    bridge_temperature: Real,
+    winding_temperature: Real,
+    /// [`Slow`]; until the thermal model has spoken no current is permitted.
+    derating: Real,
+    gear_temperature: Real,
+    mean_square_current: Real,
+    /// The mean square current is taken anew in the next control step.
+    mean_square_wanted: AtomicBool,
+}
+
+/// A number in an atomic word.
+struct Real(AtomicU32);
+
+impl Real {
+    const fn new(value: f32) -> Self {
+        Self(AtomicU32::new(value.to_bits()))
+    }
+
+    #[inline(always)]
+    fn load(&self, ordering: Ordering) -> f32 {
+        f32::from_bits(self.0.load(ordering))
+    }
+
+    #[inline(always)]
+    fn store(&self, value: f32, ordering: Ordering) {
+        self.0.store(value.to_bits(), ordering);
+    }
+}
+
+static WORDS: Words = Words {
+    steps: AtomicU32::new(0),
+    last_cycles: AtomicU32::new(0),
+    longest_cycles: AtomicU32::new(0),
+    overruns: AtomicU32::new(0),
+    switching: AtomicBool::new(false),
+    stopped: AtomicBool::new(false),
+    bridge_temperature: Real::new(f32::NAN),
+    winding_temperature: Real::new(f32::NAN),
+    derating: Real::new(0.0),
+    gear_temperature: Real::new(25.0),
+    mean_square_current: Real::new(0.0),
+    mean_square_wanted: AtomicBool::new(false),
+};
+
+static ACTIVE: Replaced<Active> = Replaced::new();
+static DEMAND: Newest<Demand> = Newest::new(Demand {
+    controlword: Controlword::DISABLE_VOLTAGE,
+    command: Command { mode: Mode::Torque, position: 0.0, velocity: 0.0, torque: 0.0, stiffness: 0.0, damping: 0.0 },
+    sequence: 0,
+});
+static REPORT: Newest<Option<Report>> = Newest::new(None);
+/// Tasks of both executors read it, one at a time.
+static READER: Mutex<RefCell<Option<Subscriber<Option<Report>>>>> = Mutex::new(RefCell::new(None));
+
+/// What the joint found and did in a control step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Report {
+    /// The step.
+    pub telemetry: Telemetry,
+    /// Faults since the last acknowledgement.
+    pub latched: Faults,
+    /// Phase currents as measured, A, offsets included: what a person looks at when a board is new.
+    pub phase_currents: Phases,
+}
 
 /// What is known of the control steps since the start; a copy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
@@ -47,14 +128,10 @@ pub struct Statistics {
     pub last_cycles: u32,
     /// Core cycles of the longest step.
     pub longest_cycles: u32,
-    /// Steps whose duties took effect half a period late.
-    pub late: u32,
     /// Steps that had not ended when the next one should have begun: a step is missing after each.
     pub overruns: u32,
     /// Whether the bridge switches.
     pub switching: bool,
-    /// Whether the gate driver reports a fault.
-    pub bridge_fault: bool,
     /// Whether [`stop`] was called.
     pub stopped: bool,
 }
@@ -62,45 +139,70 @@ pub struct Statistics {
 /// Statistics now.
 pub fn statistics() -> Statistics {
     Statistics {
-        steps: STEPS.load(Ordering::Relaxed),
-        last_cycles: LAST.load(Ordering::Relaxed),
-        longest_cycles: LONGEST.load(Ordering::Relaxed),
-        late: LATE.load(Ordering::Relaxed),
-        overruns: OVERRUNS.load(Ordering::Relaxed),
-        switching: SWITCHING.load(Ordering::Relaxed),
-        bridge_fault: BRIDGE_FAULT.load(Ordering::Relaxed),
-        stopped: STOPPED.load(Ordering::Relaxed),
+        steps: WORDS.steps.load(Ordering::Relaxed),
+        last_cycles: WORDS.last_cycles.load(Ordering::Relaxed),
+        longest_cycles: WORDS.longest_cycles.load(Ordering::Relaxed),
+        overruns: WORDS.overruns.load(Ordering::Relaxed),
+        switching: WORDS.switching.load(Ordering::Relaxed),
+        stopped: WORDS.stopped.load(Ordering::Relaxed),
     }
 }
 
 /// Switches the bridge off from the next control step on, until the next reset. The joint sees a fault of the bridge.
 pub fn stop() {
-    STOPPED.store(true, Ordering::Relaxed);
+    WORDS.stopped.store(true, Ordering::Relaxed);
 }
 
 /// Temperatures for the next control steps, °C; NaN where there is none.
 pub fn set_temperatures(bridge: f32, winding: f32) {
-    BRIDGE_TEMPERATURE.store(bridge.to_bits(), Ordering::Relaxed);
-    WINDING_TEMPERATURE.store(winding.to_bits(), Ordering::Relaxed);
+    WORDS.bridge_temperature.store(bridge, Ordering::Relaxed);
+    WORDS.winding_temperature.store(winding, Ordering::Relaxed);
 }
 
-/// Hands sensors and joint to the control interrupt and enables it. Once: a second call would take the state from under it,
-/// so it does nothing.
-pub fn start(sensors: Sensors, joint: Joint) {
-    static STARTED: AtomicBool = AtomicBool::new(false);
-    if STARTED.swap(true, Ordering::AcqRel) {
-        return;
-    }
-    // SAFETY: the interrupt is not enabled yet and this runs once.
-    unsafe { (*CONTROL.0.get()).write(Control { sensors, joint, overrun: false }) };
+/// What the thermal model says, for the next control steps.
+pub fn set_slow(slow: &Slow) {
+    WORDS.derating.store(slow.derating, Ordering::Relaxed);
+    WORDS.gear_temperature.store(slow.gear_temperature, Ordering::Relaxed);
+}
+
+/// Mean square of the current between the two calls before this one, A²; for one task only.
+pub fn mean_square_current() -> f32 {
+    let taken = WORDS.mean_square_current.load(Ordering::Acquire);
+    WORDS.mean_square_wanted.store(true, Ordering::Release);
+    taken
+}
+
+/// The newest control step's report; none before the first.
+pub fn report() -> Option<Report> {
+    critical_section::with(|section| *READER.borrow_ref_mut(section).as_mut()?.newest())
+}
+
+/// Both ends of what tasks and control interrupt exchange; none from the second call on.
+pub fn exchange() -> Option<(Commands, Ends)> {
+    let (offering, active) = ACTIVE.split()?;
+    let (publisher, demand) = DEMAND.split()?;
+    let (report, reader) = REPORT.split()?;
+    critical_section::with(|section| READER.replace(section, Some(reader)));
+    Some((Commands { demand: publisher, active: offering }, Ends { active, demand, report }))
+}
+
+/// Makes the joint, hands it and the sensors to the control interrupt and enables that. Until a configuration is offered to
+/// [`Commands::active`] there is no control step, and the bridge stays off.
+#[inline(never)]
+pub fn start(sensors: Sensors, ends: Ends) {
+    let control = Control { sensors, joint: Joint::new(), ends, overrun: false };
+    // SAFETY: the interrupt is not enabled yet, and this runs once: there is one pair of ends.
+    unsafe { (*CONTROL.0.get()).write(control) };
     // SAFETY: thread mode at start; nothing else uses these registers of the core.
     let mut core = unsafe { cortex_m::Peripherals::steal() };
     core.DCB.enable_trace();
     core.DWT.enable_cycle_counter();
-    // SAFETY: the handler's state is complete, and `main` has loaded its code.
-    unsafe {
-        core.NVIC.set_priority(Interrupt::ADC1_2, 0);
-        NVIC::unmask(Interrupt::ADC1_2);
+    for interrupt in [Interrupt::ADC1_2, super::PWM_INTERRUPT] {
+        // SAFETY: the handlers' state is complete, and `main` has loaded their code.
+        unsafe {
+            core.NVIC.set_priority(interrupt, 0);
+            NVIC::unmask(interrupt);
+        }
     }
     super::start_pwm();
 }
@@ -113,29 +215,43 @@ extern "C" fn ADC1_2() {
     adc::acknowledge(super::CONTROL_ADC);
     // SAFETY: enabled only after `start` has written it; this handler does not nest.
     let control = unsafe { (*CONTROL.0.get()).assume_init_mut() };
-    let stopped = STOPPED.load(Ordering::Relaxed);
+    let stopped = WORDS.stopped.load(Ordering::Relaxed);
 
     let mut measurements = control.sensors.measure();
-    BRIDGE_FAULT.store(measurements.bridge_fault, Ordering::Relaxed);
     measurements.bridge_fault |= stopped;
     measurements.overrun = control.overrun;
-    measurements.bridge_temperature = f32::from_bits(BRIDGE_TEMPERATURE.load(Ordering::Relaxed));
-    measurements.winding_temperature = f32::from_bits(WINDING_TEMPERATURE.load(Ordering::Relaxed));
+    measurements.bridge_temperature = WORDS.bridge_temperature.load(Ordering::Relaxed);
+    measurements.winding_temperature = WORDS.winding_temperature.load(Ordering::Relaxed);
+    let slow = Slow {
+        derating: WORDS.derating.load(Ordering::Relaxed),
+        gear_temperature: WORDS.gear_temperature.load(Ordering::Relaxed),
+    };
 
-    let wanted = control.joint.control_step(&measurements);
+    let wanted = match control.ends.active.current() {
+        Some(active) => control.joint.control_step(active, control.ends.demand.newest(), &slow, &measurements),
+        None => Bridge::OFF,
+    };
     let bridge = if stopped { Bridge::OFF } else { wanted };
-    let timing = super::apply(&bridge);
+    super::apply(&bridge);
 
-    SWITCHING.store(bridge.state == BridgeState::Switching, Ordering::Relaxed);
+    control.ends.report.publish(&Some(Report {
+        telemetry: *control.joint.telemetry(),
+        latched: control.joint.latched_faults(),
+        phase_currents: measurements.phase_currents,
+    }));
+    if WORDS.mean_square_wanted.load(Ordering::Acquire) {
+        WORDS.mean_square_wanted.store(false, Ordering::Relaxed);
+        WORDS.mean_square_current.store(control.joint.take_mean_square_current(), Ordering::Release);
+    }
+    WORDS.switching.store(bridge.state == BridgeState::Switching, Ordering::Relaxed);
     // Only this handler writes the counters, so load and store need no read-modify-write.
     let count = |counter: &AtomicU32, yes: bool| {
         counter.store(counter.load(Ordering::Relaxed).wrapping_add(yes.into()), Ordering::Relaxed);
     };
-    count(&LATE, timing == Timing::Late);
     control.overrun = adc::ended(super::CONTROL_ADC);
-    count(&OVERRUNS, control.overrun);
-    count(&STEPS, true);
+    count(&WORDS.overruns, control.overrun);
+    count(&WORDS.steps, true);
     let cycles = DWT::cycle_count().wrapping_sub(begin);
-    LAST.store(cycles, Ordering::Relaxed);
-    LONGEST.store(LONGEST.load(Ordering::Relaxed).max(cycles), Ordering::Relaxed);
+    WORDS.last_cycles.store(cycles, Ordering::Relaxed);
+    WORDS.longest_cycles.store(WORDS.longest_cycles.load(Ordering::Relaxed).max(cycles), Ordering::Relaxed);
 }

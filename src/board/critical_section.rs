@@ -1,9 +1,9 @@
 //! Critical sections that do not delay the control interrupt.
 //!
 //! The usual implementation masks every interrupt; the log alone would then hold the control interrupt up for microseconds a
-//! line. This one raises BASEPRI to the second priority: only the control interrupt, at the first, stays enabled. The price:
-//! the control interrupt must not use anything that a critical section protects (wakers, channels, the log). It talks to the
-//! tasks through atomics.
+//! line. This one raises BASEPRI to the second priority: only the control interrupt and the PWM timer's, at the first, stay
+//! enabled. The price: these two must not use anything that a critical section protects (wakers, channels, the log). They talk
+//! to the tasks through atomics.
 
 use core::arch::asm;
 use critical_section::RawRestoreState;
@@ -14,8 +14,8 @@ const MASKED: u32 = 1 << 4;
 struct BelowControl;
 critical_section::set_impl!(BelowControl);
 
-// SAFETY: between acquire and release no interrupt runs that may enter a critical section: all but the control interrupt have
-// a priority below the mask from before they are enabled (`entry`), and the control interrupt enters none. One core.
+// SAFETY: between acquire and release no interrupt runs that may enter a critical section: all but the control
+// interrupt and the PWM timer's have a priority below the mask from before they are enabled (`entry`), and these two enter none. One core.
 unsafe impl critical_section::Impl for BelowControl {
     unsafe fn acquire() -> RawRestoreState {
         let before: u32;

@@ -12,11 +12,13 @@
 
 pub mod adc;
 pub mod control;
+mod copy;
 mod critical_section;
 pub mod entry;
 pub mod faults;
 pub mod memory;
 pub mod pwm;
+mod shared;
 pub mod watchdog;
 
 #[cfg(feature = "b-g431b-esc1")]
@@ -34,6 +36,8 @@ pub use moteus_r4::*;
 pub use embassy_stm32::Peripherals;
 use embassy_stm32::gpio::{Input, Output};
 use embassy_stm32::peripherals::IWDG;
+pub use joint_firmware::default_configuration::BoardConfiguration;
+pub use shared::{Offering, Publisher};
 
 /// What a started board hands to the program.
 pub struct Parts {

@@ -20,7 +20,7 @@
 
 use super::adc::{self, FULL_SCALE, Sequence};
 use super::drv8353::Drv8353;
-use super::pwm::{self, Timing};
+use super::pwm;
 use super::{Led, Parts, Peripherals, StartError};
 use embassy_stm32::Config;
 use embassy_stm32::gpio::{Input, Level, Output, OutputType, Pull, Speed};
@@ -34,6 +34,7 @@ use embassy_stm32::spi::{self, Spi};
 use embassy_stm32::time::Hertz;
 use embassy_stm32::timer::low_level::CountingMode;
 use embassy_stm32::timer::simple_pwm::{PwmPin, SimplePwm};
+use joint_firmware::default_configuration::{self, BoardConfiguration};
 use joint_firmware::joint::{Bridge, BridgeState, Measurements};
 use joint_firmware::motor::phases::Phases;
 use joint_firmware::sensors::as5047p;
@@ -41,8 +42,12 @@ use joint_firmware::sensors::thermistor::Thermistor;
 
 /// Name of the board.
 pub const NAME: &str = "moteus-r4";
+/// The board's part of a configuration, and the joint that it is until it is commissioned.
+pub const CONFIGURATION: BoardConfiguration = default_configuration::MOTEUS_R4;
 /// Frequency of the PWM and of the control step, Hz.
-pub const CONTROL_HZ: u32 = 40_000;
+pub const CONTROL_HZ: u32 = CONFIGURATION.bridge.rate as u32;
+/// Interrupt of the PWM timer's update.
+pub const PWM_INTERRUPT: pac::Interrupt = pac::Interrupt::TIM2;
 /// Converter whose end of sequence is the control interrupt.
 pub const CONTROL_ADC: Adc = pac::ADC2;
 /// Address of the flash.
@@ -52,8 +57,8 @@ pub const FLASH_BANK: u32 = 256 * 1024;
 
 /// Top of TIM2's counter.
 const TOP: u16 = pwm::top(CONTROL_HZ);
-/// The low sides conduct at least 2.5 µs around the top (unconfirmed): dead time, settling of the amplifiers, one conversion.
-const LARGEST_DUTY: f32 = 0.9;
+/// The low sides conduct at least 2.5 µs around the top; that the amplifiers settle in that time is unconfirmed.
+const LARGEST_DUTY: f32 = CONFIGURATION.bridge.duty.1;
 
 /// A code, A (derived: 3.3 V / 4096 / (0.5 mOhm * 20)). The amplifier's output rises with a current into the motor (derived from
 /// the driver's datasheet and the place of the resistors; sign unconfirmed).
@@ -197,6 +202,7 @@ fn convert() -> Result<(), StartError> {
 
 /// Starts the PWM counter, and with it the control interrupt.
 pub fn start_pwm() {
+    pac::TIM2.dier().modify(|w| w.set_uie(true));
     pac::TIM2.cr1().modify(|w| w.set_cen(true));
 }
 
@@ -259,27 +265,36 @@ pub fn temperatures() -> (f32, f32) {
     (bridge, WINDING_NTC.temperature(fraction(adc::code::<1>(pac::ADC5))))
 }
 
-/// Sets the bridge for the next period.
+/// Sets the bridge: off at once, or switching with the duties held for the next period.
 #[inline(always)]
-pub fn apply(bridge: &Bridge) -> Timing {
-    let tim = pac::TIM2;
-    let on = bridge.state == BridgeState::Switching;
-    if !on {
+pub fn apply(bridge: &Bridge) {
+    pwm::hold(bridge.duties, TOP, LARGEST_DUTY);
+    match bridge.state {
         // HIZ only: a disabled driver would forget its configuration.
-        pac::GPIOB.bsrr().write(|w| w.set_br(7, true));
+        BridgeState::Off => pac::GPIOB.bsrr().write(|w| w.set_br(7, true)),
+        BridgeState::Switching => pac::GPIOB.bsrr().write(|w| w.set_bs(7, true)),
     }
+}
+
+/// Bottom and top of TIM2's counter: writes the duties on the way up. See `pwm`.
+#[unsafe(no_mangle)]
+#[unsafe(link_section = ".ccm.control")]
+extern "C" fn TIM2() {
+    let tim = pac::TIM2;
+    // Flags clear where a zero is written.
+    tim.sr().write(|w| {
+        w.0 = u32::MAX;
+        w.set_uif(false);
+    });
+    if tim.cr1().read().dir() == Dir::DOWN {
+        return;
+    }
+    let [a, b, c] = pwm::held();
     tim.cr1().modify(|w| w.set_udis(true));
-    tim.ccr(0).write_value(pwm::compare(bridge.duties.a, TOP, LARGEST_DUTY).into());
-    tim.ccr(1).write_value(pwm::compare(bridge.duties.b, TOP, LARGEST_DUTY).into());
-    tim.ccr(2).write_value(pwm::compare(bridge.duties.c, TOP, LARGEST_DUTY).into());
+    tim.ccr(0).write_value(a.into());
+    tim.ccr(1).write_value(b.into());
+    tim.ccr(2).write_value(c.into());
     tim.cr1().modify(|w| w.set_udis(false));
-    if on {
-        pac::GPIOB.bsrr().write(|w| w.set_bs(7, true));
-    }
-    match tim.cr1().read().dir() {
-        Dir::DOWN => Timing::Prompt,
-        Dir::UP => Timing::Late,
-    }
 }
 
 /// Switches all transistors off, now, and disables the gate driver. For fault handlers: needs nothing initialised, takes no

@@ -30,6 +30,8 @@ enum Flow {
 pub struct Reached {
     /// Address, size and name of every function, the entry included.
     pub functions: Vec<(u32, u32, String)>,
+    /// Every word that the code has as a constant, and the function: what it may take for an address.
+    pub constants: Vec<(u32, String)>,
     /// What is wrong with the walk itself, in words.
     pub unclear: Vec<String>,
 }
@@ -89,10 +91,16 @@ impl Program {
             }
             reached.functions.push((start, *size, name.clone()));
             let mut at = start;
-            // Halves of an address that movw and movt build in r12, as veneers do.
-            let mut veneer = (None, None);
+            // Lower halves that movw has put into each register.
+            let mut halves = [0; 16];
+            // What movw and movt have built in r12, as veneers do.
+            let mut veneer = None;
             while at < start + size {
                 if !self.is_code(at) {
+                    if at % 4 == 0 && at + 4 <= start + size {
+                        let word = self.half(at).zip(self.half(at + 2)).map(|(low, high)| high << 16 | low);
+                        reached.constants.extend(word.map(|word| (word, name.clone())));
+                    }
                     at += 2;
                     continue;
                 }
@@ -104,18 +112,20 @@ impl Program {
                 let second = if wide { self.half(at + 2).unwrap_or(0) } else { 0 };
                 let flow = match (wide, first) {
                     // bx r12 after movw r12 and movt r12.
-                    (false, 0x4760) => match veneer {
-                        (Some(low), Some(high)) => Flow::To((high << 16 | low) & !1u32),
-                        _ => Flow::Unknown,
-                    },
+                    (false, 0x4760) => veneer.map_or(Flow::Unknown, |address: u32| Flow::To(address & !1)),
                     (false, _) => narrow(first, at),
                     (true, _) => wide_flow(first, second, at),
                 };
-                if wide && second >> 8 & 0xf == 12 && second & 0x8000 == 0 {
+                if wide && second & 0x8000 == 0 {
                     let value = (first & 0xf) << 12 | (first >> 10 & 1) << 11 | (second >> 12 & 7) << 8 | second & 0xff;
+                    let register = (second >> 8 & 0xf) as usize;
                     match first & 0xfbf0 {
-                        0xf240 => veneer.0 = Some(value),
-                        0xf2c0 => veneer.1 = Some(value),
+                        0xf240 => halves[register] = value,
+                        0xf2c0 => {
+                            let word = value << 16 | halves[register];
+                            reached.constants.push((word, name.clone()));
+                            veneer = (register == 12).then_some(word);
+                        }
                         _ => {}
                     }
                 }
