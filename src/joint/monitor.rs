@@ -182,7 +182,7 @@ impl Monitor {
     }
 
     /// Faults that the current loop's last step shows.
-    #[inline(always)]
+    #[inline(never)]
     pub fn current_loop(&mut self, active: &Active, last: &Loop) -> Faults {
         let Loop { reference, output, speed } = last;
         let (current, voltage) = (output.current, output.voltage);
