@@ -3,6 +3,7 @@
 use super::configuration::{
     BridgeConfiguration, Configuration, ConfigurationError, GearConfiguration, Limits, VelocitySource,
 };
+use super::monitor;
 use crate::compensation::Settings;
 use crate::friction::FrictionModel;
 use crate::motor::angle::{Direction, EncoderAlignment, STEPS, TAU};
@@ -29,6 +30,9 @@ const HIGHEST_ACCELERATION: f32 = 1e6;
 const CURRENT_SUM: f32 = 0.1;
 /// Voltage that may be unexplained as a part of the highest supply: what a dead time of 1 % of the period makes, not compensated at all.
 const UNEXPLAINED: f32 = 0.015;
+/// Noise of a current as a part of the current limit that may be taken for a change: differentiated with the windings' inductance it
+/// is a voltage, in windings of many turns more than all the rest.
+const CURRENT_NOISE: f32 = 0.005;
 
 /// Scales between rotor and joint.
 #[derive(Clone, Copy, Debug)]
@@ -142,7 +146,7 @@ pub struct Active {
     /// Largest sum of the phase currents, A.
     pub current_sum_limit: f32,
     /// Voltage that the motor's equations may leave unexplained without current and at rest, V.
-    pub implausible_voltage: f32,
+    pub implausible_voltage: Dq,
     /// Electrical constants for that check: resistance, Ω, inductances, H, and flux linkage, Wb.
     pub resistance: f32,
     /// H.
@@ -180,6 +184,8 @@ impl Active {
             flux_linkage,
         };
         let (lowest_voltage, highest_voltage) = limits.bus_voltage;
+        let current_slope = CURRENT_NOISE * motor.current_limit * monitor::FILTER * rate;
+        let unexplained = |inductance: f32| UNEXPLAINED * highest_voltage + inductance * current_slope;
         let magnitude = if gear.ratio < 0.0 { -gear.ratio } else { gear.ratio };
         let rotor_velocity = OBSERVER_RESERVE * limits.velocity * magnitude;
         let scales = Scales::new(gear, &motor.alignment, motor.torque_constant);
@@ -221,7 +227,7 @@ impl Active {
             limits: *limits,
             current_limit: motor.current_limit,
             current_sum_limit: CURRENT_SUM * limits.over_current,
-            implausible_voltage: UNEXPLAINED * highest_voltage,
+            implausible_voltage: Dq { d: unexplained(motor.inductance_d), q: unexplained(motor.inductance_q) },
             resistance: motor.resistance,
             inductance: Dq { d: motor.inductance_d, q: motor.inductance_q },
             flux_linkage,

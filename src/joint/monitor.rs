@@ -26,7 +26,7 @@ pub const CURRENT_SUM_STEPS: u32 = 3;
 /// Steps for which the voltage must be unexplained: longer than the current loop takes for a step of its reference.
 pub const UNEXPLAINED_STEPS: u32 = 30;
 /// Part of a step's voltage that goes into the filter: a time constant of 8 steps.
-const FILTER: f32 = 0.125;
+pub(super) const FILTER: f32 = 0.125;
 /// Error of the resistance that counts as explained: copper 100 K above the temperature that the constants hold for has 39 % more.
 const RESISTANCE_ERROR: f32 = 0.5;
 /// Error of what the rotor's turning induces that counts as explained: a saturated or hot magnet, and an electrical angle that is a
@@ -203,9 +203,9 @@ impl Monitor {
         };
         // A wrong resistance shows along the current only: across it the bound is close.
         let turning = INDUCED_ERROR * (magnitude(memory.induced.d) + magnitude(memory.induced.q));
-        let bound =
-            |current: f32| active.implausible_voltage + turning + RESISTANCE_ERROR * resistance * magnitude(current);
-        let contradicts = beyond(left.d, bound(memory.current.d)) || beyond(left.q, bound(memory.current.q));
+        let explained = |current: f32| turning + RESISTANCE_ERROR * resistance * magnitude(current);
+        let contradicts = beyond(left.d, active.implausible_voltage.d + explained(memory.current.d))
+            || beyond(left.q, active.implausible_voltage.q + explained(memory.current.q));
         let found = memory.steps.step(contradicts, UNEXPLAINED_STEPS);
 
         let permitted = MISSED_LIMIT * active.current_limit + MISSED_REFERENCE * magnitude(reference.q);
