@@ -7,6 +7,7 @@
 //! samples, and the best one wins. Test samples are not seen.
 
 use super::grid::{search, search_from};
+use super::linear::{add_to_normal_sums, normal_equations, normal_sums, sum_over_rows};
 use super::nonlinear::{Fit, Problem};
 use super::observations::{Row, decimated};
 use crate::friction_model::{Term, Terms};
@@ -17,6 +18,12 @@ use std::fmt;
 
 /// Temperature terms are considered when the train samples cover at least this many kelvin.
 pub const TEMPERATURE_RANGE: f64 = 5.0;
+/// The position slope stands for itself when the rigid part leaves at least this fraction of the position's variance unexplained; with
+/// less its standard error is more than ten times that of a slope alone. Over some 75 degrees either way gravity's sine is a straight line but
+/// for a hundredth: noise then decides how much of gravity counts as friction, which whoever commands the joint has added already.
+const OWN_POSITION: f64 = 0.01;
+/// A position slope that does not stand for itself must be worth this fraction of the validation error.
+const CONFOUNDED_WORTH: f64 = 0.05;
 /// A term stays when it is worth at least this fraction of the validation error.
 const WORTH: f64 = 1e-3;
 /// Limit on steps: each fits about a dozen models.
@@ -76,6 +83,24 @@ fn supported(problem: &Problem, rigid: &RigidModel) -> (Structure, Vec<String>) 
     (structure, notes)
 }
 
+/// The fraction of the position's variance over the train rows that the rigid part's regressors leave unexplained.
+fn position_beside_rigid(problem: &Problem) -> f64 {
+    let regressors = &problem.regressors;
+    let n = regressors.len() + 1;
+    let sums = sum_over_rows(&problem.train, normal_sums(n), |sums, row| {
+        let mut columns: Vec<f64> = regressors.iter().map(|&regressor| row.regressors[regressor as usize]).collect();
+        columns.push(1.0);
+        add_to_normal_sums(sums, &columns, row.joint.position);
+    });
+    let equations = normal_equations(&sums, n, problem.train.len());
+    let mean = equations.gradient[n - 1];
+    let variance = equations.cost - mean * mean;
+    let explained =
+        equations.hessian.cholesky().map(|factor| factor.solve(&equations.gradient).dot(&equations.gradient));
+    // Regressors that depend on each other explain less together than they are taken for; then nothing is known.
+    explained.map_or(1.0, |explained| (equations.cost - explained) / variance.max(f64::MIN_POSITIVE))
+}
+
 /// What the structure can lose; viscous and Coulomb friction stay.
 fn freedoms(structure: &Structure) -> Vec<Freedom> {
     let terms = structure.terms.iter().filter(|term| !matches!(term, Term::Viscous | Term::Coulomb));
@@ -103,12 +128,20 @@ fn changed(structure: &Structure, freedom: Freedom, on: bool) -> Structure {
 pub fn select(problem: &Problem, rigid: &RigidModel) -> (Fit, Vec<String>) {
     let (structure, mut notes) = supported(problem, rigid);
     let rows = decimated(&problem.validation, VALIDATION_ROWS);
-    let chosen = step_by_step(problem, search(problem, &structure), &rows, &mut notes);
+    let own = position_beside_rigid(problem);
+    let chosen = if own >= OWN_POSITION {
+        step_by_step(problem, search(problem, &structure), &structure, &rows, &mut notes)
+    } else {
+        position_last(problem, &structure, own, &rows, &mut notes)
+    };
     let limit = CONTENDER * error(&chosen, &rows);
     let chosen = chosen.polished(problem);
     let mut best = (error(&chosen, &problem.validation), chosen);
+    let may_have_position = best.1.candidate.structure.terms.contains(Term::Position) || own >= OWN_POSITION;
+    let considered = |preset: &Structure| may_have_position || !preset.terms.contains(Term::Position);
     for preset in Preset::ALL {
-        let Some(fit) = preset.structure(rigid).map(|structure| search(problem, &structure)) else { continue };
+        let Some(structure) = preset.structure(rigid).filter(considered) else { continue };
+        let fit = search(problem, &structure);
         if error(&fit, &rows) > limit {
             continue;
         }
@@ -126,10 +159,34 @@ fn error(fit: &Fit, rows: &[Row]) -> f64 {
     fit.rmse(rows).unwrap_or(f64::INFINITY)
 }
 
-/// Drops terms and takes terms back until neither is worth it.
-fn step_by_step(problem: &Problem, full: Fit, rows: &[Row], notes: &mut Vec<String>) -> Fit {
-    let all = freedoms(&full.candidate.structure);
-    let (mut current, mut fit) = (error(&full, rows), full);
+/// Chooses among the other terms first, and takes a position slope that the rigid part explains only for what it adds to them.
+fn position_last(problem: &Problem, full: &Structure, own: f64, rows: &[Row], notes: &mut Vec<String>) -> Fit {
+    let slope = Freedom::Term(Term::Position);
+    let others = changed(full, slope, false);
+    let without = step_by_step(problem, search(problem, &others), &others, rows, notes);
+    let with =
+        search_from(problem, &changed(&without.candidate.structure, slope, true), &without, Some(Term::Position));
+    let (before, after) = (error(&without, rows), error(&with, rows));
+    let explained = 100.0 * (1.0 - own);
+    if after <= (1.0 - CONFOUNDED_WORTH) * before {
+        notes.push(format!(
+            "{slope} added, although the rigid part explains {explained:.1} % of the position over these motions: validation error \
+             {before:.4e} -> {after:.4e}"
+        ));
+        return step_by_step(problem, with, full, rows, notes);
+    }
+    notes.push(format!(
+        "{slope} left out: the rigid part explains {explained:.1} % of the position over these motions, and it is not worth \
+         {:.0} % of the validation error ({before:.4e} -> {after:.4e})",
+        100.0 * CONFOUNDED_WORTH
+    ));
+    without
+}
+
+/// Drops terms and takes terms of `full` back until neither is worth it.
+fn step_by_step(problem: &Problem, start: Fit, full: &Structure, rows: &[Row], notes: &mut Vec<String>) -> Fit {
+    let all = freedoms(full);
+    let (mut current, mut fit) = (error(&start, rows), start);
     let mut lowest = current;
     let (mut adding, mut exhausted) = (false, 0);
     for _ in 0..STEPS {

@@ -101,6 +101,29 @@ fn full_considers_temperature_only_when_it_varied_enough() {
 }
 
 #[test]
+fn a_position_slope_that_gravity_explains_is_not_friction_and_one_that_it_does_not_explain_is() {
+    let rigid_model = RigidModel { gravity: Gravity::Sine, ..RIGID };
+    let rigid = RigidParameters { gravity_cosine: 0.0, ..rigid() };
+    let sloped = friction(Terms::of(&[Term::Position, Term::Viscous, Term::Coulomb]));
+    let found = |scale: f64, friction: &FrictionModel| {
+        let mut samples = motion(4_000);
+        for values in [&mut samples.position, &mut samples.velocity, &mut samples.acceleration] {
+            values.iter_mut().for_each(|value| *value *= scale);
+        }
+        drive(&mut samples, &rigid, friction, 0.02, 42);
+        identify(&mut samples, &rigid_model, Preset::Full, &Options::default()).unwrap()
+    };
+    let narrow = found(0.5, &truth());
+    assert!(!narrow.friction.terms.contains(Term::Position), "{:?}", narrow.notes);
+    assert!((narrow.rigid.gravity_sine - rigid.gravity_sine).abs() < 0.1, "{:?}", narrow.rigid);
+    let says = |note: &String| note.starts_with("Position left out: the rigid part explains 99");
+    assert!(narrow.notes.iter().any(says), "{:?}", narrow.notes);
+    let wide = found(2.0, &sloped);
+    assert!(wide.friction.terms.contains(Term::Position), "{:?}", wide.notes);
+    assert!((wide.friction.position_slope - sloped.position_slope).abs() < 0.03, "{:?}", wide.friction);
+}
+
+#[test]
 fn the_test_samples_are_never_looked_at() {
     let mut clean = joint(3_000);
     let mut corrupt = clean.clone();
