@@ -2,6 +2,7 @@
 #![cfg_attr(not(test), no_std)]
 #![deny(unsafe_code)]
 
+pub mod canopen;
 pub mod compensation;
 pub mod default_configuration;
 #[allow(unsafe_code)]

@@ -1,0 +1,92 @@
+//! TPDOs: assembling one, in either context, and the timers of those that are sent by event, in the task.
+
+use super::MappedObject;
+use crate::canopen::frame::Frame;
+use crate::canopen::shared::{PdoRegisters, Shared};
+use crate::canopen::time::{MILLISECOND, elapsed};
+
+/// The frame of a TPDO that exists and carries anything. `value` gives the actual value of each object; none leaves the frame out.
+pub(crate) fn assemble(registers: &PdoRegisters, mut value: impl FnMut(MappedObject) -> Option<u64>) -> Option<Frame> {
+    let id = registers.id()?;
+    if registers.count() == 0 {
+        return None;
+    }
+    let (mut data, mut bits) = (0u64, 0u32);
+    for object in registers.mapping() {
+        let value = value(object)? & object.mask();
+        data |= value.checked_shl(bits).unwrap_or(0);
+        bits = bits.saturating_add(object.bits());
+    }
+    Some(Frame::cut(id, data.to_le_bytes(), bits.div_ceil(8).min(8) as u8))
+}
+
+/// Which SYNCs a synchronous TPDO follows; the receive interrupt.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Synchronous {
+    syncs: u8,
+}
+
+impl Synchronous {
+    /// Whether TPDO `pdo` is due with this SYNC.
+    pub(crate) fn is_due(&mut self, shared: &Shared, registers: &PdoRegisters, pdo: u8) -> bool {
+        match registers.transmission() {
+            0 => shared.take_event(pdo),
+            every @ 1..=240 => {
+                self.syncs = self.syncs.saturating_add(1);
+                let due = self.syncs >= every;
+                if due {
+                    self.syncs = 0;
+                }
+                due
+            }
+            _ => false,
+        }
+    }
+}
+
+/// Inhibit time and event timer of one TPDO of type 254 or 255; the task.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Timers {
+    /// Instant of the last transmission, while the inhibit time is not over.
+    inhibited: Option<u32>,
+    /// Instant from which the event timer counts.
+    counting: Option<u32>,
+    generation: u8,
+}
+
+impl Timers {
+    /// Whether TPDO `pdo` is due; then it counts as sent. Called in every poll in OPERATIONAL.
+    pub(crate) fn is_due(&mut self, shared: &Shared, registers: &PdoRegisters, pdo: u8, now: u32) -> bool {
+        if registers.transmission() < 254 || registers.id().is_none() {
+            *self = Self::default();
+            return false;
+        }
+        if self.generation != registers.generation() {
+            *self = Self { generation: registers.generation(), ..Self::default() };
+        }
+        let inhibit = u32::from(registers.inhibit()).saturating_mul(100);
+        if self.inhibited.is_some_and(|since| elapsed(now, since) >= inhibit) {
+            self.inhibited = None;
+        }
+        let period = u32::from(registers.event_timer()).saturating_mul(MILLISECOND);
+        let since = *self.counting.get_or_insert(now);
+        let expired = period != 0 && elapsed(now, since) >= period;
+        if period == 0 {
+            // Without a timer the instant would grow older than time reaches back.
+            self.counting = None;
+        }
+        if self.inhibited.is_some() || !(expired || shared.has_event(pdo)) {
+            return false;
+        }
+        shared.take_event(pdo);
+        self.inhibited = (inhibit != 0).then_some(now);
+        // The timer runs from the last transmission, whatever caused it.
+        self.counting = Some(now);
+        true
+    }
+
+    /// Outside OPERATIONAL nothing is counted.
+    pub(crate) fn stop(&mut self) {
+        *self = Self { generation: self.generation, ..Self::default() };
+    }
+}
