@@ -1,0 +1,218 @@
+//! SYNC, RPDOs and TPDOs.
+
+use super::*;
+
+const RPDO1: u16 = 0x205;
+const RPDO2: u16 = 0x305;
+
+#[test]
+fn an_rpdo_is_in_the_process_image_before_the_interrupt_returns() {
+    let mut node = Node::operational();
+    node.interrupt(&frame(RPDO1, &[0x34, 0x12, 4, 3, 2, 1]));
+    assert_eq!(node.image.set_points, BTreeMap::from([(U16.0, 0x1234), (U32.0, 0x0102_0304)]));
+    assert_eq!(node.image.received, [0]);
+}
+
+#[test]
+fn a_synchronous_rpdo_counts_with_the_next_sync_and_the_newest_wins() {
+    let mut node = Node::operational();
+    node.interrupt(&frame(RPDO2, &[1; 8]));
+    node.interrupt(&frame(RPDO2, &[2; 8]));
+    assert!(node.image.set_points.is_empty());
+    node.interrupt(&frame(0x80, &[]));
+    assert_eq!(node.image.set_points, BTreeMap::from([(U64.0, 0x0202_0202_0202_0202)]));
+    node.image.set_points.clear();
+    node.interrupt(&frame(0x80, &[]));
+    assert!(node.image.set_points.is_empty());
+}
+
+#[test]
+fn an_rpdo_that_waits_for_sync_is_forgotten_with_the_state_and_with_its_mapping() {
+    let mut node = Node::operational();
+    node.interrupt(&frame(RPDO2, &[1; 8]));
+    node.interrupt(&frame(0, &[2, 0]));
+    node.interrupt(&frame(0, &[1, 0]));
+    node.interrupt(&frame(0x80, &[]));
+    assert!(node.image.set_points.is_empty());
+    node.interrupt(&frame(RPDO2, &[1; 8]));
+    map(&mut node, 0x1401, 0x1601, 0x305, &[U8]).unwrap();
+    node.interrupt(&frame(0x80, &[]));
+    assert!(node.image.set_points.is_empty());
+}
+
+#[test]
+fn rpdos_outside_operational_change_nothing_and_are_not_applied_later() {
+    let mut node = Node::booted();
+    for command in [0x80, 2] {
+        node.interrupt(&frame(0, &[command, 0]));
+        node.interrupt(&frame(RPDO1, &[1; 6]));
+        node.interrupt(&frame(RPDO2, &[1; 8]));
+        node.interrupt(&frame(0x80, &[]));
+        node.interrupt(&frame(0, &[1, 0]));
+        node.interrupt(&frame(0x80, &[]));
+        assert_eq!(node.task(), []);
+        assert!(node.image.set_points.is_empty() && node.image.received.is_empty());
+    }
+}
+
+#[test]
+fn an_rpdo_that_is_too_short_changes_nothing_and_one_that_is_too_long_counts() {
+    let mut node = Node::operational();
+    assert_eq!(node.bus(RPDO1, &[1; 5]), [frame(0x85, &[0x10, 0x82, 0, 1, 0, 0, 0, 0])]);
+    assert!(node.image.set_points.is_empty());
+    assert_eq!(node.bus(RPDO1, &[1; 8]), [frame(0x85, &[0x20, 0x82, 0, 1, 0, 0, 0, 0])]);
+    assert_eq!(node.image.set_points.len(), 2);
+}
+
+#[test]
+fn an_rpdo_that_misses_its_deadline_is_reported_once_and_watched_from_the_next_one_on() {
+    let mut node = Node::operational();
+    node.write(0x1400, 5, &20u16.to_le_bytes()).unwrap();
+    assert_eq!(node.run(100), []);
+    node.interrupt(&frame(RPDO1, &[0; 6]));
+    assert_eq!(node.run(20), []);
+    assert_eq!(node.run(1), [frame(0x85, &[0x50, 0x82, 0x11, 1, 0, 0, 0, 0])]);
+    assert_eq!(node.dictionary.events.last(), Some(&Event::RpdoDeadline { pdo: 0 }));
+    assert_eq!(node.run(100), []);
+    assert_eq!(node.bus(RPDO1, &[0; 6]), [frame(0x85, &[0; 8])]);
+    // Outside OPERATIONAL nothing is due.
+    node.bus(0, &[0x80, 0]);
+    assert_eq!(node.run(100), []);
+}
+
+#[test]
+fn a_synchronous_tpdo_leaves_within_the_interrupt_of_its_sync() {
+    let mut node = Node::operational();
+    let expected = frame(0x185, &[0x10, 0x02, 0x20, 0x03, 0x00, 0x20]);
+    assert_eq!(node.interrupt(&frame(0x80, &[])), [expected]);
+    assert_eq!(node.image.syncs, 1);
+    node.write(0x1800, 2, &[3]).unwrap();
+    let sent = (0..9).map(|_| node.interrupt(&frame(0x80, &[])).len()).collect::<Vec<_>>();
+    assert_eq!(sent, [0, 0, 1, 0, 0, 1, 0, 0, 1]);
+    node.bus(0, &[0x80, 0]);
+    assert_eq!(node.interrupt(&frame(0x80, &[])), []);
+}
+
+#[test]
+fn sync_can_be_moved_to_a_free_identifier_only() {
+    let mut node = Node::operational();
+    for refused in [0x4000_0080u32, 0x2000_0080, 0, 0x601, 0x700 + 5, 0x800] {
+        assert_eq!(node.write(0x1005, 0, &refused.to_le_bytes()), Err(Abort::VALUE.0), "{refused:#x}");
+    }
+    node.write(0x1005, 0, &0x90u32.to_le_bytes()).unwrap();
+    assert_eq!(node.interrupt(&frame(0x80, &[])), []);
+    assert_eq!(node.interrupt(&frame(0x90, &[])).len(), 1);
+}
+
+#[test]
+fn a_tpdo_of_type_0_follows_its_event_with_the_next_sync() {
+    let mut node = Node::operational();
+    node.write(0x1800, 2, &[0]).unwrap();
+    // Once when the node became operational.
+    assert_eq!(node.interrupt(&frame(0x80, &[])).len(), 1);
+    assert_eq!(node.interrupt(&frame(0x80, &[])).len(), 0);
+    node.shared.trigger(0);
+    assert_eq!(node.task(), []);
+    assert_eq!(node.interrupt(&frame(0x80, &[])).len(), 1);
+}
+
+#[test]
+fn an_event_driven_tpdo_keeps_its_inhibit_time_and_its_event_timer() {
+    let mut node = Node::booted();
+    node.dictionary.values.insert((0x2000, 1), vec![0x77]);
+    map(&mut node, 0x1801, 0x1A01, 0x285, &[U8]).unwrap();
+    node.write(0x1801, 1, &0x8000_0285u32.to_le_bytes()).unwrap();
+    // 5 ms and 20 ms.
+    node.write(0x1801, 3, &50u16.to_le_bytes()).unwrap();
+    node.write(0x1801, 5, &20u16.to_le_bytes()).unwrap();
+    node.write(0x1801, 1, &0x285u32.to_le_bytes()).unwrap();
+    assert_eq!(node.run(100), []);
+    assert_eq!(node.bus(0, &[1, 0]), [frame(0x285, &[0x77])]);
+    node.shared.trigger(1);
+    assert_eq!(node.run(4), []);
+    assert_eq!(node.run(1).len(), 1);
+    assert_eq!(node.run(19).len(), 0);
+    assert_eq!(node.run(1).len(), 1);
+    assert_eq!(node.run(2_000).len(), 100);
+    // Faster than the inhibit time allows.
+    let mut sent = 0;
+    for _ in 0..100 {
+        node.shared.trigger(1);
+        sent += node.run(1).len();
+    }
+    assert_eq!(sent, 20);
+    assert_eq!(node.write(0x1801, 3, &[0; 2]), Err(Abort::VALUE.0));
+}
+
+/// Sets up a PDO by the procedure of CiA 301.
+fn map(node: &mut Node, communication: u16, mapping: u16, id: u32, objects: &[MappedObject]) -> Result<(), u32> {
+    node.write(communication, 1, &(0x8000_0000 | id).to_le_bytes())?;
+    node.write(mapping, 0, &[0])?;
+    for (object, sub_index) in objects.iter().zip(1..) {
+        node.write(mapping, sub_index, &object.0.to_le_bytes())?;
+    }
+    node.write(mapping, 0, &[objects.len() as u8])?;
+    node.write(communication, 1, &id.to_le_bytes())
+}
+
+#[test]
+fn a_mapping_set_up_at_run_time_is_what_counts() {
+    let mut node = Node::operational();
+    // A dummy entry skips a byte.
+    map(&mut node, 0x1403, 0x1603, 0x444, &[MappedObject::new(5, 0, 8), U8, U16]).unwrap();
+    node.interrupt(&frame(0x444, &[9, 1, 2, 3]));
+    assert_eq!(node.image.set_points, BTreeMap::from([(U8.0, 1), (U16.0, 0x0302)]));
+    assert_eq!(node.read(0x1603, 0), Ok(3));
+    assert_eq!(node.read(0x1603, 2), Ok(U8.0.into()));
+    map(&mut node, 0x1803, 0x1A03, 0x445, &[U64]).unwrap();
+    node.write(0x1803, 2, &[1]).unwrap();
+    let sent = node.interrupt(&frame(0x80, &[]));
+    assert_eq!(sent.last(), Some(&frame(0x445, &(0xA5A5_A5A5_0000_0000 | u64::from(U64.0)).to_le_bytes())));
+}
+
+#[test]
+fn a_mapping_cannot_change_while_the_pdo_exists() {
+    let mut node = Node::booted();
+    assert_eq!(node.write(0x1600, 0, &[0]), Err(Abort::ACCESS.0));
+    assert_eq!(node.write(0x1600, 1, &U8.0.to_le_bytes()), Err(Abort::ACCESS.0));
+    assert_eq!(node.write(0x1400, 1, &0x206u32.to_le_bytes()), Err(Abort::VALUE.0));
+    node.write(0x1400, 1, &0x8000_0205u32.to_le_bytes()).unwrap();
+    assert_eq!(node.write(0x1600, 1, &U8.0.to_le_bytes()), Err(Abort::ACCESS.0));
+    node.write(0x1600, 0, &[0]).unwrap();
+    node.write(0x1600, 1, &U8.0.to_le_bytes()).unwrap();
+}
+
+#[test]
+fn what_cannot_be_mapped_is_refused() {
+    let mut node = Node::booted();
+    let mut map =
+        |communication, mapping, objects: &[MappedObject]| map(&mut node, communication, mapping, 0x444, objects);
+    assert_eq!(map(0x1403, 0x1603, &[MappedObject::new(0x3000, 0, 8)]), Err(Abort::NO_OBJECT.0));
+    assert_eq!(map(0x1403, 0x1603, &[MappedObject::new(0x2000, 9, 8)]), Err(Abort::NO_SUB_INDEX.0));
+    assert_eq!(map(0x1403, 0x1603, &[MappedObject::new(0x2000, 1, 7)]), Err(Abort::NOT_MAPPABLE.0));
+    assert_eq!(map(0x1403, 0x1603, &[MappedObject::new(0x2001, 0, 32)]), Err(Abort::NOT_MAPPABLE.0));
+    assert_eq!(map(0x1403, 0x1603, &[MappedObject::new(0x2010, 0, 64)]), Err(Abort::NOT_MAPPABLE.0));
+    assert_eq!(map(0x1803, 0x1A03, &[MappedObject::new(0x2002, 0, 32)]), Err(Abort::NOT_MAPPABLE.0));
+    assert_eq!(map(0x1803, 0x1A03, &[MappedObject::new(5, 0, 8)]), Err(Abort::NO_OBJECT.0));
+    assert_eq!(map(0x1403, 0x1603, &[U64, U8]), Err(Abort::PDO_LENGTH.0));
+    assert_eq!(map(0x1403, 0x1603, &[U8; 8]), Ok(()));
+    assert_eq!(node.write(0x1403, 1, &0x8000_0444u32.to_le_bytes()), Ok(()));
+    assert_eq!(node.write(0x1603, 0, &[9]), Err(Abort::PDO_LENGTH.0));
+    assert_eq!(node.write(0x1603, 9, &[0; 4]), Err(Abort::NO_SUB_INDEX.0));
+}
+
+#[test]
+fn transmission_types_that_need_remote_frames_and_reserved_ones_are_refused() {
+    let mut node = Node::booted();
+    for kind in 0..=255 {
+        let expected = if (241..=253).contains(&kind) { Err(Abort::VALUE.0) } else { Ok(()) };
+        assert_eq!(node.write(0x1800, 2, &[kind]), expected, "{kind}");
+        assert_eq!(node.write(0x1400, 2, &[kind]), expected, "{kind}");
+    }
+    assert_eq!(node.write(0x1400, 3, &[0; 2]), Err(Abort::NO_SUB_INDEX.0));
+    assert_eq!(node.write(0x1800, 4, &[0]), Err(Abort::NO_SUB_INDEX.0));
+    for restricted in [0u32, 0x601, 0x2000_0205, 0x7E5] {
+        node.write(0x1403, 1, &0x8000_0000u32.to_le_bytes()).unwrap();
+        assert_eq!(node.write(0x1403, 1, &restricted.to_le_bytes()), Err(Abort::VALUE.0));
+    }
+}
