@@ -1,4 +1,5 @@
-//! One face for all objects, the server's and the application's, and one SDO transfer's reading or writing of an entry; the task.
+//! One face for all objects, the server's and the application's, and one SDO transfer's reading or writing of an
+//! entry; the task.
 
 use super::abort::Abort;
 use super::communication::{Communication, Object};

@@ -65,9 +65,11 @@ pub enum Group {
 pub enum Event {
     /// The NMT state changed. Every set-point that came by PDO is invalid from here on.
     State(NmtState),
-    /// The NMT master resets. After [`Reset::Node`] the application restarts itself; if it returns, communication starts anew.
+    /// The NMT master resets. After [`Reset::Node`] the application restarts itself; if it returns, communication
+    /// starts anew.
     Reset(Reset),
-    /// A node that object 1016h monitors fell silent. Reported as EMCY 8130h, too, and object 1029h decides about the NMT state.
+    /// A node that object 1016h monitors fell silent. Reported as EMCY 8130h, too, and object 1029h decides about the
+    /// NMT state.
     HeartbeatLost {
         /// Its node id.
         node: u8,
@@ -125,21 +127,25 @@ pub trait ObjectDictionary {
     /// Attributes of an entry. [`Abort::NO_OBJECT`] and [`Abort::NO_SUB_INDEX`] are the usual errors.
     fn entry(&self, index: u16, sub_index: u8) -> Result<Entry, Abort>;
 
-    /// Fills all of `out` from byte `offset` on, little endian. A value is read at once, from offset 0; a stream in any pieces within
-    /// the length that [`ObjectDictionary::entry`] told when the transfer began. Where a segment was lost, the same bytes are read
-    /// again and must still be the same: refuse once they are not ([`Abort::DEVICE_STATE`]).
+    /// Fills all of `out` from byte `offset` on, little endian. A value is read at once, from offset 0; a stream in
+    /// any pieces within the length that [`ObjectDictionary::entry`] told when the transfer began. Where a segment was
+    /// lost, the same bytes are read again and must still be the same: refuse once they are not
+    /// ([`Abort::DEVICE_STATE`]).
     fn read(&mut self, index: u16, sub_index: u8, offset: u32, out: &mut [u8]) -> Result<(), Abort>;
 
     /// Sets a value: all of its bytes, little endian. An error changes nothing.
     fn write(&mut self, index: u16, sub_index: u8, value: &[u8]) -> Result<(), Abort>;
 
-    /// A stream is going to be written, of `length` bytes where the client said so. An error refuses it, and that was all.
+    /// A stream is going to be written, of `length` bytes where the client said so. An error refuses it, and that was
+    /// all.
     fn open(&mut self, index: u16, sub_index: u8, length: Option<u32>) -> Result<(), Abort>;
 
-    /// The next bytes of the open stream, of which `offset` came before. Together never more than announced or writable.
+    /// The next bytes of the open stream, of which `offset` came before. Together never more than announced or
+    /// writable.
     fn append(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Abort>;
 
-    /// The open stream is whole: length and, where used, CRC are right. An error is followed by [`ObjectDictionary::abandon`].
+    /// The open stream is whole: length and, where used, CRC are right. An error is followed by
+    /// [`ObjectDictionary::abandon`].
     fn finish(&mut self) -> Result<(), Abort>;
 
     /// The open stream will not be finished: the client, a time-out, an error or the NMT state ended it.

@@ -1,4 +1,5 @@
-//! EMCY, error register and error history: CiA 301 sections 7.2.7 and 7.5.2.2 to 7.5.2.4 (objects 1001h, 1003h, 1014h, 1015h); the task.
+//! EMCY, error register and error history: CiA 301 sections 7.2.7 and 7.5.2.2 to 7.5.2.4 (objects 1001h, 1003h, 1014h,
+//! 1015h); the task.
 
 use super::frame::Frame;
 use super::parameters::INVALID;
@@ -7,7 +8,8 @@ use heapless::Deque;
 
 /// Errors that object 1003h remembers.
 pub const HISTORY: usize = 8;
-/// EMCYs that wait for their inhibit time or for a state that may send them. When they are more, the oldest are dropped and counted.
+/// EMCYs that wait for their inhibit time or for a state that may send them. When they are more, the oldest are
+/// dropped and counted.
 const PENDING: usize = 8;
 
 /// Codes that the server itself sends.
@@ -75,7 +77,8 @@ impl Emergencies {
         }
     }
 
-    /// Reports an error, or with [`code::RESET`] the end of one; `application` are the bits of the error register that the application knows of.
+    /// Reports an error, or with [`code::RESET`] the end of one; `application` are the bits of the error register that
+    /// the application knows of.
     pub(super) fn report(&mut self, code: u16, application: u8, information: [u8; 5]) {
         self.application = application;
         self.push(code, information);

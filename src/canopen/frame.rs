@@ -1,7 +1,8 @@
 //! A classic CAN data frame with an 11-bit identifier, which is all that the server speaks; any context.
 //!
-//! Extended and remote frames have no representation here: constructing one from `embedded_can` parts gives `None`, so they end at the
-//! driver. With them end remotely requested TPDOs and node guarding, which CiA discourages and this server does not offer.
+//! Extended and remote frames have no representation here: constructing one from `embedded_can` parts gives `None`, so
+//! they end at the driver. With them end remotely requested TPDOs and node guarding, which CiA discourages and this
+//! server does not offer.
 
 use embedded_can::{Id, StandardId};
 

@@ -1,4 +1,5 @@
-//! Heartbeat: producing one's own and missing those of others. CiA 301 sections 7.2.8.2 and 7.5.2.13, 7.5.2.14 (objects 1016h, 1017h); the task.
+//! Heartbeat: producing one's own and missing those of others. CiA 301 sections 7.2.8.2 and 7.5.2.13, 7.5.2.14
+//! (objects 1016h, 1017h); the task.
 //!
 //! Node guarding, its predecessor, is not supported: it needs remote frames.
 
@@ -86,7 +87,8 @@ impl Consumers {
             let limit = u32::from(consumer.limit()).saturating_mul(MILLISECOND);
             match consumer.heard().get() {
                 Some(heard) if elapsed(now, heard) > limit => {
-                    // Forgotten, so that the instant does not grow older than time reaches back; the next one brings the node back.
+                    // Forgotten, so that the instant does not grow older than time reaches back; the next one brings
+                    // the node back.
                     consumer.heard().forget();
                     if !core::mem::replace(lost, true) {
                         return Some(Change::Lost { consumer: number, node });

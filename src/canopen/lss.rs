@@ -1,7 +1,7 @@
 //! LSS slave: node ids for nodes that have none. CiA 305; the task.
 //!
-//! Bit timing is fixed at 1 Mbit/s: configuring that is accepted, any other rate refused, and activating it changes nothing. Store goes to the
-//! application. Works in every NMT state.
+//! Bit timing is fixed at 1 Mbit/s: configuring that is accepted, any other rate refused, and activating it changes
+//! nothing. Store goes to the application. Works in every NMT state.
 
 use super::dictionary::{Identity, ObjectDictionary};
 use super::parameters::is_node_id;
@@ -135,7 +135,8 @@ impl Lss {
         Outcome::answer(0x44, [0; 4])
     }
 
-    /// Identify remote slave: vendor, product, least and greatest revision, least and greatest serial number, in this order.
+    /// Identify remote slave: vendor, product, least and greatest revision, least and greatest serial number, in this
+    /// order.
     fn identify(&mut self, part: u8, number: u32, identity: &Identity<'_>) -> Outcome {
         let matches = match part {
             0 => identity.vendor == number,

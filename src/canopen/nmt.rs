@@ -4,7 +4,8 @@
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum NmtState {
-    /// From reset until the boot-up message; also a node without a node id. Its number is the boot-up message's data byte.
+    /// From reset until the boot-up message; also a node without a node id. Its number is the boot-up message's data
+    /// byte.
     Initialising = 0x00,
     /// Nothing but NMT, heartbeat and LSS.
     Stopped = 0x04,

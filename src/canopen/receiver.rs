@@ -1,8 +1,8 @@
 //! The part of the server that acts in the receive interrupt: NMT, SYNC, RPDOs, and hearing the heartbeats of others.
 //!
-//! One call for each received frame, in the order of reception. The work is bounded by the number of PDOs and mapped objects. Only what
-//! is addressed to this node's SDO server or to LSS is left for the task, so that the queue between the two holds nothing that
-//! other nodes say to each other, and nothing that has to be quick ever is in a queue.
+//! One call for each received frame, in the order of reception. The work is bounded by the number of PDOs and mapped
+//! objects. Only what is addressed to this node's SDO server or to LSS is left for the task, so that the queue between
+//! the two holds nothing that other nodes say to each other, and nothing that has to be quick ever is in a queue.
 
 use super::frame::Frame;
 use super::nmt::{Command, NmtState};
@@ -39,8 +39,8 @@ impl<'a> Receiver<'a> {
         Self { shared, known: shared.epoch(), waiting: [None; PDOS], synchronous: [Synchronous::default(); PDOS] }
     }
 
-    /// Takes one frame, received at `now` (microseconds, wrapping). `send` gets up to four TPDOs, after SYNC only. What the node itself sends
-    /// must not come back here.
+    /// Takes one frame, received at `now` (microseconds, wrapping). `send` gets up to four TPDOs, after SYNC only.
+    /// What the node itself sends must not come back here.
     pub fn receive(
         &mut self,
         frame: &Frame,

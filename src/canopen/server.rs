@@ -7,7 +7,7 @@ use super::emergency::{Emergencies, Lasting, code};
 use super::frame::Frame;
 use super::heartbeat::{Change, Consumers, Producer};
 use super::lss::Lss;
-use super::nmt::{NmtState, Reset};
+use super::nmt::NmtState;
 use super::parameters::{CommunicationParameters, PDOS, is_node_id};
 use super::pdo::MappedObject;
 use super::pdo::transmit::{Timers, assemble};
@@ -23,6 +23,9 @@ pub struct Server<'a> {
     identity: &'a Identity<'a>,
     /// The state that this side has acted upon.
     known: Epoch,
+    /// The reset that was dealt with last: each has a count of transitions of its own, so that none is lost that comes
+    /// while another one is being dealt with.
+    initialised: Option<Epoch>,
     /// The boot-up message is yet to be sent, and ends this state.
     booting: Option<Epoch>,
     sdo: SdoServer,
@@ -35,16 +38,16 @@ pub struct Server<'a> {
 }
 
 impl<'a> Server<'a> {
-    /// One for each [`Shared`], before its receive interrupt is enabled. `node_id` is 1 to 127; any other means that there is none, and the node
-    /// waits for LSS.
+    /// One for each [`Shared`], before its receive interrupt is enabled. `node_id` is 1 to 127; any other means that
+    /// there is none, and the node waits for LSS.
     pub fn new(shared: &'a Shared, identity: &'a Identity<'a>, settings: SdoSettings, node_id: u8) -> Self {
         let node_id = if is_node_id(node_id) { node_id } else { NO_NODE_ID };
-        shared.set_node_id(NO_NODE_ID);
-        shared.request_reset(Reset::Communication);
+        shared.power_on();
         Self {
             shared,
             identity,
             known: shared.epoch(),
+            initialised: None,
             booting: None,
             sdo: SdoServer::new(settings),
             lss: Lss::new(node_id),
@@ -56,8 +59,8 @@ impl<'a> Server<'a> {
         }
     }
 
-    /// Takes a frame that [`super::Receiver::receive`] routed here; its answer, if it has one, is to be sent before the next call. Others
-    /// are ignored. `now` in microseconds, wrapping.
+    /// Takes a frame that [`super::Receiver::receive`] routed here; its answer, if it has one, is to be sent before
+    /// the next call. Others are ignored. `now` in microseconds, wrapping.
     pub fn receive(&mut self, frame: &Frame, now: u32, dictionary: &mut impl ObjectDictionary) -> Option<Frame> {
         self.follow(dictionary);
         let request = frame.eight()?;
@@ -65,7 +68,8 @@ impl<'a> Server<'a> {
         if frame.id() == LSS_MASTER {
             let outcome = self.lss.receive(request, node_id, self.identity, dictionary);
             if outcome.start {
-                self.start(dictionary);
+                // Nothing but LSS reaches a node without a node id, so it has been initialising since the task looked.
+                self.initialise(self.known, dictionary);
             }
             return Some(Frame::full(LSS_SLAVE, outcome.answer?));
         }
@@ -78,11 +82,13 @@ impl<'a> Server<'a> {
         Some(Frame::full(SDO_TRANSMIT | u16::from(node_id), answer))
     }
 
-    /// What is to be sent next, one frame at a time, most urgent first; call it until there is none, or until the sender's queue is full. At
-    /// least every millisecond for timers to be exact to a millisecond, and never less than every half hour.
+    /// What is to be sent next, one frame at a time, most urgent first; call it until there is none, or until the
+    /// sender's queue is full. At least every millisecond for timers to be exact to a millisecond, and never less than
+    /// every half hour.
     pub fn poll(&mut self, now: u32, dictionary: &mut impl ObjectDictionary) -> Option<Frame> {
-        if let Some(reset) = self.shared.take_reset() {
-            self.restart(reset, dictionary);
+        let epoch = self.shared.epoch();
+        if epoch.state() == NmtState::Initialising && self.initialised != Some(epoch) {
+            self.restart(epoch, dictionary);
         }
         self.follow(dictionary);
         let node_id = self.shared.node_id();
@@ -116,8 +122,8 @@ impl<'a> Server<'a> {
         Some(Frame::full(SDO_TRANSMIT | u16::from(node_id), message))
     }
 
-    /// Reports an error, or with code 0 the end of one. `register` are all bits of the error register (object 1001h) that the application
-    /// wants set from now on, `information` is the manufacturer's field.
+    /// Reports an error, or with code 0 the end of one. `register` are all bits of the error register (object 1001h)
+    /// that the application wants set from now on, `information` is the manufacturer's field.
     pub fn emergency(&mut self, code: u16, register: u8, information: [u8; 5]) {
         self.emergencies.report(code, register, information);
     }
@@ -169,21 +175,17 @@ impl<'a> Server<'a> {
         dictionary.event(Event::State(epoch.state()));
     }
 
-    /// A node without a node id got one.
-    fn start(&mut self, dictionary: &mut impl ObjectDictionary) {
-        // Nothing but LSS reaches a node without a node id, so the interrupt asks for no reset meanwhile.
-        self.initialise(dictionary);
-    }
-
-    fn restart(&mut self, reset: Reset, dictionary: &mut impl ObjectDictionary) {
+    fn restart(&mut self, epoch: Epoch, dictionary: &mut impl ObjectDictionary) {
+        self.initialised = Some(epoch);
         self.sdo.cancel(dictionary);
-        dictionary.event(Event::Reset(reset));
-        self.initialise(dictionary);
+        if let Some(reset) = self.shared.reset() {
+            dictionary.event(Event::Reset(reset));
+        }
+        self.initialise(epoch, dictionary);
     }
 
     /// Power-on values, in the state "initialising"; in it the interrupt uses none of them.
-    fn initialise(&mut self, dictionary: &mut impl ObjectDictionary) {
-        let epoch = self.shared.epoch();
+    fn initialise(&mut self, epoch: Epoch, dictionary: &mut impl ObjectDictionary) {
         self.lss.restart();
         self.consumers.restart();
         let node_id = self.lss.pending();

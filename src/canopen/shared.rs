@@ -2,10 +2,12 @@
 //!
 //! Nobody waits for anybody here, and nothing needs a lock:
 //!
-//!  - The interrupt is never interrupted by the task, so what it reads cannot change while it runs, and its NMT commands are final. The
-//!    task changes the NMT state by compare-and-exchange, and a command that came in between wins.
-//!  - The task alone writes parameters. A PDO's mapping, inhibit time and identifier change only while the PDO does not exist (bit 31 of its
-//!    COB-ID), which is CiA 301's own procedure; the COB-ID is written last (release) and read first (acquire).
+//!  - The interrupt is never interrupted by the task, so what it reads cannot change while it runs, and its NMT
+//!    commands are final. The task changes the NMT state by compare-and-exchange, and a command that came in between
+//!    wins.
+//!  - The task alone writes parameters. A PDO's mapping, inhibit time and identifier change only while the PDO does
+//!    not exist (bit 31 of its COB-ID), which is CiA 301's own procedure; the COB-ID is written last (release) and
+//!    read first (acquire).
 
 use super::nmt::{NmtState, Reset};
 use super::parameters::{CONSUMERS, INVALID, MAPPED, PDOS, PdoParameters};
@@ -19,12 +21,14 @@ const NO_RESET: u8 = 0;
 const RESET_COMMUNICATION: u8 = 1;
 const RESET_NODE: u8 = 2;
 
-/// The shared part of one node. Belongs into a static; [`super::Receiver`] and [`super::Server`] borrow it, one of each.
+/// The shared part of one node. Belongs into a static; [`super::Receiver`] and [`super::Server`] borrow it, one of
+/// each.
 #[derive(Debug)]
 pub struct Shared {
     node_id: AtomicU8,
     /// NMT state in bits 0 to 7; above them a count of transitions, so that leaving a state and coming back is seen.
     state: AtomicU32,
+    /// What the newest reset was; that there was one, the count of transitions says.
     reset: AtomicU8,
     sync_cob_id: AtomicU16,
     pub(super) receive: [PdoRegisters; PDOS],
@@ -77,8 +81,8 @@ impl Shared {
         self.node_id.load(Ordering::Relaxed)
     }
 
-    /// The application's event of TPDO `pdo`, 0 to 3: it is sent as soon as its inhibit time (types 254 and 255) or the next SYNC (type 0)
-    /// allows. Any context.
+    /// The application's event of TPDO `pdo`, 0 to 3: it is sent as soon as its inhibit time (types 254 and 255) or
+    /// the next SYNC (type 0) allows. Any context.
     pub fn trigger(&self, pdo: u8) {
         self.events.fetch_or(bit(pdo), Ordering::Relaxed);
     }
@@ -110,7 +114,7 @@ impl Shared {
         }
     }
 
-    /// Initialising from here on; the task does the rest. Interrupt, or before it is enabled.
+    /// Initialising from here on; the task does the rest. Interrupt.
     pub(super) fn request_reset(&self, reset: Reset) {
         self.reset.store(
             match reset {
@@ -122,8 +126,16 @@ impl Shared {
         self.state.store(self.epoch().next(NmtState::Initialising).0, Ordering::Release);
     }
 
-    pub(super) fn take_reset(&self) -> Option<Reset> {
-        match self.reset.swap(NO_RESET, Ordering::AcqRel) {
+    /// Power-on: initialising, although nobody asked for it. Before the interrupt is enabled.
+    pub(super) fn power_on(&self) {
+        self.set_node_id(NO_NODE_ID);
+        self.reset.store(NO_RESET, Ordering::Relaxed);
+        self.state.store(self.epoch().next(NmtState::Initialising).0, Ordering::Release);
+    }
+
+    /// The newest reset; none at power-on.
+    pub(super) fn reset(&self) -> Option<Reset> {
+        match self.reset.load(Ordering::Relaxed) {
             RESET_COMMUNICATION => Some(Reset::Communication),
             RESET_NODE => Some(Reset::Node),
             _ => None,
@@ -320,7 +332,8 @@ impl Instant {
         self.noted.store(true, Ordering::Release);
     }
 
-    /// None where nothing was noted since it was forgotten. An instant that is replaced meanwhile is as good as the new one.
+    /// None where nothing was noted since it was forgotten. An instant that is replaced meanwhile is as good as the
+    /// new one.
     pub(super) fn get(&self) -> Option<u32> {
         self.noted.load(Ordering::Acquire).then(|| self.at.load(Ordering::Relaxed))
     }

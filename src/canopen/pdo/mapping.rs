@@ -1,5 +1,6 @@
-//! Changing PDO parameters at run time, by the procedure of CiA 301 section 7.5.2.36: take the PDO out of service (bit 31 of the COB-ID), set
-//! sub-index 0 of the mapping to 0, write the entries, set sub-index 0 to their number, put the PDO into service; the task.
+//! Changing PDO parameters at run time, by the procedure of CiA 301 section 7.5.2.36: take the PDO out of service (bit
+//! 31 of the COB-ID), set sub-index 0 of the mapping to 0, write the entries, set sub-index 0 to their number, put the
+//! PDO into service; the task.
 
 use super::MappedObject;
 use crate::canopen::abort::Abort;
@@ -22,7 +23,8 @@ pub(crate) fn cob_id(registers: &PdoRegisters, direction: Direction) -> u32 {
     }
 }
 
-/// Writes sub-index 1. Bit 30 is taken with either value and reads as it is: 1 for a TPDO, as there are no remote frames.
+/// Writes sub-index 1. Bit 30 is taken with either value and reads as it is: 1 for a TPDO, as there are no remote
+/// frames.
 pub(crate) fn set_cob_id(registers: &PdoRegisters, value: u32) -> Result<(), Abort> {
     let wanted = value & !NO_REMOTE;
     let now = registers.cob_id() & !NO_REMOTE;

@@ -37,7 +37,8 @@ impl MappedObject {
         }
     }
 
-    /// Bits of the data type that a dummy entry (index 0001h to 001Bh) skips in an RPDO; none for other objects. CiA 301 section 7.4.7.3.
+    /// Bits of the data type that a dummy entry (index 0001h to 001Bh) skips in an RPDO; none for other objects. CiA
+    /// 301 section 7.4.7.3.
     const fn dummy(self) -> Option<u32> {
         if self.sub_index() != 0 {
             return None;
@@ -52,10 +53,11 @@ impl MappedObject {
     }
 }
 
-/// What the receive interrupt does with process data: set-points in, actual values out. Everything here has to be quick and must not wait.
+/// What the receive interrupt does with process data: set-points in, actual values out. Everything here has to be
+/// quick and must not wait.
 pub trait ProcessImage {
-    /// An object of an RPDO has arrived: its value in the low bits, not sign-extended. The entry was found mappable when the PDO was
-    /// set up; ignore it where it is not.
+    /// An object of an RPDO has arrived: its value in the low bits, not sign-extended. The entry was found mappable
+    /// when the PDO was set up; ignore it where it is not.
     fn receive(&mut self, object: MappedObject, value: u64);
 
     /// All objects of RPDO `pdo`, 0 to 3, have been given: they count from now on, together.

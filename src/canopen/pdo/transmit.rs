@@ -5,7 +5,8 @@ use crate::canopen::frame::Frame;
 use crate::canopen::shared::{PdoRegisters, Shared};
 use crate::canopen::time::{MILLISECOND, elapsed};
 
-/// The frame of a TPDO that exists and carries anything. `value` gives the actual value of each object; none leaves the frame out.
+/// The frame of a TPDO that exists and carries anything. `value` gives the actual value of each object; none leaves
+/// the frame out.
 pub(crate) fn assemble(registers: &PdoRegisters, mut value: impl FnMut(MappedObject) -> Option<u64>) -> Option<Frame> {
     let id = registers.id()?;
     if registers.count() == 0 {

@@ -20,8 +20,8 @@ pub(super) struct BlockDownload {
     sequence: u8,
     /// The newest segment. How many of its bytes count is known only when another one follows, or at the end.
     held: Option<[u8; 7]>,
-    /// The message that closed the block before. CAN may repeat a frame whose end was disturbed (ISO 11898-1); this one would
-    /// be taken for a block of which everything else was lost.
+    /// The message that closed the block before. CAN may repeat a frame whose end was disturbed (ISO 11898-1); this
+    /// one would be taken for a block of which everything else was lost.
     closing: Option<Message>,
     /// Whether the last segment came, so that the client is about to end.
     complete: bool,

@@ -1,9 +1,12 @@
-//! SDO server: one channel, object 1200h, with expedited, segmented and block transfers. CiA 301 section 7.2.4; the task.
+//! SDO server: one channel, object 1200h, with expedited, segmented and block transfers. CiA 301 section 7.2.4; the
+//! task.
 //!
-//! A channel has one client. Two clients on the same identifiers cannot be told apart: the request that does not belong into the transfer
-//! in progress aborts it (0504 0001h, which both see), nothing is half written, and the next request begins anew.
+//! A channel has one client. Two clients on the same identifiers cannot be told apart: the request that does not
+//! belong into the transfer in progress aborts it (0504 0001h, which both see), nothing is half written, and the next
+//! request begins anew.
 //!
-//! A client's abort ends any transfer at any moment, without an answer. Requests that are not 8 bytes long are not requests.
+//! A client's abort ends any transfer at any moment, without an answer. Requests that are not 8 bytes long are not
+//! requests.
 
 mod block_download;
 mod block_upload;
@@ -115,8 +118,8 @@ impl SdoServer {
         }
     }
 
-    /// What has to be sent without a request: segments of a block upload, and the abort after a time-out. One message at a time, so that
-    /// the sender's queue paces the upload.
+    /// What has to be sent without a request: segments of a block upload, and the abort after a time-out. One message
+    /// at a time, so that the sender's queue paces the upload.
     pub(super) fn poll<D: ObjectDictionary>(&mut self, now: u32, objects: &mut Objects<'_, '_, D>) -> Option<Message> {
         if let State::BlockUpload(upload) = &mut self.state
             && upload.is_sending()

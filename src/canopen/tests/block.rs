@@ -174,8 +174,8 @@ fn apply(disturbance: Disturbance, segments: &mut Vec<[u8; 8]>, keep_ends: bool)
 }
 
 proptest! {
-    /// A block of which nothing but the last segment arrives, twice in a row, is the one loss that ends in a time-out as well: it cannot be
-    /// told from that segment's repetition.
+    /// A block of which nothing but the last segment arrives, twice in a row, is the one loss that ends in a time-out
+    /// as well: it cannot be told from that segment's repetition.
     #[test]
     fn lost_and_repeated_segments_of_a_download_come_again(
         length in 0usize..=2048, crc: bool, size: bool,

@@ -1,4 +1,5 @@
-//! Random and mutated frames: nothing panics, and nothing changes that the protocol does not allow. Overflow checks are on in tests.
+//! Random and mutated frames: nothing panics, and nothing changes that the protocol does not allow. Overflow checks
+//! are on in tests.
 
 use super::*;
 use proptest::prelude::*;

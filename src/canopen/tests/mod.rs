@@ -28,8 +28,8 @@ pub const IDENTITY: Identity<'static> = Identity {
     serial: 0x8000_0001,
 };
 
-/// Objects of an application: numbers of 1, 2, 4 and 8 bytes at 2000h:1 to 4, one read only at 2001h, one write only at 2002h, a DOMAIN that is
-/// replaced as a whole at 2010h, an empty one at 2011h.
+/// Objects of an application: numbers of 1, 2, 4 and 8 bytes at 2000h:1 to 4, one read only at 2001h, one write only
+/// at 2002h, a DOMAIN that is replaced as a whole at 2010h, an empty one at 2011h.
 #[derive(Default)]
 pub struct Dictionary {
     pub values: BTreeMap<(u16, u8), Vec<u8>>,
@@ -45,6 +45,8 @@ pub struct Dictionary {
     pub restored: Option<Group>,
     pub stored_node_id: Option<u8>,
     pub parameters: Option<CommunicationParameters>,
+    /// The interrupt takes another reset while the task tells of one.
+    pub interrupted: Option<&'static Shared>,
 }
 
 /// Most bytes of 2010h.
@@ -157,6 +159,9 @@ impl ObjectDictionary for Dictionary {
 
     fn event(&mut self, event: Event) {
         self.events.push(event);
+        if let (Event::Reset(_), Some(shared)) = (event, self.interrupted.take()) {
+            shared.request_reset(Reset::Node);
+        }
     }
 }
 

@@ -69,6 +69,21 @@ fn a_reset_between_a_reset_and_its_boot_up_message_is_not_lost() {
 }
 
 #[test]
+fn a_reset_while_the_task_deals_with_another_is_dealt_with_too() {
+    let mut node = Node::booted();
+    node.dictionary.interrupted = Some(node.shared);
+    node.dictionary.events.clear();
+    node.interrupt(&frame(0, &[0x82, 0]));
+    // One boot-up message, after the second.
+    assert_eq!(node.run(2), [frame(HEARTBEAT_OF_NODE, &[0])]);
+    let resets = node.dictionary.events.iter().filter(|event| matches!(event, Event::Reset(_))).collect::<Vec<_>>();
+    assert_eq!(resets, [&Event::Reset(Reset::Communication), &Event::Reset(Reset::Node)]);
+    assert_eq!(node.shared.state(), NmtState::PreOperational);
+    assert_eq!(node.bus(0, &[1, 0]), []);
+    assert_eq!(node.shared.state(), NmtState::Operational);
+}
+
+#[test]
 fn heartbeats_tell_the_state_in_every_state() {
     let mut node = Node::booted();
     node.write(0x1017, 0, &10u16.to_le_bytes()).unwrap();
