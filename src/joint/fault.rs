@@ -146,21 +146,25 @@ impl Faults {
     }
 
     /// Whether there is none.
+    #[inline(always)]
     pub const fn is_empty(self) -> bool {
         self.0 == 0
     }
 
     /// Whether a fault is in the set.
+    #[inline(always)]
     pub const fn contains(self, fault: Fault) -> bool {
         self.0 & fault.bit() != 0
     }
 
     /// What is in both sets.
+    #[inline(always)]
     pub const fn intersection(self, other: Self) -> Self {
         Self(self.0 & other.0)
     }
 
     /// Both sets.
+    #[inline(always)]
     pub const fn union(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
