@@ -12,6 +12,11 @@ use crate::motor::transform::Dq;
 
 /// Largest lag, electrical turns: beyond 60° the rotor is about to slip.
 const LARGEST_LAG: f32 = 1.0 / 6.0;
+/// Part of the current with which the zero is looked for again. Where x is not zero, it differs then by 10 to 30 degrees unless
+/// psi is less than a quarter of (L_q - L_d) I.
+pub(super) const LESS_CURRENT: f32 = 0.6;
+/// Largest difference of the zeros, electrical turns: 8 degrees, which cost 1 % of the torque.
+const LARGEST_DIFFERENCE: f32 = 8.0 / 360.0;
 /// How far the measured ratio of turns may be from a whole number.
 const LARGEST_FRACTION: f32 = 0.2;
 
@@ -109,6 +114,16 @@ impl Alignment {
         let electrical_zero = ElectricalAngle(there.wrapping_add(lag as u32));
         Ok((EncoderAlignment { electrical_zero, ..without_zero }, lag_turns))
     }
+}
+
+/// Whether the zero with less current is the same.
+pub(super) fn is_the_same(found: &EncoderAlignment, again: &EncoderAlignment) -> Result<(), Failure> {
+    let difference = again.electrical_zero.0.wrapping_sub(found.electrical_zero.0) as i32;
+    let turns = difference as f32 / STEPS;
+    if turns.abs() > LARGEST_DIFFERENCE {
+        return Err(Failure::RotorBesideField { turns, limit: LARGEST_DIFFERENCE });
+    }
+    Ok(())
 }
 
 impl Sweep {

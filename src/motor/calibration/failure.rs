@@ -139,6 +139,14 @@ pub enum Failure {
         /// Limit, electrical turns.
         limit: f32,
     },
+    /// The electrical zero is another with less current: the rotor lies beside the field, not in line with it. The current is too high
+    /// for this motor's saliency.
+    RotorBesideField {
+        /// Difference, electrical turns.
+        turns: f32,
+        /// Limit, electrical turns.
+        limit: f32,
+    },
 }
 
 impl core::fmt::Display for Failure {
@@ -194,6 +202,12 @@ impl core::fmt::Display for Failure {
             }
             Self::LagTooLarge { lag, limit } => {
                 write!(f, "rotor lagged {lag} electrical turns behind the field, limit is {limit}")
+            }
+            Self::RotorBesideField { turns, limit } => {
+                write!(
+                    f,
+                    "electrical zero differs by {turns} turns with less current, limit is {limit}: the rotor lies beside the field, calibrate with less current"
+                )
             }
         }
     }

@@ -4,7 +4,8 @@
 //!  - `offsets`: the bridge is off, what the current sensors read is their offset;
 //!  - `resistance`: the current along phase A rises to two levels; the rotor turns into line;
 //!  - `inductance`: a small alternating voltage on top of the second level, along the magnet and then across it;
-//!  - `alignment`: the field turns slowly there and back and takes the rotor along: direction, pole pairs, electrical zero;
+//!  - `alignment`: the field turns slowly there and back and takes the rotor along: direction, pole pairs, electrical zero; once more with
+//!    less current, with which the zero must be the same;
 //!  - the voltage falls to zero and the bridge goes off.
 //!
 //! The joint moves by [`CalibrationSettings::electrical_turns`] and one electrical turn more, and back, so it must be free to. Every
@@ -106,6 +107,7 @@ enum Stage {
     InductanceD(Hold, Inductance),
     InductanceQ(Hold, f32, Inductance),
     Alignment(Hold, [f32; 2], Alignment),
+    Again(Calibration, f32, Alignment),
     RampDown(Calibration, f32),
     Done(Calibration),
     Failed(Failure),
@@ -150,7 +152,7 @@ impl CalibrationSequence {
             Stage::Offsets(_) => Progress::Offsets,
             Stage::Resistance(_) => Progress::Resistance,
             Stage::InductanceD(..) | Stage::InductanceQ(..) => Progress::Inductance,
-            Stage::Alignment(..) => Progress::Alignment,
+            Stage::Alignment(..) | Stage::Again(..) => Progress::Alignment,
             Stage::RampDown(..) => Progress::RampDown,
             Stage::Done(calibration) => Progress::Done(calibration),
             Stage::Failed(failure) => Progress::Failed(failure),
@@ -263,7 +265,16 @@ impl CalibrationSequence {
                         alignment: found,
                         lag,
                     };
-                    let voltage = hold.voltage;
+                    let voltage = hold.with_less_current(alignment::LESS_CURRENT);
+                    self.stage = Stage::Again(calibration, voltage, Alignment::default());
+                    along_a(voltage)
+                }
+            },
+            Stage::Again(calibration, voltage, alignment) => match alignment.step(plan, *voltage, position)? {
+                Next::Continue(voltage) => voltage,
+                Next::Finished((again, _)) => {
+                    alignment::is_the_same(&calibration.alignment, &again)?;
+                    let (calibration, voltage) = (*calibration, *voltage);
                     self.stage = Stage::RampDown(calibration, voltage);
                     along_a(voltage)
                 }

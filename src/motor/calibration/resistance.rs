@@ -17,6 +17,9 @@ pub(super) const REACH: u32 = 4;
 /// Resistances of motors, Ω.
 const PLAUSIBLE: (f32, f32) = (1e-3, 100.0);
 
+/// What is lost along phase A, where the whole current flows through A and half of it through B and through C, over what one leg loses.
+const ALONG_A: f32 = 4.0 / 3.0;
+
 /// The second level, which the rotor is held with from here on.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Hold {
@@ -26,6 +29,14 @@ pub(super) struct Hold {
     pub resistance: f32,
     /// V.
     pub lost_voltage: f32,
+}
+
+impl Hold {
+    /// Voltage for a part of the current.
+    pub fn with_less_current(&self, part: f32) -> f32 {
+        let lost = ALONG_A * self.lost_voltage;
+        lost + part * (self.voltage - lost)
+    }
 }
 
 /// Means at one level.
@@ -117,7 +128,7 @@ impl Resistance {
             return Err(Failure::ResistanceImplausible { resistance, least, greatest });
         }
         // Along phase A a leg's loss v shows as 4/3 v: its own, and a third of both others'.
-        let lost_voltage = 0.75 * (second.voltage - resistance * second.current);
+        let lost_voltage = (second.voltage - resistance * second.current) / ALONG_A;
         Ok(Hold { voltage: second.voltage, resistance, lost_voltage })
     }
 }

@@ -74,8 +74,8 @@ impl Plan {
         let offset_steps = (OFFSET_TIME * rate) as u32;
         let settle_steps = (s.settle_time * rate) as u32;
         let turn_steps = (s.turn_time * rate) as u32;
-        let sweeps = 2 * (s.electrical_turns + 1) * turn_steps;
-        // Twice: reach, settle, average. Then two inductances, two sweeps, the ramp down; and a step between each two.
+        let sweeps = 4 * (s.electrical_turns + 1) * turn_steps;
+        // Twice: reach, settle, average. Then two inductances, two sweeps with each current, the ramp down; and a step between each two.
         let longest = offset_steps
             + 2 * (super::resistance::REACH + 2) * settle_steps
             + 2 * super::inductance::LONGEST
