@@ -19,7 +19,7 @@ pub enum ParameterError {
     },
     /// A whole number, or the length of a list, lies outside the permitted range.
     CountOutOfRange {
-        /// The parameter's path, for example `sensors.delay` or `trajectory.segments`.
+        /// The parameter's path, for example `motor.gear_ratio` or `trajectory.segments`.
         name: &'static str,
         /// The number given.
         value: usize,

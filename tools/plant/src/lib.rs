@@ -29,10 +29,7 @@
 //! - [`contact`]: what the link runs into
 //! - [`joint`]: all of these, integrated
 //! - [`actuator`]: the joint behind windings, bridge, supply and a drive's sensors, at the control rate; with faults
-//! - [`sensors`]: what the drive sees of it: counts, noise, offset, delay
-//! - [`drive`]: the recording drive's velocity filter and position controller
 //! - [`fourier`], [`excitation`]: the motions that are recorded
-//! - [`mod@record`]: a joint and an excitation in, a log and its ground truth out
 //! - [`parameters`], [`randomised`]: everything that describes a joint, and joints drawn at random
 //! - [`virtual_joint`]: the firmware's own control step, closed over the actuator
 //! - [`error`]: what is refused, and the range that would not be
@@ -41,7 +38,6 @@
 
 pub mod actuator;
 pub mod contact;
-pub mod drive;
 pub mod error;
 pub mod excitation;
 pub mod fourier;
@@ -52,8 +48,6 @@ pub mod load;
 pub mod motor;
 pub mod parameters;
 pub mod randomised;
-pub mod record;
-pub mod sensors;
 pub mod thermal;
 pub mod virtual_joint;
 
@@ -64,5 +58,4 @@ pub use error::ParameterError;
 pub use excitation::Excitation;
 pub use joint::Joint;
 pub use parameters::JointParameters;
-pub use record::{Log, Recording, Truth, record};
 pub use virtual_joint::VirtualJoint;

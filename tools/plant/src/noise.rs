@@ -31,9 +31,4 @@ impl Noise {
     pub(crate) fn scale(&mut self, minimum: f64, maximum: f64) -> f64 {
         minimum * libm::pow(maximum / minimum, self.0.random::<f64>())
     }
-
-    /// A seed for something that draws on its own.
-    pub(crate) fn seed(&mut self) -> u64 {
-        self.0.random()
-    }
 }

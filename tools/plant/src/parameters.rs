@@ -4,7 +4,6 @@ use crate::error::{ParameterError, within};
 use crate::friction::{Directional, FrictionParameters, Ripple};
 use crate::load::LoadParameters;
 use crate::motor::MotorParameters;
-use crate::sensors::SensorParameters;
 use crate::thermal::ThermalParameters;
 use serde::{Deserialize, Serialize};
 
@@ -30,8 +29,6 @@ pub struct JointParameters {
     pub friction: FrictionParameters,
     /// Heat.
     pub thermal: ThermalParameters,
-    /// Sensors.
-    pub sensors: SensorParameters,
     /// Limits of motion.
     pub limits: Limits,
 }
@@ -71,16 +68,6 @@ impl JointParameters {
                 housing_to_ambient: 1.5,
                 ambient: 22.0,
             },
-            sensors: SensorParameters {
-                counts_per_revolution: 262_144.0,
-                position_noise: 5e-6,
-                current_noise: 0.05,
-                current_offset: 0.03,
-                current_resolution: 0.01,
-                delay: 1,
-                temperature_resolution: 0.5,
-                temperature_lag: 8.0,
-            },
             limits: Limits { travel: 1.5, speed: 4.0 },
         }
     }
@@ -102,22 +89,6 @@ impl JointParameters {
         self
     }
 
-    /// The same joint with perfect sensors: 2^26 counts, no noise, offset, delay or lag.
-    #[must_use]
-    pub fn with_perfect_sensors(mut self) -> Self {
-        self.sensors = SensorParameters {
-            counts_per_revolution: 67_108_864.0,
-            position_noise: 0.0,
-            current_noise: 0.0,
-            current_offset: 0.0,
-            current_resolution: 0.0,
-            delay: 0,
-            temperature_resolution: 0.0,
-            temperature_lag: 0.0,
-        };
-        self
-    }
-
     /// Checks every parameter against its documented range.
     ///
     /// # Errors
@@ -127,7 +98,6 @@ impl JointParameters {
         self.load.validate()?;
         self.friction.validate()?;
         self.thermal.validate()?;
-        self.sensors.validate()?;
         within("limits.travel", self.limits.travel, 0.05, 6.3)?;
         within("limits.speed", self.limits.speed, 0.05, 50.0)
     }

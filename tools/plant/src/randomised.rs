@@ -17,10 +17,7 @@
 //! | gear loss | 0.01..0.1 Nm/Nm |
 //! | ripple | 1..8 and 10..80 periods per revolution, 2..15 % and 1..8 % of the friction |
 //! | winding and housing time constants | 20..120 s, 300..1500 s |
-//! | encoder | 2^14..2^20 counts per link revolution, noise 0..1 count |
-//! | current noise, offset, resolution | 0.1..1 %, up to ±0.5 %, 1/4096..1/512 of the limit |
-//! | delay | 0..3 samples |
-//! | temperature resolution, lag, ambient | 0.1..1 K, 2..20 s, 15..35 °C |
+//! | ambient temperature | 15..35 °C |
 //! | travel, speed limit | 0.8..2.5 rad, 2..8 rad/s |
 
 use crate::friction::{Directional, FrictionParameters, Ripple};
@@ -28,9 +25,8 @@ use crate::load::{GRAVITY, LoadParameters};
 use crate::motor::MotorParameters;
 use crate::noise::Noise;
 use crate::parameters::{JointParameters, Limits};
-use crate::sensors::SensorParameters;
 use crate::thermal::ThermalParameters;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
 impl JointParameters {
     /// The joint number `seed` of all joints within the ranges of this module's table; always valid.
@@ -44,8 +40,7 @@ impl JointParameters {
         let inertia = motor.reflected_inertia() + load.total_inertia();
         let friction = friction(&mut draw, motor.torque_limit(), inertia, limits.speed);
         let thermal = thermal(&mut draw);
-        let sensors = sensors(&mut draw, motor.current_limit);
-        Self { motor, load, friction, thermal, sensors, limits }
+        Self { motor, load, friction, thermal, limits }
     }
 }
 
@@ -116,19 +111,5 @@ fn thermal(draw: &mut Noise) -> ThermalParameters {
         winding_to_housing,
         housing_to_ambient,
         ambient: draw.uniform(15.0, 35.0),
-    }
-}
-
-fn sensors(draw: &mut Noise, current_limit: f64) -> SensorParameters {
-    let counts_per_revolution = draw.scale(16_384.0, 1_048_576.0).floor();
-    SensorParameters {
-        counts_per_revolution,
-        position_noise: draw.uniform(0.0, 1.0) * TAU / counts_per_revolution,
-        current_noise: current_limit * draw.scale(0.001, 0.01),
-        current_offset: current_limit * draw.uniform(-0.005, 0.005),
-        current_resolution: current_limit * draw.scale(1.0 / 4096.0, 1.0 / 512.0),
-        delay: draw.uniform(0.0, 4.0) as usize,
-        temperature_resolution: draw.scale(0.1, 1.0),
-        temperature_lag: draw.scale(2.0, 20.0),
     }
 }

@@ -1,7 +1,7 @@
 //! What is out of range is refused by name, with the range.
 
-use plant::excitation::{Excitation, Run, Segment, Trajectory};
-use plant::{Joint, JointParameters, ParameterError, record};
+use plant::excitation::{Segment, Trajectory};
+use plant::{JointParameters, ParameterError};
 
 #[test]
 fn every_parameter_is_refused_as_not_a_number_and_far_outside_its_range() {
@@ -35,13 +35,6 @@ fn every_parameter_is_refused_as_not_a_number_and_far_outside_its_range() {
         ("thermal.winding_to_housing", |p| &mut p.thermal.winding_to_housing),
         ("thermal.housing_to_ambient", |p| &mut p.thermal.housing_to_ambient),
         ("thermal.ambient", |p| &mut p.thermal.ambient),
-        ("sensors.counts_per_revolution", |p| &mut p.sensors.counts_per_revolution),
-        ("sensors.position_noise", |p| &mut p.sensors.position_noise),
-        ("sensors.current_noise", |p| &mut p.sensors.current_noise),
-        ("sensors.current_offset", |p| &mut p.sensors.current_offset),
-        ("sensors.current_resolution", |p| &mut p.sensors.current_resolution),
-        ("sensors.temperature_resolution", |p| &mut p.sensors.temperature_resolution),
-        ("sensors.temperature_lag", |p| &mut p.sensors.temperature_lag),
         ("limits.travel", |p| &mut p.limits.travel),
         ("limits.speed", |p| &mut p.limits.speed),
     ];
@@ -67,32 +60,6 @@ fn a_breakaway_torque_below_the_coulomb_torque_is_refused_with_it_as_the_limit()
     parameters.friction.breakaway.backward = 2.4;
     let error = parameters.validate().unwrap_err();
     assert_eq!(error.to_string(), "friction.breakaway.backward = 2.4 is outside [2.5, 12.5]");
-}
-
-#[test]
-fn a_delay_longer_than_the_buffer_is_refused() {
-    let mut parameters = JointParameters::reference();
-    parameters.sensors.delay = 65;
-    let error = parameters.validate().unwrap_err();
-    assert_eq!(error.to_string(), "sensors.delay = 65 is outside 0..=64");
-}
-
-#[test]
-fn recording_refuses_bad_joints_sample_periods_warmth_and_empty_excitations() {
-    let good = JointParameters::reference();
-    let excitation = Excitation::for_joint(&good, 1).unwrap();
-    let name = |result: Result<_, ParameterError>| match result.map(|_: plant::Recording| ()).unwrap_err() {
-        ParameterError::OutOfRange { name, .. } | ParameterError::CountOutOfRange { name, .. } => name,
-    };
-    let mut bad = good;
-    bad.load.mass = -1.0;
-    assert_eq!(name(record(&bad, &excitation, 1, 4e-3)), "load.mass");
-    assert_eq!(name(record(&good, &excitation, 1, 0.0)), "sample_period");
-    assert_eq!(name(record(&good, &Excitation { runs: vec![] }, 1, 4e-3)), "excitation.runs");
-    let trajectory = Trajectory::new(vec![Segment::Rest { duration: 1.0 }]).unwrap();
-    let hot = Excitation { runs: vec![Run { warmth: 61.0, trajectory }] };
-    assert_eq!(name(record(&good, &hot, 1, 4e-3)), "excitation.warmth");
-    assert!(Joint::new(good, 151.0).is_err());
 }
 
 #[test]

@@ -3,11 +3,10 @@
 //! A row holds means over its time, of all signals alike. A mean of the torque beside a sample of the position would lag by half a
 //! row, and a network takes such a lag for friction.
 
-use super::run::{Ending, drive, every};
+use super::run::{Ending, USUAL_SAMPLE_PERIOD, drive, every};
 use super::{Motion, Part, SimulationError};
 use plant::ActuatorParameters;
 use plant::excitation::{Excitation, Run};
-use plant::record::USUAL_SAMPLE_PERIOD;
 use plant::virtual_joint::Setup;
 use rayon::prelude::*;
 use std::fmt::Write;

@@ -12,8 +12,10 @@ use joint_firmware::joint::Demand;
 use joint_firmware::joint::fault::{Fault, Faults};
 use joint_firmware::joint::state_machine::{Controlword, State};
 use plant::VirtualJoint;
-use plant::record::USUAL_SAMPLE_PERIOD;
 use plant::virtual_joint::Setup;
+
+/// Time between two rows of a log as users record it over the bus, s.
+pub const USUAL_SAMPLE_PERIOD: f64 = 4e-3;
 
 /// Commands a second.
 pub const COMMAND_RATE: f64 = 1000.0;

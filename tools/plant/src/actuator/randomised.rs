@@ -75,9 +75,6 @@ fn rewound(mut joint: JointParameters, voltage: f64) -> JointParameters {
     let left = voltage - motor.resistance / 1.5 * motor.current_limit;
     let reachable = 1.5 * left / (motor.torque_constant * motor.gear_ratio);
     joint.limits.speed = joint.limits.speed.min(reachable);
-    joint.sensors.current_noise /= turns;
-    joint.sensors.current_offset /= turns;
-    joint.sensors.current_resolution /= turns;
     joint
 }
 
