@@ -1,0 +1,31 @@
+//! A joint as a user commissions it: excite it without compensation, record, fit, and take what the board would load.
+
+use joint_firmware::friction::FrictionModel;
+use jointctl::dataset::prepare;
+use jointctl::fit::{Options, fit};
+use jointctl::progress::Silent;
+use jointctl::simulation::recording::{DESCRIPTION, record};
+use plant::actuator::ActuatorParameters;
+use plant::virtual_joint::Setup;
+
+/// What commissioning leaves.
+pub struct Commissioned {
+    /// The model as the board would run it.
+    pub model: FrictionModel,
+    /// Whether a network is part of it.
+    pub network: bool,
+}
+
+/// Excites, records, fits.
+pub fn commission(parameters: &ActuatorParameters, setup: &Setup, seed: u64) -> Result<Commissioned, String> {
+    let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).map_err(|e| e.to_string());
+    write("log.csv", &record(parameters, setup, seed).map_err(|error| error.to_string())?)?;
+    write("dataset.toml", DESCRIPTION)?;
+    let mut prepared = prepare(&folder.path().join("dataset.toml")).map_err(|error| error.to_string())?;
+    let options = Options { restarts: 2, samples: 4000, reference: false, ..Options::default() };
+    let fitted = fit(&mut prepared, &options, &Silent).map_err(|error| error.to_string())?;
+    let model = FrictionModel::new(&fitted.image.friction, setup.bridge.rate as u32);
+    let network = fitted.image.friction.sets.iter().any(|set| set.network.is_some());
+    Ok(Commissioned { model, network })
+}

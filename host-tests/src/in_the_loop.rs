@@ -1,0 +1,188 @@
+//! Compensation in the loop on a random joint that is not our model: excited without compensation, recorded and fitted as a user would,
+//! then moved with and without the image that came out.
+
+use crate::commission::{Commissioned, commission};
+use crate::driving::follow;
+use crate::variant::{DEFAULT, Variant};
+use joint_firmware::compensation::{Reason, Request};
+use joint_firmware::friction::FrictionModel;
+use joint_firmware::joint::Telemetry;
+use jointctl::metrics::relative_floor;
+use plant::actuator::ActuatorParameters;
+use plant::excitation::{Segment, Trajectory, slow_reversals};
+use plant::virtual_joint::Setup;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::thread;
+
+/// Errors along one trajectory.
+#[derive(Clone, Copy, Debug)]
+pub struct Errors {
+    /// Mean of |friction - compensation| / |motor torque|, %, where the motor torque is at least a tenth of its RMS (001 eq. 11).
+    pub torque: f64,
+    /// RMS of the position error, rad.
+    pub tracking: f64,
+    /// How often a layer held compensation back.
+    pub shares: Shares,
+}
+
+/// Shares of the control steps, %.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Shares {
+    /// Clamp or slew limit changed the torque.
+    pub limited: f64,
+    /// A signal lay outside the trained box.
+    pub outside: f64,
+    /// The fade at standstill or the guard took something away.
+    pub withheld: f64,
+}
+
+impl Shares {
+    fn count(&mut self, telemetry: &Telemetry) {
+        let compensated = &telemetry.compensated;
+        let outside =
+            matches!(compensated.output.reason, Reason::OutsideTrainedBox(_) | Reason::FarOutsideTrainedBox(_));
+        self.limited += f64::from(u8::from(compensated.output.limited));
+        self.outside += f64::from(u8::from(outside));
+        self.withheld += f64::from(u8::from(compensated.permitted < 1.0));
+    }
+
+    fn of(self, steps: usize) -> Self {
+        let percent = |count: f64| 100.0 * count / steps as f64;
+        Self { limited: percent(self.limited), outside: percent(self.outside), withheld: percent(self.withheld) }
+    }
+}
+
+/// A random joint, commissioned.
+pub struct RandomJoint {
+    /// Seed.
+    pub seed: u64,
+    /// The actuator.
+    pub parameters: ActuatorParameters,
+    /// Its configuration, compensation off.
+    pub off: Setup,
+    /// What its owner found.
+    pub found: Commissioned,
+    moves: Trajectory,
+    reversals: Trajectory,
+}
+
+/// A joint's errors with one kind of compensation.
+#[derive(Clone, Copy, Debug)]
+pub struct Moved {
+    /// Over moves.
+    pub moves: Errors,
+    /// Over slow reversals.
+    pub reversals: Errors,
+}
+
+impl RandomJoint {
+    /// Draws, excites, records and fits joint number `seed`.
+    ///
+    /// # Errors
+    /// What plant, firmware or fit refuse, and a fault on the way.
+    pub fn commissioned(seed: u64) -> Result<Self, String> {
+        let parameters = ActuatorParameters::randomised(seed).aligned();
+        let off = Setup::of(&parameters);
+        let found = commission(&parameters, &off, seed)?;
+        let limits = &parameters.joint.limits;
+        let acceleration = parameters.joint.usable_acceleration().min(20.0);
+        // Shares of speed limit and travel.
+        let moves = [(0.5, 0.6), (0.5, -0.6), (0.2, 0.3), (0.7, -0.3), (0.05, 0.0)].map(|(speed, to)| Segment::Move {
+            to: to * limits.travel,
+            speed: speed * limits.speed,
+            acceleration: 0.5 * acceleration,
+        });
+        let trajectory = |segments| Trajectory::new(segments).map_err(|error| error.to_string());
+        let moves = trajectory(moves.to_vec())?;
+        let reversals = trajectory(slow_reversals(0.01 * limits.speed, 1.0, acceleration, 6))?;
+        Ok(Self { seed, parameters, off, found, moves, reversals })
+    }
+
+    /// Moves without compensation.
+    ///
+    /// # Errors
+    /// A fault on the way.
+    pub fn without(&self) -> Result<Moved, String> {
+        self.run(&self.off, &DEFAULT, None)
+    }
+
+    /// Moves with it.
+    ///
+    /// # Errors
+    /// A fault on the way.
+    pub fn with(&self, variant: &Variant) -> Result<Moved, String> {
+        let on = self.off.compensating(Request::PhysicalAndNetwork);
+        self.run(&on, variant, Some(&self.found.model))
+    }
+
+    fn run(&self, setup: &Setup, variant: &Variant, model: Option<&FrictionModel>) -> Result<Moved, String> {
+        let errors = |trajectory| self.errors(setup, variant, model, trajectory);
+        Ok(Moved { moves: errors(&self.moves)?, reversals: errors(&self.reversals)? })
+    }
+
+    /// Follows the trajectory 10 K above the ambient temperature.
+    fn errors(
+        &self,
+        setup: &Setup,
+        variant: &Variant,
+        model: Option<&FrictionModel>,
+        trajectory: &Trajectory,
+    ) -> Result<Errors, String> {
+        let failed = |error: String| format!("joint {}, {}: {error}", self.seed, variant.name);
+        let joint = variant.enabled(&self.parameters, setup, model.cloned(), 10.0, 99);
+        let mut joint = joint.map_err(|error| failed(error.to_string()))?;
+        let mut torques: Vec<(f64, f64)> = Vec::new();
+        let (mut squares, mut shares) = (0.0, Shares::default());
+        let outcome = follow(&mut joint, trajectory, |time, telemetry, state| {
+            let left = state.joint.friction_torque - f64::from(telemetry.compensated.torque);
+            torques.push((state.joint.motor_torque, left));
+            squares += (trajectory.at(time).position - state.joint.position).powi(2);
+            shares.count(telemetry);
+        });
+        outcome.map_err(|state| {
+            failed(format!("ended in {state:?}: {:?}", joint.joint().latched_faults().iter().collect::<Vec<_>>()))
+        })?;
+        let motor: Vec<f64> = torques.iter().map(|(motor, _)| *motor).collect();
+        let floor = relative_floor(&motor, 0.1);
+        let counted: Vec<f64> = torques
+            .iter()
+            .filter(|(motor, _)| motor.abs() >= floor)
+            .map(|(motor, left)| (left / motor).abs())
+            .collect();
+        Ok(Errors {
+            torque: 100.0 * counted.iter().sum::<f64>() / counted.len() as f64,
+            tracking: (squares / torques.len() as f64).sqrt(),
+            shares: shares.of(torques.len()),
+        })
+    }
+}
+
+/// The median; mean of the middle two of an even number.
+pub fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let n = values.len();
+    0.5 * (values[(n - 1) / 2] + values[n / 2])
+}
+
+/// `work` for every seed on all cores, in the order of the seeds.
+pub fn for_seeds<T: Send>(seeds: std::ops::Range<u64>, work: impl Fn(u64) -> T + Sync) -> Vec<T> {
+    let threads = thread::available_parallelism().map_or(1, usize::from);
+    let next = AtomicU64::new(seeds.start);
+    let worker = || {
+        let mut done = Vec::new();
+        loop {
+            let seed = next.fetch_add(1, Ordering::Relaxed);
+            if seed >= seeds.end {
+                return done;
+            }
+            done.push((seed, work(seed)));
+        }
+    };
+    let mut all: Vec<(u64, T)> = thread::scope(|scope| {
+        let workers: Vec<_> = (0..threads).map(|_| scope.spawn(worker)).collect();
+        workers.into_iter().flat_map(|worker| worker.join().unwrap_or_default()).collect()
+    });
+    all.sort_by_key(|(seed, _)| *seed);
+    assert_eq!(all.len() as u64, seeds.end - seeds.start, "a worker panicked");
+    all.into_iter().map(|(_, result)| result).collect()
+}

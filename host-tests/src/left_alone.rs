@@ -1,0 +1,137 @@
+//! A joint that nobody commands, with a model that is wrong in every parameter and sensors up to two periods late: what it does by itself.
+//! Judged by energy.
+
+use crate::informed::informed;
+use crate::variant::{DEFAULT, Variant, measured};
+use joint_firmware::compensation::Request;
+use joint_firmware::friction::FrictionModel;
+use joint_firmware::joint::state_machine::{Controlword, State};
+use joint_firmware::joint::{Command, Demand, Mode};
+use plant::actuator::ActuatorParameters;
+use plant::friction_factors::FrictionFactors;
+use plant::virtual_joint::Setup;
+
+/// Error of every parameter of the model.
+pub const ERROR: f64 = 0.3;
+
+/// What a joint did in a scenario.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Seen {
+    /// Largest distance from the start before the push, rad.
+    pub drift: f64,
+    /// Largest mechanical energy during the push, J, over that at rest.
+    pub pushed: f64,
+    /// Largest growth of the energy over a tenth of a second after the push, J.
+    pub growth: f64,
+    /// Friction's work in the last half second, J: what a limit cycle would have to deliver.
+    pub lost: f64,
+    /// Energy that the bristles hold when they break away, J: the scale of what creep at rest can store and give back.
+    pub breakaway: f64,
+    /// Largest withheld share of the compensation.
+    pub withheld: f64,
+}
+
+/// How a joint is left alone.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Alone {
+    /// Torque mode, no torque.
+    Free,
+    /// A spring and a damper hold the position.
+    Held,
+}
+
+/// Leaves joint `seed` alone, pushes it once, and leaves it alone again; with a compensation that differs from the default in `variant`, or none.
+/// Friction is computed for the measured velocity, the source that feeds back; the command's has nothing to add while nothing is commanded.
+///
+/// # Errors
+/// A joint that does not stay enabled.
+pub fn run(seed: u64, alone: Alone, variant: Option<&Variant>) -> Result<Seen, String> {
+    let parameters = ActuatorParameters::randomised(seed).aligned().without_payload();
+    // Half of the models are wrong at the corners of the range, with most of them too strong.
+    let factors = match seed % 4 {
+        0 => FrictionFactors::drawn(seed, ERROR),
+        1 => FrictionFactors::extreme(seed, ERROR),
+        _ => FrictionFactors::uniform(1.0 + ERROR),
+    };
+    let wrong = parameters.joint.friction.scaled(&factors).map_err(|error| error.to_string())?;
+    let request = if variant.is_some() { Request::Physical } else { Request::Off };
+    let mut setup = Setup::of(&parameters).compensating(request);
+    measured(&mut setup.configuration);
+    let model = FrictionModel::new(&informed(&parameters, &wrong), setup.bridge.rate as u32);
+    let variant = variant.unwrap_or(&DEFAULT);
+    let mut joint = variant.enabled(&parameters, &setup, Some(model), 0.0, seed).map_err(|error| error.to_string())?;
+
+    let gains = setup.configuration.gains;
+    let mut command = Command::default();
+    if alone == Alone::Held {
+        command =
+            Command { mode: Mode::Impedance, stiffness: gains.stiffness, damping: 0.2 * gains.damping, ..command };
+    }
+    let friction = &parameters.joint.friction;
+    let strength = 3.0 * friction.breakaway.forward.max(friction.breakaway.backward);
+    let mut demand = Demand { controlword: Controlword::ENABLE_OPERATION, command, sequence: 0 };
+    let level = friction.breakaway.forward.max(friction.breakaway.backward);
+    let mut seen = Seen { breakaway: 0.5 * level * level / friction.bristle_stiffness, ..Seen::default() };
+    let start = joint.actuator().state().joint.position;
+    let (mut window, mut rest) = (f64::NAN, 0.0);
+    let speed = parameters.joint.limits.speed;
+    let mut pushing = false;
+    for n in 0..30_000u32 {
+        demand.sequence = n / 20;
+        // Quiet for 0.3 s, then a push until a quarter of the speed limit, a tenth of a second at most.
+        let state = joint.actuator().state().joint;
+        pushing = (n == 6_000 || pushing) && n < 8_000 && state.velocity < 0.25 * speed;
+        let external = if pushing { strength } else { 0.0 };
+        let telemetry = *joint.step(&demand, external);
+        if telemetry.state != State::OperationEnabled {
+            return Err(format!("{:?} {:?}", telemetry.state, telemetry.faults));
+        }
+        let state = joint.actuator().state().joint;
+        let spring =
+            if alone == Alone::Held { 0.5 * f64::from(gains.stiffness) * state.position * state.position } else { 0.0 };
+        let energy = joint.actuator().joint().stored_energy() + spring;
+        seen.withheld = seen.withheld.max(1.0 - f64::from(telemetry.compensated.permitted));
+        if n < 6_000 {
+            seen.drift = seen.drift.max((state.position - start).abs());
+            rest = energy;
+        }
+        if n >= 8_000 && n % 2_000 == 0 {
+            if n > 8_000 {
+                seen.growth = seen.growth.max(energy - window);
+            }
+            window = energy;
+        } else if n < 8_000 {
+            seen.pushed = seen.pushed.max(energy - rest);
+        }
+        if n >= 20_000 {
+            seen.lost += (state.friction_torque * state.velocity * joint.period()).abs();
+        }
+    }
+    Ok(seen)
+}
+
+/// Whether a joint that was left alone moved by itself; with what it did without compensation.
+pub fn moves_by_itself(with: &Seen, without: &Seen) -> bool {
+    let starts = with.drift > without.drift + 1e-3;
+    let gains_energy = with.growth > without.growth + 0.01 * with.pushed + 0.1 * with.breakaway;
+    // A weakly damped spring still creeps back against friction; with less friction, for longer.
+    let keeps = with.lost > 2.0 * without.lost + 0.01 * with.pushed + 0.1 * with.breakaway;
+    starts || gains_energy || keeps
+}
+
+/// Joint `seed` in both situations with a compensation: the largest drift, rad, and what moved by itself.
+pub fn judged(seed: u64, variant: &Variant) -> (f64, Vec<String>) {
+    let (mut drift, mut bad) = (0.0f64, Vec::new());
+    for alone in [Alone::Free, Alone::Held] {
+        match (run(seed, alone, Some(variant)), run(seed, alone, None)) {
+            (Ok(with), Ok(without)) => {
+                drift = drift.max(with.drift);
+                if moves_by_itself(&with, &without) {
+                    bad.push(format!("joint {seed}, {alone:?}: {with:?}, without compensation {without:?}"));
+                }
+            }
+            (with, without) => bad.push(format!("joint {seed}, {alone:?}: {with:?}, without compensation {without:?}")),
+        }
+    }
+    (drift, bad)
+}

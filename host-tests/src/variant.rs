@@ -1,0 +1,77 @@
+//! The layers between a friction estimate and the torque that is added, each of which can be taken away to see what it does.
+
+use crate::driving::enabled;
+use joint_firmware::compensation::Request;
+use joint_firmware::friction::FrictionModel;
+use joint_firmware::joint::active::Active;
+use joint_firmware::joint::configuration::{Configuration, VelocitySource};
+use plant::VirtualJoint;
+use plant::actuator::ActuatorParameters;
+use plant::virtual_joint::{Setup, VirtualJointError};
+
+/// Largest slew limit that a configuration may have, Nm/s.
+const FASTEST_SLEW: f32 = 30e3;
+
+/// A compensation that differs from the default in one layer.
+#[derive(Clone, Copy)]
+pub struct Variant {
+    /// What differs.
+    pub name: &'static str,
+    /// How, in the configuration.
+    pub configure: fn(&mut Configuration),
+    /// How, in what the configuration does not offer.
+    pub prepare: fn(&mut Active),
+}
+
+/// As [`Setup::of`] configures it, physical model and network.
+pub const DEFAULT: Variant = Variant { name: "all layers", configure: |_| {}, prepare: |_| {} };
+
+/// The default and everything that can be taken away from it.
+pub const ALL: [Variant; 8] = [
+    DEFAULT,
+    Variant { name: "velocity always the measured one", configure: measured, ..DEFAULT },
+    Variant { name: "no network", configure: |c| c.compensation.request = Request::Physical, ..DEFAULT },
+    Variant { name: "gain 1 for 0.98", configure: |c| c.compensation.gain = 1.0, ..DEFAULT },
+    Variant { name: "no clamp", configure: |c| c.compensation.clamp = c.limits.torque, ..DEFAULT },
+    Variant { name: "no slew limit", configure: |c| c.compensation.slew = FASTEST_SLEW, ..DEFAULT },
+    Variant {
+        name: "no fade at standstill",
+        prepare: |active| active.compensation.inverse_standstill = f32::INFINITY,
+        ..DEFAULT
+    },
+    Variant {
+        name: "no energy guard",
+        // Nothing counts as speeding up.
+        prepare: |active| active.compensation.standstill = f32::INFINITY,
+        ..DEFAULT
+    },
+];
+
+/// Friction for the measured velocity in every mode.
+pub fn measured(configuration: &mut Configuration) {
+    configuration.compensation.velocity_source = VelocitySource::Measured;
+}
+
+impl Variant {
+    /// A joint with this compensation and `model`, switched on, at rest and `warmth` (K) above the ambient temperature.
+    ///
+    /// # Errors
+    /// What plant or firmware refuse.
+    pub fn enabled(
+        &self,
+        parameters: &ActuatorParameters,
+        setup: &Setup,
+        model: Option<FrictionModel>,
+        warmth: f64,
+        seed: u64,
+    ) -> Result<VirtualJoint, VirtualJointError> {
+        let mut setup = *setup;
+        (self.configure)(&mut setup.configuration);
+        let mut joint = enabled(parameters, &setup, warmth, seed)?;
+        joint.set_friction(model);
+        let mut active = joint.active().clone();
+        (self.prepare)(&mut active);
+        joint.set_active(active);
+        Ok(joint)
+    }
+}
