@@ -3,7 +3,6 @@
 use super::configuration::{
     BridgeConfiguration, Configuration, ConfigurationError, GearConfiguration, Limits, VelocitySource,
 };
-use super::monitor;
 use crate::compensation::Settings;
 use crate::friction::FrictionModel;
 use crate::motor::angle::{Direction, EncoderAlignment, STEPS, TAU};
@@ -33,6 +32,8 @@ const UNEXPLAINED: f32 = 0.015;
 /// Noise of a current as a part of the current limit that may be taken for a change: differentiated with the windings' inductance it
 /// is a voltage, in windings of many turns more than all the rest.
 const CURRENT_NOISE: f32 = 0.005;
+/// Part of a step's unexplained voltage that goes into its filter: a time constant of 8 steps.
+pub(super) const VOLTAGE_FILTER: f32 = 0.125;
 
 /// Scales between rotor and joint.
 #[derive(Clone, Copy, Debug)]
@@ -169,8 +170,16 @@ pub struct Active {
     pub thermal: ThermalSettings,
 }
 
+impl Configuration {
+    /// Checks the whole record and prepares it for the control step on a bridge.
+    pub fn prepare(&self, bridge: &BridgeConfiguration) -> Result<Active, ConfigurationError> {
+        self.check(bridge)?;
+        Active::new(self, bridge)
+    }
+}
+
 impl Active {
-    pub(super) fn new(configuration: &Configuration, bridge: &BridgeConfiguration) -> Result<Self, ConfigurationError> {
+    fn new(configuration: &Configuration, bridge: &BridgeConfiguration) -> Result<Self, ConfigurationError> {
         let Configuration { motor, gear, limits, gains, compensation, thermal, .. } = configuration;
         let rate = bridge.rate;
         let period = 1.0 / rate;
@@ -184,7 +193,7 @@ impl Active {
             flux_linkage,
         };
         let (lowest_voltage, highest_voltage) = limits.bus_voltage;
-        let current_slope = CURRENT_NOISE * motor.current_limit * monitor::FILTER * rate;
+        let current_slope = CURRENT_NOISE * motor.current_limit * VOLTAGE_FILTER * rate;
         let unexplained = |inductance: f32| UNEXPLAINED * highest_voltage + inductance * current_slope;
         let magnitude = if gear.ratio < 0.0 { -gear.ratio } else { gear.ratio };
         let rotor_velocity = OBSERVER_RESERVE * limits.velocity * magnitude;

@@ -3,7 +3,6 @@
 //! It is separate from the friction image: it changes when the joint is built or its limits are set, the image whenever the
 //! friction is learned anew.
 
-use super::active::Active;
 use crate::compensation::SettingsError;
 use crate::motor::angle::EncoderAlignment;
 use crate::motor::setting::{SettingError, check};
@@ -198,8 +197,8 @@ impl core::fmt::Display for ConfigurationError {
 impl core::error::Error for ConfigurationError {}
 
 impl Configuration {
-    /// Checks the whole record and prepares it for the control step on a bridge.
-    pub fn prepare(&self, bridge: &BridgeConfiguration) -> Result<Active, ConfigurationError> {
+    /// Checks every number that [`Configuration::prepare`] does not check where it uses it.
+    pub(super) fn check(&self, bridge: &BridgeConfiguration) -> Result<(), ConfigurationError> {
         if !matches!(self.node_id, 1..=127 | 255) {
             return Err(ConfigurationError::NodeId(self.node_id));
         }
@@ -238,6 +237,6 @@ impl Configuration {
         check("compensation clamp", "Nm", compensation.clamp, 0.0, limits.torque)?;
         check("compensation slew limit", "Nm/s", compensation.slew, 0.5, 32e3)?;
         check("standstill velocity", "rad/s", compensation.standstill_velocity, 1e-4, 10.0)?;
-        Active::new(self, bridge)
+        Ok(())
     }
 }

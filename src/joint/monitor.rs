@@ -10,7 +10,7 @@
 //! without current, because the loop raises the voltage and nothing follows. In the second case the current misses its reference.
 
 use super::JointMotion;
-use super::active::Active;
+use super::active::{Active, VOLTAGE_FILTER};
 use super::fault::{Fault, Faults};
 use super::signals::Measurements;
 use crate::motor::field_oriented::FieldOrientedOutput;
@@ -25,8 +25,6 @@ pub const ENCODER_STEPS: u32 = 5;
 pub const CURRENT_SUM_STEPS: u32 = 3;
 /// Steps for which the voltage must be unexplained: longer than the current loop takes for a step of its reference.
 pub const UNEXPLAINED_STEPS: u32 = 30;
-/// Part of a step's voltage that goes into the filter: a time constant of 8 steps.
-pub(super) const FILTER: f32 = 0.125;
 /// Error of the resistance that counts as explained: copper 100 K above the temperature that the constants hold for has 39 % more.
 const RESISTANCE_ERROR: f32 = 0.5;
 /// Error of what the rotor's turning induces that counts as explained: a saturated or hot magnet, and an electrical angle that is a
@@ -122,7 +120,7 @@ fn beyond(value: f32, limit: f32) -> bool {
 /// One step of a first-order filter; what is not a number counts as zero.
 #[inline(always)]
 fn filter(state: &mut Dq, value: Dq) {
-    let step = |state: f32, value: f32| state + FILTER * (limited(value, 1e4) - state);
+    let step = |state: f32, value: f32| state + VOLTAGE_FILTER * (limited(value, 1e4) - state);
     *state = Dq { d: step(state.d, value.d), q: step(state.q, value.q) };
 }
 
@@ -196,7 +194,7 @@ impl Monitor {
         filter(&mut memory.error, *reference - current);
 
         // The filtered slope of the current is its distance from the filtered current over the filter's time constant.
-        let slope = FILTER * active.bridge.rate;
+        let slope = VOLTAGE_FILTER * active.bridge.rate;
         let left = Dq {
             d: memory.unexplained.d - inductance.d * slope * (or_zero(current.d) - memory.current.d),
             q: memory.unexplained.q - inductance.q * slope * (or_zero(current.q) - memory.current.q),

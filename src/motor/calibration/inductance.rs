@@ -16,17 +16,9 @@
 use super::Next;
 use super::failure::Failure;
 use super::resistance::Hold;
-use super::settings::Plan;
+use super::settings::{MEASURE, Plan, RISE, SETTLE};
 use crate::motor::number::square_root;
 
-/// Cycles in which the amplitude rises to its highest.
-const RISE: u32 = 250;
-/// Cycles from the last rise to the measurement.
-const SETTLE: u32 = 30;
-/// Cycles that are measured.
-const MEASURE: u32 = 128;
-/// Longest time that it takes, steps.
-pub(super) const LONGEST: u32 = 8 * (RISE + SETTLE + MEASURE + 2);
 /// Amplitude of the current at which the voltage's stops rising, and the least to measure by, in parts of the holding current.
 const AMPLITUDE: (f32, f32) = (0.2, 0.02);
 /// Least impedance in parts of the resistance: below, the inductance's share is too small to tell.

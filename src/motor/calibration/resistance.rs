@@ -6,14 +6,11 @@
 
 use super::Next;
 use super::failure::{Failure, Phase};
-use super::settings::Plan;
+use super::settings::{Plan, REACH};
 use crate::motor::number::{limited, within};
 use crate::motor::phases::Phases;
 use crate::motor::transform::AlphaBeta;
 
-/// Settling times within which a current must be reached. The voltage rises to its highest in one, and approaches what is needed with
-/// a time constant of one at most.
-pub(super) const REACH: u32 = 4;
 /// Resistances of motors, Ω.
 const PLAUSIBLE: (f32, f32) = (1e-3, 100.0);
 

@@ -5,6 +5,17 @@ use crate::motor::setting::{SettingError, check};
 
 /// Most pole pairs that are looked for.
 pub(super) const MOST_POLE_PAIRS: u32 = 64;
+/// Settling times within which the current that measures the resistance must be reached. The voltage rises to its highest in one, and approaches what is needed with
+/// a time constant of one at most.
+pub(super) const REACH: u32 = 4;
+/// Cycles of the inductance's alternating voltage in which the amplitude rises to its highest.
+pub(super) const RISE: u32 = 250;
+/// Cycles from the last rise to the measurement.
+pub(super) const SETTLE: u32 = 30;
+/// Cycles that are measured.
+pub(super) const MEASURE: u32 = 128;
+/// Longest time that an inductance takes, steps.
+const INDUCTANCE: u32 = 8 * (RISE + SETTLE + MEASURE + 2);
 /// Time for which offsets are averaged, s.
 const OFFSET_TIME: f32 = 0.1;
 
@@ -76,12 +87,7 @@ impl Plan {
         let turn_steps = (s.turn_time * rate) as u32;
         let sweeps = 4 * (s.electrical_turns + 1) * turn_steps;
         // Twice: reach, settle, average. Then two inductances, two sweeps with each current, the ramp down; and a step between each two.
-        let longest = offset_steps
-            + 2 * (super::resistance::REACH + 2) * settle_steps
-            + 2 * super::inductance::LONGEST
-            + sweeps
-            + settle_steps
-            + 20;
+        let longest = offset_steps + 2 * (REACH + 2) * settle_steps + 2 * INDUCTANCE + sweeps + settle_steps + 20;
         Ok(Self {
             rate,
             current,

@@ -1,6 +1,8 @@
 //! The motions that are recorded: rests, Fourier series and trapezoidal moves, strung together.
 
 use crate::error::{ParameterError, count_within, within};
+pub use crate::fourier::Reference;
+
 use crate::fourier::FourierSeries;
 use crate::noise::Noise;
 use crate::parameters::JointParameters;
@@ -10,17 +12,6 @@ pub const DEFAULT_RUNS: usize = 6;
 
 /// Largest acceleration of the default excitation, rad/s².
 pub const GENTLE_ACCELERATION: f64 = 20.0;
-
-/// Where the joint should be.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Reference {
-    /// Position, rad.
-    pub position: f64,
-    /// Velocity, rad/s.
-    pub velocity: f64,
-    /// Acceleration, rad/s².
-    pub acceleration: f64,
-}
 
 /// One piece of a trajectory; it starts and ends at rest.
 #[derive(Clone, Debug, PartialEq)]

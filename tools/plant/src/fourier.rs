@@ -8,9 +8,19 @@
 //! Erratum: the paper prints the velocity with -b_l sin(w l t) and the acceleration with -b_l w l cos(w l t), which
 //! are not the derivatives of its position; here both have the plus sign.
 
-use crate::excitation::Reference;
 use crate::noise::Noise;
 use std::f64::consts::TAU;
+
+/// Where the joint should be.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Reference {
+    /// Position, rad.
+    pub position: f64,
+    /// Velocity, rad/s.
+    pub velocity: f64,
+    /// Acceleration, rad/s².
+    pub acceleration: f64,
+}
 
 /// Harmonics of a series drawn at random.
 pub const HARMONICS: usize = 5;

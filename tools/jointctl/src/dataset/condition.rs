@@ -1,6 +1,6 @@
 //! Tests on raw columns, evaluated once for every row of the table; host.
 
-use super::description::{Condition, Value};
+use super::condition_keys::{Condition, Value};
 use super::load::Table;
 
 /// For each row whether `condition` holds. The columns it names must have been loaded as the kinds that it compares with.

@@ -1,6 +1,7 @@
 //! All files of a data set as one table of raw columns, grouped into runs and joined with the table of runs; host.
 
-use super::description::{Condition, Description, Rule, Value};
+use super::condition_keys::{Condition, Value};
+use super::description::{Description, Rule};
 use super::error::DatasetError;
 use super::load::{self, Environment, Table, TextColumn, Wanted};
 use sha2::{Digest, Sha256};

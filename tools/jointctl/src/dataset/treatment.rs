@@ -1,6 +1,6 @@
 //! The keys of the description that say how signals are treated: cleaning, filters, differentiation, motion states; host.
 
-use super::description::Condition;
+use super::condition_keys::Condition;
 use serde::Deserialize;
 
 /// Dropouts, outliers, gaps and uneven sampling.

@@ -2,7 +2,8 @@
 //!
 //! Everything that can be judged without the recordings is judged here, so that a mistake shows before a large file is read.
 
-use super::description::{Condition, Description, EffortUnit, Gravity, PositionUnit, Rule, Value};
+use super::condition_keys::{Condition, Value};
+use super::description::{Description, EffortUnit, Gravity, PositionUnit, Rule};
 use super::error::DatasetError;
 use super::treatment::{LowPass, VelocityFrom};
 use std::fmt::Display;
