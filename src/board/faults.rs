@@ -9,6 +9,7 @@ use core::ptr::{addr_of, addr_of_mut};
 use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m::peripheral::SCB;
 use embassy_stm32::pac;
+use joint_firmware::parameters::ecc::{self, Decision, Storage};
 use joint_firmware::reset_record::{Cause, Record, WORDS};
 
 /// The region PANIC of the board's memory: the startup code does not touch it.
@@ -134,27 +135,27 @@ extern "C" fn hard_fault(frame: *const u32) -> ! {
 /// Flash ECC, clock security or SRAM parity.
 ///
 /// Reading a parameter word that a loss of power tore gives a double ECC error and so this interrupt. That is no reason to
-/// stop: the bridge goes off (parameters are read with the bridge off anyway), the flag is cleared, and the reader finds a
-/// slot with a bad checksum. ECCR gives the offset in the bank (RM0440, 5.7.6; that it counts bytes is unconfirmed).
+/// stop: the bridge goes off (parameters are read with the bridge off anyway), the flag is cleared, and the reader of the double
+/// word finds [`torn_words`] risen. What is that and what is fatal: [`ecc`].
 #[unsafe(no_mangle)]
 extern "C" fn NonMaskableInt() {
     super::bridge_off();
-    let status = pac::FLASH.eccr().read();
-    let start = addr_of!(__parameters_start) as u32;
-    let end = addr_of!(__parameters_end) as u32;
-    let address = super::FLASH_START + status.addr_ecc() + if status.bk_ecc() { super::FLASH_BANK } else { 0 };
-    let parameters = !status.sysf_ecc() && address >= start && address < end;
-    if status.eccd() && parameters {
-        pac::FLASH.eccr().modify(|w| {
-            // Both flags clear where a one is written: only this one.
-            w.set_eccc(false);
-            w.set_eccd(true);
-        });
-        TORN_WORDS.fetch_add(1, Ordering::Relaxed);
-        return;
-    }
+    let status = pac::FLASH.eccr().read().0;
+    let storage = Storage {
+        flash: super::FLASH_START,
+        bank: super::FLASH_BANK,
+        parameters: addr_of!(__parameters_start) as u32..addr_of!(__parameters_end) as u32,
+    };
+    let address = match ecc::decide(status, &storage) {
+        Decision::Resume { clear, .. } => {
+            pac::FLASH.eccr().write(|w| w.0 = clear);
+            TORN_WORDS.fetch_add(1, Ordering::Relaxed);
+            return;
+        }
+        Decision::Fatal { address } => address,
+    };
     cortex_m::interrupt::disable();
-    reset_with(Record::new(Cause::NonMaskable, address, status.0))
+    reset_with(Record::new(Cause::NonMaskable, address, status))
 }
 
 /// Any interrupt that nobody handles.

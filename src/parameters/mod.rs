@@ -2,5 +2,6 @@
 
 pub mod certificate;
 mod codec;
+pub mod ecc;
 pub mod image;
 pub mod slots;
