@@ -47,6 +47,8 @@
 //! A golden vector is 36 bytes: the index of the set (1 byte), three reserved, the six signals (Q16.16, in the order of [`Signal`]),
 //! and the exact Q16.16 torques of the physical model and of the network. A device evaluates them before it uses an
 //! image, which proves that its arithmetic is the one that the image was judged with.
+//!
+//! An upload is an image and, behind it, the tag of 32 bytes that [authenticates](super::authentication) it, where there is one.
 
 use super::certificate::Limits;
 use super::codec::{Reader, Writer, decode_content, encode_content};
@@ -247,6 +249,11 @@ impl Image {
     /// Checked in this order: magic, format, length, checksum, fields. Whether the image is safe to use is the
     /// [certificate](super::certificate)'s business.
     pub fn decode(bytes: &[u8]) -> Result<Self, ImageError> {
+        decode_content(Reader { bytes: Self::content(bytes)?, offset: 0 })
+    }
+
+    /// What the checksum is of, once magic, format, length and checksum are right.
+    pub(super) fn content(bytes: &[u8]) -> Result<&[u8], ImageError> {
         let mut head = Reader { bytes, offset: 0 };
         let found = head.bytes()?;
         if found != MAGIC {
@@ -274,7 +281,7 @@ impl Image {
         if stored != computed {
             return Err(ImageError::Checksum { stored, computed });
         }
-        decode_content(Reader { bytes: content, offset: 0 })
+        Ok(content)
     }
 
     /// Writes the image to the start of `buffer`; the number of bytes used. An image that [`Image::decode`] would not give

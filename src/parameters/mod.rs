@@ -1,5 +1,6 @@
 //! How a trained model travels: the byte layout of an image, the proof that it is safe to use, and how it is kept.
 
+pub mod authentication;
 pub mod certificate;
 mod codec;
 pub mod ecc;
