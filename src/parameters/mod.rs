@@ -5,4 +5,5 @@ pub mod certificate;
 mod codec;
 pub mod ecc;
 pub mod image;
+pub mod life_cycle;
 pub mod slots;

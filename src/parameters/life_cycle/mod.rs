@@ -1,0 +1,500 @@
+//! The life of an image on the joint, as a state machine; task or host.
+//!
+//! ```text
+//! Empty -> Staged -> Verified -> Shadow, Trial -> Storing -> Committed -> Active
+//!                        ^____________|
+//!                      time is over, heartbeat lost
+//! ```
+//!
+//! It touches neither flash nor control step: it says what to do ([`Action`]) and is told how that went
+//! ([`LifeCycle::finished`]). Time is passed in, in milliseconds of a clock that does not wrap (u64). The bytes of an upload lie in
+//! a buffer of the caller's that nobody else writes; what was verified is compared by its checksum before it is run or stored.
+//!
+//! Versions: an image older than the floor is refused. Storing an image raises the floor to its version; the same version may come
+//! again. Rolling back goes to the stored previous image alone, whatever its version, and leaves the floor.
+
+mod refusal;
+#[cfg(test)]
+mod tests;
+mod verification;
+
+use super::authentication::{Key, STAGING, lockout_left};
+use super::slots::SlotError;
+pub use refusal::Refusal;
+pub use verification::{Requirements, Verified};
+
+/// Longest trial, ms: an hour.
+pub const MAX_TRIAL_MS: u32 = 3_600_000;
+
+const CRC: crc::Crc<u32, crc::NoTable> = crc::Crc::<u32, crc::NoTable>::new(&crc::CRC_32_ISO_HDLC);
+
+/// What a client asks for, with the number that it writes to object 2212:1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Command {
+    /// Check what is staged.
+    Verify = 1,
+    /// Run it from RAM for a time.
+    Trial = 2,
+    /// Store it.
+    Commit = 3,
+    /// Go back to the stored previous image.
+    RollBack = 4,
+    /// Forget what is staged; where it runs, go back to the stored image.
+    Discard = 5,
+    /// Compute it for a time beside the stored one, without effect.
+    Shadow = 6,
+}
+
+impl Command {
+    /// All commands, by number.
+    pub const ALL: [Self; 6] = [Self::Verify, Self::Trial, Self::Commit, Self::RollBack, Self::Discard, Self::Shadow];
+
+    /// The command with this number.
+    pub fn from_number(value: u8) -> Result<Self, Refusal> {
+        Self::ALL.into_iter().find(|command| *command as u8 == value).ok_or(Refusal::UnknownCommand { value })
+    }
+}
+
+/// Where an image stands, with the number of object 2212:2.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum State {
+    /// Nothing is staged.
+    #[default]
+    Empty = 0,
+    /// Bytes have arrived.
+    Staged = 1,
+    /// Everything holds of them.
+    Verified = 2,
+    /// Computed without effect.
+    Shadow = 3,
+    /// In use from RAM.
+    Trial = 4,
+    /// Being written to flash, or the roll back is.
+    Storing = 5,
+    /// In flash, not in use yet.
+    Committed = 6,
+    /// In flash and in use; nothing is staged.
+    Active = 7,
+}
+
+/// How an image runs from RAM.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mode {
+    /// Computed, without effect on the torque.
+    Shadow,
+    /// In use.
+    Trial,
+}
+
+/// What the caller does next. But for [`Action::Nothing`], it tells by [`LifeCycle::finished`] how that went.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Action {
+    /// Nothing.
+    Nothing,
+    /// Prepare the first `length` bytes of the staging buffer and swap them in between two control steps.
+    Run {
+        /// How.
+        mode: Mode,
+        /// Bytes of the image.
+        length: usize,
+    },
+    /// Swap the stored image in again, or none where there is none.
+    Revert,
+    /// Store the first `length` bytes of the staging buffer in the slots; then keep [`LifeCycle::floor`].
+    Store {
+        /// Bytes of the image.
+        length: usize,
+    },
+    /// Roll the slots back. The staging buffer may be used for it.
+    RollBack,
+    /// Swap the image of the newest slot in.
+    Activate,
+}
+
+/// Why a trial ended by itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// Its time was over.
+    Time,
+    /// The heartbeat of whoever asked for it was lost.
+    Heartbeat,
+}
+
+/// What is true of the joint at this instant.
+#[derive(Clone, Copy, Debug)]
+pub struct Conditions<'a> {
+    /// Time, ms.
+    pub now: u64,
+    /// The motor is, or may be, under current.
+    pub armed: bool,
+    /// Code and parameters lie in one bank: writing stops the program.
+    pub single_bank: bool,
+    /// The key, once there is one.
+    pub key: Option<&'a Key>,
+}
+
+/// What verification leaves behind.
+#[derive(Clone, Copy, Debug)]
+struct Checked {
+    verified: Verified,
+    /// Of the upload's bytes.
+    checksum: u32,
+    /// Number of the key that the tag was checked with.
+    key: Option<u32>,
+}
+
+/// The state machine.
+#[derive(Clone, Debug)]
+pub struct LifeCycle {
+    requirements: Requirements,
+    state: State,
+    /// What the caller has been told to do and has not finished, with the state to go back to.
+    pending: Option<(Action, State)>,
+    /// Bytes in the staging buffer.
+    length: usize,
+    announced: Option<usize>,
+    verified: Option<Checked>,
+    /// End of the trial, ms.
+    end: u64,
+    trial_time: u32,
+    ending: Option<Ending>,
+    floor: u32,
+    failures: u16,
+    last_failure: u64,
+    result: Option<Refusal>,
+}
+
+impl LifeCycle {
+    /// At start, at time `now`, ms: nothing is staged.
+    ///
+    /// `floor`: the highest of the kept floor and the versions of both stored images, so that a loss of power between storing an
+    /// image and keeping its floor does not lower it. `failures`: the kept count of wrong tags.
+    pub const fn new(requirements: Requirements, floor: u32, failures: u16, now: u64) -> Self {
+        Self {
+            requirements,
+            state: State::Empty,
+            pending: None,
+            length: 0,
+            announced: None,
+            verified: None,
+            end: 0,
+            trial_time: 0,
+            ending: None,
+            floor,
+            failures,
+            last_failure: now,
+            result: None,
+        }
+    }
+
+    /// Where the image stands.
+    pub const fn state(&self) -> State {
+        self.state
+    }
+
+    /// The reason of the last refusal; none after a success.
+    pub const fn result(&self) -> Option<Refusal> {
+        self.result
+    }
+
+    /// What was found out of the staged image, from verification on.
+    pub fn verified(&self) -> Option<Verified> {
+        self.verified.map(|checked| checked.verified)
+    }
+
+    /// Bytes staged.
+    pub const fn length(&self) -> usize {
+        self.length
+    }
+
+    /// Lowest version that is taken. To be kept when it has risen.
+    pub const fn floor(&self) -> u32 {
+        self.floor
+    }
+
+    /// Wrong tags in a row. To be kept whenever it has changed, before the client is answered.
+    pub const fn failures(&self) -> u16 {
+        self.failures
+    }
+
+    /// What is left of a lock-out, ms.
+    pub const fn lockout_left(&self, now: u64) -> u32 {
+        lockout_left(self.failures, now.saturating_sub(self.last_failure))
+    }
+
+    /// What is left of a trial or shadow, ms; 0 outside.
+    pub fn trial_left(&self, now: u64) -> u32 {
+        match self.state {
+            State::Shadow | State::Trial => u32::try_from(self.end.saturating_sub(now)).unwrap_or(u32::MAX),
+            _ => 0,
+        }
+    }
+
+    /// How the last trial ended by itself; none while one runs, or where a command ended it.
+    pub const fn ending(&self) -> Option<Ending> {
+        self.ending
+    }
+
+    /// Sets the time of trials that follow, 1 to [`MAX_TRIAL_MS`] ms.
+    pub fn set_trial_time(&mut self, time: u32) -> Result<(), Refusal> {
+        let result = if (1..=MAX_TRIAL_MS).contains(&time) {
+            self.trial_time = time;
+            Ok(())
+        } else {
+            Err(Refusal::TrialTime { time })
+        };
+        self.note(result)
+    }
+
+    /// An upload begins, of `announced` bytes where the client has said so. What was staged is forgotten.
+    pub fn begin(&mut self, announced: Option<usize>) -> Result<(), Refusal> {
+        let result = match announced {
+            Some(length) if length > STAGING => Err(Refusal::UploadTooLong { length }),
+            _ => self.upload_possible(),
+        };
+        if result.is_ok() {
+            self.forget();
+            self.announced = announced;
+        }
+        self.note(result)
+    }
+
+    /// The next piece of an upload, into the staging buffer.
+    pub fn receive(&mut self, staging: &mut [u8; STAGING], piece: &[u8]) -> Result<(), Refusal> {
+        let result = self.upload_possible().and_then(|()| {
+            let end = self.length.saturating_add(piece.len());
+            let place = staging.get_mut(self.length..end).ok_or(Refusal::UploadTooLong { length: end })?;
+            place.copy_from_slice(piece);
+            self.length = end;
+            self.verified = None;
+            self.state = State::Staged;
+            Ok(())
+        });
+        self.note(result)
+    }
+
+    /// Carries a command out, as far as it does not touch flash or control step; the caller does the rest.
+    pub fn command(
+        &mut self,
+        command: Command,
+        staging: &[u8; STAGING],
+        conditions: &Conditions,
+    ) -> Result<Action, Refusal> {
+        let result = match self.pending {
+            Some(_) => Err(Refusal::Busy),
+            None => match command {
+                Command::Verify => self.verify(staging, conditions),
+                Command::Shadow => self.run(Mode::Shadow, staging, conditions),
+                Command::Trial => self.run(Mode::Trial, staging, conditions),
+                Command::Commit => self.commit(staging, conditions),
+                Command::RollBack => self.roll_back(conditions),
+                Command::Discard => Ok(self.discard()),
+            },
+        };
+        self.note(result)
+    }
+
+    /// To be called often: ends a trial whose time is over or whose client is gone.
+    pub fn tick(&mut self, now: u64, heartbeat_lost: bool) -> Action {
+        if self.pending.is_some() || !matches!(self.state, State::Shadow | State::Trial) {
+            return Action::Nothing;
+        }
+        let ending = if heartbeat_lost {
+            Ending::Heartbeat
+        } else if now >= self.end {
+            Ending::Time
+        } else {
+            return Action::Nothing;
+        };
+        self.ending = Some(ending);
+        self.revert(State::Verified)
+    }
+
+    /// How what [`LifeCycle::command`], [`LifeCycle::tick`] or this function asked for went; what is to be done then.
+    pub fn finished(&mut self, outcome: Result<(), SlotError>) -> Action {
+        let Some((action, before)) = self.pending.take() else { return Action::Nothing };
+        let next = match (action, outcome) {
+            (Action::Store { .. }, Ok(())) => {
+                if let Some(checked) = self.verified {
+                    self.floor = self.floor.max(checked.verified.version);
+                }
+                self.state = State::Committed;
+                Action::Activate
+            }
+            // The buffer may have served the roll back: nothing is staged any more, whatever came of it.
+            (Action::RollBack, outcome) => {
+                self.forget();
+                match outcome {
+                    Ok(()) => {
+                        self.state = State::Committed;
+                        Action::Activate
+                    }
+                    Err(error) => {
+                        self.result = Some(error.into());
+                        Action::Nothing
+                    }
+                }
+            }
+            (Action::Store { .. }, Err(error)) => {
+                self.state = before;
+                self.result = Some(error.into());
+                Action::Nothing
+            }
+            (Action::Activate, Ok(())) => {
+                self.forget();
+                self.state = State::Active;
+                Action::Nothing
+            }
+            // The stored image is the newest all the same; it is asked for until the control step takes it.
+            (Action::Activate | Action::Revert, Err(_)) => action,
+            (Action::Run { .. }, Err(_)) => {
+                // A trial that was to follow a shadow: what runs is not known, the stored image is.
+                self.result = Some(Refusal::NotRun);
+                self.state = State::Verified;
+                Action::Revert
+            }
+            (Action::Run { .. } | Action::Revert | Action::Nothing, _) => Action::Nothing,
+        };
+        if next != Action::Nothing {
+            self.pending = Some((next, self.state));
+        }
+        next
+    }
+
+    fn note<T>(&mut self, result: Result<T, Refusal>) -> Result<T, Refusal> {
+        self.result = result.as_ref().err().copied();
+        result
+    }
+
+    fn forget(&mut self) {
+        self.state = State::Empty;
+        self.length = 0;
+        self.announced = None;
+        self.verified = None;
+    }
+
+    fn begin_action(&mut self, action: Action, before: State) -> Action {
+        self.pending = Some((action, before));
+        action
+    }
+
+    fn upload_possible(&self) -> Result<(), Refusal> {
+        match (self.pending, self.state) {
+            (Some(_), _) => Err(Refusal::Busy),
+            (None, State::Empty | State::Staged | State::Verified | State::Active) => Ok(()),
+            (None, state) => Err(Refusal::State { command: None, state }),
+        }
+    }
+
+    fn verify(&mut self, staging: &[u8; STAGING], conditions: &Conditions) -> Result<Action, Refusal> {
+        if !matches!(self.state, State::Staged | State::Verified) {
+            return Err(Refusal::State { command: Some(Command::Verify), state: self.state });
+        }
+        self.state = State::Staged;
+        self.verified = None;
+        let length = self.length;
+        if let Some(announced) = self.announced.filter(|announced| *announced != length) {
+            return Err(Refusal::UploadLength { length, announced });
+        }
+        let left = self.lockout_left(conditions.now);
+        if conditions.key.is_some() && left > 0 {
+            return Err(Refusal::LockedOut { left, failures: self.failures });
+        }
+        let upload = staging.get(..length).ok_or(Refusal::UploadTooLong { length })?;
+        if !verification::authentic(upload, conditions.key)? {
+            self.failures = self.failures.saturating_add(1);
+            self.last_failure = conditions.now;
+            return Err(Refusal::TagWrong { failures: self.failures });
+        }
+        if conditions.key.is_some() {
+            self.failures = 0;
+        }
+        let verified = verification::verify(upload, &self.requirements, self.floor)?;
+        self.verified = Some(Checked { verified, checksum: CRC.checksum(upload), key: conditions.key.map(Key::id) });
+        self.state = State::Verified;
+        Ok(Action::Nothing)
+    }
+
+    /// The verified image, if the staging buffer still holds it and the joint has not got a key since.
+    fn unchanged(
+        &self,
+        command: Command,
+        staging: &[u8; STAGING],
+        conditions: &Conditions,
+    ) -> Result<Verified, Refusal> {
+        let refused = Refusal::State { command: Some(command), state: self.state };
+        let (true, Some(Checked { verified, checksum, key })) =
+            (matches!(self.state, State::Verified | State::Shadow | State::Trial), self.verified)
+        else {
+            return Err(refused);
+        };
+        let upload = staging.get(..self.length).ok_or(refused)?;
+        if CRC.checksum(upload) != checksum {
+            return Err(Refusal::Changed);
+        }
+        if key != conditions.key.map(Key::id) {
+            return Err(Refusal::TagMissing);
+        }
+        Ok(verified)
+    }
+
+    fn run(&mut self, mode: Mode, staging: &[u8; STAGING], conditions: &Conditions) -> Result<Action, Refusal> {
+        let (command, state) = match mode {
+            Mode::Shadow => (Command::Shadow, State::Shadow),
+            Mode::Trial => (Command::Trial, State::Trial),
+        };
+        let Verified { length, .. } = self.unchanged(command, staging, conditions)?;
+        if self.trial_time == 0 {
+            return Err(Refusal::TrialTime { time: 0 });
+        }
+        let before = self.state;
+        self.end = conditions.now.saturating_add(self.trial_time.into());
+        self.ending = None;
+        self.state = state;
+        Ok(self.begin_action(Action::Run { mode, length }, before))
+    }
+
+    fn commit(&mut self, staging: &[u8; STAGING], conditions: &Conditions) -> Result<Action, Refusal> {
+        let Verified { length, .. } = self.unchanged(Command::Commit, staging, conditions)?;
+        if conditions.single_bank && conditions.armed {
+            return Err(Refusal::Armed { command: Command::Commit });
+        }
+        let before = self.state;
+        self.state = State::Storing;
+        Ok(self.begin_action(Action::Store { length }, before))
+    }
+
+    fn roll_back(&mut self, conditions: &Conditions) -> Result<Action, Refusal> {
+        if matches!(self.state, State::Shadow | State::Trial) {
+            return Err(Refusal::State { command: Some(Command::RollBack), state: self.state });
+        }
+        if conditions.single_bank && conditions.armed {
+            return Err(Refusal::Armed { command: Command::RollBack });
+        }
+        let before = self.state;
+        self.state = State::Storing;
+        Ok(self.begin_action(Action::RollBack, before))
+    }
+
+    fn discard(&mut self) -> Action {
+        let before = self.state;
+        self.forget();
+        self.ending = None;
+        match before {
+            State::Shadow | State::Trial => self.revert(State::Empty),
+            State::Active => {
+                // Nothing is staged to be forgotten.
+                self.state = State::Active;
+                Action::Nothing
+            }
+            _ => Action::Nothing,
+        }
+    }
+
+    fn revert(&mut self, state: State) -> Action {
+        self.state = state;
+        self.begin_action(Action::Revert, state)
+    }
+}
