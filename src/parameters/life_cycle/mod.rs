@@ -266,7 +266,9 @@ impl LifeCycle {
         let result = self.upload_possible().and_then(|()| {
             let end = self.length.saturating_add(piece.len());
             let place = staging.get_mut(self.length..end).ok_or(Refusal::UploadTooLong { length: end })?;
-            place.copy_from_slice(piece);
+            for (place, byte) in place.iter_mut().zip(piece) {
+                *place = *byte;
+            }
             self.length = end;
             self.verified = None;
             self.state = State::Staged;

@@ -36,8 +36,8 @@
 //! # Rolling back
 //!
 //! [`Slots::roll_back`] takes the previous payload into RAM and stores it again with a new sequence number, into the slot that it came
-//! from. The content that was in use stays whole until then and becomes the previous one. The price: where power is lost within those
-//! 50 ms, the joint starts with the content that was in use, and the previous one is lost.
+//! from. The content that was in use stays whole until then and becomes the previous one. The price: where power is lost meanwhile,
+//! the joint starts with the content that was in use, and the previous one is lost.
 //!
 //! # Bit rot
 //!
