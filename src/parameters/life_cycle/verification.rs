@@ -8,7 +8,7 @@ use super::Refusal;
 use crate::friction::FrictionModel;
 use crate::parameters::authentication::{Key, split};
 use crate::parameters::certificate::{Certificate, Limits, certify};
-use crate::parameters::image::{Effort, Image, Target};
+use crate::parameters::image::{Effort, Image, ImageError, Target};
 
 /// What this joint asks of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,9 +46,15 @@ pub(super) fn authentic(upload: &[u8], key: Option<&Key>) -> Result<bool, Refusa
 }
 
 /// Checks the rest of an authentic upload.
+#[inline(never)]
 pub(super) fn verify(upload: &[u8], requirements: &Requirements, floor: u32) -> Result<Verified, Refusal> {
     let (bytes, _) = split(upload);
-    let image = Image::decode(bytes)?;
+    // By reference: an image taken out of the result is another 2 KiB of stack.
+    let decoded = decoded(bytes);
+    let image = match &decoded {
+        Ok(image) => image,
+        Err(error) => return Err((*error).into()),
+    };
     let Requirements { target, effort, limits, rate } = *requirements;
     if image.version < floor {
         return Err(Refusal::Version { version: image.version, floor });
@@ -67,7 +73,24 @@ pub(super) fn verify(upload: &[u8], requirements: &Requirements, floor: u32) -> 
         torque_gain: image.limits.torque_gain.min(limits.torque_gain),
         velocity_slope: image.limits.velocity_slope.min(limits.velocity_slope),
     };
-    let certificate = certify(&image.friction, &limits).map_err(Refusal::Certificate)?;
-    image.verify_golden(&FrictionModel::new(&image.friction, rate)).map_err(Refusal::Golden)?;
+    let certificate = certified(image, &limits)?;
+    golden(image, rate)?;
     Ok(Verified { length: bytes.len(), version: image.version, certificate })
+}
+
+// Functions of their own, so that the KiB of stack that each takes are not taken side by side.
+
+#[inline(never)]
+fn decoded(bytes: &[u8]) -> Result<Image, ImageError> {
+    Image::decode(bytes)
+}
+
+#[inline(never)]
+fn certified(image: &Image, limits: &Limits) -> Result<Certificate, Refusal> {
+    certify(&image.friction, limits).map_err(Refusal::Certificate)
+}
+
+#[inline(never)]
+fn golden(image: &Image, rate: u32) -> Result<(), Refusal> {
+    image.verify_golden(&FrictionModel::new(&image.friction, rate)).map_err(Refusal::Golden)
 }
