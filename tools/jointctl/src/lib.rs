@@ -25,6 +25,7 @@ pub mod identify;
 pub mod image_text;
 pub mod joint_model;
 pub mod joint_text;
+pub mod key_file;
 pub mod levenberg_marquardt;
 pub mod metrics;
 pub mod network;

@@ -50,6 +50,21 @@ fn an_image_survives_the_way_to_toml_and_back_and_a_damaged_one_is_refused() {
     assert!(evaluated.status.success(), "{}", stderr(&evaluated));
     assert!(String::from_utf8_lossy(&evaluated.stdout).contains("image, compensation"));
 
+    for key in ["joint.key", "other.key"] {
+        assert!(run(&["key", "new", key]).status.success());
+    }
+    assert!(stderr(&run(&["key", "new", "joint.key"])).contains("joint.key exists; a key is never overwritten"));
+    assert!(run(&["sign", "again.img", "--key", "joint.key", "--version", "7", "--serial", "12"]).status.success());
+    assert_eq!(read("again.signed").len(), read("again.img").len() + 32);
+    assert!(run(&["image", "verify", "again.signed", "--key", "joint.key"]).status.success());
+    let refused = run(&["image", "verify", "again.signed", "--key", "other.key"]);
+    assert!(!refused.status.success() && stderr(&refused).contains("its tag is not of key"), "{}", stderr(&refused));
+    let refused = run(&["image", "verify", "again.img", "--key", "joint.key"]);
+    assert!(!refused.status.success() && stderr(&refused).contains("no tag behind it"), "{}", stderr(&refused));
+    let inspected = run(&["image", "inspect", "again.signed"]);
+    let text = String::from_utf8_lossy(&inspected.stdout).into_owned();
+    assert!(text.contains("version = 7\n") && text.contains("serial = 12\n"), "{text}");
+
     let mut damaged = read("again.img");
     damaged[100] ^= 1;
     std::fs::write(folder.path().join("damaged.img"), damaged).unwrap();

@@ -3,10 +3,12 @@
 use super::CommandError;
 use super::fit::bytes;
 use crate::image_text;
+use crate::key_file;
 use crate::output::write_file;
 use crate::quantize::golden_vectors;
 use clap::{Args, Subcommand};
 use joint_firmware::friction::FrictionModel;
+use joint_firmware::parameters::authentication::{Key, split};
 use joint_firmware::parameters::certificate::{Certificate, certify};
 use joint_firmware::parameters::image::Image;
 use std::path::{Path, PathBuf};
@@ -19,10 +21,13 @@ pub enum ImageCommand {
         /// Image, binary or TOML
         image: PathBuf,
     },
-    /// Check an image as a joint does before it uses one: checksum, fields, certificate, golden vectors
+    /// Check an image as a joint does before it uses one: checksum, fields, certificate, golden vectors; with a key, the tag
     Verify {
-        /// Image, binary or TOML
+        /// Image, binary, signed or TOML
         image: PathBuf,
+        /// The key that its tag must be of
+        #[arg(long, value_name = "FILE")]
+        key: Option<PathBuf>,
     },
     /// Convert between the binary form and TOML (by the names' endings: .toml is TOML)
     Convert(Convert),
@@ -45,7 +50,10 @@ impl ImageCommand {
     pub fn run(&self) -> Result<(), CommandError> {
         match self {
             Self::Inspect { image } => print!("{}", image_text::to_text(&read(image)?)),
-            Self::Verify { image: path } => {
+            Self::Verify { image: path, key } => {
+                if let Some(key) = key {
+                    verify_tag(path, &key_file::read(key)?)?;
+                }
                 let image = read(path)?;
                 let certificate = verify(&image, path)?;
                 print!("{}", summary(&image, &certificate));
@@ -81,7 +89,20 @@ fn is_text(path: &Path) -> bool {
     path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
 }
 
-/// Reads an image: TOML where the name ends in `.toml`, else binary.
+/// Whether the tag behind an image is of this key.
+fn verify_tag(path: &Path, key: &Key) -> Result<(), CommandError> {
+    let refused = |reason: String| Err(CommandError::Image { path: path.to_owned(), reason });
+    let upload = std::fs::read(path).map_err(|source| CommandError::Read { path: path.to_owned(), source })?;
+    match split(&upload) {
+        (_, None) => refused("there is no tag behind it; `jointctl sign` puts one there".to_owned()),
+        (image, Some(tag)) if !key.verify(image, tag) => {
+            refused(format!("its tag is not of key {:08x}, or the image has been changed", key.id()))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Reads an image, with or without a tag behind it: TOML where the name ends in `.toml`, else binary.
 pub fn read(path: &Path) -> Result<Image, CommandError> {
     let unreadable = |source| CommandError::Read { path: path.to_owned(), source };
     let refused = |reason: String| CommandError::Image { path: path.to_owned(), reason };
@@ -90,7 +111,7 @@ pub fn read(path: &Path) -> Result<Image, CommandError> {
         return image_text::from_text(&text).map_err(|error| refused(error.to_string()));
     }
     let bytes = std::fs::read(path).map_err(unreadable)?;
-    Image::decode(&bytes).map_err(|error| refused(error.to_string()))
+    Image::decode(split(&bytes).0).map_err(|error| refused(error.to_string()))
 }
 
 /// What a joint checks before it uses an image, after decoding.

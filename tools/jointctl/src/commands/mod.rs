@@ -6,6 +6,7 @@ pub mod excite;
 pub mod fit;
 pub mod image;
 pub mod joint;
+pub mod key;
 pub mod sim;
 
 use clap::{Parser, Subcommand};
@@ -32,6 +33,11 @@ pub enum Command {
     /// Inspect, verify or convert a parameter image
     #[command(subcommand)]
     Image(image::ImageCommand),
+    /// Make a key, or print its number
+    #[command(subcommand)]
+    Key(key::KeyCommand),
+    /// Put a tag behind an image, so that joints with that key take it
+    Sign(key::Sign),
     /// Run the firmware's joint against a simulated actuator, without and with compensation
     Sim(sim::Sim),
     /// Write a motion that identifies a joint, or check one
@@ -106,6 +112,9 @@ pub enum CommandError {
         /// Why.
         reason: String,
     },
+    /// A key.
+    #[error(transparent)]
+    Key(#[from] crate::key_file::KeyFileError),
     /// Arguments that contradict each other.
     #[error("{0}")]
     Arguments(String),
@@ -118,6 +127,8 @@ pub fn run(arguments: Arguments) -> Result<(), CommandError> {
         Command::Fit(fit) => fit.run(),
         Command::Evaluate(evaluate) => evaluate.run(),
         Command::Image(image) => image.run(),
+        Command::Key(key) => key.run(),
+        Command::Sign(sign) => sign.run(),
         Command::Sim(sim) => sim.run(),
         Command::Excite(excite) => excite.run(),
     }

@@ -1,0 +1,85 @@
+//! `jointctl key` and `jointctl sign`: who may change what a joint adds to its torque.
+
+use super::CommandError;
+use super::fit::bytes;
+use super::image::{read, verify};
+use crate::key_file;
+use crate::output::write_file;
+use clap::{Args, Subcommand};
+use std::path::PathBuf;
+
+/// What to do with a key.
+#[derive(Debug, Subcommand)]
+pub enum KeyCommand {
+    /// Make a key and write it to a new file that only you can read
+    New {
+        /// File to write; an existing one is never overwritten
+        file: PathBuf,
+    },
+    /// Print a key's number, by which a joint names it; it says nothing of the key
+    Number {
+        /// The key
+        file: PathBuf,
+    },
+}
+
+impl KeyCommand {
+    /// Runs the command.
+    pub fn run(&self) -> Result<(), CommandError> {
+        match self {
+            Self::New { file } => {
+                let key = key_file::create(file)?;
+                println!("key {:08x} written: {}", key.id(), file.display());
+                println!("Whoever has this file can change the compensation of every joint that has the key.");
+            }
+            Self::Number { file } => println!("{:08x}", key_file::read(file)?.id()),
+        }
+        Ok(())
+    }
+}
+
+/// Arguments of `sign`.
+#[derive(Debug, Args)]
+pub struct Sign {
+    /// Image, binary or TOML; it is verified as a joint does it first
+    image: PathBuf,
+    /// The joint's key
+    #[arg(long, value_name = "FILE")]
+    key: PathBuf,
+    /// Version to sign it as; a joint takes none that is older than what it had [default: the image's]
+    #[arg(long, value_name = "N")]
+    version: Option<u32>,
+    /// Product to sign it for, 0 for any [default: the image's]
+    #[arg(long, value_name = "N")]
+    product: Option<u32>,
+    /// Serial number of the only joint to sign it for, 0 for any [default: the image's]
+    #[arg(long, value_name = "N")]
+    serial: Option<u32>,
+    /// File to write: the image with its tag behind it [default: the image's name with the ending .signed]
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+impl Sign {
+    /// Runs the command.
+    pub fn run(&self) -> Result<(), CommandError> {
+        let key = key_file::read(&self.key)?;
+        let mut image = read(&self.image)?;
+        image.version = self.version.unwrap_or(image.version);
+        image.target.product = self.product.unwrap_or(image.target.product);
+        image.target.serial = self.serial.unwrap_or(image.target.serial);
+        verify(&image, &self.image)?;
+        let mut upload = bytes(&image, &self.image)?;
+        let tag = key.sign(&upload);
+        upload.extend_from_slice(&tag);
+        let out = self.out.clone().unwrap_or_else(|| self.image.with_extension("signed"));
+        write_file(&out, &upload)?;
+        let target = match (image.target.product, image.target.serial) {
+            (0, 0) => "any joint".to_owned(),
+            (product, 0) => format!("every joint of product {product:#010x}"),
+            (product, serial) => format!("joint {serial} of product {product:#010x}"),
+        };
+        println!("version {} for {target}, signed with key {:08x}: {}", image.version, key.id(), out.display());
+        Ok(())
+    }
+}
