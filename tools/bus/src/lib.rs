@@ -1,0 +1,19 @@
+//! CAN buses chosen by a string, and a paced virtual bus; host.
+//!
+//! ```text
+//! transport::open("udp:239.74.163.2:43113")   one trait over socketcan, slcan, UDP multicast and a bus within this process
+//! pacing::PacedBus                            what these frames cost on a wire: bits, arbitration, load, latency
+//! ```
+//!
+//! Frames, NMT states and abort codes are the server's own, from `joint_firmware::canopen`: one meaning on both sides.
+//!
+//! - [`transport`]: the buses
+//! - [`pacing`]: the wire as a model, in simulated time; `virtual:NAME?bitrate=1000000` runs it in real time
+
+#![forbid(unsafe_code)]
+
+pub mod pacing;
+pub mod transport;
+
+pub use joint_firmware::canopen::Frame;
+pub use transport::{BusError, Transport, open};
