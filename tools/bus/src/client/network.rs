@@ -1,0 +1,317 @@
+//! A bus with one reader and any number of subscribers; host, a thread of its own.
+
+use super::cob_id;
+use super::error::{ClientError, Object};
+use super::nmt::{Command, Target};
+use super::node::Node;
+use super::sdo::{Failure, Transfer};
+use super::{Emergency, NmtState};
+use crate::{BusError, Frame, Transport};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// Frames that a subscriber may leave unread; newer ones are dropped and counted.
+const UNREAD: usize = 1 << 14;
+/// How soon the reader notices that nobody needs it any more.
+const READ: Duration = Duration::from_millis(20);
+
+/// A frame and when it came.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Received {
+    /// The frame.
+    pub frame: Frame,
+    /// When the reader had it: some tens of microseconds after the bus, a millisecond over USB.
+    pub at: Instant,
+}
+
+type Filter = Box<dyn Fn(&Frame) -> bool + Send>;
+
+struct Subscriber {
+    filter: Filter,
+    frames: SyncSender<Received>,
+    dropped: Arc<AtomicU64>,
+}
+
+/// What the reader and everyone else share.
+struct Shared {
+    transport: Arc<dyn Transport>,
+    subscribers: Mutex<Vec<Subscriber>>,
+    /// Why the reader ended.
+    failure: Mutex<Option<BusError>>,
+    over: AtomicBool,
+    /// A bit for every node id that was heard.
+    heard: [AtomicU64; 2],
+    /// One SDO transfer at a time and node within this program.
+    channels: [Mutex<()>; 128],
+    frames: AtomicU64,
+}
+
+/// A CANopen network as a master sees it. Cloning gives another handle to the same reader, which ends with the last of them.
+#[derive(Clone)]
+pub struct Network {
+    reader: Arc<Reader>,
+}
+
+struct Reader {
+    shared: Arc<Shared>,
+    thread: Mutex<Option<JoinHandle<()>>>,
+}
+
+impl std::fmt::Debug for Network {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.debug_tuple("Network").field(&self.reader.shared.transport).finish()
+    }
+}
+
+impl Drop for Reader {
+    fn drop(&mut self) {
+        self.shared.over.store(true, Ordering::Relaxed);
+        if let Some(thread) = lock(&self.thread).take() {
+            // It panics only where a subscriber's filter does, which has been reported.
+            let _ = thread.join();
+        }
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Shared {
+    fn read(&self) {
+        while !self.over.load(Ordering::Relaxed) {
+            match self.transport.receive(READ) {
+                Ok(Some(frame)) => self.distribute(Received { frame, at: Instant::now() }),
+                Ok(None) => {}
+                Err(error) => {
+                    *lock(&self.failure) = Some(error);
+                    // Whoever waits for a frame sees the channel closed.
+                    lock(&self.subscribers).clear();
+                    return;
+                }
+            }
+        }
+    }
+
+    fn distribute(&self, received: Received) {
+        self.frames.fetch_add(1, Ordering::Relaxed);
+        if let Some(node) = sender(&received.frame)
+            && let Some(bits) = self.heard.get(usize::from(node / 64))
+        {
+            bits.fetch_or(1 << (node % 64), Ordering::Relaxed);
+        }
+        lock(&self.subscribers).retain(|subscriber| {
+            if !(subscriber.filter)(&received.frame) {
+                return true;
+            }
+            match subscriber.frames.try_send(received) {
+                Ok(()) => true,
+                Err(TrySendError::Full(_)) => {
+                    subscriber.dropped.fetch_add(1, Ordering::Relaxed);
+                    true
+                }
+                Err(TrySendError::Disconnected(_)) => false,
+            }
+        });
+    }
+
+    fn failure(&self) -> Option<BusError> {
+        lock(&self.failure).clone()
+    }
+}
+
+/// Which node sent this, by the predefined connection set; PDOs may have other identifiers, so they do not count.
+fn sender(frame: &Frame) -> Option<u8> {
+    let node = (frame.id() & 0x7F) as u8;
+    let by_node = matches!(frame.id() & 0x780, cob_id::EMERGENCY | cob_id::SDO_TRANSMIT | cob_id::HEARTBEAT);
+    (by_node && node != 0 && frame.id() < cob_id::LSS_SLAVE).then_some(node)
+}
+
+impl Network {
+    /// Takes over the receiving side of a bus. Whoever else holds it may send, but not receive.
+    pub fn new(transport: Arc<dyn Transport>) -> Self {
+        let shared = Arc::new(Shared {
+            transport,
+            subscribers: Mutex::default(),
+            failure: Mutex::default(),
+            over: AtomicBool::new(false),
+            heard: Default::default(),
+            channels: [const { Mutex::new(()) }; 128],
+            frames: AtomicU64::new(0),
+        });
+        let reader = Arc::clone(&shared);
+        let thread = std::thread::spawn(move || reader.read());
+        Self { reader: Arc::new(Reader { shared, thread: Mutex::new(Some(thread)) }) }
+    }
+
+    fn shared(&self) -> &Shared {
+        &self.reader.shared
+    }
+
+    /// The bus.
+    pub fn transport(&self) -> &Arc<dyn Transport> {
+        &self.shared().transport
+    }
+
+    /// Sends a frame: an RPDO, or anything else.
+    pub fn send(&self, frame: &Frame) -> Result<(), ClientError> {
+        match self.shared().failure() {
+            Some(error) => Err(error.into()),
+            None => Ok(self.shared().transport.send(frame)?),
+        }
+    }
+
+    /// Every frame from now on for which `filter` is true: a TPDO by its identifier, or all of them for a monitor. `filter` runs in the
+    /// reader and has to be quick.
+    pub fn subscribe(&self, filter: impl Fn(&Frame) -> bool + Send + 'static) -> Subscription {
+        let (sender, frames) = sync_channel(UNREAD);
+        let dropped = Arc::<AtomicU64>::default();
+        let subscriber = Subscriber { filter: Box::new(filter), frames: sender, dropped: Arc::clone(&dropped) };
+        let mut subscribers = lock(&self.shared().subscribers);
+        // After a failure the channel is closed from the beginning.
+        if self.shared().failure().is_none() {
+            subscribers.push(subscriber);
+        }
+        drop(subscribers);
+        Subscription { frames, dropped, network: self.clone() }
+    }
+
+    /// A node by its id, 1 to 127.
+    pub fn node(&self, id: u8) -> Result<Node, ClientError> {
+        if matches!(id, 1..=127) { Ok(Node::new(self.clone(), id)) } else { Err(ClientError::NodeId(id)) }
+    }
+
+    /// Sends an NMT command. Nodes do not answer it; see [`Network::heartbeats`].
+    pub fn command(&self, command: Command, target: Target) -> Result<(), ClientError> {
+        if let Target::Node(id @ (0 | 128..)) = target {
+            return Err(ClientError::NodeId(id));
+        }
+        self.send(&command.frame(target))
+    }
+
+    /// Sends one SYNC, without counter.
+    pub fn sync(&self) -> Result<(), ClientError> {
+        self.send(&frame(cob_id::SYNC, &[]))
+    }
+
+    /// Heartbeats and boot-up messages of all nodes.
+    pub fn heartbeats(&self) -> Subscription {
+        self.subscribe(|frame| super::heartbeat::parse(frame).is_some())
+    }
+
+    /// EMCYs of all nodes; see [`Emergency::decode`].
+    pub fn emergencies(&self) -> Subscription {
+        self.subscribe(|frame| Emergency::decode(frame).is_some())
+    }
+
+    /// Resets a node, or all, and waits for the boot-up message of `node`. It is listened for before the command is sent: a quick node is not missed.
+    pub fn reset_and_wait(&self, command: Command, node: u8, timeout: Duration) -> Result<(), ClientError> {
+        let heartbeats = self.heartbeats();
+        self.command(command, Target::Node(node))?;
+        let deadline = Instant::now() + timeout;
+        while let Some(received) = heartbeats.next(deadline.saturating_duration_since(Instant::now()))? {
+            if super::heartbeat::parse(&received.frame) == Some((node, NmtState::Initialising)) {
+                return Ok(());
+            }
+        }
+        Err(ClientError::Silence { what: format!("the boot-up message of node {node}"), timeout })
+    }
+
+    /// Nodes of which an EMCY, an SDO answer, a heartbeat or a boot-up message was heard since the bus was opened.
+    pub fn heard(&self) -> Vec<u8> {
+        let bits = self.shared().heard.each_ref().map(|bits| bits.load(Ordering::Relaxed));
+        (1..=127u8)
+            .filter(|node| bits.get(usize::from(node / 64)).is_some_and(|bits| bits >> (node % 64) & 1 != 0))
+            .collect()
+    }
+
+    /// Frames that were received.
+    pub fn frames(&self) -> u64 {
+        self.shared().frames.load(Ordering::Relaxed)
+    }
+
+    /// Runs an SDO transfer. Those of one node wait for each other.
+    pub(super) fn run(&self, mut transfer: Transfer, timeout: Duration) -> Result<Vec<u8>, ClientError> {
+        let object = transfer.object();
+        let _channel = self.shared().channels.get(usize::from(object.node)).map(lock);
+        let node = u16::from(object.node);
+        let (answers, requests) = (cob_id::SDO_TRANSMIT | node, cob_id::SDO_RECEIVE | node);
+        let frames = self.subscribe(move |frame| frame.id() == answers || frame.id() == requests);
+        let began = Instant::now();
+        loop {
+            while let Some(message) = transfer.poll(began.elapsed()) {
+                self.send(&frame(requests, &message))?;
+                // An abort by the node ends a block that is going out.
+                while let Some(received) = frames.try_next()? {
+                    hear(&mut transfer, &received, answers, began);
+                }
+            }
+            if let Some(outcome) = transfer.outcome() {
+                return outcome.clone().map_err(|failure| self.explain(object, failure, timeout));
+            }
+            let wait = transfer.deadline().unwrap_or_default().saturating_sub(began.elapsed());
+            if let Some(received) = frames.next(wait)? {
+                hear(&mut transfer, &received, answers, began);
+            }
+        }
+    }
+
+    fn explain(&self, object: Object, failure: Failure, timeout: Duration) -> ClientError {
+        match failure {
+            Failure::Timeout => ClientError::NoAnswer { object, timeout, heard: self.heard() },
+            Failure::Aborted(abort) => ClientError::Aborted { object, abort },
+            Failure::OtherClient => ClientError::OtherClient { object },
+            Failure::Protocol(problem) => ClientError::Protocol { object, problem },
+        }
+    }
+}
+
+/// Requests that are heard are another client's: one's own are not.
+fn hear(transfer: &mut Transfer, received: &Received, answers: u16, began: Instant) {
+    if received.frame.id() == answers {
+        transfer.receive(received.frame.data(), received.at.saturating_duration_since(began));
+    } else {
+        transfer.disturbed();
+    }
+}
+
+/// A frame of this crate's own making: identifiers are constants or made of them, and no data is longer than 8 bytes.
+pub(super) fn frame(id: u16, data: &[u8]) -> Frame {
+    let data = data.get(..8).unwrap_or(data);
+    Frame::new(id & 0x7FF, data).unwrap_or_else(|| unreachable!("11 bits and 8 bytes are a frame"))
+}
+
+/// Frames of one interest, in the order of arrival. Ends with being dropped.
+#[derive(Debug)]
+pub struct Subscription {
+    frames: Receiver<Received>,
+    dropped: Arc<AtomicU64>,
+    network: Network,
+}
+
+impl Subscription {
+    /// The next frame; none when nothing came within `timeout`. Fails once the bus is gone and everything that came before was read.
+    pub fn next(&self, timeout: Duration) -> Result<Option<Received>, ClientError> {
+        match self.frames.recv_timeout(timeout) {
+            Ok(received) => Ok(Some(received)),
+            Err(RecvTimeoutError::Timeout) => Ok(None),
+            Err(RecvTimeoutError::Disconnected) => match self.network.shared().failure() {
+                Some(error) => Err(error.into()),
+                None => Ok(None),
+            },
+        }
+    }
+
+    /// A frame that has come already.
+    pub fn try_next(&self) -> Result<Option<Received>, ClientError> {
+        self.next(Duration::ZERO)
+    }
+
+    /// Frames that were dropped because too many waited to be read.
+    pub fn dropped(&self) -> u64 {
+        self.dropped.load(Ordering::Relaxed)
+    }
+}

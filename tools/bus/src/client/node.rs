@@ -1,0 +1,69 @@
+//! One node's object dictionary; host. Every call waits for the node.
+
+use super::error::{ClientError, Object};
+use super::network::Network;
+use super::sdo::{Method, Settings, Transfer};
+
+/// A node, by its id.
+#[derive(Clone, Debug)]
+pub struct Node {
+    network: Network,
+    id: u8,
+    settings: Settings,
+}
+
+impl Node {
+    pub(super) fn new(network: Network, id: u8) -> Self {
+        Self { network, id, settings: Settings::default() }
+    }
+
+    /// With other patience, say for storing into flash.
+    pub fn with_settings(self, settings: Settings) -> Self {
+        Self { settings, ..self }
+    }
+
+    /// Node id, 1 to 127.
+    pub fn id(&self) -> u8 {
+        self.id
+    }
+
+    /// The network it is part of.
+    pub fn network(&self) -> &Network {
+        &self.network
+    }
+
+    fn object(&self, index: u16, sub_index: u8) -> Object {
+        Object { node: self.id, index, sub_index }
+    }
+
+    /// Reads an object.
+    pub fn upload(&self, index: u16, sub_index: u8) -> Result<Vec<u8>, ClientError> {
+        self.upload_by(index, sub_index, Method::Automatic)
+    }
+
+    /// Reads an object in a certain way.
+    pub fn upload_by(&self, index: u16, sub_index: u8, method: Method) -> Result<Vec<u8>, ClientError> {
+        let transfer = Transfer::upload(self.object(index, sub_index), method, self.settings);
+        self.network.run(transfer, self.settings.timeout)
+    }
+
+    /// Writes an object.
+    pub fn download(&self, index: u16, sub_index: u8, data: &[u8]) -> Result<(), ClientError> {
+        self.download_by(index, sub_index, data, Method::Automatic)
+    }
+
+    /// Writes an object in a certain way.
+    pub fn download_by(&self, index: u16, sub_index: u8, data: &[u8], method: Method) -> Result<(), ClientError> {
+        let transfer = Transfer::download(self.object(index, sub_index), data, method, self.settings);
+        self.network.run(transfer, self.settings.timeout).map(drop)
+    }
+
+    /// Reads a number of exactly `N` bytes, little endian: `u32::from_le_bytes(node.number(0x1000, 0)?)`.
+    pub fn number<const N: usize>(&self, index: u16, sub_index: u8) -> Result<[u8; N], ClientError> {
+        let data = self.upload(index, sub_index)?;
+        <[u8; N]>::try_from(data.as_slice()).map_err(|_| ClientError::Protocol {
+            object: self.object(index, sub_index),
+            problem: format!("{} bytes, where {N} were expected", data.len()),
+        })
+    }
+}
