@@ -27,6 +27,7 @@ pub fn demand(joint: &VirtualJoint, trajectory: &Trajectory, n: u64) -> Demand {
             damping: gains.damping,
         },
         sequence: command as u32 + 1,
+        ..Demand::default()
     }
 }
 

@@ -69,7 +69,7 @@ pub fn run(seed: u64, alone: Alone, variant: Option<&Variant>, steps: u32) -> Re
     }
     let friction = &parameters.joint.friction;
     let strength = 3.0 * friction.breakaway.forward.max(friction.breakaway.backward);
-    let mut demand = Demand { controlword: Controlword::ENABLE_OPERATION, command, sequence: 0 };
+    let mut demand = Demand { controlword: Controlword::ENABLE_OPERATION, command, ..Demand::default() };
     let level = friction.breakaway.forward.max(friction.breakaway.backward);
     let mut seen = Seen { breakaway: 0.5 * level * level / friction.bristle_stiffness, ..Seen::default() };
     let start = joint.actuator().state().joint.position;

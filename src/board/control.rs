@@ -13,7 +13,7 @@ use critical_section::Mutex;
 use embassy_stm32::pac::Interrupt;
 use joint_firmware::joint::fault::Faults;
 use joint_firmware::joint::state_machine::Controlword;
-use joint_firmware::joint::{Active, Bridge, BridgeState, Command, Demand, Joint, Mode, Slow, Telemetry};
+use joint_firmware::joint::{Active, Bridge, BridgeState, Command, Coupled, Demand, Joint, Mode, Slow, Telemetry};
 use joint_firmware::motor::phases::Phases;
 
 /// Everything that the control interrupt owns.
@@ -103,6 +103,7 @@ static DEMAND: Newest<Demand> = Newest::new(Demand {
     controlword: Controlword::DISABLE_VOLTAGE,
     command: Command { mode: Mode::Torque, position: 0.0, velocity: 0.0, torque: 0.0, stiffness: 0.0, damping: 0.0 },
     sequence: 0,
+    coupled: Coupled { velocity: 0.0, sequence: 0 },
 });
 static REPORT: Newest<Option<Report>> = Newest::new(None);
 /// Tasks of both executors read it, one at a time.

@@ -42,4 +42,16 @@ pub struct Demand {
     pub command: Command,
     /// Changes with every set-point that arrives, also where its content is the same: the command deadline counts from here.
     pub sequence: u32,
+    /// The joint that shares this joint's drive.
+    pub coupled: Coupled,
+}
+
+/// Velocity of the joint that shares this joint's drive, as its neighbour last told it. One that is silent for longer than the command
+/// deadline counts as standing.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Coupled {
+    /// rad/s.
+    pub velocity: f32,
+    /// Changes with every velocity that arrives.
+    pub sequence: u32,
 }

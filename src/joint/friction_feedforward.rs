@@ -37,6 +37,15 @@ pub struct Compensated {
     pub permitted: f32,
 }
 
+/// What friction depends on besides this joint's motion and torque.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Surroundings {
+    /// Of the gear, °C.
+    pub temperature: f32,
+    /// Of the joint that shares the drive, rad/s.
+    pub coupled_velocity: f32,
+}
+
 /// Compensation, from one control step to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FrictionFeedforward {
@@ -60,7 +69,7 @@ impl FrictionFeedforward {
         *self = Self::default();
     }
 
-    /// One control step. `measured_torque` is the torque of the measured current, Nm; `temperature` the gear's, °C.
+    /// One control step. `measured_torque` is the torque of the measured current, Nm.
     #[inline(always)]
     pub fn step(
         &mut self,
@@ -68,7 +77,7 @@ impl FrictionFeedforward {
         motion: &JointMotion,
         wanted: &Wanted,
         measured_torque: f32,
-        temperature: f32,
+        surroundings: &Surroundings,
     ) -> Compensated {
         let gains = &active.compensation;
         let reference = match gains.source {
@@ -83,8 +92,8 @@ impl FrictionFeedforward {
             acceleration: Acceleration::from_bits(q16(acceleration)),
             theoretical_torque: Torque::from_bits(q16(wanted.torque)),
             measured_torque: Torque::from_bits(q16(measured_torque)),
-            temperature: Temperature::from_bits(q16(temperature)),
-            coupled_velocity: Velocity::ZERO,
+            temperature: Temperature::from_bits(q16(surroundings.temperature)),
+            coupled_velocity: Velocity::from_bits(q16(surroundings.coupled_velocity)),
         };
         let output = self.compensation.step(active.friction.as_ref(), &gains.settings, &state);
         let speed = if velocity < 0.0 { -velocity } else { velocity };

@@ -26,7 +26,7 @@ mod signals;
 pub mod state_machine;
 
 pub use active::{Active, JointMotion};
-pub use command::{Command, Demand, Mode};
+pub use command::{Command, Coupled, Demand, Mode};
 pub use offsets::OFFSET_STEPS;
 pub use signals::{Bridge, BridgeState, Measurements};
 
@@ -38,7 +38,7 @@ use crate::motor::phases::Phases;
 use crate::motor::thermal::MeanSquareCurrent;
 use crate::motor::transform::Dq;
 use fault::{Fault, Faults, Reaction};
-use friction_feedforward::{Compensated, FrictionFeedforward};
+use friction_feedforward::{Compensated, FrictionFeedforward, Surroundings};
 use history::{History, Snapshot};
 use monitor::{Loop, Monitor};
 use motion_law::{MotionLaw, Wanted};
@@ -116,6 +116,9 @@ pub struct Joint {
     encoder: u32,
     sequence: u32,
     stale_steps: u32,
+    coupled_sequence: u32,
+    /// Steps since the coupled joint was heard.
+    coupled_steps: u32,
     braking: Braking,
     /// Faults since the last acknowledgement.
     latched: Faults,
@@ -181,8 +184,10 @@ impl Joint {
             _ => Wanted::default(),
         };
         let measured_torque = or_zero(self.telemetry.current.q * active.scales.torque_per_current);
+        let surroundings =
+            Surroundings { temperature: slow.gear_temperature, coupled_velocity: self.coupled(active, demand) };
         let compensated = if COMPENSATION && state == State::OperationEnabled {
-            self.friction.step(active, &motion, &wanted, measured_torque, slow.gear_temperature)
+            self.friction.step(active, &motion, &wanted, measured_torque, &surroundings)
         } else {
             self.friction.reset();
             Compensated::default()
@@ -327,6 +332,15 @@ impl Joint {
         self.sequence = demand.sequence;
     }
 
+    /// Velocity of the coupled joint, rad/s; zero once it has been silent for longer than the command deadline.
+    #[inline(always)]
+    fn coupled(&mut self, active: &Active, demand: &Demand) -> f32 {
+        let heard = demand.coupled.sequence != self.coupled_sequence;
+        self.coupled_sequence = demand.coupled.sequence;
+        self.coupled_steps = if heard { 0 } else { self.coupled_steps.saturating_add(1) };
+        if self.coupled_steps <= active.deadline_steps { demand.coupled.velocity } else { 0.0 }
+    }
+
     /// The state from now on. A fault that must not be braked against goes straight through the reaction to "fault".
     #[inline(never)]
     fn decide(&mut self, active: &Active, demand: &Demand, faults: Faults, motion: &JointMotion) -> State {
@@ -376,5 +390,26 @@ impl Joint {
             current: t.current,
             bus_voltage: t.bus_voltage,
         });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_coupled_joint_that_falls_silent_counts_as_standing_after_the_command_deadline() {
+        let board = crate::default_configuration::B_G431B_ESC1;
+        let active = board.joint.prepare(&board.bridge).unwrap();
+        let mut joint = Joint::new();
+        let mut demand = Demand::default();
+        assert_eq!(joint.coupled(&active, &demand), 0.0);
+        demand.coupled = Coupled { velocity: -2.5, sequence: 1 };
+        for _ in 0..=active.deadline_steps {
+            assert_eq!(joint.coupled(&active, &demand), -2.5);
+        }
+        assert_eq!(joint.coupled(&active, &demand), 0.0);
+        demand.coupled.sequence = 2;
+        assert_eq!(joint.coupled(&active, &demand), -2.5);
     }
 }

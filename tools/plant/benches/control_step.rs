@@ -49,7 +49,7 @@ fn moving() -> (VirtualJoint, Demand) {
     joint.set_friction(Some(friction()));
     joint.enable().expect("a sound joint");
     let command = Command { mode: Mode::Velocity, velocity: 0.1, ..Command::default() };
-    (joint, Demand { controlword: Controlword::ENABLE_OPERATION, command, sequence: 0 })
+    (joint, Demand { controlword: Controlword::ENABLE_OPERATION, command, ..Demand::default() })
 }
 
 #[divan::bench]

@@ -71,6 +71,7 @@ fn demand() -> impl Strategy<Value = Demand> {
         controlword: Controlword(word),
         command,
         sequence,
+        ..Demand::default()
     })
 }
 
@@ -120,7 +121,7 @@ fn comes_back(joint: &mut Joint, active: &Active) -> Result<(), TestCaseError> {
     let mut sequence = 0;
     let mut ask = |joint: &mut Joint, word: Controlword| {
         sequence += 1;
-        let demand = Demand { controlword: word, command: Command::default(), sequence };
+        let demand = Demand { controlword: word, sequence, ..Demand::default() };
         joint.control_step(active, &demand, &Slow::default(), &sane());
         joint.telemetry().state
     };
@@ -169,7 +170,7 @@ proptest! {
         let mut joint = Joint::new();
         comes_back(&mut joint, &active)?;
         for (n, (command, slow)) in commands.into_iter().enumerate() {
-            let demand = Demand { controlword: Controlword::ENABLE_OPERATION, command, sequence: n as u32 };
+            let demand = Demand { controlword: Controlword::ENABLE_OPERATION, command, sequence: n as u32, ..Demand::default() };
             let slow = Slow { derating: if slow.derating > 0.0 { slow.derating } else { 1.0 }, ..slow };
             let bridge = joint.control_step(&active, &demand, &slow, &sane());
             keeps_its_promises(&joint, &active, &bridge)?;
@@ -187,7 +188,7 @@ fn two_opposite_infinities_ask_for_no_torque() {
         comes_back(&mut joint, &active).unwrap();
         let (position, torque) = (infinity, -infinity);
         let command = Command { mode: Mode::Impedance, position, stiffness: 10.0, torque, ..Command::default() };
-        let demand = Demand { controlword: Controlword::ENABLE_OPERATION, command, sequence: 1 };
+        let demand = Demand { controlword: Controlword::ENABLE_OPERATION, command, sequence: 1, ..Demand::default() };
         joint.control_step(&active, &demand, &Slow::default(), &sane());
         assert_eq!(joint.telemetry().wanted.torque, 0.0);
     }

@@ -12,7 +12,7 @@ use joint_firmware::friction::FrictionModel;
 use joint_firmware::joint::active::SLOW_RATE;
 use joint_firmware::joint::configuration::ConfigurationError;
 use joint_firmware::joint::state_machine::{Controlword, State};
-use joint_firmware::joint::{Active, Bridge, BridgeState, Command, Demand, Joint, Measurements, Slow, Telemetry};
+use joint_firmware::joint::{Active, Bridge, BridgeState, Demand, Joint, Measurements, Slow, Telemetry};
 use joint_firmware::motor::thermal::WindingTemperature;
 pub use setup::Setup;
 
@@ -163,7 +163,7 @@ impl VirtualJoint {
         let mut sequence = 0;
         let mut ask = |joint: &mut Self, controlword: Controlword| {
             sequence += 1;
-            joint.step(&Demand { controlword, command: Command::default(), sequence }, 0.0).state
+            joint.step(&Demand { controlword, sequence, ..Demand::default() }, 0.0).state
         };
         for _ in 0..=joint_firmware::joint::OFFSET_STEPS {
             ask(self, Controlword::DISABLE_VOLTAGE);
