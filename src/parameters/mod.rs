@@ -7,3 +7,6 @@ pub mod ecc;
 pub mod image;
 pub mod life_cycle;
 pub mod slots;
+mod summary;
+
+pub use summary::Summary;

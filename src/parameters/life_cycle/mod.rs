@@ -237,6 +237,11 @@ impl LifeCycle {
         self.ending
     }
 
+    /// Time of the trials that follow, ms; 0 before it was set.
+    pub const fn trial_time(&self) -> u32 {
+        self.trial_time
+    }
+
     /// Sets the time of trials that follow, 1 to [`MAX_TRIAL_MS`] ms.
     pub fn set_trial_time(&mut self, time: u32) -> Result<(), Refusal> {
         let result = if (1..=MAX_TRIAL_MS).contains(&time) {
@@ -296,6 +301,19 @@ impl LifeCycle {
             },
         };
         self.note(result)
+    }
+
+    /// [`LifeCycle::command`], by the command's number.
+    pub fn command_number(
+        &mut self,
+        number: u8,
+        staging: &[u8; STAGING],
+        conditions: &Conditions,
+    ) -> Result<Action, Refusal> {
+        match Command::from_number(number) {
+            Ok(command) => self.command(command, staging, conditions),
+            Err(refusal) => self.note(Err(refusal)),
+        }
     }
 
     /// To be called often: ends a trial whose time is over or whose client is gone.
