@@ -12,6 +12,7 @@ pub mod exchange;
 pub mod friction;
 pub mod joint;
 pub mod motor;
+pub mod objects;
 pub mod parameters;
 pub mod quantity;
 pub mod reset_record;

@@ -1,0 +1,439 @@
+//! The joint's objects as [`canopen`](crate::canopen) asks for them; the task.
+
+use super::communication::default_communication;
+use super::emergency::{Emergency, Reports, of_refusal};
+use super::field::{ConfigurationField, Field, ImageField, Range, SetPoint};
+use super::images::{Circumstances, Failure, Images, StoredImages, abort};
+use super::observed::{Observed, signed};
+use super::program::{NotConfigured, Program};
+use super::refused::Refused;
+use super::set_points::mode;
+use super::settings::Setting;
+use super::shared::Shared;
+use super::stored::{RECORD, Stored, is_range};
+use super::{history, table};
+use crate::canopen::{Abort, Access, CommunicationParameters, Entry, Event, Group, Length, NmtState, ObjectDictionary};
+use crate::joint::configuration::Configuration;
+use crate::joint::state_machine::State;
+use crate::parameters::authentication::{KEY, STAGING};
+use crate::parameters::life_cycle::{Action, Refusal};
+use crate::parameters::slots::SlotError;
+use core::cell::Cell;
+use heapless::Deque;
+
+/// EMCYs that wait for the task; when they are more, the newest are dropped.
+const WAITING: usize = 8;
+
+/// What the objects start with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Start {
+    /// Configuration in use, with which the control step runs.
+    pub configuration: Configuration,
+    /// The stored record, or [`Stored::NOTHING`].
+    pub stored: Stored,
+    /// Code and parameters lie in one bank of flash: writing stops the program, so the motor has to be off.
+    pub single_bank: bool,
+}
+
+/// The task's part of the objects.
+#[derive(Debug)]
+pub struct Objects<'a, P> {
+    shared: &'a Shared,
+    program: P,
+    images: Images<'a>,
+    observed: Observed,
+    state: NmtState,
+    configuration: Configuration,
+    staged: Configuration,
+    refused: Refused,
+    stored: Stored,
+    single_bank: bool,
+    now: u64,
+    heartbeat_lost: bool,
+    /// As it was when communication began; what is stored holds for it.
+    node_id: Cell<u8>,
+    reports: Reports,
+    emergencies: Deque<Emergency, WAITING>,
+}
+
+impl<'a, P: Program> Objects<'a, P> {
+    /// One for each [`Shared`].
+    pub fn new(shared: &'a Shared, program: P, images: Images<'a>, start: &Start) -> Self {
+        let Start { configuration, stored, single_bank } = *start;
+        for (range, value) in Range::ALL.into_iter().zip(stored.ranges()) {
+            shared.set_range(range, value);
+        }
+        shared.set_rated_torque(configuration.limits.torque);
+        let objects = Self {
+            shared,
+            program,
+            images,
+            observed: Observed::default(),
+            state: NmtState::Initialising,
+            configuration,
+            staged: configuration,
+            refused: Refused::default(),
+            stored,
+            single_bank,
+            now: 0,
+            heartbeat_lost: false,
+            node_id: Cell::new(0),
+            reports: Reports::default(),
+            emergencies: Deque::new(),
+        };
+        objects.publish();
+        objects
+    }
+
+    /// The program around the objects.
+    pub fn program(&mut self) -> &mut P {
+        &mut self.program
+    }
+
+    /// Configuration in use.
+    pub fn configuration(&self) -> &Configuration {
+        &self.configuration
+    }
+
+    /// Every millisecond or so: what is known of the joint, and the time, ms, that does not wrap. Ends trials.
+    pub fn poll(&mut self, now: u64, observed: &Observed) {
+        self.now = now;
+        self.observed = *observed;
+        self.images.tick(now, self.heartbeat_lost);
+        while !self.emergencies.is_full()
+            && let Some(emergency) = self.reports.next(observed, now)
+        {
+            self.report(emergency);
+        }
+        self.publish();
+    }
+
+    /// What is to be sent as EMCY by [`Server::emergency`](crate::canopen::Server::emergency), one at a time.
+    pub fn take_emergency(&mut self) -> Option<Emergency> {
+        self.emergencies.pop_front()
+    }
+
+    /// What the program is to do with an image; how that went it tells by [`Objects::finished`].
+    pub fn take_action(&mut self) -> Action {
+        self.images.take_action()
+    }
+
+    /// The staging buffer, for an action.
+    pub fn staging(&mut self) -> &mut [u8; STAGING] {
+        self.images.staging()
+    }
+
+    /// How an action went, and what the slots hold now. The next action is there to be taken.
+    pub fn finished(&mut self, outcome: Result<(), SlotError>, stored: StoredImages) {
+        let floor = self.images.life().floor();
+        self.images.set_stored(stored);
+        if let Some(emergency) = self.images.finished(outcome, self.observed.latched) {
+            self.report(emergency);
+        }
+        if self.images.life().floor() != floor {
+            // The floor is found again in the stored image's version where it cannot be kept.
+            if let Err(error) = self.keep() {
+                self.report(of_refusal(error.into(), self.observed.latched));
+            }
+        }
+        self.publish();
+    }
+
+    fn keep(&mut self) -> Result<(), SlotError> {
+        let life = self.images.life();
+        self.program.keep(life.floor(), life.failures())
+    }
+
+    fn publish(&self) {
+        self.shared.set_image(self.images.version(), self.images.state());
+    }
+
+    fn report(&mut self, emergency: Emergency) {
+        // What does not fit is in the objects all the same.
+        let _ = self.emergencies.push_back(emergency);
+    }
+
+    /// Under current, or one command away from it.
+    fn armed(&self) -> bool {
+        let state = self.observed.telemetry.state;
+        !matches!(state, State::NotReadyToSwitchOn | State::SwitchOnDisabled | State::Fault)
+    }
+
+    fn circumstances(&self) -> Circumstances {
+        Circumstances { now: self.now, armed: self.armed(), single_bank: self.single_bank }
+    }
+
+    /// Reports a refusal of the life cycle.
+    fn refuse(&mut self, refusal: Refusal) -> Abort {
+        self.report(of_refusal(refusal, self.observed.latched));
+        abort(refusal)
+    }
+
+    fn fail(&mut self, failure: Failure) -> Abort {
+        match failure {
+            Failure::Refused(refusal) => self.refuse(refusal),
+            Failure::Abort(abort) => abort,
+        }
+    }
+
+    fn readable(&self, field: Field) -> u32 {
+        match field {
+            Field::Image(ImageField::Active) => self.images.active_length(),
+            Field::History => self.program.history().map_or(0, history::length),
+            Field::Configuration(_) => self.refused.name().len() as u32,
+            _ => 0,
+        }
+    }
+
+    fn value(&self, field: Field) -> u64 {
+        match field {
+            Field::Highest(number) => number.into(),
+            Field::Constant(number) => signed(number),
+            Field::SetPoint(set_point) => self.shared.set_point(set_point),
+            Field::Range(range) => self.shared.range(range).to_bits().into(),
+            Field::Actual(actual) => self.observed.actual(actual, self.shared),
+            Field::Setting(setting) => setting.get(&self.staged).into(),
+            Field::Compensation(setting) => setting.get(&self.configuration).into(),
+            Field::Configuration(ConfigurationField::Changed) => (self.staged != self.configuration).into(),
+            Field::Configuration(part) => self.refused.get(part).into(),
+            Field::Image(part) => self.images.get(part, self.now).into(),
+            Field::Server | Field::History => 0,
+        }
+    }
+
+    fn write_set_point(&mut self, set_point: SetPoint, value: u64) -> Result<(), Abort> {
+        match set_point {
+            SetPoint::Mode if mode(value as i8).is_none() => return Err(Abort::VALUE),
+            SetPoint::Mode => {}
+            _ if self.state != NmtState::Operational => return Err(Abort::DEVICE_STATE),
+            _ => {}
+        }
+        if self.shared.write(set_point, value) { Ok(()) } else { Err(Abort::LOCAL_CONTROL) }
+    }
+
+    fn write_range(&mut self, range: Range, value: f32) -> Result<(), Abort> {
+        if !is_range(range, value) {
+            return Err(Abort::VALUE);
+        }
+        // A frame must not change its meaning under a moving joint.
+        if self.armed() {
+            return Err(Abort::DEVICE_STATE);
+        }
+        self.shared.set_range(range, value);
+        Ok(())
+    }
+
+    /// Has the control step take a configuration.
+    fn configure(&mut self, configuration: &Configuration) -> Result<(), Abort> {
+        match self.program.configure(configuration) {
+            Ok(()) => {
+                self.refused = Refused::default();
+                self.configuration = *configuration;
+                self.shared.set_rated_torque(configuration.limits.torque);
+                Ok(())
+            }
+            Err(NotConfigured::Refused(error)) => {
+                self.refused = Refused::by(&error);
+                Err(Abort::VALUE)
+            }
+            Err(NotConfigured::Busy) => {
+                self.refused = Refused::busy();
+                Err(Abort::DEVICE_STATE)
+            }
+        }
+    }
+
+    fn command_configuration(&mut self, command: u32) -> Result<(), Abort> {
+        match command {
+            1 if self.armed() => Err(Abort::DEVICE_STATE),
+            1 => {
+                let staged = self.staged;
+                self.configure(&staged)
+            }
+            2 => {
+                self.staged = self.configuration;
+                self.refused = Refused::default();
+                Ok(())
+            }
+            _ => Err(Abort::VALUE),
+        }
+    }
+
+    fn write_compensation(&mut self, setting: Setting, number: u32) -> Result<(), Abort> {
+        let mut configuration = self.configuration;
+        if !setting.set(&mut configuration, number) {
+            return Err(Abort::VALUE);
+        }
+        self.configure(&configuration)?;
+        self.staged.compensation = configuration.compensation;
+        Ok(())
+    }
+
+    fn write_image(&mut self, field: ImageField, number: u32) -> Result<(), Abort> {
+        let failures = self.images.life().failures();
+        let result = match field {
+            ImageField::Command => self.images.command(number as u8, self.circumstances()),
+            ImageField::TrialTime => self.images.set_trial_time(number),
+            _ => return Err(Abort::READ_ONLY),
+        };
+        if matches!(field, ImageField::Command) {
+            self.heartbeat_lost = false;
+        }
+        // Before the client is answered: or a loss of power would make every guess the first.
+        let kept = if self.images.life().failures() != failures { self.keep() } else { Ok(()) };
+        self.publish();
+        result.map_err(|refusal| self.refuse(refusal))?;
+        kept.map_err(|error| self.refuse(error.into()))
+    }
+
+    /// A function of its own: the record is 2 KiB of stack.
+    #[inline(never)]
+    fn store_record(&mut self, stored: Stored) -> Result<(), Abort> {
+        if self.single_bank && self.armed() {
+            return Err(Abort::DEVICE_STATE);
+        }
+        let mut record = [0; RECORD];
+        let length = stored.encode(&mut record).ok_or(Abort::MEMORY)?;
+        let record = record.get(..length).ok_or(Abort::MEMORY)?;
+        self.program.store(record).map_err(|error| self.refuse(error.into()))?;
+        self.stored = stored;
+        Ok(())
+    }
+}
+
+impl<P: Program> ObjectDictionary for Objects<'_, P> {
+    fn entry(&self, index: u16, sub_index: u8) -> Result<Entry, Abort> {
+        let Some(object) = table::find(index, sub_index) else {
+            return Err(if table::exists(index) { Abort::NO_SUB_INDEX } else { Abort::NO_OBJECT });
+        };
+        let length = match object.data_type.bytes() {
+            Some(bytes) => Length::Value(bytes),
+            None => Length::Stream {
+                readable: self.readable(object.field),
+                writable: match object.field {
+                    Field::Image(ImageField::Staging) => STAGING as u32,
+                    Field::Image(ImageField::Key) => KEY as u32,
+                    _ => 0,
+                },
+            },
+        };
+        Ok(Entry { length, access: object.access, mappable: object.mappable })
+    }
+
+    fn read(&mut self, index: u16, sub_index: u8, offset: u32, out: &mut [u8]) -> Result<(), Abort> {
+        let object = table::find(index, sub_index).ok_or(Abort::NO_OBJECT)?;
+        if object.access == Access::WriteOnly {
+            return Err(Abort::WRITE_ONLY);
+        }
+        let done = match object.field {
+            Field::Image(ImageField::Active) => {
+                self.images.is_same_image(offset) && self.program.read_image(offset, out)
+            }
+            Field::History => self.program.history().is_some_and(|steps| history::read(steps, offset, out)),
+            Field::Configuration(ConfigurationField::RefusedSetting) => {
+                history::copy(self.refused.name().as_bytes(), offset, out)
+            }
+            field => history::copy(&self.value(field).to_le_bytes(), offset, out),
+        };
+        if done { Ok(()) } else { Err(Abort::DEVICE_STATE) }
+    }
+
+    fn write(&mut self, index: u16, sub_index: u8, value: &[u8]) -> Result<(), Abort> {
+        let object = table::find(index, sub_index).ok_or(Abort::NO_OBJECT)?;
+        if object.access == Access::ReadOnly {
+            return Err(Abort::READ_ONLY);
+        }
+        let mut bytes = [0; 8];
+        bytes.iter_mut().zip(value).for_each(|(byte, given)| *byte = *given);
+        let number = u64::from_le_bytes(bytes);
+        let word = number as u32;
+        match object.field {
+            Field::SetPoint(set_point) => self.write_set_point(set_point, number),
+            Field::Range(range) => self.write_range(range, f32::from_bits(word)),
+            Field::Setting(setting) => {
+                if setting.set(&mut self.staged, word) {
+                    Ok(())
+                } else {
+                    Err(Abort::VALUE)
+                }
+            }
+            Field::Compensation(setting) => self.write_compensation(setting, word),
+            Field::Configuration(ConfigurationField::Command) => self.command_configuration(word),
+            Field::Image(field) => self.write_image(field, word),
+            _ => Err(Abort::READ_ONLY),
+        }
+    }
+
+    fn open(&mut self, index: u16, sub_index: u8, length: Option<u32>) -> Result<(), Abort> {
+        let object = table::find(index, sub_index).ok_or(Abort::NO_OBJECT)?;
+        let Field::Image(field) = object.field else { return Err(Abort::READ_ONLY) };
+        let result = self.images.open(field, length);
+        self.publish();
+        result.map_err(|failure| self.fail(failure))
+    }
+
+    fn append(&mut self, _offset: u32, bytes: &[u8]) -> Result<(), Abort> {
+        let result = self.images.append(bytes);
+        self.publish();
+        result.map_err(|failure| self.fail(failure))
+    }
+
+    fn finish(&mut self) -> Result<(), Abort> {
+        if let Some(key) = self.images.finish().map_err(|failure| self.fail(failure))? {
+            self.program.provision(&key).map_err(|error| self.refuse(error.into()))?;
+            self.images.set_key(key);
+        }
+        Ok(())
+    }
+
+    fn abandon(&mut self) {
+        self.images.abandon();
+    }
+
+    fn store(&mut self, group: Group, communication: &CommunicationParameters) -> Result<(), Abort> {
+        let mut stored = self.stored;
+        if matches!(group, Group::All | Group::Application) {
+            stored.application = Some((self.configuration, Range::ALL.map(|range| self.shared.range(range))));
+        }
+        if matches!(group, Group::All | Group::Communication) {
+            stored.communication = Some((self.node_id.get(), *communication));
+        }
+        self.store_record(stored)
+    }
+
+    fn restore(&mut self, group: Group) -> Result<(), Abort> {
+        let mut stored = self.stored;
+        if matches!(group, Group::All | Group::Application) {
+            stored.application = None;
+        }
+        if matches!(group, Group::All | Group::Communication) {
+            stored.communication = None;
+        }
+        self.store_record(stored)
+    }
+
+    fn store_node_id(&mut self, node_id: u8) -> Result<(), Abort> {
+        self.store_record(Stored { node_id, ..self.stored })?;
+        self.configuration.node_id = node_id;
+        self.staged.node_id = node_id;
+        Ok(())
+    }
+
+    fn communication_parameters(&self, node_id: u8) -> CommunicationParameters {
+        self.node_id.set(node_id);
+        match self.stored.communication {
+            Some((of, parameters)) if of == node_id => parameters,
+            _ => default_communication(node_id),
+        }
+    }
+
+    fn event(&mut self, event: Event) {
+        match event {
+            Event::State(state) => self.state = state,
+            Event::HeartbeatLost { .. } => self.heartbeat_lost = true,
+            Event::HeartbeatBack { .. } => self.heartbeat_lost = false,
+            _ => {}
+        }
+        self.program.event(event);
+    }
+}

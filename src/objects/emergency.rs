@@ -1,0 +1,93 @@
+//! Errors as EMCY messages: which code, which bits of the error register; the task.
+
+use super::observed::{Observed, fault_bits, reason_number};
+use crate::joint::fault::{Fault, Faults};
+use crate::parameters::life_cycle::Refusal;
+
+/// The joint left the range that its friction was learned in. Information: [`reason`](super::table), number of departures (u16).
+pub const ENVELOPE: u16 = 0xFF01;
+/// An image with a wrong tag, or none, or too many of them. Information: code of the refusal (u16).
+pub const AUTHENTICATION: u16 = 0xFF02;
+/// An image was refused for another reason. Information: code of the refusal (u16).
+pub const PARAMETER: u16 = 0x6320;
+/// Flash could not be written or read. Information: code of the refusal (u16).
+pub const FLASH: u16 = 0x5530;
+/// No error any more.
+const RESET: u16 = 0;
+/// A joint that wanders along the edge of the range reports it once in this time, ms.
+const ENVELOPE_QUIET: u64 = 1_000;
+
+/// For [`Server::emergency`](crate::canopen::Server::emergency).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Emergency {
+    /// Error code.
+    pub code: u16,
+    /// All bits of the error register that are set from now on.
+    pub register: u8,
+    /// The manufacturer's field.
+    pub information: [u8; 5],
+}
+
+/// The bit of the error register, CiA 301 section 7.5.2.2.
+const fn register_bit(fault: Fault) -> u8 {
+    match fault {
+        Fault::OverCurrent | Fault::CurrentSensor | Fault::CurrentNotFollowed => 1 << 1,
+        Fault::OverVoltage | Fault::UnderVoltage => 1 << 2,
+        Fault::BridgeTemperature | Fault::WindingTemperature | Fault::TemperatureSensor => 1 << 3,
+        Fault::StaleCommand => 1 << 4,
+        Fault::EncoderLost | Fault::EncoderJump | Fault::EncoderImplausible => 1 << 5,
+        Fault::OverSpeed | Fault::PositionLimit => 1 << 5,
+        Fault::Overrun | Fault::BridgeDriver => 1 << 7,
+    }
+}
+
+fn register(faults: Faults) -> u8 {
+    faults.iter().fold(0, |register, fault| register | register_bit(fault))
+}
+
+/// What has been reported.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Reports {
+    faults: Faults,
+    violations: u16,
+    quiet_until: u64,
+}
+
+impl Reports {
+    /// The next thing to report: a fault that is new, the end of all, a departure from the trained range. Information of a fault: its
+    /// number, and the bits of object 2021h:4 (u16).
+    pub(super) fn next(&mut self, observed: &Observed, now: u64) -> Option<Emergency> {
+        let latched = observed.latched;
+        if latched.is_empty() && !self.faults.is_empty() {
+            self.faults = Faults::NONE;
+            return Some(Emergency { code: RESET, register: 0, information: [0; 5] });
+        }
+        if let Some(fault) = latched.iter().find(|fault| !self.faults.contains(*fault)) {
+            self.faults.set(fault, true);
+            let [low, high] = fault_bits(latched).to_le_bytes();
+            let information = [fault as u8, low, high, 0, 0];
+            return Some(Emergency { code: fault.error_code(), register: register(latched), information });
+        }
+        let violations = observed.friction.violations();
+        if violations != self.violations && now >= self.quiet_until {
+            self.violations = violations;
+            self.quiet_until = now.saturating_add(ENVELOPE_QUIET);
+            let [low, high] = violations.to_le_bytes();
+            let reason = reason_number(observed.telemetry.compensated.output.reason);
+            let information = [reason, low, high, 0, 0];
+            return Some(Emergency { code: ENVELOPE, register: register(latched), information });
+        }
+        None
+    }
+}
+
+/// What a refused image is reported as.
+pub(super) fn of_refusal(refusal: Refusal, latched: Faults) -> Emergency {
+    let code = match refusal {
+        Refusal::TagMissing | Refusal::TagWrong { .. } | Refusal::LockedOut { .. } => AUTHENTICATION,
+        Refusal::Slots(_) => FLASH,
+        _ => PARAMETER,
+    };
+    let [low, high] = refusal.code().to_le_bytes();
+    Emergency { code, register: register(latched), information: [low, high, 0, 0, 0] }
+}

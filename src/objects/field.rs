@@ -1,0 +1,219 @@
+//! What an object of this joint is about; any context. The [table](super::table) says which index means which field, nothing else does.
+
+use super::settings::Setting;
+
+/// What an object reads or writes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Field {
+    /// Served by [`canopen`](crate::canopen).
+    Server,
+    /// Sub-index 0 of a record: its highest sub-index.
+    Highest(u8),
+    /// A number that never changes.
+    Constant(i32),
+    /// What is asked of the joint.
+    SetPoint(SetPoint),
+    /// The range of a part of the impedance frame.
+    Range(Range),
+    /// What the joint measures and does.
+    Actual(Actual),
+    /// A setting of the configuration: staged, and taken with all others by a command.
+    Setting(Setting),
+    /// A setting of the compensation: acts at once.
+    Compensation(Setting),
+    /// Taking the configuration, and why it was refused.
+    Configuration(ConfigurationField),
+    /// The life of a parameter image.
+    Image(ImageField),
+    /// The control steps before a fault.
+    History,
+}
+
+/// What is asked of the joint. Everything but the mode ends with the NMT state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum SetPoint {
+    /// For the state machine.
+    Controlword = 0,
+    /// Mode of operation.
+    Mode = 1,
+    /// Counter of the master's set-points.
+    Counter = 2,
+    /// Torque mode; added in velocity and position mode.
+    TargetTorque = 3,
+    /// Position mode.
+    TargetPosition = 4,
+    /// Velocity mode.
+    TargetVelocity = 5,
+    /// Impedance mode: all of its five set-points.
+    ImpedanceFrame = 6,
+    /// Velocity of the joint that shares this joint's drive.
+    CoupledVelocity = 7,
+}
+
+/// Number of [`SetPoint`]s.
+pub(super) const SET_POINTS: usize = 8;
+
+/// A part of the impedance frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Range {
+    /// rad, to both sides.
+    Position = 0,
+    /// rad/s, to both sides.
+    Velocity = 1,
+    /// Nm/rad, from 0.
+    Stiffness = 2,
+    /// Nm s/rad, from 0.
+    Damping = 3,
+    /// Nm, to both sides.
+    Torque = 4,
+}
+
+/// Number of [`Range`]s.
+pub const RANGES: usize = 5;
+
+impl Range {
+    /// All of them, by number.
+    pub const ALL: [Self; RANGES] = [Self::Position, Self::Velocity, Self::Stiffness, Self::Damping, Self::Torque];
+
+    /// The widest that is taken: what a command may ask for at most.
+    pub const fn widest(self) -> f32 {
+        match self {
+            Self::Position => 1_000.0,
+            Self::Velocity => 200.0,
+            Self::Stiffness => 1e5,
+            Self::Damping => 1e4,
+            Self::Torque => 2_000.0,
+        }
+    }
+}
+
+/// What the joint measures and does. The receive interrupt has all of it, for TPDOs that follow SYNC.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Actual {
+    /// State machine.
+    Statusword,
+    /// Mode of operation.
+    Mode,
+    /// Position of the joint.
+    Position,
+    /// Velocity of the joint.
+    Velocity,
+    /// Torque of the measured current.
+    Torque,
+    /// Torque that the command asks for within all limits, before compensation.
+    TorqueDemand,
+    /// What permille of torque refer to.
+    RatedTorque,
+    /// Code of the first latched fault.
+    ErrorCode,
+    /// Torque that compensation adds.
+    CompensationTorque,
+    /// Torque that neither feed-forward nor compensation explain.
+    Residual,
+    /// Supply.
+    BusVoltage,
+    /// Winding's sensor or model.
+    WindingTemperature,
+    /// Bridge's sensor.
+    BridgeTemperature,
+    /// Temperature that friction is computed for.
+    GearTemperature,
+    /// Faults since the last acknowledgement, a bit each.
+    LatchedFaults,
+    /// Which friction model acts.
+    ActingModel,
+    /// Why less acts than was asked for.
+    Reason,
+    /// How often the joint left the range that its friction was learned in.
+    Violations,
+    /// How far the full model would be from what acts.
+    ShadowRms,
+    /// Part of the compensation that standstill and energy guard let through.
+    Permitted,
+    /// Version of the image in use.
+    ImageVersion,
+    /// Where a staged image stands.
+    ImageState,
+}
+
+/// Taking the staged configuration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ConfigurationField {
+    /// 1 takes what is staged, 2 forgets it.
+    Command,
+    /// What came of the last command.
+    Result,
+    /// Name of the setting that was refused.
+    RefusedSetting,
+    /// Value that was refused.
+    RefusedValue,
+    /// Least value that is possible.
+    Lowest,
+    /// Greatest value that is possible.
+    Highest,
+    /// Whether what is staged differs from what is in use.
+    Changed,
+}
+
+/// The life of a parameter image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ImageField {
+    /// Upload.
+    Staging,
+    /// The image in use, as it is stored.
+    Active,
+    /// What is to be done with what is staged.
+    Command,
+    /// Why the last command was refused.
+    Result,
+    /// Bytes staged.
+    Length,
+    /// Of the bytes staged.
+    Checksum,
+    /// What is left of a trial.
+    TrialLeft,
+    /// Time of the trials that follow.
+    TrialTime,
+    /// How the last trial ended by itself.
+    Ending,
+    /// A stored image.
+    Stored(Which, StoredField),
+    /// Whether the joint has a key.
+    KeyPresent,
+    /// Number of the key.
+    KeyNumber,
+    /// Lowest version that is taken.
+    Floor,
+    /// Wrong tags in a row.
+    Failures,
+    /// What is left of a lock-out.
+    Lockout,
+    /// The key itself, once.
+    Key,
+}
+
+/// One of the two stored images.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Which {
+    /// In use.
+    Active,
+    /// What a roll back would make active.
+    Previous,
+}
+
+/// What is told of a stored image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StoredField {
+    /// Version.
+    Version,
+    /// Its checksum.
+    Checksum,
+    /// Physical model alone, or with a network.
+    Model,
+    /// Where it lies.
+    Slot,
+    /// When it was made.
+    Created,
+}

@@ -1,0 +1,258 @@
+//! Objects 2210h to 2215h: the image life cycle as a client sees it; the task.
+//!
+//! A command that is accepted is answered at once; flash and control step are for the program to do afterwards ([`Images::take_action`],
+//! [`Images::finished`]), and the client polls the state.
+
+use super::emergency::{Emergency, of_refusal};
+use super::field::{ImageField, StoredField, Which};
+use crate::canopen::Abort;
+use crate::joint::fault::Faults;
+use crate::parameters::Summary;
+use crate::parameters::authentication::{KEY, Key, STAGING};
+use crate::parameters::life_cycle::{Action, Conditions, Ending, LifeCycle, Refusal, State};
+use crate::parameters::slots::{Slot, SlotError};
+
+/// What the slots hold.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StoredImages {
+    /// In use, with the slot that it lies in.
+    pub active: Option<(Summary, Slot)>,
+    /// What a roll back would make active.
+    pub previous: Option<(Summary, Slot)>,
+}
+
+/// What is true of the joint while an object is written.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Circumstances {
+    pub(super) now: u64,
+    pub(super) armed: bool,
+    pub(super) single_bank: bool,
+}
+
+/// Where an upload goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Upload {
+    Image,
+    Key { length: usize },
+}
+
+/// Life cycle, staging buffer and key.
+#[derive(Debug)]
+pub struct Images<'a> {
+    staging: &'a mut [u8; STAGING],
+    life: LifeCycle,
+    key: Option<Key>,
+    stored: StoredImages,
+    action: Action,
+    upload: Option<Upload>,
+    key_bytes: [u8; KEY],
+    /// Of the image that is being read.
+    reading: Option<u32>,
+}
+
+impl<'a> Images<'a> {
+    /// From what was found at start.
+    pub fn new(staging: &'a mut [u8; STAGING], life: LifeCycle, key: Option<Key>, stored: StoredImages) -> Self {
+        let key_bytes = [0; KEY];
+        Self { staging, life, key, stored, action: Action::Nothing, upload: None, key_bytes, reading: None }
+    }
+
+    pub(super) fn state(&self) -> u8 {
+        // Nothing staged beside an image in use is what a joint starts with, too.
+        match self.life.state() {
+            State::Empty if self.stored.active.is_some() => State::Active as u8,
+            state => state as u8,
+        }
+    }
+
+    pub(super) fn life(&self) -> &LifeCycle {
+        &self.life
+    }
+
+    pub(super) fn version(&self) -> u32 {
+        self.stored.active.map_or(0, |(summary, _)| summary.version)
+    }
+
+    pub(super) fn set_stored(&mut self, stored: StoredImages) {
+        self.stored = stored;
+    }
+
+    pub(super) fn staging(&mut self) -> &mut [u8; STAGING] {
+        self.staging
+    }
+
+    pub(super) fn tick(&mut self, now: u64, heartbeat_lost: bool) {
+        self.demand(|life| life.tick(now, heartbeat_lost));
+    }
+
+    pub(super) fn take_action(&mut self) -> Action {
+        core::mem::replace(&mut self.action, Action::Nothing)
+    }
+
+    /// What an action led to, and what is to be reported of it.
+    pub(super) fn finished(&mut self, outcome: Result<(), SlotError>, latched: Faults) -> Option<Emergency> {
+        self.demand(|life| life.finished(outcome));
+        outcome.err().map(|error| of_refusal(error.into(), latched))
+    }
+
+    fn demand(&mut self, ask: impl FnOnce(&mut LifeCycle) -> Action) {
+        let action = ask(&mut self.life);
+        if action != Action::Nothing {
+            self.action = action;
+        }
+    }
+
+    /// The value of an object that has one.
+    pub(super) fn get(&self, field: ImageField, now: u64) -> u32 {
+        match field {
+            ImageField::Staging | ImageField::Active | ImageField::Command | ImageField::Key => 0,
+            ImageField::Result => self.life.result().map_or(0, |refusal| refusal.code().into()),
+            ImageField::Length => self.life.length() as u32,
+            ImageField::Checksum => self.checksum(),
+            ImageField::TrialLeft => self.life.trial_left(now),
+            ImageField::TrialTime => self.life.trial_time(),
+            ImageField::Ending => match self.life.ending() {
+                None => 0,
+                Some(Ending::Time) => 1,
+                Some(Ending::Heartbeat) => 2,
+            },
+            ImageField::Stored(which, part) => self.stored_part(which, part),
+            ImageField::KeyPresent => self.key.is_some().into(),
+            ImageField::KeyNumber => self.key.as_ref().map_or(0, Key::id),
+            ImageField::Floor => self.life.floor(),
+            ImageField::Failures => self.life.failures().into(),
+            ImageField::Lockout => self.life.lockout_left(now),
+        }
+    }
+
+    fn stored_part(&self, which: Which, part: StoredField) -> u32 {
+        let image = match which {
+            Which::Active => self.stored.active,
+            Which::Previous => self.stored.previous,
+        };
+        let Some((summary, slot)) = image else { return 0 };
+        match part {
+            StoredField::Version => summary.version,
+            StoredField::Checksum => summary.checksum,
+            StoredField::Model => 1 + u32::from(summary.network),
+            StoredField::Slot => match slot {
+                Slot::First => 1,
+                Slot::Second => 2,
+            },
+            StoredField::Created => u32::try_from(summary.created).unwrap_or(u32::MAX),
+        }
+    }
+
+    fn checksum(&self) -> u32 {
+        const CRC: crc::Crc<u32, crc::NoTable> = crc::Crc::<u32, crc::NoTable>::new(&crc::CRC_32_ISO_HDLC);
+        CRC.checksum(self.staging.get(..self.life.length()).unwrap_or_default())
+    }
+
+    /// Carries a command out as far as the life cycle does.
+    pub(super) fn command(&mut self, number: u8, circumstances: Circumstances) -> Result<(), Refusal> {
+        let Circumstances { now, armed, single_bank } = circumstances;
+        let conditions = Conditions { now, armed, single_bank, key: self.key.as_ref() };
+        let action = self.life.command_number(number, self.staging, &conditions)?;
+        if action != Action::Nothing {
+            self.action = action;
+        }
+        Ok(())
+    }
+
+    pub(super) fn set_trial_time(&mut self, time: u32) -> Result<(), Refusal> {
+        self.life.set_trial_time(time)
+    }
+
+    pub(super) fn open(&mut self, field: ImageField, length: Option<u32>) -> Result<(), Failure> {
+        let length = length.map(|length| length as usize);
+        match field {
+            ImageField::Staging => {
+                self.life.begin(length)?;
+                self.upload = Some(Upload::Image);
+            }
+            ImageField::Key if self.key.is_some() => return Err(Failure::Abort(Abort::LOCAL_CONTROL)),
+            ImageField::Key => self.upload = Some(Upload::Key { length: 0 }),
+            _ => return Err(Failure::Abort(Abort::READ_ONLY)),
+        }
+        Ok(())
+    }
+
+    pub(super) fn append(&mut self, bytes: &[u8]) -> Result<(), Failure> {
+        match &mut self.upload {
+            Some(Upload::Image) => Ok(self.life.receive(self.staging, bytes)?),
+            Some(Upload::Key { length }) => {
+                let end = length.saturating_add(bytes.len());
+                let place = self.key_bytes.get_mut(*length..end).ok_or(Failure::Abort(Abort::TOO_LONG))?;
+                place.iter_mut().zip(bytes).for_each(|(place, byte)| *place = *byte);
+                *length = end;
+                Ok(())
+            }
+            None => Err(Failure::Abort(Abort::GENERAL)),
+        }
+    }
+
+    /// The upload is whole; a key that came with it is to be kept and then given to [`Images::set_key`].
+    pub(super) fn finish(&mut self) -> Result<Option<Key>, Failure> {
+        let upload = self.upload.take();
+        let bytes = core::mem::replace(&mut self.key_bytes, [0; KEY]);
+        match upload {
+            Some(Upload::Key { length: KEY }) => {
+                let key = Key::provision(self.key.as_ref(), bytes);
+                Ok(Some(key.map_err(|_| Failure::Abort(Abort::VALUE))?))
+            }
+            Some(Upload::Key { .. }) => Err(Failure::Abort(Abort::TOO_SHORT)),
+            _ => Ok(None),
+        }
+    }
+
+    pub(super) fn set_key(&mut self, key: Key) {
+        self.key = Some(key);
+    }
+
+    /// What has arrived of an image stays where it is; its length tells that it is not whole, and verification would say so.
+    pub(super) fn abandon(&mut self) {
+        self.upload = None;
+        self.key_bytes = [0; KEY];
+    }
+
+    /// Bytes of the stored image in use.
+    pub(super) fn active_length(&self) -> u32 {
+        self.stored.active.map_or(0, |(summary, _)| summary.length)
+    }
+
+    /// Whether the bytes from `offset` on are of the image whose first bytes were read.
+    pub(super) fn is_same_image(&mut self, offset: u32) -> bool {
+        let now = self.stored.active.map(|(summary, _)| summary.checksum);
+        if offset == 0 {
+            self.reading = now;
+        }
+        self.reading == now
+    }
+}
+
+/// Why an upload is not taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Failure {
+    /// By the life cycle.
+    Refused(Refusal),
+    /// For another reason.
+    Abort(Abort),
+}
+
+impl From<Refusal> for Failure {
+    fn from(refusal: Refusal) -> Self {
+        Self::Refused(refusal)
+    }
+}
+
+/// The abort code of a refusal.
+pub(super) const fn abort(refusal: Refusal) -> Abort {
+    match refusal {
+        Refusal::UploadTooLong { .. } => Abort::TOO_LONG,
+        Refusal::UnknownCommand { .. } | Refusal::TrialTime { .. } => Abort::VALUE,
+        Refusal::State { .. } | Refusal::Busy | Refusal::Armed { .. } => Abort::DEVICE_STATE,
+        Refusal::TagMissing | Refusal::TagWrong { .. } | Refusal::LockedOut { .. } => Abort::LOCAL_CONTROL,
+        Refusal::Slots(_) => Abort::HARDWARE,
+        _ => Abort::STORE,
+    }
+}

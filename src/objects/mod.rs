@@ -1,0 +1,58 @@
+//! This joint's object dictionary: the only place where an index meets a field.
+//!
+//! # Two contexts, as in [`canopen`](crate::canopen)
+//!
+//!  - [`JointImage`], in the receive interrupt: RPDOs to one [`Demand`](crate::joint::Demand), actual values to TPDOs.
+//!  - [`Objects`], in the task below: every object by SDO, storing, the image life cycle, EMCYs.
+//!  - [`Shared`], a static, which both borrow.
+//!
+//! [`table`] declares every object once; the server's entries, `docs/objects.md` and the texts that a host makes (EDS, DBC) come
+//! from it. [`field`] is what an object can be about. The rest has one idea a file: [`Observed`] and its scaling, [`settings`] of the
+//! configuration, [`Images`] for the life cycle, [`Stored`] for what 1010h keeps, [`emergency`] for codes.
+//!
+//! ```text
+//!  receive interrupt   image.observe(&observed)
+//!                      receiver.receive(&frame, now, &mut image, send)      route to the task's queue
+//!                      image.follow(node.state()); publish(image.demand())
+//!  task                server.receive(&frame, now, &mut objects)            where shared.has_written(): pend the interrupt
+//!                      objects.poll(milliseconds, &observed)
+//!                      objects.take_emergency() -> server.emergency(..)
+//!                      objects.take_action() -> flash or control step -> objects.finished(..)
+//!                      server.poll(now, &mut objects) -> send
+//! ```
+//!
+//! A demand that nobody refreshes becomes stale by its deadline. The task has the interrupt run on every
+//! [`Event::State`](crate::canopen::Event::State), so that a transition of its own reaches the joint without a frame.
+
+mod communication;
+mod dictionary;
+pub mod emergency;
+pub mod field;
+mod friction_statistics;
+mod history;
+mod images;
+mod number;
+mod observed;
+mod process_image;
+mod program;
+mod refused;
+mod set_points;
+pub mod settings;
+mod shared;
+mod stored;
+pub mod table;
+
+#[cfg(test)]
+mod tests;
+
+pub use communication::default_communication;
+pub use dictionary::{Objects, Start};
+pub use friction_statistics::FrictionStatistics;
+pub use history::STEP;
+pub use images::{Images, StoredImages};
+pub use observed::Observed;
+pub use process_image::JointImage;
+pub use program::{NotConfigured, Program};
+pub use set_points::impedance_frame;
+pub use shared::{DEFAULT_RANGES, Shared};
+pub use stored::{RECORD, Stored};

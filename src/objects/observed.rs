@@ -1,0 +1,106 @@
+//! What is known of the joint at one instant, and the actual values that objects show of it; receive interrupt and task.
+
+use super::field::{Actual, SetPoint};
+use super::friction_statistics::FrictionStatistics;
+use super::number::{temperature, to_i16, to_i32, to_u16, to_u32};
+use super::shared::Shared;
+use crate::compensation::Reason;
+use crate::joint::Telemetry;
+use crate::joint::fault::Faults;
+
+/// A copy of what the control step and the slow task know.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Observed {
+    /// Of a control step.
+    pub telemetry: Telemetry,
+    /// Faults since the last acknowledgement.
+    pub latched: Faults,
+    /// Torque of the command that this step followed, [`Command::torque`](crate::joint::Command::torque), Nm.
+    pub feedforward_torque: f32,
+    /// °C; NaN where it is not known.
+    pub winding_temperature: f32,
+    /// °C; NaN where the board has no sensor.
+    pub bridge_temperature: f32,
+    /// Of the compensation.
+    pub friction: FrictionStatistics,
+}
+
+impl Default for Observed {
+    /// Before the first control step.
+    fn default() -> Self {
+        Self {
+            telemetry: Telemetry::default(),
+            latched: Faults::NONE,
+            feedforward_torque: 0.0,
+            winding_temperature: f32::NAN,
+            bridge_temperature: f32::NAN,
+            friction: FrictionStatistics::default(),
+        }
+    }
+}
+
+impl Observed {
+    /// Torque that neither the command's feed-forward nor compensation explain, Nm: in position, velocity and impedance mode what is
+    /// left for the controller, which is what a better friction model would take over.
+    pub fn residual(&self) -> f32 {
+        self.telemetry.measured_torque - self.feedforward_torque - self.telemetry.compensated.torque
+    }
+
+    /// The value as its object carries it, sign-extended.
+    pub(super) fn actual(&self, actual: Actual, shared: &Shared) -> u64 {
+        let t = &self.telemetry;
+        let permille = |torque: f32| {
+            let rated = shared.rated_torque();
+            let part = if rated > 0.0 { torque / rated } else { 0.0 };
+            signed(to_i16(1e3 * part).into())
+        };
+        let milli = |value: f32| signed(to_i16(1e3 * value).into());
+        let tenths = |value: f32| signed(temperature(value).into());
+        match actual {
+            Actual::Statusword => t.statusword().into(),
+            Actual::Mode => shared.set_point(SetPoint::Mode),
+            Actual::Position => signed(to_i32(1e6 * t.motion.position)),
+            Actual::Velocity => signed(to_i32(1e3 * t.motion.velocity)),
+            Actual::Torque => permille(t.measured_torque),
+            Actual::TorqueDemand => permille(t.wanted.torque),
+            Actual::RatedTorque => to_u32(1e3 * shared.rated_torque()).into(),
+            Actual::ErrorCode => self.latched.iter().next().map_or(0, |fault| fault.error_code().into()),
+            Actual::CompensationTorque => milli(t.compensated.torque),
+            Actual::Residual => milli(self.residual()),
+            Actual::BusVoltage => to_u16(100.0 * t.bus_voltage).into(),
+            Actual::WindingTemperature => tenths(self.winding_temperature),
+            Actual::BridgeTemperature => tenths(self.bridge_temperature),
+            Actual::GearTemperature => tenths(t.gear_temperature),
+            Actual::LatchedFaults => fault_bits(self.latched).into(),
+            Actual::ActingModel => t.compensated.output.acting as u64,
+            Actual::Reason => reason_number(t.compensated.output.reason).into(),
+            Actual::Violations => self.friction.violations().into(),
+            Actual::ShadowRms => self.friction.shadow_rms().to_bits().into(),
+            Actual::Permitted => to_u16(1e3 * t.compensated.permitted).into(),
+            Actual::ImageVersion => shared.image_version().into(),
+            Actual::ImageState => shared.image_state().into(),
+        }
+    }
+}
+
+/// As an object carries it: the low bytes are the value's, whatever its length.
+pub(super) fn signed(value: i32) -> u64 {
+    i64::from(value) as u64
+}
+
+/// A bit for each fault: n - 1 for fault n.
+pub(super) fn fault_bits(faults: Faults) -> u16 {
+    faults.iter().fold(0, |bits, fault| bits | 1u16.checked_shl((fault as u32).wrapping_sub(1)).unwrap_or(0))
+}
+
+/// The number of a reason in object 2200h:8.
+pub(super) const fn reason_number(reason: Reason) -> u8 {
+    match reason {
+        Reason::AsRequested => 0,
+        Reason::Off => 1,
+        Reason::NoModel => 2,
+        Reason::NoNetwork => 3,
+        Reason::OutsideTrainedBox(signal) => 16 + signal as u8,
+        Reason::FarOutsideTrainedBox(signal) => 32 + signal as u8,
+    }
+}

@@ -1,0 +1,156 @@
+//! Process data of the joint: RPDOs to one [`Demand`], actual values to TPDOs; the receive interrupt.
+//!
+//! An RPDO counts as a whole, once all of its objects are there. Its set-points renew the command deadline
+//! ([`Demand::sequence`]) unless it carries object 2010h:1 with the number that the one before had: a master that repeats itself
+//! without thinking is not alive.
+//!
+//! Outside OPERATIONAL, and in it until a controlword comes, the joint is asked for a quick stop and no torque. It is the node's own
+//! demand, and its sequence changes with the transition only: a joint that still brakes when the command deadline is over has a fault.
+
+use super::field::{Field, SetPoint};
+use super::observed::Observed;
+use super::set_points::SetPoints;
+use super::shared::Shared;
+use super::table;
+use crate::canopen::{MappedObject, NmtState, ProcessImage};
+use crate::joint::state_machine::Controlword;
+use crate::joint::{Command, Coupled, Demand, Mode};
+
+/// The interrupt's part of the objects.
+#[derive(Debug)]
+pub struct JointImage<'a> {
+    shared: &'a Shared,
+    observed: Observed,
+    state: NmtState,
+    /// In force.
+    points: SetPoints,
+    /// With what has arrived of an RPDO.
+    arriving: SetPoints,
+    arrived: Arrived,
+    sequence: u32,
+    coupled_sequence: u32,
+}
+
+/// What has arrived of an RPDO.
+#[derive(Clone, Copy, Debug, Default)]
+struct Arrived {
+    /// Something that is asked of the joint.
+    asked: bool,
+    /// A neighbour's velocity.
+    coupled: bool,
+    counter: Option<u8>,
+}
+
+impl<'a> JointImage<'a> {
+    /// One for each [`Shared`].
+    pub fn new(shared: &'a Shared) -> Self {
+        let points = SetPoints::none(Mode::Torque);
+        points.publish(shared);
+        Self {
+            shared,
+            observed: Observed::default(),
+            state: NmtState::Initialising,
+            points,
+            arriving: points,
+            arrived: Arrived::default(),
+            sequence: 0,
+            coupled_sequence: 0,
+        }
+    }
+
+    /// What TPDOs carry from now on. Before [`Receiver::receive`](crate::canopen::Receiver::receive), at least where the frame is SYNC.
+    pub fn observe(&mut self, observed: &Observed) {
+        self.observed = *observed;
+    }
+
+    /// Takes what came by SDO, and follows a transition that the task made: `state` is
+    /// [`canopen::Shared::state`](crate::canopen::Shared::state). At the end of every receive interrupt, before
+    /// [`JointImage::demand`].
+    pub fn follow(&mut self, state: NmtState) {
+        if state != self.state {
+            self.state_changed(state);
+        }
+        let Some((set_point, value)) = self.shared.take_written() else { return };
+        if set_point == SetPoint::Mode || self.state == NmtState::Operational {
+            self.arriving = self.points;
+            self.put(set_point, value);
+            self.come_into_force();
+        }
+    }
+
+    /// What is asked of the joint now.
+    pub fn demand(&self) -> Demand {
+        let coupled = Coupled { velocity: self.points.coupled_velocity(), sequence: self.coupled_sequence };
+        if self.state != NmtState::Operational {
+            let controlword = Controlword::QUICK_STOP;
+            return Demand { controlword, command: Command::default(), sequence: self.sequence, coupled };
+        }
+        Demand {
+            controlword: Controlword(self.points.controlword),
+            command: self.points.command(self.shared),
+            sequence: self.sequence,
+            coupled,
+        }
+    }
+
+    fn put(&mut self, set_point: SetPoint, value: u64) {
+        self.arriving.set(set_point, value);
+        match set_point {
+            SetPoint::CoupledVelocity => self.arrived.coupled = true,
+            SetPoint::Counter => self.arrived.counter = Some(value as u8),
+            // A choice, nothing that is asked of the joint.
+            SetPoint::Mode => {}
+            _ => self.arrived.asked = true,
+        }
+    }
+
+    fn come_into_force(&mut self) {
+        let Arrived { asked, coupled, counter } = core::mem::take(&mut self.arrived);
+        let repeated = counter.is_some() && counter == self.points.counter;
+        if asked && !repeated {
+            self.sequence = self.sequence.wrapping_add(1);
+        }
+        if coupled {
+            self.coupled_sequence = self.coupled_sequence.wrapping_add(1);
+        }
+        self.points = self.arriving;
+        self.points.publish(self.shared);
+    }
+}
+
+impl ProcessImage for JointImage<'_> {
+    fn receive(&mut self, object: MappedObject, value: u64) {
+        if let Some(object) = table::find(object.index(), object.sub_index())
+            && let Field::SetPoint(set_point) = object.field
+        {
+            self.put(set_point, value);
+        }
+    }
+
+    fn received(&mut self, _pdo: u8) {
+        self.come_into_force();
+    }
+
+    fn transmit(&mut self, object: MappedObject) -> u64 {
+        match table::find(object.index(), object.sub_index()).map(|object| object.field) {
+            Some(Field::Actual(actual)) => self.observed.actual(actual, self.shared),
+            Some(Field::Constant(number)) => super::observed::signed(number),
+            _ => 0,
+        }
+    }
+
+    fn state_changed(&mut self, state: NmtState) {
+        let none = SetPoints::none(self.points.mode);
+        // A transition by the task comes here twice: after it, and with the next frame.
+        if state == self.state && self.points == none {
+            return;
+        }
+        self.state = state;
+        self.points = none;
+        self.arriving = none;
+        self.arrived = Arrived::default();
+        self.points.publish(self.shared);
+        self.sequence = self.sequence.wrapping_add(1);
+        self.coupled_sequence = self.coupled_sequence.wrapping_add(1);
+    }
+}

@@ -1,0 +1,40 @@
+//! What the objects need done at once by the program around them; the task.
+
+use crate::canopen::Event;
+use crate::joint::configuration::{Configuration, ConfigurationError};
+use crate::joint::history::History;
+use crate::parameters::authentication::Key;
+use crate::parameters::slots::SlotError;
+
+/// Why a configuration is not in use.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum NotConfigured {
+    /// It is refused.
+    Refused(ConfigurationError),
+    /// The control step has not taken the one before.
+    Busy,
+}
+
+/// What a board, or a simulation of one, does for the objects.
+pub trait Program {
+    /// Prepares a configuration, with the friction model in use, and has the control step swap it in.
+    fn configure(&mut self, configuration: &Configuration) -> Result<(), NotConfigured>;
+
+    /// Makes a record outlast a loss of power. At start it goes to [`Stored::decode`](super::Stored::decode).
+    fn store(&mut self, record: &[u8]) -> Result<(), SlotError>;
+
+    /// Keeps the lowest version that is taken and the number of wrong tags. The client is answered after that.
+    fn keep(&mut self, floor: u32, failures: u16) -> Result<(), SlotError>;
+
+    /// Keeps the key, for good.
+    fn provision(&mut self, key: &Key) -> Result<(), SlotError>;
+
+    /// Fills `out` with bytes of the stored image in use, from `offset` on; false where they cannot be read.
+    fn read_image(&mut self, offset: u32, out: &mut [u8]) -> bool;
+
+    /// The steps before a fault, while one is latched.
+    fn history(&self) -> Option<&History>;
+
+    /// The network tells something. Of a transition the objects know already.
+    fn event(&mut self, event: Event);
+}

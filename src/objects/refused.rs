@@ -1,0 +1,56 @@
+//! What came of the last configuration, readable object by object; the task.
+
+use super::field::ConfigurationField;
+use crate::compensation::SettingsError;
+use crate::joint::configuration::ConfigurationError;
+use crate::motor::setting::SettingError;
+
+/// Objects 2100h:2 to 6.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Refused {
+    result: u8,
+    name: &'static str,
+    value: f32,
+    lowest: f32,
+    highest: f32,
+}
+
+impl Refused {
+    pub(super) fn busy() -> Self {
+        Self { result: 2, ..Self::default() }
+    }
+
+    pub(super) fn by(error: &ConfigurationError) -> Self {
+        let of = |name, value, lowest, highest| Self { result: 1, name, value, lowest, highest };
+        match *error {
+            ConfigurationError::Setting(SettingError { name, value, low, high, .. }) => of(name, value, low, high),
+            ConfigurationError::Compensation(error) => {
+                let torque = |torque: crate::quantity::Torque| torque.to_bits() as f32 / 65_536.0;
+                match error {
+                    SettingsError::Gain(gain) => of("compensation gain", gain as f32 / 65_536.0, 0.0, 1.0),
+                    SettingsError::Clamp(clamp) => of("compensation clamp", torque(clamp), 0.0, f32::INFINITY),
+                    SettingsError::Slew { slew, least } => {
+                        of("compensation slew limit", torque(slew), torque(least), f32::INFINITY)
+                    }
+                    SettingsError::Rate(rate) => of("control rate", rate as f32, 1.0, f32::INFINITY),
+                }
+            }
+            ConfigurationError::NodeId(id) => of("node id", id.into(), 1.0, 127.0),
+            ConfigurationError::PolePairs(pairs) => of("pole pairs", pairs as f32, 1.0, 64.0),
+        }
+    }
+
+    pub(super) fn name(&self) -> &'static str {
+        self.name
+    }
+
+    pub(super) fn get(&self, part: ConfigurationField) -> u32 {
+        match part {
+            ConfigurationField::Result => self.result.into(),
+            ConfigurationField::RefusedValue => self.value.to_bits(),
+            ConfigurationField::Lowest => self.lowest.to_bits(),
+            ConfigurationField::Highest => self.highest.to_bits(),
+            ConfigurationField::Command | ConfigurationField::RefusedSetting | ConfigurationField::Changed => 0,
+        }
+    }
+}

@@ -1,0 +1,116 @@
+//! Settings of the [`Configuration`], each as the number that an object carries; the task. Which setting is which member stands here
+//! and nowhere else.
+
+use crate::compensation::Request;
+use crate::joint::configuration::{Configuration, VelocitySource};
+use crate::motor::angle::Direction;
+
+/// Declares the settings: their names, and the members that are real numbers.
+macro_rules! settings {
+    ($($name:ident => $($member:ident).+ $([$tuple:tt])?,)+ ; $($other:ident,)+) => {
+        /// A setting of the configuration.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[allow(missing_docs, reason = "the members of the configuration have these names")]
+        pub enum Setting {
+            $($name,)+
+            $($other,)+
+        }
+
+        impl Setting {
+            /// The member, where it is a real number.
+            fn real(self, configuration: &mut Configuration) -> Option<&mut f32> {
+                Some(match self {
+                    $(Self::$name => &mut configuration.$($member).+ $(.$tuple)?,)+
+                    $(Self::$other => return None,)+
+                })
+            }
+        }
+    };
+}
+
+settings! {
+    Resistance => motor.resistance,
+    InductanceD => motor.inductance_d,
+    InductanceQ => motor.inductance_q,
+    TorqueConstant => motor.torque_constant,
+    CurrentLimit => motor.current_limit,
+    EncoderLatency => motor.encoder_latency,
+    GearRatio => gear.ratio,
+    JointZero => gear.zero,
+    TorqueLimit => limits.torque,
+    VelocityLimit => limits.velocity,
+    LowestPosition => limits.position[0],
+    HighestPosition => limits.position[1],
+    PositionMargin => limits.position_margin,
+    OverCurrent => limits.over_current,
+    LowestBusVoltage => limits.bus_voltage[0],
+    HighestBusVoltage => limits.bus_voltage[1],
+    BridgeTemperature => limits.bridge_temperature,
+    WindingTemperature => limits.winding_temperature,
+    CommandDeadline => limits.command_deadline,
+    CurrentBandwidth => gains.current_bandwidth,
+    ObserverBandwidth => gains.observer_bandwidth,
+    Stiffness => gains.stiffness,
+    Damping => gains.damping,
+    Integral => gains.integral,
+    Acceleration => gains.acceleration,
+    QuickStopDeceleration => gains.quick_stop_deceleration,
+    BrakingTime => gains.braking_time,
+    CompensationGain => compensation.gain,
+    Clamp => compensation.clamp,
+    Slew => compensation.slew,
+    StandstillVelocity => compensation.standstill_velocity,
+    WindingCapacity => thermal.winding_capacity,
+    HousingCapacity => thermal.housing_capacity,
+    WindingToHousing => thermal.winding_to_housing,
+    HousingToAmbient => thermal.housing_to_ambient,
+    Ambient => thermal.ambient,
+    ;
+    PolePairs,
+    Direction,
+    ElectricalZero,
+    Request,
+    VelocitySource,
+}
+
+impl Setting {
+    /// The number that the object carries: bits of a REAL32, or an unsigned number.
+    pub fn get(self, configuration: &Configuration) -> u32 {
+        // A copy, so that one declaration serves both ways.
+        let mut copy = *configuration;
+        if let Some(real) = self.real(&mut copy) {
+            return real.to_bits();
+        }
+        match self {
+            Self::PolePairs => copy.motor.alignment.pole_pairs,
+            Self::Direction => (copy.motor.alignment.direction == Direction::Reverse).into(),
+            Self::ElectricalZero => copy.motor.alignment.electrical_zero.0,
+            Self::Request => copy.compensation.request as u32,
+            _ => (copy.compensation.velocity_source == VelocitySource::Measured).into(),
+        }
+    }
+
+    /// Sets it; false, and nothing happens, for a number that stands for nothing. Ranges are the business of
+    /// [`Configuration::prepare`].
+    #[must_use]
+    pub fn set(self, configuration: &mut Configuration, number: u32) -> bool {
+        if let Some(real) = self.real(configuration) {
+            *real = f32::from_bits(number);
+            return true;
+        }
+        match (self, number) {
+            (Self::PolePairs, _) => configuration.motor.alignment.pole_pairs = number,
+            (Self::Direction, 0) => configuration.motor.alignment.direction = Direction::Forward,
+            (Self::Direction, 1) => configuration.motor.alignment.direction = Direction::Reverse,
+            (Self::ElectricalZero, _) => configuration.motor.alignment.electrical_zero.0 = number,
+            (Self::Request, 0) => configuration.compensation.request = Request::Off,
+            (Self::Request, 1) => configuration.compensation.request = Request::Physical,
+            (Self::Request, 2) => configuration.compensation.request = Request::PhysicalAndNetwork,
+            (Self::Request, 3) => configuration.compensation.request = Request::NetworkInShadow,
+            (Self::VelocitySource, 0) => configuration.compensation.velocity_source = VelocitySource::Reference,
+            (Self::VelocitySource, 1) => configuration.compensation.velocity_source = VelocitySource::Measured,
+            _ => return false,
+        }
+        true
+    }
+}

@@ -1,0 +1,71 @@
+//! 6000h to 67FFh: what CiA 402-2 has an object for.
+
+use super::*;
+use crate::objects::field::{Actual, Field::Actual as A, Field::Constant, Field::SetPoint as Set, SetPoint};
+
+room! {
+    0x6007 "abort connection option code" {
+        0, "abort connection option code", I16, RO, UNMAPPED, Constant(3); "", 1.0, ANY;
+            "3: outside OPERATIONAL the joint makes a quick stop"
+    }
+    0x603F "error code" {
+        0, "error code", U16, RO, TRANSMIT, A(Actual::ErrorCode); "", 1.0, ANY;
+            "Of the first latched fault, in the order of 2021h:4; 0 where there is none"
+    }
+    0x6040 "controlword" {
+        0, "controlword", U16, RW, RECEIVE, Set(SetPoint::Controlword); "", 1.0, ANY;
+            "Commands of the state machine"
+    }
+    0x6041 "statusword" {
+        0, "statusword", U16, RO, TRANSMIT, A(Actual::Statusword); "", 1.0, ANY;
+            "State of the state machine, voltage present (bit 4), remote (bit 9)"
+    }
+    0x605A "quick stop option code" {
+        0, "quick stop option code", I16, RO, UNMAPPED, Constant(2); "", 1.0, ANY;
+            "2: brake along the quick-stop ramp, then switch on disabled"
+    }
+    0x6060 "modes of operation" {
+        0, "modes of operation", I8, RW, RECEIVE, Set(SetPoint::Mode); "", 1.0, within(-1.0, 10.0);
+            "8 position (CSP), 9 velocity (CSV), 10 torque (CST), -1 impedance; in a PDO any other number changes nothing"
+    }
+    0x6061 "modes of operation display" {
+        0, "modes of operation display", I8, RO, TRANSMIT, A(Actual::Mode); "", 1.0, ANY;
+            "Mode that was chosen"
+    }
+    0x6064 "position actual value" {
+        0, "position actual value", I32, RO, TRANSMIT, A(Actual::Position); "rad", 1e-6, ANY;
+            "Position of the joint"
+    }
+    0x606C "velocity actual value" {
+        0, "velocity actual value", I32, RO, TRANSMIT, A(Actual::Velocity); "rad/s", 1e-3, ANY;
+            "Velocity of the joint"
+    }
+    0x6071 "target torque" {
+        0, "target torque", I16, RW, RECEIVE, Set(SetPoint::TargetTorque); "of 6076h", 1e-3, ANY;
+            "Torque mode; added in position and velocity mode"
+    }
+    0x6074 "torque demand" {
+        0, "torque demand", I16, RO, TRANSMIT, A(Actual::TorqueDemand); "of 6076h", 1e-3, ANY;
+            "Torque that the command asks for within all limits, before compensation: friction's theoretical torque"
+    }
+    0x6076 "motor rated torque" {
+        0, "motor rated torque", U32, RO, UNMAPPED, A(Actual::RatedTorque); "Nm", 1e-3, ANY;
+            "What the thousandths of 6071h, 6074h and 6077h refer to: the torque limit of the joint, 2103h:1"
+    }
+    0x6077 "torque actual value" {
+        0, "torque actual value", I16, RO, TRANSMIT, A(Actual::Torque); "of 6076h", 1e-3, ANY;
+            "Torque of the measured current at the joint"
+    }
+    0x607A "target position" {
+        0, "target position", I32, RW, RECEIVE, Set(SetPoint::TargetPosition); "rad", 1e-6, ANY;
+            "Position mode; without one since the last NMT transition the joint gives no torque"
+    }
+    0x60FF "target velocity" {
+        0, "target velocity", I32, RW, RECEIVE, Set(SetPoint::TargetVelocity); "rad/s", 1e-3, ANY;
+            "Velocity mode"
+    }
+    0x6502 "supported drive modes" {
+        0, "supported drive modes", U32, RO, TRANSMIT, Constant(0x0001_0380); "", 1.0, ANY;
+            "Position, velocity and torque (bits 7 to 9), impedance (bit 16)"
+    }
+}

@@ -1,0 +1,68 @@
+//! An SDO client: expedited and segmented.
+
+use super::*;
+
+impl Node {
+    fn ask(&mut self, request: [u8; 8]) -> Result<[u8; 8], u32> {
+        let sent = self.receive(0x600 + u16::from(NODE), &request);
+        let answers = sent.iter().filter(|frame| frame.id() == 0x580 + u16::from(NODE)).collect::<Vec<_>>();
+        let [answer] = answers[..] else { panic!("{} answers to {request:02x?}", answers.len()) };
+        match *answer.eight().unwrap() {
+            [0x80, _, _, _, a, b, c, d] => Err(u32::from_le_bytes([a, b, c, d])),
+            answer => Ok(answer),
+        }
+    }
+
+    pub fn upload(&mut self, index: u16, sub_index: u8) -> Result<Vec<u8>, u32> {
+        let [low, high] = index.to_le_bytes();
+        let answer = self.ask([0x40, low, high, sub_index, 0, 0, 0, 0])?;
+        if answer[0] & 2 != 0 {
+            return Ok(answer[4..8 - usize::from(answer[0] >> 2 & 3)].to_vec());
+        }
+        let (mut data, mut toggle) = (Vec::new(), 0);
+        loop {
+            let answer = self.ask([0x60 | toggle, 0, 0, 0, 0, 0, 0, 0])?;
+            data.extend(&answer[1..8 - usize::from(answer[0] >> 1 & 7)]);
+            if answer[0] & 1 != 0 {
+                return Ok(data);
+            }
+            toggle ^= 0x10;
+        }
+    }
+
+    pub fn download(&mut self, index: u16, sub_index: u8, data: &[u8]) -> Result<(), u32> {
+        let [low, high] = index.to_le_bytes();
+        if (1..=4).contains(&data.len()) {
+            let mut request = [0x23 | (4 - data.len() as u8) << 2, low, high, sub_index, 0, 0, 0, 0];
+            request[4..4 + data.len()].copy_from_slice(data);
+            return self.ask(request).map(|_| ());
+        }
+        let [a, b, c, d] = (data.len() as u32).to_le_bytes();
+        self.ask([0x21, low, high, sub_index, a, b, c, d])?;
+        let segments = data.chunks(7).collect::<Vec<_>>();
+        for (number, segment) in segments.iter().enumerate() {
+            let last = u8::from(number + 1 == segments.len());
+            let mut request = [0; 8];
+            request[0] = (number as u8 & 1) << 4 | (7 - segment.len() as u8) << 1 | last;
+            request[1..=segment.len()].copy_from_slice(segment);
+            self.ask(request)?;
+        }
+        Ok(())
+    }
+
+    /// A value of up to eight bytes, not sign-extended.
+    pub fn number(&mut self, index: u16, sub_index: u8) -> u64 {
+        let data = self.upload(index, sub_index).unwrap_or_else(|abort| panic!("{index:04x}:{sub_index} {abort:08x}"));
+        let mut bytes = [0; 8];
+        bytes[..data.len()].copy_from_slice(&data);
+        u64::from_le_bytes(bytes)
+    }
+
+    pub fn real(&mut self, index: u16, sub_index: u8) -> f32 {
+        f32::from_bits(self.number(index, sub_index) as u32)
+    }
+
+    pub fn set_real(&mut self, index: u16, sub_index: u8, value: f32) -> Result<(), u32> {
+        self.download(index, sub_index, &value.to_le_bytes())
+    }
+}

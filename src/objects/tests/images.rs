@@ -1,0 +1,218 @@
+//! The image life cycle over SDO: every step, every refusal with its code, its abort and its EMCY.
+
+use super::*;
+use crate::friction::domain::{Domain, Range};
+use crate::friction::physical::{Coefficients, PhysicalParameters, Terms};
+use crate::friction::regime::Selector;
+use crate::friction::state::{JointState, SIGNALS};
+use crate::friction::{FrictionModel, FrictionParameters, ParameterSet};
+use crate::joint::state_machine::State;
+use crate::parameters::Summary;
+use crate::parameters::image::{GoldenVector, Image, MAX_LENGTH};
+use crate::parameters::life_cycle::{Action, Mode};
+use crate::parameters::slots::Slot;
+
+const VERIFY: u8 = 1;
+const TRIAL: u8 = 2;
+const COMMIT: u8 = 3;
+const ROLL_BACK: u8 = 4;
+const DISCARD: u8 = 5;
+
+/// An image with a constant friction of half a newton metre.
+fn image(version: u32) -> Vec<u8> {
+    let coefficients = Coefficients::from_array(core::array::from_fn(|i| if i == 0 { 1 << 15 } else { 0 }));
+    let set = ParameterSet { physical: PhysicalParameters { terms: Terms::ALL, coefficients }, network: None };
+    let range = Range { low: -(1 << 16), high: 1 << 16 };
+    let friction = FrictionParameters {
+        domain: Domain { ranges: [range; SIGNALS], margin: 0, reference_temperature: 0 },
+        selector: Selector::default(),
+        sets: [set, ParameterSet::default(), ParameterSet::default(), ParameterSet::default()],
+    };
+    let expected = FrictionModel::new(&friction, 20_000).evaluate(0, &JointState::from_signals([7; SIGNALS]));
+    let image = Image {
+        version,
+        target: Target::default(),
+        created: 1_700_000_000,
+        effort: Effort::NewtonMetre,
+        data_hash: [0; 16],
+        friction,
+        limits: Limits { output: u32::MAX, torque_gain: u32::MAX - 1, velocity_slope: u32::MAX },
+        golden: [GoldenVector { set: 0, signals: [7; SIGNALS], expected }].into_iter().collect(),
+    };
+    let mut buffer = [0; MAX_LENGTH];
+    let length = image.encode(&mut buffer).unwrap();
+    buffer[..length].to_vec()
+}
+
+fn stored(bytes: &[u8]) -> StoredImages {
+    StoredImages { active: Some((Image::summary(bytes).unwrap(), Slot::First)), previous: None }
+}
+
+fn command(node: &mut Node, command: u8) -> Result<(), u32> {
+    node.download(0x2212, 1, &[command])
+}
+
+fn verified(bytes: &[u8]) -> Node {
+    let mut node = Node::operational();
+    node.download(0x2210, 0, bytes).unwrap();
+    command(&mut node, VERIFY).unwrap();
+    assert_eq!((node.number(0x2212, 2), node.number(0x2212, 3)), (2, 0));
+    node.download(0x2212, 7, &5_000u32.to_le_bytes()).unwrap();
+    node
+}
+
+#[test]
+fn a_summary_says_what_the_image_says() {
+    let bytes = image(3);
+    let checksum = u32::from_le_bytes(*bytes.last_chunk().unwrap());
+    let length = bytes.len() as u32;
+    let expected = Summary { version: 3, created: 1_700_000_000, network: false, checksum, length };
+    assert_eq!(Image::summary(&bytes), Ok(expected));
+    assert!(Image::summary(&bytes[..100]).is_err());
+}
+
+#[test]
+fn an_upload_is_counted_and_its_checksum_told() {
+    let mut node = Node::new();
+    assert_eq!((node.number(0x2212, 2), node.number(0x2212, 4)), (0, 0));
+    node.download(0x2210, 0, b"123456789").unwrap();
+    assert_eq!((node.number(0x2212, 2), node.number(0x2212, 4)), (1, 9));
+    // The check value of CRC-32.
+    assert_eq!(node.number(0x2212, 5), 0xCBF4_3926);
+}
+
+#[test]
+fn a_trial_ends_with_its_time_and_can_begin_again() {
+    let bytes = image(1);
+    let mut node = verified(&bytes);
+    command(&mut node, TRIAL).unwrap();
+    assert_eq!(node.objects.take_action(), Action::Run { mode: Mode::Trial, length: bytes.len() });
+    assert_eq!(node.objects.staging()[..bytes.len()], bytes);
+    node.objects.finished(Ok(()), StoredImages::default());
+    assert_eq!((node.number(0x2212, 2), node.number(0x2212, 6)), (4, 5_000));
+    node.now += 5_000_000;
+    node.task();
+    assert_eq!(node.objects.take_action(), Action::Revert);
+    node.objects.finished(Ok(()), StoredImages::default());
+    assert_eq!((node.number(0x2212, 2), node.number(0x2212, 6), node.number(0x2212, 8)), (2, 0, 1));
+    command(&mut node, TRIAL).unwrap();
+    assert_eq!(node.number(0x2212, 8), 0);
+}
+
+#[test]
+fn a_trial_ends_with_a_lost_heartbeat() {
+    let mut node = verified(&image(1));
+    node.download(0x1016, 1, &(9 << 16 | 100u32).to_le_bytes()).unwrap();
+    node.receive(0x709, &[5]);
+    command(&mut node, TRIAL).unwrap();
+    node.objects.take_action();
+    node.objects.finished(Ok(()), StoredImages::default());
+    node.now += 90_000;
+    node.task();
+    assert_eq!(node.objects.take_action(), Action::Nothing);
+    node.now += 20_000;
+    node.task();
+    node.task();
+    assert_eq!(node.objects.take_action(), Action::Revert);
+    node.objects.finished(Ok(()), StoredImages::default());
+    assert_eq!(node.number(0x2212, 8), 2);
+}
+
+#[test]
+fn a_commit_goes_through_flash_to_active_and_back() {
+    let bytes = image(4);
+    let mut node = verified(&bytes);
+    command(&mut node, COMMIT).unwrap();
+    assert_eq!(node.number(0x2212, 2), 5);
+    // While it is being written nothing else is taken.
+    assert_eq!(command(&mut node, DISCARD), Err(0x0800_0022));
+    assert_eq!(node.download(0x2210, 0, &bytes), Err(0x0800_0022));
+    assert_eq!(node.objects.take_action(), Action::Store { length: bytes.len() });
+    node.objects.finished(Ok(()), stored(&bytes));
+    assert_eq!(node.objects.program().kept, [(4, 0)]);
+    assert_eq!((node.number(0x2212, 2), node.objects.take_action()), (6, Action::Activate));
+    node.objects.program().image = bytes.clone();
+    node.objects.finished(Ok(()), stored(&bytes));
+    assert_eq!(node.number(0x2212, 2), 7);
+    assert_eq!(node.upload(0x2211, 0), Ok(bytes.clone()));
+    assert_eq!([1, 3, 4, 5].map(|sub| node.number(0x2213, sub)), [4, 1, 1, 1_700_000_000]);
+    assert_eq!((node.number(0x2214, 1), node.number(0x2215, 3)), (0, 4));
+    command(&mut node, ROLL_BACK).unwrap();
+    assert_eq!(node.objects.take_action(), Action::RollBack);
+    node.objects.finished(Err(SlotError::NoPrevious), stored(&bytes));
+    assert_eq!((node.number(0x2212, 3), node.number(0x2213, 1)), (0x0905, 4));
+}
+
+#[test]
+fn a_refusal_is_an_abort_a_number_and_an_emcy() {
+    let emcy = |sent: &[Frame]| sent.iter().find(|frame| frame.id() == 0x85).map(|frame| frame.data()[..5].to_vec());
+    let write = |node: &mut Node, value: u8| node.receive(0x605, &[0x2F, 0x12, 0x22, 1, value, 0, 0, 0]);
+    let mut node = Node::new();
+    let sent = write(&mut node, COMMIT);
+    assert_eq!(sent[0].data()[4..], 0x0800_0022u32.to_le_bytes());
+    assert_eq!(emcy(&sent), Some(vec![0x20, 0x63, 0, 0x02, 0x08]));
+    assert_eq!(node.number(0x2212, 3), 0x0802);
+    let sent = write(&mut node, 9);
+    assert_eq!(sent[0].data()[4..], 0x0609_0030u32.to_le_bytes());
+    assert_eq!(node.number(0x2212, 3), 0x0801);
+    let mut damaged = image(1);
+    damaged[60] ^= 1;
+    node.download(0x2210, 0, &damaged).unwrap();
+    let sent = write(&mut node, VERIFY);
+    assert_eq!(sent[0].data()[4..], 0x0800_0020u32.to_le_bytes());
+    assert_eq!(node.number(0x2212, 3), 0x0205);
+    assert_eq!(node.download(0x2210, 0, &[0; 2049]), Err(0x0607_0012));
+}
+
+#[test]
+fn one_bank_of_flash_takes_a_commit_only_with_the_motor_off() {
+    let mut node = Node::with(Stored::NOTHING, true);
+    node.download(0x2210, 0, &image(1)).unwrap();
+    command(&mut node, VERIFY).unwrap();
+    node.observed.telemetry.state = State::OperationEnabled;
+    assert_eq!(command(&mut node, COMMIT), Err(0x0800_0022));
+    assert_eq!((node.number(0x2212, 3), node.objects.take_action()), (0x0804, Action::Nothing));
+    node.observed.telemetry.state = State::SwitchOnDisabled;
+    command(&mut node, COMMIT).unwrap();
+}
+
+#[test]
+fn a_key_is_given_once_and_from_then_on_tags_count() {
+    let mut node = Node::new();
+    assert_eq!(node.download(0x2215, 6, &[9; 31]), Err(0x0607_0013));
+    assert_eq!(node.download(0x2215, 6, &[9; 32]), Err(0x0609_0030));
+    let bytes: [u8; 32] = core::array::from_fn(|i| i as u8);
+    node.download(0x2215, 6, &bytes).unwrap();
+    let key = Key::new(bytes).unwrap();
+    assert_eq!((node.number(0x2215, 1), node.number(0x2215, 2)), (1, key.id().into()));
+    assert_eq!(node.objects.program().key, Some(bytes));
+    assert_eq!(node.download(0x2215, 6, &[1; 32]), Err(0x0800_0021));
+    let image = image(1);
+    let tagged = |tag: &[u8; 32]| [&image[..], tag].concat();
+    node.download(0x2210, 0, &image).unwrap();
+    assert_eq!(command(&mut node, VERIFY), Err(0x0800_0021));
+    assert_eq!((node.number(0x2212, 3), node.number(0x2215, 4)), (0x0301, 0));
+    node.download(0x2210, 0, &tagged(&[0; 32])).unwrap();
+    for failures in 1..=4 {
+        assert_eq!(command(&mut node, VERIFY), Err(0x0800_0021));
+        assert_eq!(node.objects.program().kept.last(), Some(&(0, failures)));
+    }
+    assert_eq!((node.number(0x2215, 4), node.number(0x2215, 5)), (4, 1_000));
+    node.download(0x2210, 0, &tagged(&key.sign(&image))).unwrap();
+    assert_eq!((command(&mut node, VERIFY), node.number(0x2212, 3)), (Err(0x0800_0021), 0x0303));
+    node.now += 1_000_000;
+    node.task();
+    command(&mut node, VERIFY).unwrap();
+    assert_eq!((node.number(0x2212, 2), node.number(0x2215, 4)), (2, 0));
+    assert_eq!(node.number(0x1003, 1) as u16, emergency::AUTHENTICATION);
+}
+
+#[test]
+fn an_upload_that_breaks_off_is_not_verified() {
+    let mut node = Node::new();
+    let [a, b, c, d] = 500u32.to_le_bytes();
+    node.receive(0x605, &[0x21, 0x10, 0x22, 0, a, b, c, d]);
+    node.receive(0x605, &[0x00, 1, 2, 3, 4, 5, 6, 7]);
+    node.receive(0x605, &[0x80, 0x10, 0x22, 0, 0, 0, 0, 0]);
+    assert_eq!((command(&mut node, VERIFY), node.number(0x2212, 3)), (Err(0x0800_0020), 0x0102));
+}

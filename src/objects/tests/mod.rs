@@ -1,0 +1,184 @@
+//! The objects behind the real server: a client by SDO, a master by PDO, a hostile bus; the host.
+
+mod client;
+mod documentation;
+mod hostile;
+mod images;
+mod process_data;
+mod settings;
+mod table;
+
+use super::*;
+use crate::canopen::{self, Event, Frame, Identity, NmtState, Receiver, Route, SdoSettings, Server};
+use crate::default_configuration::{B_G431B_ESC1, BoardConfiguration};
+use crate::joint::configuration::Configuration;
+use crate::joint::history::History;
+use crate::parameters::authentication::{Key, STAGING};
+use crate::parameters::certificate::Limits;
+use crate::parameters::image::{Effort, Target};
+use crate::parameters::life_cycle::{LifeCycle, Requirements};
+use crate::parameters::slots::SlotError;
+use std::collections::VecDeque;
+
+pub const NODE: u8 = 5;
+const BOARD: BoardConfiguration = B_G431B_ESC1;
+const IDENTITY: Identity<'static> = Identity {
+    device_type: 0x0002_0192,
+    device_name: "joint",
+    hardware_version: "host",
+    software_version: "0.1.0",
+    vendor: 1,
+    product: 2,
+    revision: 3,
+    serial: 4,
+};
+
+/// A program that keeps everything in memory and does what it is told.
+#[derive(Default)]
+pub struct Memory {
+    pub configured: Vec<Configuration>,
+    pub busy: bool,
+    pub record: Option<Vec<u8>>,
+    pub kept: Vec<(u32, u16)>,
+    pub key: Option<[u8; 32]>,
+    pub image: Vec<u8>,
+    pub history: Option<History>,
+    pub fails: Option<SlotError>,
+}
+
+impl Program for Memory {
+    fn configure(&mut self, configuration: &Configuration) -> Result<(), NotConfigured> {
+        if self.busy {
+            return Err(NotConfigured::Busy);
+        }
+        configuration.prepare(&BOARD.bridge).map_err(NotConfigured::Refused)?;
+        self.configured.push(*configuration);
+        Ok(())
+    }
+
+    fn store(&mut self, record: &[u8]) -> Result<(), SlotError> {
+        self.fails.map_or(Ok(()), Err)?;
+        self.record = Some(record.to_vec());
+        Ok(())
+    }
+
+    fn keep(&mut self, floor: u32, failures: u16) -> Result<(), SlotError> {
+        self.kept.push((floor, failures));
+        Ok(())
+    }
+
+    fn provision(&mut self, key: &Key) -> Result<(), SlotError> {
+        self.key = Some(key.to_bytes());
+        Ok(())
+    }
+
+    fn read_image(&mut self, offset: u32, out: &mut [u8]) -> bool {
+        out.copy_from_slice(&self.image[offset as usize..][..out.len()]);
+        true
+    }
+
+    fn history(&self) -> Option<&History> {
+        self.history.as_ref()
+    }
+
+    fn event(&mut self, _event: Event) {}
+}
+
+/// A joint's node without the joint: what it observes is the test's to say.
+pub struct Node {
+    pub shared: &'static Shared,
+    pub bus: &'static canopen::Shared,
+    pub receiver: Receiver<'static>,
+    pub server: Server<'static>,
+    pub image: JointImage<'static>,
+    pub objects: Objects<'static, Memory>,
+    pub observed: Observed,
+    queue: VecDeque<Frame>,
+    pub now: u32,
+}
+
+impl Node {
+    /// In PRE-OPERATIONAL.
+    pub fn new() -> Self {
+        Self::with(Stored::NOTHING, false)
+    }
+
+    pub fn with(stored: Stored, single_bank: bool) -> Self {
+        let bus: &canopen::Shared = Box::leak(Box::new(canopen::Shared::new()));
+        let shared: &Shared = Box::leak(Box::new(Shared::new()));
+        let requirements = Requirements {
+            target: Target { product: 2, serial: 4 },
+            effort: Effort::NewtonMetre,
+            limits: Limits { output: u32::MAX, torque_gain: u32::MAX, velocity_slope: u32::MAX },
+            rate: 20_000,
+        };
+        let staging = Box::leak(Box::new([0; STAGING]));
+        let images = Images::new(staging, LifeCycle::new(requirements, 0, 0, 0), None, StoredImages::default());
+        let start = Start { configuration: stored.configuration(&BOARD.joint), stored, single_bank };
+        let mut node = Self {
+            shared,
+            bus,
+            server: Server::new(bus, &IDENTITY, SdoSettings::default(), NODE),
+            receiver: Receiver::new(bus),
+            image: JointImage::new(shared),
+            objects: Objects::new(shared, Memory::default(), images, &start),
+            observed: Observed::default(),
+            queue: VecDeque::new(),
+            now: 0,
+        };
+        node.task();
+        assert_eq!(node.bus.state(), NmtState::PreOperational);
+        node
+    }
+
+    pub fn operational() -> Self {
+        let mut node = Self::new();
+        node.receive(0, &[1, NODE]);
+        assert_eq!(node.bus.state(), NmtState::Operational);
+        node
+    }
+
+    /// The receive interrupt: the frames that it sends.
+    fn interrupt(&mut self, frame: &Frame) -> Vec<Frame> {
+        let mut sent = Vec::new();
+        self.image.observe(&self.observed);
+        match self.receiver.receive(frame, self.now, &mut self.image, |frame| sent.push(frame)) {
+            Route::Server => self.queue.push_back(*frame),
+            Route::Done => {}
+        }
+        self.image.follow(self.bus.state());
+        sent
+    }
+
+    /// The task, until it has nothing to do: the frames that it sends.
+    pub fn task(&mut self) -> Vec<Frame> {
+        self.objects.poll(u64::from(self.now / 1_000), &self.observed);
+        while let Some(emergency) = self.objects.take_emergency() {
+            self.server.emergency(emergency.code, emergency.register, emergency.information);
+        }
+        let mut sent = Vec::new();
+        loop {
+            if let Some(frame) = self.queue.pop_front() {
+                sent.extend(self.server.receive(&frame, self.now, &mut self.objects));
+                while let Some(emergency) = self.objects.take_emergency() {
+                    self.server.emergency(emergency.code, emergency.register, emergency.information);
+                }
+            } else if let Some(frame) = self.server.poll(self.now, &mut self.objects) {
+                sent.push(frame);
+            } else {
+                break;
+            }
+        }
+        // Pended by the task: a written set-point, a transition.
+        self.image.follow(self.bus.state());
+        assert!(!self.shared.has_written());
+        sent
+    }
+
+    /// A frame from the bus, and everything that comes of it.
+    pub fn receive(&mut self, id: u16, data: &[u8]) -> Vec<Frame> {
+        let mut sent = self.interrupt(&Frame::new(id, data).unwrap());
+        sent.extend(self.task());
+        sent
+    }
+}

@@ -1,0 +1,243 @@
+//! RPDOs to demands, observations to TPDOs, and what a transition does.
+
+use super::*;
+use crate::joint::fault::Fault;
+use crate::joint::state_machine::{Controlword, State};
+use crate::joint::{Command, Demand, Mode};
+
+fn rpdo1(controlword: u16, torque: i16, position: i32) -> Vec<u8> {
+    [&controlword.to_le_bytes()[..], &torque.to_le_bytes(), &position.to_le_bytes()].concat()
+}
+
+fn rpdo2(controlword: u16, mode: i8, counter: u8, velocity: i32) -> Vec<u8> {
+    [&controlword.to_le_bytes()[..], &mode.to_le_bytes(), &[counter], &velocity.to_le_bytes()].concat()
+}
+
+fn set_mode(node: &mut Node, mode: i8) {
+    node.download(0x6060, 0, &mode.to_le_bytes()).unwrap();
+    assert_eq!(node.number(0x6061, 0), u64::from(mode as u8));
+}
+
+#[test]
+fn each_mode_takes_its_own_set_point() {
+    let mut node = Node::operational();
+    let rated = BOARD.joint.limits.torque;
+    node.receive(0x205, &rpdo1(0x0F, -250, 1_500_000));
+    let Demand { controlword, command, .. } = node.image.demand();
+    assert_eq!(controlword, Controlword(0x0F));
+    assert_eq!((command.mode, command.position), (Mode::Torque, 0.0));
+    assert!((command.torque + 0.25 * rated).abs() < 1e-6 * rated);
+    set_mode(&mut node, 8);
+    let command = node.image.demand().command;
+    assert_eq!(command.mode, Mode::Position);
+    assert!((command.position - 1.5).abs() < 1e-6 && (command.torque + 0.25 * rated).abs() < 1e-6 * rated);
+    node.receive(0x305, &rpdo2(0x0F, 9, 1, -2_500));
+    let command = node.image.demand().command;
+    assert_eq!((command.mode, command.velocity), (Mode::Velocity, -2.5));
+}
+
+#[test]
+fn the_ends_of_every_number_are_kept() {
+    let mut node = Node::operational();
+    set_mode(&mut node, 8);
+    for (position, rad) in [(i32::MAX, 2_147.483_6), (i32::MIN, -2_147.483_6)] {
+        node.receive(0x205, &rpdo1(0, i16::MAX, position));
+        let command = node.image.demand().command;
+        assert!((command.position - rad).abs() < 3e-4, "{}", command.position);
+        assert!((command.torque / BOARD.joint.limits.torque - 32.767).abs() < 1e-4);
+    }
+}
+
+#[test]
+fn the_impedance_frame_is_the_mini_cheetahs() {
+    let mut node = Node::operational();
+    // By SDO, as RPDO 3 carries no mode.
+    set_mode(&mut node, -1);
+    node.receive(0x405, &[0xFF, 0xFF, 0, 0x0F, 0xFF, 0, 0x0F, 0xFF]);
+    let [position, velocity, stiffness, _, torque] = DEFAULT_RANGES;
+    let expected = Command { mode: Mode::Impedance, position, velocity: -velocity, stiffness, damping: 0.0, torque };
+    assert_eq!(node.image.demand().command, expected);
+    for command in [expected, Command { position: -1.25, velocity: 3.0, damping: 2.5, torque: -4.5, ..expected }] {
+        node.receive(0x405, &impedance_frame(&command, DEFAULT_RANGES).to_le_bytes());
+        let Command { position: p, velocity: v, stiffness: k, damping: d, torque: t, .. } = node.image.demand().command;
+        let errors = [
+            (p - command.position) / (position / 65_535.0),
+            (v - command.velocity) / (velocity / 4_095.0),
+            (k - command.stiffness) / (stiffness / 8_190.0),
+            (d - command.damping) / (5.0 / 8_190.0),
+            (t - command.torque) / (torque / 4_095.0),
+        ];
+        assert!(errors.iter().all(|error| error.abs() < 1.01), "{errors:?}");
+    }
+    assert_eq!(
+        node.number(0x2011, 1),
+        u64::from_le_bytes(
+            impedance_frame(
+                &Command { position: -1.25, velocity: 3.0, damping: 2.5, torque: -4.5, ..expected },
+                DEFAULT_RANGES
+            )
+            .to_le_bytes()
+        )
+    );
+}
+
+#[test]
+fn a_joint_that_was_not_told_where_to_go_is_asked_for_no_torque() {
+    let mut node = Node::operational();
+    for mode in [8, -1] {
+        node.receive(0x305, &rpdo2(0x0F, mode, mode as u8, 0));
+        assert_eq!(node.image.demand().command, Command::default());
+    }
+}
+
+#[test]
+fn every_transition_ends_every_set_point_and_keeps_the_mode() {
+    for command in [0x02, 0x80, 0x81, 0x82] {
+        let mut node = Node::operational();
+        set_mode(&mut node, 8);
+        node.receive(0x205, &rpdo1(0x0F, 100, 1_000_000));
+        let before = node.image.demand();
+        assert_ne!(before.command, Command::default());
+        node.receive(0, &[command, NODE]);
+        let after = node.image.demand();
+        assert_eq!((after.controlword, after.command), (Controlword::QUICK_STOP, Command::default()));
+        assert_ne!(after.sequence, before.sequence);
+        // What comes now changes nothing, now and after the next start.
+        node.receive(0x205, &rpdo1(0x0F, 100, 1_000_000));
+        node.receive(0x80, &[]);
+        assert_eq!(node.image.demand(), after);
+        node.receive(0, &[1, NODE]);
+        let Demand { controlword, command, .. } = node.image.demand();
+        assert_eq!((controlword, command), (Controlword::QUICK_STOP, Command::default()));
+        node.receive(0x205, &rpdo1(0x0F, 0, 500_000));
+        assert_eq!(node.image.demand().command.mode, Mode::Position);
+    }
+}
+
+#[test]
+fn set_points_by_sdo_need_operational_and_a_mode_does_not() {
+    let mut node = Node::new();
+    for (index, value) in
+        [(0x6040, &[0x0F, 0][..]), (0x6071, &[1, 0]), (0x607A, &[1, 0, 0, 0]), (0x60FF, &[1, 0, 0, 0])]
+    {
+        assert_eq!(node.download(index, 0, value), Err(0x0800_0022), "{index:04x}");
+    }
+    set_mode(&mut node, 9);
+    assert_eq!(node.download(0x6060, 0, &[3]), Err(0x0609_0030));
+    node.receive(0, &[1, NODE]);
+    let before = node.image.demand().sequence;
+    node.download(0x6040, 0, &[0x06, 0]).unwrap();
+    node.download(0x60FF, 0, &1_000i32.to_le_bytes()).unwrap();
+    let Demand { controlword, command, sequence, .. } = node.image.demand();
+    assert_eq!((controlword, command.velocity, sequence), (Controlword::SHUTDOWN, 1.0, before + 2));
+    assert_eq!(node.number(0x60FF, 0), 1_000);
+}
+
+#[test]
+fn a_repeated_counter_does_not_renew_the_deadline() {
+    let mut node = Node::operational();
+    let mut sequences = [1u8, 1, 2, 2].map(|counter| {
+        node.receive(0x305, &rpdo2(0x0F, 9, counter, 0));
+        node.image.demand().sequence
+    });
+    assert_eq!((sequences[0], sequences[2]), (sequences[1], sequences[3]));
+    assert_eq!(sequences[2], sequences[0] + 1);
+    // A PDO without the counter is not measured by it.
+    sequences[3] += 1;
+    node.receive(0x205, &rpdo1(0x0F, 0, 0));
+    assert_eq!(node.image.demand().sequence, sequences[3]);
+}
+
+#[test]
+fn a_mode_that_does_not_exist_changes_nothing() {
+    let mut node = Node::operational();
+    node.receive(0x305, &rpdo2(0x0F, 9, 1, 5));
+    node.receive(0x305, &rpdo2(0x0F, 3, 2, 6));
+    assert_eq!(node.image.demand().command, Command { mode: Mode::Velocity, velocity: 0.006, ..Command::default() });
+}
+
+#[test]
+fn a_neighbours_velocity_comes_out_of_its_second_tpdo() {
+    let mut node = Node::operational();
+    node.download(0x1403, 1, &0x286u32.to_le_bytes()).unwrap();
+    let before = node.image.demand();
+    node.receive(0x286, &[0x30, 0xF8, 0xFF, 0xFF, 1, 2, 3, 4]);
+    let after = node.image.demand();
+    assert_eq!(after.coupled.velocity, -2.0);
+    assert_eq!(after.coupled.sequence, before.coupled.sequence + 1);
+    // It asks nothing of this joint.
+    assert_eq!(Demand { coupled: before.coupled, ..after }, before);
+}
+
+#[test]
+fn telemetry_is_scaled_as_the_table_says_and_held_at_the_ends() {
+    let mut node = Node::operational();
+    let t = &mut node.observed.telemetry;
+    t.state = State::OperationEnabled;
+    t.motion.position = -1.234_567;
+    t.motion.velocity = 2.5;
+    t.measured_torque = 0.01;
+    t.compensated.torque = -0.0125;
+    t.bus_voltage = 23.456;
+    node.observed.feedforward_torque = 0.02;
+    node.observed.winding_temperature = 45.67;
+    node.observed.latched.set(Fault::OverCurrent, true);
+    node.observed.latched.set(Fault::BridgeDriver, true);
+    let sent = node.receive(0x80, &[]);
+    let pdo = |id: u16| sent.iter().find(|frame| frame.id() == id).unwrap().data().to_vec();
+    let permille = (10.0 / BOARD.joint.limits.torque) as i16;
+    assert_eq!(
+        pdo(0x185),
+        [&0x0237u16.to_le_bytes()[..], &permille.to_le_bytes(), &(-1_234_567i32).to_le_bytes()].concat()
+    );
+    // 10 mNm measured, 20 mNm fed forward, -12.5 mNm by compensation: 2.5 mNm are left.
+    let velocity = [&2_500i32.to_le_bytes()[..], &(-13i16).to_le_bytes(), &3i16.to_le_bytes()].concat();
+    assert_eq!(pdo(0x285)[..6], velocity[..6]);
+    assert!((i16::from_le_bytes([pdo(0x285)[6], pdo(0x285)[7]]) - 3).abs() <= 1);
+    assert_eq!(node.number(0x2021, 1), 2_346);
+    assert_eq!(node.number(0x2021, 2), 457);
+    assert_eq!(node.number(0x2021, 3) as u16 as i16, i16::MIN);
+    assert_eq!(node.number(0x2021, 4), 0x8001);
+    assert_eq!(node.number(0x603F, 0), 0x2310);
+    assert_eq!(node.number(0x6076, 0), (BOARD.joint.limits.torque * 1e3) as u64);
+    for (value, position, torque) in
+        [(f32::NAN, 0, 0), (f32::INFINITY, i32::MAX, i16::MAX), (-1e30, i32::MIN, i16::MIN)]
+    {
+        node.observed.telemetry.motion.position = value;
+        node.observed.telemetry.compensated.torque = value;
+        assert_eq!(node.number(0x6064, 0) as i32, position);
+        assert_eq!(node.number(0x2020, 1) as i16, torque);
+    }
+}
+
+#[test]
+fn a_fault_is_reported_with_its_code_and_its_end() {
+    let mut node = Node::operational();
+    node.observed.latched.set(Fault::OverVoltage, true);
+    let emergency =
+        |node: &mut Node| node.task().iter().find(|frame| frame.id() == 0x85).map(|frame| *frame.eight().unwrap());
+    assert_eq!(emergency(&mut node), Some([0x10, 0x32, 0x05, 4, 8, 0, 0, 0]));
+    assert_eq!(emergency(&mut node), None);
+    node.observed.latched = crate::joint::fault::Faults::NONE;
+    assert_eq!(emergency(&mut node), Some([0; 8]));
+    assert_eq!(node.number(0x1003, 1), 0x0804_3210);
+}
+
+#[test]
+fn the_history_of_a_fault_is_one_domain() {
+    use crate::joint::history::Snapshot;
+    let mut node = Node::new();
+    assert_eq!(node.upload(0x2300, 0), Ok(vec![]));
+    let mut history = History::default();
+    let mut faults = crate::joint::fault::Faults::NONE;
+    faults.set(Fault::OverSpeed, true);
+    history.note(Snapshot { position: 1.0, ..Snapshot::default() });
+    history.note(Snapshot { state: State::Fault, position: 2.0, bus_voltage: 12.0, faults, ..Snapshot::default() });
+    node.objects.program().history = Some(history);
+    let bytes = node.upload(0x2300, 0).unwrap();
+    assert_eq!(bytes.len(), 64 * STEP);
+    let last = &bytes[63 * STEP..];
+    assert_eq!((last[0], &last[4..8]), (7, &[0, 1, 0, 0][..]));
+    assert_eq!((&last[8..12], &last[32..]), (&2f32.to_le_bytes()[..], &12f32.to_le_bytes()[..]));
+    assert_eq!(bytes[62 * STEP + 8..][..4], 1f32.to_le_bytes());
+}

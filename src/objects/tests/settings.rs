@@ -1,0 +1,177 @@
+//! The configuration: staged, taken as a whole, stored, restored.
+
+use super::*;
+use crate::joint::state_machine::State;
+use crate::objects::field::{Field, Range};
+use crate::objects::table::{DataType, described};
+
+const TAKE: (u16, u8) = (0x2100, 1);
+
+fn take(node: &mut Node) -> Result<(), u32> {
+    node.download(TAKE.0, TAKE.1, &[1])
+}
+
+#[test]
+fn what_is_staged_counts_once_it_is_taken() {
+    let mut node = Node::new();
+    node.set_real(0x2103, 1, 0.03).unwrap();
+    node.set_real(0x2104, 3, 0.5).unwrap();
+    assert_eq!((node.number(0x2100, 7), node.objects.program().configured.len()), (1, 0));
+    take(&mut node).unwrap();
+    let taken = *node.objects.program().configured.last().unwrap();
+    assert_eq!((taken.limits.torque, taken.gains.stiffness), (0.03, 0.5));
+    assert_eq!((node.number(0x2100, 7), node.number(0x2100, 2), node.number(0x6076, 0)), (0, 0, 30));
+}
+
+#[test]
+fn a_refused_configuration_says_which_setting_and_why() {
+    let mut node = Node::new();
+    node.set_real(0x2101, 4, 7.0).unwrap();
+    assert_eq!(take(&mut node), Err(0x0609_0030));
+    assert_eq!(node.number(0x2100, 2), 1);
+    assert_eq!(node.upload(0x2100, 3).unwrap(), b"torque constant");
+    assert_eq!((node.real(0x2100, 4), node.real(0x2100, 5), node.real(0x2100, 6)), (7.0, 1e-3, 5.0));
+    assert!(node.objects.program().configured.is_empty());
+    node.download(TAKE.0, TAKE.1, &[2]).unwrap();
+    assert_eq!((node.real(0x2101, 4), node.upload(0x2100, 3)), (BOARD.joint.motor.torque_constant, Ok(vec![])));
+}
+
+#[test]
+fn every_limit_in_the_table_is_one_that_the_joint_keeps() {
+    for (object, text) in described() {
+        let (setting, (low, high)) = match (object.field, text.limits) {
+            (Field::Setting(setting) | Field::Compensation(setting), Some(limits)) => (setting, limits),
+            (Field::Setting(_) | Field::Compensation(_), None) => continue,
+            _ => continue,
+        };
+        for outside in [low - 1e-3 * (1.0 + low.abs()), high + 1e-3 * (1.0 + high.abs())] {
+            let mut configuration = BOARD.joint;
+            let bits = match object.data_type {
+                DataType::F32 => (outside as f32).to_bits(),
+                _ => (outside + if outside > 0.0 { 1.0 } else { 0.0 }) as i64 as u32,
+            };
+            // Unsigned numbers cannot go below zero.
+            if object.data_type != DataType::F32 && bits == low as u32 {
+                continue;
+            }
+            let refused = !setting.set(&mut configuration, bits) || configuration.prepare(&BOARD.bridge).is_err();
+            assert!(refused, "{}: {outside}", text.name);
+        }
+    }
+}
+
+#[test]
+fn every_setting_keeps_the_number_it_was_given() {
+    for (object, text) in described() {
+        let (Field::Setting(setting) | Field::Compensation(setting)) = object.field else { continue };
+        let number = if object.data_type == DataType::F32 { 0.123f32.to_bits() } else { 1 };
+        let mut configuration = BOARD.joint;
+        assert!(setting.set(&mut configuration, number));
+        assert_eq!(setting.get(&configuration), number, "{}", text.name);
+        // And nothing else changed.
+        assert!(setting.set(&mut configuration, setting.get(&BOARD.joint)));
+        assert_eq!(configuration, BOARD.joint, "{}", text.name);
+    }
+}
+
+#[test]
+fn compensation_acts_at_once_also_under_way_and_the_rest_does_not() {
+    let mut node = Node::operational();
+    node.observed.telemetry.state = State::OperationEnabled;
+    node.set_real(0x2200, 3, 0.8).unwrap();
+    node.download(0x2200, 1, &[2]).unwrap();
+    assert_eq!(node.objects.program().configured.last().unwrap().compensation.gain, 0.8);
+    assert_eq!(node.set_real(0x2200, 3, 1.5), Err(0x0609_0030));
+    assert_eq!(node.upload(0x2200 - 0x100, 3).unwrap(), b"compensation gain");
+    assert_eq!(node.real(0x2200, 3), 0.8);
+    assert_eq!(node.download(0x2200, 1, &[4]), Err(0x0609_0030));
+    node.set_real(0x2103, 1, 0.03).unwrap();
+    assert_eq!(take(&mut node), Err(0x0800_0022));
+    assert_eq!(node.set_real(0x2012, 5, 9.0), Err(0x0800_0022));
+}
+
+#[test]
+fn a_control_step_that_takes_nothing_is_told_from_a_refusal() {
+    let mut node = Node::new();
+    node.objects.program().busy = true;
+    assert_eq!(take(&mut node), Err(0x0800_0022));
+    assert_eq!(node.number(0x2100, 2), 2);
+}
+
+#[test]
+fn ranges_are_positive_and_no_wider_than_a_command_may_be() {
+    let mut node = Node::new();
+    for range in Range::ALL {
+        let sub_index = range as u8 + 1;
+        for value in [0.0, -1.0, f32::NAN, f32::INFINITY, 1.001 * range.widest()] {
+            assert_eq!(node.set_real(0x2012, sub_index, value), Err(0x0609_0030), "{range:?} {value}");
+        }
+        node.set_real(0x2012, sub_index, range.widest()).unwrap();
+        assert_eq!(node.real(0x2012, sub_index), range.widest());
+    }
+}
+
+#[test]
+fn what_is_stored_is_there_after_a_reset_and_restored_it_is_not() {
+    let mut node = Node::new();
+    node.set_real(0x2104, 3, 0.5).unwrap();
+    take(&mut node).unwrap();
+    node.set_real(0x2012, 5, 9.0).unwrap();
+    node.set_real(0x2200, 3, 0.25).unwrap();
+    node.download(0x1017, 0, &[50, 0]).unwrap();
+    node.download(0x1802, 5, &[20, 0]).unwrap();
+    // Staged, not taken: not stored.
+    node.set_real(0x2104, 4, 0.9).unwrap();
+    node.download(0x1010, 1, b"save").unwrap();
+    let again = |node: &mut Node| {
+        let record = node.objects.program().record.clone().unwrap();
+        Node::with(Stored::decode(&record, &BOARD.joint).unwrap(), false)
+    };
+    let mut node = again(&mut node);
+    assert_eq!((node.real(0x2104, 3), node.real(0x2012, 5), node.real(0x2200, 3)), (0.5, 9.0, 0.25));
+    assert_eq!((node.number(0x1017, 0), node.number(0x1802, 5)), (50, 20));
+    assert_eq!(node.real(0x2104, 4), BOARD.joint.gains.damping);
+    node.download(0x1011, 3, b"load").unwrap();
+    assert_eq!(node.real(0x2104, 3), 0.5, "only after the next reset");
+    // Storing communication does not bring back what was restored.
+    node.download(0x1010, 2, b"save").unwrap();
+    let mut node = again(&mut node);
+    assert_eq!((node.real(0x2104, 3), node.real(0x2012, 5)), (BOARD.joint.gains.stiffness, DEFAULT_RANGES[4]));
+    assert_eq!(node.number(0x1017, 0), 50);
+    node.download(0x1011, 1, b"load").unwrap();
+    assert_eq!(again(&mut node).number(0x1017, 0), 0);
+}
+
+#[test]
+fn the_whole_record_comes_back_and_fits() {
+    let stored = Stored {
+        node_id: 17,
+        application: Some((crate::default_configuration::MOTEUS_R4.joint, [1.0, 2.0, 3.0, 4.0, 5.0])),
+        communication: Some((9, default_communication(9))),
+    };
+    let mut record = [0; RECORD];
+    let length = stored.encode(&mut record).unwrap();
+    assert_eq!(Stored::decode(&record[..length], &BOARD.joint), Some(stored));
+    assert_eq!(Stored::decode(&[2], &BOARD.joint), None);
+    assert_eq!(Stored::decode(&[2, 255, 0], &BOARD.joint), None);
+    assert_eq!(Stored::decode(&[1, 255, 0], &BOARD.joint), Some(Stored::NOTHING));
+}
+
+#[test]
+fn a_joint_of_one_bank_stores_only_with_its_motor_off() {
+    for (single_bank, expected) in [(true, Err(0x0800_0022)), (false, Ok(()))] {
+        let mut node = Node::with(Stored::NOTHING, single_bank);
+        node.observed.telemetry.state = State::SwitchedOn;
+        assert_eq!(node.download(0x1010, 1, b"save"), expected);
+        node.observed.telemetry.state = State::Fault;
+        assert_eq!(node.download(0x1010, 1, b"save"), Ok(()));
+    }
+}
+
+#[test]
+fn a_flash_that_fails_is_reported_and_nothing_counts_as_stored() {
+    let mut node = Node::new();
+    node.objects.program().fails = Some(SlotError::NoPrevious);
+    assert_eq!(node.download(0x1010, 1, b"save"), Err(0x0606_0000));
+    assert_eq!(node.number(0x1003, 1) as u16, emergency::FLASH);
+}
