@@ -151,6 +151,7 @@ fn the_whole_record_comes_back_and_fits() {
     };
     let mut record = [0; RECORD];
     let length = stored.encode(&mut record).unwrap();
+    assert_eq!(length, 1_088);
     assert_eq!(Stored::decode(&record[..length], &BOARD.joint), Some(stored));
     assert_eq!(Stored::decode(&[2], &BOARD.joint), None);
     assert_eq!(Stored::decode(&[2, 255, 0], &BOARD.joint), None);

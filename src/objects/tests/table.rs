@@ -23,7 +23,7 @@ fn the_tables_are_sorted_and_each_entry_is_found() {
 #[test]
 fn every_record_begins_with_its_highest_sub_index() {
     for object in &OBJECTS {
-        let last = OBJECTS.iter().filter(|other| other.index == object.index).next_back().unwrap().sub_index;
+        let last = OBJECTS.iter().rfind(|other| other.index == object.index).unwrap().sub_index;
         let first = find(object.index, 0).unwrap();
         assert_eq!(last != 0, first.field == Field::Highest(last), "{:04x}", object.index);
     }
