@@ -1,0 +1,96 @@
+//! The two slots of friction images: what they hold, and the friction model that comes of it.
+
+use crate::flash::Flash;
+use joint_firmware::friction::FrictionModel;
+use joint_firmware::objects::StoredImages;
+use joint_firmware::parameters::Summary;
+use joint_firmware::parameters::authentication::STAGING;
+use joint_firmware::parameters::image::{Image, MAX_LENGTH};
+use joint_firmware::parameters::slots::{Layout, Slot, SlotError, Slots};
+
+/// Content of the slots, for their checksum: friction images.
+const KIND: u32 = 1;
+
+/// Slots in a flash of their own.
+#[derive(Clone, Debug)]
+pub struct SlotImages {
+    flash: Flash,
+    slots: Slots,
+}
+
+impl SlotImages {
+    /// What a flash holds, as found at a start.
+    ///
+    /// # Errors
+    /// A flash that cannot be written.
+    pub fn open(mut flash: Flash) -> Result<Self, SlotError> {
+        // One page each: never refused.
+        let layout = Layout::new(0, 1, KIND).ok_or(SlotError::NoPrevious)?;
+        let slots = Slots::open(&mut flash, layout)?;
+        Ok(Self { flash, slots })
+    }
+
+    /// Empty slots.
+    ///
+    /// # Errors
+    /// None in practice: an erased flash can be written.
+    pub fn empty() -> Result<Self, SlotError> {
+        Self::open(Flash::erased(2))
+    }
+
+    /// The flash, for the next start.
+    #[must_use]
+    pub fn flash(&self) -> &Flash {
+        &self.flash
+    }
+
+    /// What stands in the slots.
+    pub fn stored(&mut self) -> StoredImages {
+        let (active, previous) = (self.slots.active(), self.slots.previous());
+        StoredImages { active: self.summary(active), previous: self.summary(previous) }
+    }
+
+    fn summary(&mut self, slot: Option<Slot>) -> Option<(Summary, Slot)> {
+        let slot = slot?;
+        Some((Image::summary(&self.bytes(slot)?).ok()?, slot))
+    }
+
+    fn bytes(&mut self, slot: Slot) -> Option<Vec<u8>> {
+        let mut buffer = vec![0; MAX_LENGTH];
+        let length = self.slots.copy(&mut self.flash, slot, &mut buffer).ok()?;
+        buffer.truncate(length);
+        Some(buffer)
+    }
+
+    /// Bytes of the image in use; none where there is none.
+    pub fn active(&mut self) -> Option<Vec<u8>> {
+        let slot = self.slots.active()?;
+        self.bytes(slot)
+    }
+
+    /// Stores an image.
+    ///
+    /// # Errors
+    /// What the slots refuse; the content in use is then untouched.
+    pub fn store(&mut self, image: &[u8]) -> Result<(), SlotError> {
+        self.slots.store(&mut self.flash, image)
+    }
+
+    /// Makes the previous image the one in use.
+    ///
+    /// # Errors
+    /// There is none; what the flash refuses.
+    pub fn roll_back(&mut self, buffer: &mut [u8; STAGING]) -> Result<(), SlotError> {
+        self.slots.roll_back(&mut self.flash, buffer)
+    }
+
+    /// The friction model of the image in use, for a control loop of `rate` Hz.
+    pub fn model(&mut self, rate: u32) -> Option<FrictionModel> {
+        model(&self.active()?, rate)
+    }
+}
+
+/// The friction model of an image's bytes; none where they are no image.
+pub fn model(image: &[u8], rate: u32) -> Option<FrictionModel> {
+    Some(FrictionModel::new(&Image::decode(image).ok()?.friction, rate))
+}

@@ -1,0 +1,314 @@
+//! The virtual joint driven over the bus alone, in simulated time: SDO, PDO, NMT, and images from upload to flash and back.
+
+use bus::Frame;
+use bus::client::sdo::{Failure, Method, Settings, Transfer};
+use bus::client::{Abort, Command, Emergency, NmtState, Object, Target};
+use joint_firmware::friction::domain::{Domain, Range};
+use joint_firmware::friction::physical::{Coefficients, PhysicalParameters, Terms};
+use joint_firmware::friction::regime::Selector;
+use joint_firmware::friction::state::{JointState, SIGNALS};
+use joint_firmware::friction::{FrictionModel, FrictionParameters, ParameterSet};
+use joint_firmware::joint::state_machine::State;
+use joint_firmware::parameters::authentication::Key;
+use joint_firmware::parameters::certificate::Limits;
+use joint_firmware::parameters::image::{Effort, GoldenVector, Image, MAX_LENGTH, Target as ImageTarget};
+use node::{Options, SlotImages, VirtualNode};
+use plant::ActuatorParameters;
+use plant::virtual_joint::Setup;
+use std::time::Duration;
+
+const ID: u8 = 5;
+/// Control steps in a millisecond.
+const MILLISECOND: u64 = 20;
+
+/// A master with one node on its bus.
+struct Master {
+    node: VirtualNode,
+    /// What the node sent beside SDO answers.
+    heard: Vec<Frame>,
+    counter: u8,
+}
+
+impl Master {
+    fn new() -> Self {
+        Self::with(SlotImages::empty().unwrap())
+    }
+
+    fn with(images: SlotImages) -> Self {
+        let parameters = ActuatorParameters::reference().aligned().without_payload();
+        let setup = Setup::of(&parameters);
+        let options = Options { node_id: ID, serial: 12, seed: 1 };
+        let node = VirtualNode::new(parameters, &setup, &options, images).unwrap();
+        let mut master = Self { node, heard: vec![], counter: 0 };
+        // The joint measures its current sensors' offsets.
+        master.wait(200);
+        master
+    }
+
+    fn listen(&mut self) {
+        while let Some(frame) = self.node.take_frame() {
+            self.heard.push(frame);
+        }
+    }
+
+    fn wait(&mut self, milliseconds: u64) {
+        self.node.advance(milliseconds * MILLISECOND);
+        self.listen();
+    }
+
+    fn send(&mut self, id: u16, data: &[u8]) {
+        self.node.receive(&Frame::new(id, data).unwrap());
+        self.node.work();
+        self.listen();
+    }
+
+    fn command(&mut self, command: Command) {
+        self.node.receive(&command.frame(Target::Node(ID)));
+        self.node.work();
+        self.listen();
+    }
+
+    fn transfer(&mut self, mut transfer: Transfer) -> Result<Vec<u8>, Failure> {
+        loop {
+            let now = Duration::from_secs_f64(self.node.steps() as f64 / f64::from(self.node.rate()));
+            while let Some(message) = transfer.poll(now) {
+                self.node.receive(&Frame::new(0x600 + u16::from(ID), &message).unwrap());
+            }
+            self.node.work();
+            self.listen();
+            let (answers, rest) = self.heard.drain(..).partition(|frame| frame.id() == 0x580 + u16::from(ID));
+            self.heard = rest;
+            let answers: Vec<Frame> = answers;
+            answers.iter().for_each(|frame| transfer.receive(frame.data(), now));
+            if let Some(outcome) = transfer.outcome() {
+                return outcome.clone();
+            }
+            self.wait(1);
+        }
+    }
+
+    fn upload(&mut self, index: u16, sub_index: u8) -> Vec<u8> {
+        let object = Object { node: ID, index, sub_index };
+        self.transfer(Transfer::upload(object, Method::Automatic, Settings::default())).unwrap()
+    }
+
+    fn number(&mut self, index: u16, sub_index: u8) -> i64 {
+        let bytes = self.upload(index, sub_index);
+        let mut eight = [0; 8];
+        eight[..bytes.len()].copy_from_slice(&bytes);
+        i64::from_le_bytes(eight)
+    }
+
+    fn download(&mut self, index: u16, sub_index: u8, data: &[u8]) -> Result<(), Failure> {
+        let object = Object { node: ID, index, sub_index };
+        self.transfer(Transfer::download(object, data, Method::Automatic, Settings::default())).map(|_| ())
+    }
+
+    fn image(&mut self, command: u8) -> Result<(), Failure> {
+        self.download(0x2212, 1, &[command])
+    }
+
+    /// RPDO 2 every 10 ms: controlword, velocity mode, velocity in mrad/s.
+    fn drive(&mut self, controlword: u16, velocity: i32, milliseconds: u64) {
+        for _ in 0..milliseconds / 10 {
+            self.counter = self.counter.wrapping_add(1);
+            let mut data = controlword.to_le_bytes().to_vec();
+            data.extend([9, self.counter]);
+            data.extend(velocity.to_le_bytes());
+            self.send(0x300 + u16::from(ID), &data);
+            self.wait(10);
+        }
+    }
+
+    fn enabled(&mut self) {
+        self.command(Command::Start);
+        for controlword in [6, 7, 15] {
+            self.drive(controlword, 0, 10);
+        }
+        assert_eq!(self.state(), State::OperationEnabled);
+    }
+
+    fn state(&self) -> State {
+        self.node.joint().joint().telemetry().state
+    }
+
+    fn emergencies(&self) -> Vec<u16> {
+        self.heard.iter().filter_map(Emergency::decode).map(|emergency| emergency.code).collect()
+    }
+}
+
+/// An image with a constant friction of `level` Nm.
+fn image(version: u32, level: f64) -> Vec<u8> {
+    // Full scale of a constant: see the image's layout.
+    let coefficients =
+        Coefficients::from_array(std::array::from_fn(|i| if i == 0 { (level * 65_536.0) as i32 } else { 0 }));
+    let set = ParameterSet { physical: PhysicalParameters { terms: Terms::ALL, coefficients }, network: None };
+    let range = Range { low: -(100 << 16), high: 100 << 16 };
+    let friction = FrictionParameters {
+        domain: Domain { ranges: [range; SIGNALS], margin: 0, reference_temperature: 0 },
+        selector: Selector::default(),
+        sets: [set, ParameterSet::default(), ParameterSet::default(), ParameterSet::default()],
+    };
+    let signals = [7; SIGNALS];
+    let expected = FrictionModel::new(&friction, 20_000).evaluate(0, &JointState::from_signals(signals));
+    let image = Image {
+        version,
+        target: ImageTarget::default(),
+        created: 0,
+        effort: Effort::NewtonMetre,
+        data_hash: [0; 16],
+        friction,
+        limits: Limits { output: 2 << 16, torque_gain: 1 << 15, velocity_slope: 1 << 24 },
+        golden: [GoldenVector { set: 0, signals, expected }].into_iter().collect(),
+    };
+    let mut buffer = [0; MAX_LENGTH];
+    let length = image.encode(&mut buffer).unwrap();
+    buffer[..length].to_vec()
+}
+
+#[test]
+fn a_node_boots_says_who_it_is_and_takes_no_set_point_before_it_is_started() {
+    let mut master = Master::new();
+    assert_eq!(master.heard.first().map(|frame| (frame.id(), frame.data().to_vec())), Some((0x705, vec![0])));
+    assert_eq!(master.node.state(), NmtState::PreOperational);
+    assert_eq!((master.number(0x1000, 0), master.number(0x1018, 4)), (0x0002_0192, 12));
+    assert!(String::from_utf8(master.upload(0x1008, 0)).unwrap().starts_with("virtual joint"));
+    for controlword in [6, 7, 15] {
+        master.drive(controlword, 500, 50);
+    }
+    assert_eq!(master.state(), State::SwitchOnDisabled);
+}
+
+#[test]
+fn a_velocity_by_rpdo_is_followed_and_told_by_tpdo_and_silence_ends_in_a_fault() {
+    let mut master = Master::new();
+    master.enabled();
+    master.drive(15, 500, 600);
+    master.heard.clear();
+    master.send(0x080, &[]);
+    let told = |id: u16| master.heard.iter().find(|frame| frame.id() == id).unwrap().eight().copied().unwrap();
+    let (first, second) = (told(0x185), told(0x285));
+    assert_eq!(u16::from_le_bytes([first[0], first[1]]) & 0x6F, 0x27, "operation enabled");
+    let velocity = i32::from_le_bytes([second[0], second[1], second[2], second[3]]);
+    assert!((480..=520).contains(&velocity), "{velocity} mrad/s");
+
+    // The command deadline is 0.1 s, then the joint brakes.
+    master.wait(1_000);
+    assert_eq!(master.state(), State::Fault);
+    assert!(master.emergencies().contains(&0x8100), "{:04x?}", master.emergencies());
+    assert!(master.node.joint().actuator().state().joint.velocity.abs() < 0.05);
+    assert_eq!(master.number(0x603F, 0), 0x8100);
+    // Without a reset the fault stays, with one and fresh set-points the joint runs again.
+    master.drive(15, 500, 50);
+    assert_eq!(master.state(), State::Fault);
+    for controlword in [0x80, 6, 7, 15] {
+        master.drive(controlword, 0, 20);
+    }
+    assert_eq!(master.state(), State::OperationEnabled);
+}
+
+#[test]
+fn nmt_stop_in_motion_brakes_the_joint_and_set_points_no_longer_count() {
+    let mut master = Master::new();
+    master.enabled();
+    master.drive(15, 500, 600);
+    master.command(Command::Stop);
+    assert_eq!(master.node.state(), NmtState::Stopped);
+    master.drive(15, 500, 600);
+    assert!(master.node.joint().actuator().state().joint.velocity.abs() < 0.05);
+    assert_ne!(master.state(), State::OperationEnabled);
+}
+
+#[test]
+fn an_image_goes_from_upload_by_way_of_a_trial_to_flash_and_back() {
+    let mut master = Master::new();
+    let (first, second) = (image(1, 0.25), image(2, 0.5));
+    master.download(0x2210, 0, &first).unwrap();
+    master.image(1).unwrap();
+    assert_eq!((master.number(0x2212, 2), master.number(0x2212, 3)), (2, 0));
+    master.image(3).unwrap();
+    assert_eq!((master.number(0x2212, 2), master.number(0x2213, 1)), (7, 1));
+    assert_eq!(master.upload(0x2211, 0), first);
+
+    // In motion the second one is tried; it acts, and reverts by itself.
+    master.download(0x2200, 3, &1f32.to_le_bytes()).unwrap();
+    master.download(0x2200, 1, &[1]).unwrap();
+    master.enabled();
+    master.drive(15, 300, 500);
+    let acts = |master: &Master| master.node.joint().joint().telemetry().compensated.torque;
+    assert!((acts(&master) - 0.25).abs() < 1e-3, "{}", acts(&master));
+    master.download(0x2210, 0, &second).unwrap();
+    master.image(1).unwrap();
+    master.download(0x2212, 7, &200u32.to_le_bytes()).unwrap();
+    master.image(2).unwrap();
+    master.drive(15, 300, 100);
+    assert!((acts(&master) - 0.5).abs() < 1e-3, "{}", acts(&master));
+    master.drive(15, 300, 300);
+    assert_eq!((master.number(0x2212, 2), master.number(0x2212, 8)), (2, 1));
+    assert!((acts(&master) - 0.25).abs() < 1e-3, "{}", acts(&master));
+
+    // One bank of flash: not under current.
+    assert_eq!(master.image(3), Err(Failure::Aborted(Abort::DEVICE_STATE)));
+    assert_eq!(master.state(), State::OperationEnabled);
+    master.drive(0, 0, 50);
+    master.image(3).unwrap();
+    assert_eq!((master.number(0x2213, 1), master.number(0x2214, 1)), (2, 1));
+
+    // What a loss of power leaves.
+    let images = SlotImages::open(master.node.flash()).unwrap();
+    let mut master = Master::with(images);
+    assert_eq!((master.number(0x2213, 1), master.number(0x2214, 1)), (2, 1));
+    assert_eq!(master.upload(0x2211, 0), second);
+    master.image(4).unwrap();
+    assert_eq!((master.number(0x2213, 1), master.upload(0x2211, 0)), (1, first));
+}
+
+#[test]
+fn a_shadow_is_computed_and_has_no_effect() {
+    let mut master = Master::new();
+    master.download(0x2210, 0, &image(1, 0.5)).unwrap();
+    master.image(1).unwrap();
+    master.download(0x2212, 7, &60_000u32.to_le_bytes()).unwrap();
+    master.image(6).unwrap();
+    master.enabled();
+    master.drive(15, 300, 3_000);
+    assert_eq!(master.node.joint().joint().telemetry().compensated.torque, 0.0);
+    let rms = f32::from_bits(master.number(0x2200, 7) as u32);
+    assert!((0.4..=0.5).contains(&rms), "{rms} Nm");
+    master.image(5).unwrap();
+    assert_eq!(master.number(0x2212, 2), 0);
+}
+
+#[test]
+fn a_damaged_an_old_and_an_unsigned_image_are_refused_and_nothing_changes() {
+    let mut master = Master::new();
+    let good = image(3, 0.25);
+    master.download(0x2210, 0, &good).unwrap();
+    master.image(1).unwrap();
+    master.image(3).unwrap();
+    let mut damaged = image(4, 0.5);
+    damaged[60] ^= 4;
+    let key = Key::new(std::array::from_fn(|i| i as u8)).unwrap();
+    let refused = |master: &mut Master, upload: &[u8]| {
+        master.download(0x2210, 0, upload).unwrap();
+        assert!(master.image(1).is_err());
+        assert!(master.image(3).is_err(), "what is not verified is not stored");
+        assert_eq!((master.number(0x2213, 1), master.upload(0x2211, 0)), (3, good.clone()));
+        master.download(0x2210, 0, upload).unwrap();
+        assert!(master.image(1).is_err());
+        master.number(0x2212, 3)
+    };
+    let codes = [refused(&mut master, &damaged), refused(&mut master, &image(2, 0.5))];
+    master.download(0x2215, 6, &key.to_bytes()).unwrap();
+    let unsigned = refused(&mut master, &image(4, 0.5));
+    assert!(codes[0] != 0 && codes[1] != 0 && unsigned != 0 && codes[0] != codes[1] && codes[1] != unsigned);
+
+    let mut signed = image(4, 0.5);
+    signed.extend(key.sign(&signed));
+    master.download(0x2210, 0, &signed).unwrap();
+    master.image(1).unwrap();
+    master.image(3).unwrap();
+    assert_eq!(master.number(0x2213, 1), 4);
+    // A key is written once.
+    assert!(master.download(0x2215, 6, &[7; 32]).is_err());
+}
