@@ -229,3 +229,39 @@ time = { column = "t" }
 position = { column = "q" }
 effort = { column = "tau", unit = "Nm" }
 "#;
+
+#[test]
+fn a_virtual_joint_on_a_bus_is_found_and_a_bus_without_one_is_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    // The system chooses a port that is free; nobody else takes it within a moment.
+    let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+    let (listening, calling) = (format!("slcan:listen://127.0.0.1:{port}"), format!("slcan:tcp://127.0.0.1:{port}"));
+    let mut joint = Command::new(env!("CARGO_BIN_EXE_jointctl"))
+        .current_dir(folder.path())
+        .args(["sim", "--bus", &listening, "--node", "7", "--duration", "60"])
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut line = String::new();
+    let mut log = std::io::BufReader::new(joint.stderr.take().unwrap());
+    std::io::BufRead::read_line(&mut log, &mut line).unwrap();
+    assert!(line.starts_with("node 7 on slcan:listen"), "{line}");
+
+    let found = jointctl(folder.path(), &["scan", "--bus", &calling]);
+    let text = String::from_utf8_lossy(&found.stdout).into_owned();
+    assert!(found.status.success() && text.lines().count() == 1, "{text} {}", stderr(&found));
+    assert!(text.starts_with("node 7: virtual joint") && text.contains("serial 7"), "{text}");
+    joint.kill().unwrap();
+    joint.wait().unwrap();
+
+    let gone = jointctl(folder.path(), &["scan", "--bus", &calling]);
+    assert!(!gone.status.success() && stderr(&gone).contains(&calling), "{}", stderr(&gone));
+    let empty = jointctl(folder.path(), &["scan", "--bus", "virtual:empty"]);
+    assert!(!empty.status.success() && stderr(&empty).contains("no node answered"), "{}", stderr(&empty));
+    for (bus, problem) in [("can0", "a kind and a colon are missing"), ("socketcan:nocan9", "nocan9")] {
+        let refused = jointctl(folder.path(), &["sim", "--bus", bus]);
+        assert!(!refused.status.success() && stderr(&refused).contains(problem), "{}", stderr(&refused));
+    }
+    let refused = jointctl(folder.path(), &["sim", "--bus", "virtual:x", "--node", "200"]);
+    assert!(!refused.status.success() && stderr(&refused).contains("node id 200"), "{}", stderr(&refused));
+}

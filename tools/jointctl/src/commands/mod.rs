@@ -1,5 +1,6 @@
 //! The commands of `jointctl`, one file each: arguments in, files and a few lines of text out; host.
 
+pub mod bus;
 pub mod demo;
 pub mod evaluate;
 pub mod excite;
@@ -40,6 +41,8 @@ pub enum Command {
     Sign(key::Sign),
     /// Run the firmware's joint against a simulated actuator, without and with compensation
     Sim(sim::Sim),
+    /// Find the joints on a CAN bus
+    Scan(bus::Scan),
     /// Write a motion that identifies a joint, or check one
     Excite(excite::Excite),
 }
@@ -115,6 +118,9 @@ pub enum CommandError {
     /// A key.
     #[error(transparent)]
     Key(#[from] crate::key_file::KeyFileError),
+    /// The CAN bus, or a node on it.
+    #[error("{0}")]
+    Bus(String),
     /// Arguments that contradict each other.
     #[error("{0}")]
     Arguments(String),
@@ -130,6 +136,7 @@ pub fn run(arguments: Arguments) -> Result<(), CommandError> {
         Command::Key(key) => key.run(),
         Command::Sign(sign) => sign.run(),
         Command::Sim(sim) => sim.run(),
+        Command::Scan(scan) => scan.run(),
         Command::Excite(excite) => excite.run(),
     }
 }

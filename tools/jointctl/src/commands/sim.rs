@@ -1,6 +1,7 @@
 //! `jointctl sim`: the firmware's joint in closed loop with the simulated actuator, without and with compensation.
 
 use super::CommandError;
+use super::bus::OnBus;
 use super::image::{read, verify};
 use super::joint::JointChoice;
 use crate::excite::file as excitation;
@@ -40,6 +41,9 @@ pub struct Sim {
     /// Time between two rows of a log, s
     #[arg(long, value_name = "S", default_value_t = USUAL_SAMPLE_PERIOD)]
     sample_period: f64,
+    /// The bus.
+    #[command(flatten)]
+    on_bus: OnBus,
     /// Folder for logs, page, and the files that describe joint and actuator
     #[arg(long, value_name = "DIR", default_value = "sim")]
     out: PathBuf,
@@ -67,6 +71,13 @@ impl Sim {
             return Err(CommandError::Arguments(text));
         }
         let (plant, setup) = self.joint.read()?;
+        if let Some(bus) = self.on_bus.bus() {
+            let image = self.image.as_deref().map(read).transpose()?;
+            if let (Some(image), Some(path)) = (&image, &self.image) {
+                verify(image, path)?;
+            }
+            return self.on_bus.run(bus, &plant, &setup, image.as_ref());
+        }
         let friction = self.friction(&setup)?;
         let samples = self.excitation.as_deref().map(excitation::read).transpose()?;
         let mut scenarios = if self.scenario.is_empty() { Scenario::ALL.to_vec() } else { self.scenario.clone() };

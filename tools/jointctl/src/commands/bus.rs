@@ -1,0 +1,170 @@
+//! `jointctl sim --bus` and `jointctl scan`: virtual joints on a CAN bus, and who is there.
+
+use super::CommandError;
+use bus::client::sdo::Settings;
+use bus::client::{ClientError, Network, Node};
+use clap::Args;
+use joint_firmware::parameters::image::Image;
+use node::{NodeError, Options, SlotImages, VirtualNode, serve};
+use plant::ActuatorParameters;
+use plant::virtual_joint::Setup;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// How long `scan` waits for each node's answer.
+const PATIENCE: Duration = Duration::from_millis(20);
+
+/// Arguments of `sim` that put the joint on a bus.
+#[derive(Debug, Args)]
+pub struct OnBus {
+    /// Be a node on this bus instead of running scenarios, until Ctrl-C: socketcan:can0, slcan:/dev/ttyACM0, slcan:tcp://host:port,
+    /// slcan:listen://host:port, udp:239.74.163.2:43113
+    #[arg(long, value_name = "BUS")]
+    bus: Option<String>,
+    /// Node id on the bus, 1 to 127, or 255 for one that LSS has to give; repeatable, a joint each
+    #[arg(long, value_name = "N", default_values_t = [1], requires = "bus")]
+    node: Vec<u8>,
+    /// Leave the bus after this time, s
+    #[arg(long, value_name = "S", requires = "bus")]
+    duration: Option<f64>,
+}
+
+impl OnBus {
+    /// The bus, where one is named.
+    pub fn bus(&self) -> Option<&str> {
+        self.bus.as_deref()
+    }
+
+    /// Runs a joint for every node id in real time.
+    pub fn run(
+        &self,
+        name: &str,
+        plant: &ActuatorParameters,
+        setup: &Setup,
+        image: Option<&Image>,
+    ) -> Result<(), CommandError> {
+        let duration = match self.duration {
+            Some(seconds) if !(seconds > 0.0 && seconds < 1e6) => {
+                return Err(CommandError::Arguments(format!("--duration is {seconds} s, must lie in 0 to 1000000 s")));
+            }
+            seconds => seconds.map(Duration::from_secs_f64),
+        };
+        let stop = AtomicBool::new(false);
+        let failed = |error: &dyn std::fmt::Display| CommandError::Bus(error.to_string());
+        std::thread::scope(|scope| {
+            let mut joints = Vec::new();
+            for &id in &self.node {
+                let transport = bus::open(name).map_err(|error| failed(&error))?;
+                let options = Options { node_id: id, serial: id.into(), seed: id.into() };
+                let mut joint = joint(plant, setup, &options, image).map_err(|error| failed(&error))?;
+                eprintln!("node {id} on {name}: virtual joint, serial {}", options.serial);
+                let stop = &stop;
+                joints.push(scope.spawn(move || {
+                    let left = serve(&mut joint, &*transport, stop);
+                    stop.store(true, Ordering::Relaxed);
+                    left
+                }));
+            }
+            let start = Instant::now();
+            while !stop.load(Ordering::Relaxed) && duration.is_none_or(|duration| start.elapsed() < duration) {
+                std::thread::sleep(Duration::from_millis(20));
+            }
+            stop.store(true, Ordering::Relaxed);
+            for (joint, id) in joints.into_iter().zip(&self.node) {
+                match joint.join() {
+                    Ok(Ok(lost)) if lost > 0.0 => {
+                        eprintln!("node {id}: {lost:.1} s were lost, this machine is too slow for real time");
+                    }
+                    Ok(Ok(_)) => {}
+                    Ok(Err(error)) => return Err(failed(&error)),
+                    Err(_) => return Err(CommandError::Bus(format!("node {id} panicked"))),
+                }
+            }
+            Ok(())
+        })
+    }
+}
+
+fn joint(
+    plant: &ActuatorParameters,
+    setup: &Setup,
+    options: &Options,
+    image: Option<&Image>,
+) -> Result<VirtualNode, NodeError> {
+    let mut images = SlotImages::empty().map_err(NodeError::Slots)?;
+    if let Some(image) = image {
+        let mut buffer = [0; joint_firmware::parameters::image::MAX_LENGTH];
+        // It has been verified, which encodes it.
+        let length = image.encode(&mut buffer).unwrap_or(0);
+        images.store(&buffer[..length]).map_err(NodeError::Slots)?;
+    }
+    VirtualNode::new(*plant, setup, options, images)
+}
+
+/// Arguments of `scan`.
+#[derive(Debug, Args)]
+pub struct Scan {
+    /// The bus, as of `sim --bus`
+    #[arg(long, value_name = "BUS")]
+    bus: String,
+}
+
+impl Scan {
+    /// Runs the command.
+    pub fn run(&self) -> Result<(), CommandError> {
+        let failed = |error: &dyn std::fmt::Display| CommandError::Bus(error.to_string());
+        let transport = bus::open(&self.bus).map_err(|error| failed(&error))?;
+        let network = Network::new(transport);
+        let mut found = 0;
+        for id in 1..=127 {
+            let node = network.node(id).map_err(|error| failed(&error))?;
+            let node = node.with_settings(Settings { timeout: PATIENCE, ..Settings::default() });
+            match Described::of(&node) {
+                Ok(described) => {
+                    found += 1;
+                    println!("node {id}: {described}");
+                }
+                Err(ClientError::NoAnswer { .. }) => {}
+                Err(error @ ClientError::Bus(_)) => return Err(failed(&error)),
+                Err(error) => println!("node {id}: {error}"),
+            }
+        }
+        match found {
+            0 => Err(CommandError::Bus(format!("{}: no node answered", self.bus))),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// What a node says of itself.
+struct Described {
+    name: String,
+    product: u32,
+    serial: u32,
+    statusword: u16,
+    version: u32,
+}
+
+impl Described {
+    fn of(node: &Node) -> Result<Self, ClientError> {
+        let word = |index, sub_index| node.number::<4>(index, sub_index).map(u32::from_le_bytes);
+        Ok(Self {
+            product: word(0x1018, 2)?,
+            serial: word(0x1018, 4)?,
+            name: String::from_utf8_lossy(&node.upload(0x1008, 0)?).into_owned(),
+            statusword: node.number::<2>(0x6041, 0).map(u16::from_le_bytes)?,
+            version: word(0x2213, 1)?,
+        })
+    }
+}
+
+impl std::fmt::Display for Described {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { name, product, serial, statusword, version } = self;
+        write!(f, "{name}; product {product:08x}, serial {serial}, statusword {statusword:04x}, ")?;
+        match version {
+            0 => f.write_str("no friction image"),
+            version => write!(f, "friction image version {version}"),
+        }
+    }
+}
