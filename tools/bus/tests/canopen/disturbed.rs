@@ -31,11 +31,11 @@ impl Transport for Disturbed {
         let step = |random: u32| Some(random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223));
         let random = self.random.fetch_update(Ordering::Relaxed, Ordering::Relaxed, step).unwrap() >> 8;
         if (self.concerned)(frame) {
-            if random % self.loss == 0 {
+            if random.is_multiple_of(self.loss) {
                 self.lost.fetch_add(1, Ordering::Relaxed);
                 return Ok(());
             }
-            if random % self.delay == 0 {
+            if random.is_multiple_of(self.delay) {
                 std::thread::sleep(Duration::from_millis(3));
             }
         }
