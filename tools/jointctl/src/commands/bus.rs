@@ -1,18 +1,21 @@
 //! `jointctl sim --bus` and `jointctl scan`: virtual joints on a CAN bus, and who is there.
 
 use super::CommandError;
-use bus::client::sdo::Settings;
-use bus::client::{ClientError, Network, Node};
+use bus::Frame;
+use bus::client::{ClientError, Network, Node, cob_id};
 use clap::Args;
 use joint_firmware::parameters::image::Image;
 use node::{NodeError, Options, SlotImages, VirtualNode, serve};
 use plant::ActuatorParameters;
 use plant::virtual_joint::Setup;
+use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// How long `scan` waits for each node's answer.
-const PATIENCE: Duration = Duration::from_millis(20);
+/// How long `scan` listens for an answer, and for each further one.
+const PATIENCE: Duration = Duration::from_millis(500);
+/// Request of an SDO upload of object 1000h, which every node has (CiA 301, 7.2.4.3.5).
+const ASK: [u8; 8] = [0x40, 0x00, 0x10, 0, 0, 0, 0, 0];
 
 /// Arguments of `sim` that put the joint on a bus.
 #[derive(Debug, Args)]
@@ -115,25 +118,36 @@ impl Scan {
         let failed = |error: &dyn std::fmt::Display| CommandError::Bus(error.to_string());
         let transport = bus::open(&self.bus).map_err(|error| failed(&error))?;
         let network = Network::new(transport);
-        let mut found = 0;
-        for id in 1..=127 {
-            let node = network.node(id).map_err(|error| failed(&error))?;
-            let node = node.with_settings(Settings { timeout: PATIENCE, ..Settings::default() });
-            match Described::of(&node) {
-                Ok(described) => {
-                    found += 1;
-                    println!("node {id}: {described}");
-                }
-                Err(ClientError::NoAnswer { .. }) => {}
+        let present = present(&network).map_err(|error| failed(&error))?;
+        for &id in &present {
+            match network.node(id).and_then(|node| Described::of(&node)) {
+                Ok(described) => println!("node {id}: {described}"),
                 Err(error @ ClientError::Bus(_)) => return Err(failed(&error)),
                 Err(error) => println!("node {id}: {error}"),
             }
         }
-        match found {
-            0 => Err(CommandError::Bus(format!("{}: no node answered", self.bus))),
-            _ => Ok(()),
+        if present.is_empty() {
+            return Err(CommandError::Bus(format!("{}: no node answered", self.bus)));
+        }
+        Ok(())
+    }
+}
+
+/// Nodes that answer. All are asked at once: a node on a busy machine may take its time without the others having to wait for it.
+fn present(network: &Network) -> Result<BTreeSet<u8>, ClientError> {
+    let answers = network.subscribe(|frame| matches!(frame.id(), 0x581..=0x5FF));
+    for id in 1..=127u16 {
+        if let Some(request) = Frame::new(cob_id::SDO_RECEIVE | id, &ASK) {
+            network.send(&request)?;
         }
     }
+    let mut present = BTreeSet::new();
+    // Others may be talking as well: not for ever.
+    let end = Instant::now() + 4 * PATIENCE;
+    while let Some(answer) = answers.next(PATIENCE.min(end.saturating_duration_since(Instant::now())))? {
+        present.insert((answer.frame.id() & 0x7F) as u8);
+    }
+    Ok(present)
 }
 
 /// What a node says of itself.
