@@ -96,6 +96,8 @@ pub struct Handover {
 pub struct Preparer<'a> {
     shared: &'a Handover,
     own: u8,
+    /// Something has been offered.
+    any: bool,
 }
 
 /// The side of a [`Handover`] that uses values.
@@ -116,11 +118,16 @@ impl Handover {
     /// Both sides; none from the second call on.
     pub fn split(&self) -> Option<(Preparer<'_>, User<'_>)> {
         let first = !self.split.swap(true, Ordering::AcqRel);
-        first.then_some((Preparer { shared: self, own: 0 }, User { shared: self, own: None }))
+        first.then_some((Preparer { shared: self, own: 0, any: false }, User { shared: self, own: None }))
     }
 }
 
 impl Preparer<'_> {
+    /// The place with the value in use, 0 or 1, to be read; none before the first was taken, and while a value waits.
+    pub fn in_use(&self) -> Option<usize> {
+        self.place().filter(|_| self.any).map(|place| place ^ 1)
+    }
+
     /// The place to write the next value to, 0 or 1; none while the value before has not been taken.
     pub fn place(&self) -> Option<usize> {
         (!self.shared.offered.load(Ordering::Acquire)).then_some(self.own.into())
@@ -133,6 +140,7 @@ impl Preparer<'_> {
         }
         // The place in use becomes the preparer's, but not before the user has let go of it.
         self.own ^= 1;
+        self.any = true;
         self.shared.offered.store(true, Ordering::Release);
         true
     }
@@ -200,13 +208,13 @@ mod tests {
     fn a_second_offer_waits_until_the_first_is_taken() {
         let handover = Handover::new();
         let (mut preparer, mut user) = handover.split().unwrap();
-        assert_eq!((preparer.place(), user.place()), (Some(0), None));
+        assert_eq!((preparer.place(), preparer.in_use(), user.place()), (Some(0), None, None));
         assert!(!user.take());
         assert!(preparer.offer());
-        assert_eq!(preparer.place(), None);
+        assert_eq!((preparer.place(), preparer.in_use()), (None, None));
         assert!(!preparer.offer());
         assert!(user.take());
-        assert_eq!((preparer.place(), user.place()), (Some(1), Some(0)));
+        assert_eq!((preparer.place(), preparer.in_use(), user.place()), (Some(1), Some(0), Some(0)));
     }
 
     proptest! {
@@ -271,6 +279,7 @@ mod tests {
                     },
                 }
                 prop_assert!(preparer.place().is_none() || preparer.place() != user.place());
+                prop_assert!(preparer.in_use().is_none() || preparer.in_use() == user.place());
             }
         }
     }

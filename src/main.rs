@@ -4,9 +4,10 @@
 //! |---|---|---|
 //! | 0 | control interrupt, every PWM period | measure, one control step, set the bridge |
 //! | 0 | PWM timer's update, twice a period | write the duties of the step |
+//! | 4 | CAN receive interrupt, where there is a bus | NMT, SYNC, RPDOs to commands |
 //! | 6 | interrupts of drivers and of time | wake tasks |
-//! | 8 | interrupt executor | every millisecond: temperatures, button, command; at 100 Hz: thermal model |
-//! | thread | thread executor | LED, log, watchdog |
+//! | 8 | interrupt executor | every millisecond: temperatures, button, watchdog, model in shadow; at 100 Hz: thermal model |
+//! | thread | thread executor | CANopen server, images, flash; LED, log |
 //!
 //! Nothing has run on a board yet.
 #![cfg_attr(target_os = "none", no_std)]

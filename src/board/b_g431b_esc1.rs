@@ -51,6 +51,12 @@ use joint_firmware::sensors::thermistor::Thermistor;
 
 /// Name of the board.
 pub const NAME: &str = "b-g431b-esc1";
+/// Product number, object 1018h:2: "ESC1".
+#[cfg(feature = "bus")]
+pub const PRODUCT: u32 = 0x4553_4331;
+/// Code and parameters lie in one bank of flash.
+#[cfg(feature = "bus")]
+pub const SINGLE_BANK: bool = true;
 /// The board's part of a configuration, and the joint that it is until it is commissioned.
 pub const CONFIGURATION: BoardConfiguration = default_configuration::B_G431B_ESC1;
 /// Frequency of the PWM and of the control step, Hz.
@@ -143,6 +149,10 @@ pub fn start(p: Peripherals, encoder_counts: u16) -> Result<Parts, StartError> {
         sensors: Sensors { encoder, counts_kept: true },
         led: Led { pin: Output::new(p.PC6, Level::Low, Speed::Low), lit_when_low: false },
         button: Some(Input::new(p.PC10, Pull::Up)),
+        #[cfg(feature = "bus")]
+        can: super::can::configure(p.FDCAN1, p.PA11, p.PB9),
+        #[cfg(feature = "bus")]
+        flash: p.FLASH,
         watchdog: p.IWDG,
     })
 }

@@ -12,6 +12,8 @@ use cortex_m::peripheral::{DWT, NVIC};
 use critical_section::Mutex;
 use embassy_stm32::pac::Interrupt;
 use joint_firmware::joint::fault::Faults;
+#[cfg(feature = "bus")]
+use joint_firmware::joint::history::History;
 use joint_firmware::joint::state_machine::Controlword;
 use joint_firmware::joint::{Active, Bridge, BridgeState, Command, Coupled, Demand, Joint, Mode, Slow, Telemetry};
 use joint_firmware::motor::phases::Phases;
@@ -176,6 +178,17 @@ pub fn mean_square_current() -> f32 {
 /// The newest control step's report; none before the first.
 pub fn report() -> Option<Report> {
     critical_section::with(|section| *READER.borrow_ref_mut(section).as_mut()?.newest())
+}
+
+/// Reads the steps before a fault; none while no fault is latched. A control step that is due meanwhile waits: the bridge is off then.
+#[cfg(feature = "bus")]
+pub fn history<R>(read: impl FnOnce(&History) -> R) -> Option<R> {
+    report().filter(|report| !report.latched.is_empty())?;
+    cortex_m::interrupt::free(|_| {
+        // SAFETY: there was a control step, so it is written, and the interrupt that owns it cannot come between.
+        let history = unsafe { (*CONTROL.0.get()).assume_init_ref() }.joint.history();
+        history.is_frozen().then(|| read(history))
+    })
 }
 
 /// Both ends of what tasks and control interrupt exchange; none from the second call on.

@@ -80,6 +80,14 @@ pub fn report() {
     );
 }
 
+/// Starts the program anew, as a master asked for: bridge off first. Nothing is kept, as nothing went wrong.
+#[cfg(feature = "bus")]
+pub fn restart() -> ! {
+    super::bridge_off();
+    cortex_m::asm::dsb();
+    SCB::sys_reset()
+}
+
 /// Forgets the last stop: the program has run long enough since.
 pub fn forget() {
     store([0; WORDS]);

@@ -11,11 +11,15 @@
 //! - to switch off in a fault handler, which owns no driver.
 
 pub mod adc;
+#[cfg(feature = "bus")]
+pub mod can;
 pub mod control;
 mod copy;
 mod critical_section;
 pub mod entry;
 pub mod faults;
+#[cfg(feature = "bus")]
+pub mod flash;
 pub mod memory;
 pub mod pwm;
 mod shared;
@@ -37,7 +41,9 @@ pub use embassy_stm32::Peripherals;
 use embassy_stm32::gpio::{Input, Output};
 use embassy_stm32::peripherals::IWDG;
 pub use joint_firmware::default_configuration::BoardConfiguration;
-pub use shared::{Offering, Publisher};
+pub use shared::Publisher;
+#[cfg(feature = "bus")]
+pub use shared::{Offering, Prepared};
 
 /// What a started board hands to the program.
 pub struct Parts {
@@ -47,6 +53,12 @@ pub struct Parts {
     pub led: Led,
     /// The button, on boards that have one.
     pub button: Option<Input<'static>>,
+    /// The CAN controller with its pins, stopped.
+    #[cfg(feature = "bus")]
+    pub can: embassy_stm32::can::CanConfigurator<'static>,
+    /// The flash.
+    #[cfg(feature = "bus")]
+    pub flash: embassy_stm32::Peri<'static, embassy_stm32::peripherals::FLASH>,
     /// The independent watchdog, not started.
     pub watchdog: embassy_stm32::Peri<'static, IWDG>,
 }

@@ -42,6 +42,12 @@ use joint_firmware::sensors::thermistor::Thermistor;
 
 /// Name of the board.
 pub const NAME: &str = "moteus-r4";
+/// Product number, object 1018h:2: "Mot4".
+#[cfg(feature = "bus")]
+pub const PRODUCT: u32 = 0x4D6F_7434;
+/// Code and parameters lie in one bank of flash.
+#[cfg(feature = "bus")]
+pub const SINGLE_BANK: bool = false;
 /// The board's part of a configuration, and the joint that it is until it is commissioned.
 pub const CONFIGURATION: BoardConfiguration = default_configuration::MOTEUS_R4;
 /// Frequency of the PWM and of the control step, Hz.
@@ -139,6 +145,10 @@ pub fn start(p: Peripherals, _encoder_counts: u16) -> Result<Parts, StartError> 
         sensors: Sensors { angle: 0 },
         led: Led { pin: Output::new(p.PF0, Level::High, Speed::Low), lit_when_low: true },
         button: None,
+        #[cfg(feature = "bus")]
+        can: super::can::configure(p.FDCAN1, p.PA11, p.PA12),
+        #[cfg(feature = "bus")]
+        flash: p.FLASH,
         watchdog: p.IWDG,
     })
 }

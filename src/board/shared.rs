@@ -110,15 +110,21 @@ pub struct Prepared<'a, T: 'static> {
 }
 
 impl<T> Offering<T> {
-    /// Makes a value; none, and nothing happens, while the one before has not been taken.
+    /// Makes a value, which may look at the one in use; none, and nothing happens, while the one before has not been taken.
     ///
     /// A function of its own: the stack has to bear the value once, and only while it is made.
     #[inline(never)]
-    pub fn prepare<E>(&mut self, make: impl FnOnce() -> Result<T, E>) -> Option<Result<Prepared<'_, T>, E>> {
+    pub fn prepare<E>(&mut self, make: impl FnOnce(Option<&T>) -> Result<T, E>) -> Option<Result<Prepared<'_, T>, E>> {
         let place = self.preparer.place()?;
+        // SAFETY: the place in use was written before it was offered, its user only reads it, and it changes hands no earlier than
+        // another value is offered, which needs the borrow that this one is part of.
+        let in_use = self
+            .preparer
+            .in_use()
+            .map(|place| unsafe { (*self.places.get().cast::<MaybeUninit<T>>().add(place)).assume_init_ref() });
         // SAFETY: the place is the preparer's until it is offered, which needs the borrow that this one becomes; it is one of the two.
         let place = unsafe { &mut *self.places.get().cast::<MaybeUninit<T>>().add(place) };
-        Some(match make() {
+        Some(match make(in_use) {
             Ok(value) => Ok(Prepared { value: place.write(value), preparer: &mut self.preparer }),
             Err(error) => Err(error),
         })

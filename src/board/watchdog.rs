@@ -1,4 +1,5 @@
-//! The independent watchdog: fed only while the control interrupt and both executors are alive.
+//! The independent watchdog: fed only while the control interrupt and both executors are alive. The slow executor may be busy for a
+//! while, with the proof of an image or with the flash; the control interrupt never is.
 //!
 //! After 100 ms without food the chip resets; its pins then float and the gate drivers' own resistors keep the bridge off.
 
@@ -8,32 +9,41 @@ use embassy_stm32::Peri;
 use embassy_stm32::pac;
 use embassy_stm32::peripherals::IWDG;
 use embassy_stm32::wdg::IndependentWatchdog;
+use embassy_time::{Duration, Instant};
 use static_cell::StaticCell;
 
 /// Longest time without food, µs; runs on the low-speed oscillator, which is off by up to 10 % over temperature.
 const TIMEOUT_US: u32 = 100_000;
-/// How often it is to be fed, ms.
-pub const FEED_MS: u64 = 20;
+/// How often it is to be fed, ms; by the medium executor, whose life the feeding itself proves.
+pub const FEED_MS: u32 = 20;
+/// Longest time that the slow executor may be busy.
+const PATIENCE: Duration = Duration::from_secs(1);
 
-/// Counts up whenever the medium executor runs its task.
-static MEDIUM: AtomicU32 = AtomicU32::new(0);
+/// Counts up whenever the slow executor runs its task.
+static SLOW: AtomicU32 = AtomicU32::new(0);
 
 /// Who has to be alive, as last seen.
 pub struct Watchdog {
     hardware: IndependentWatchdog<'static, IWDG>,
     control: u32,
-    medium: u32,
+    slow: u32,
+    slow_seen: Instant,
 }
 
 /// The watchdog, stopped.
 pub fn new(hardware: Peri<'static, IWDG>) -> &'static mut Watchdog {
     static WATCHDOG: StaticCell<Watchdog> = StaticCell::new();
-    WATCHDOG.init(Watchdog { hardware: IndependentWatchdog::new(hardware, TIMEOUT_US), control: 0, medium: 0 })
+    WATCHDOG.init(Watchdog {
+        hardware: IndependentWatchdog::new(hardware, TIMEOUT_US),
+        control: 0,
+        slow: 0,
+        slow_seen: Instant::now(),
+    })
 }
 
-/// The medium executor is alive.
-pub fn medium_is_alive() {
-    MEDIUM.fetch_add(1, Ordering::Relaxed);
+/// The slow executor is alive.
+pub fn slow_is_alive() {
+    SLOW.fetch_add(1, Ordering::Relaxed);
 }
 
 impl Watchdog {
@@ -45,12 +55,15 @@ impl Watchdog {
         self.hardware.unleash();
     }
 
-    /// Feeds it, if control interrupt and medium executor have run since the last call; the caller is the slow one.
+    /// Feeds it, if the control interrupt has run since the last call and the slow executor not too long ago; the caller is the medium one.
     pub fn feed(&mut self) {
-        let (control, medium) = (control::statistics().steps, MEDIUM.load(Ordering::Relaxed));
-        if control != self.control && medium != self.medium {
+        let (control, slow) = (control::statistics().steps, SLOW.load(Ordering::Relaxed));
+        if slow != self.slow {
+            (self.slow, self.slow_seen) = (slow, Instant::now());
+        }
+        if control != self.control && self.slow_seen.elapsed() < PATIENCE {
             self.hardware.pet();
         }
-        (self.control, self.medium) = (control, medium);
+        self.control = control;
     }
 }

@@ -16,6 +16,8 @@ const PENDING: usize = 8;
 pub mod code {
     /// The last error is gone.
     pub const RESET: u16 = 0x0000;
+    /// The controller is error passive: so many errors that it may not disturb others any more.
+    pub const ERROR_PASSIVE: u16 = 0x8120;
     /// A node that is monitored fell silent; the first byte of the manufacturer's field is its node id.
     pub const HEARTBEAT: u16 = 0x8130;
     /// Communication resumed after bus-off.
@@ -41,7 +43,7 @@ pub(super) struct Emergencies {
     pub(super) inhibit: u16,
     /// The application's bits of the error register.
     application: u8,
-    /// The server's own errors that last, a bit for each: monitored nodes in 0 to 7, RPDO deadlines in 8 to 15.
+    /// The server's own errors that last, a bit for each: monitored nodes in 0 to 6, error passive in 7, RPDO deadlines in 8 to 15.
     lasting: u16,
     history: Deque<u32, HISTORY>,
     pending: Deque<[u8; 8], PENDING>,
@@ -56,6 +58,8 @@ pub(super) enum Lasting {
     Heartbeat(u8),
     /// Number of the RPDO, 0 to 3.
     Deadline(u8),
+    /// Of the controller.
+    ErrorPassive,
 }
 
 impl Lasting {
@@ -63,6 +67,7 @@ impl Lasting {
         match self {
             Self::Heartbeat(consumer) => 1 << (consumer & 7),
             Self::Deadline(pdo) => 0x100 << (pdo & 7),
+            Self::ErrorPassive => 1 << 7,
         }
     }
 }

@@ -134,6 +134,15 @@ impl<'a> Server<'a> {
         self.communication_error(dictionary);
     }
 
+    /// Whether the controller is error passive: EMCY 8120h when it begins, and its end.
+    pub fn error_passive(&mut self, passive: bool) {
+        if passive {
+            self.emergencies.begin(Lasting::ErrorPassive, code::ERROR_PASSIVE, 0);
+        } else {
+            self.emergencies.end(Lasting::ErrorPassive);
+        }
+    }
+
     /// EMCYs that were dropped because more than eight waited.
     pub fn dropped_emergencies(&self) -> u32 {
         self.emergencies.dropped()

@@ -22,6 +22,7 @@ pub mod history;
 pub mod monitor;
 pub mod motion_law;
 mod offsets;
+pub mod shadow;
 mod signals;
 pub mod state_machine;
 

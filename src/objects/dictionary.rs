@@ -123,6 +123,11 @@ impl<'a, P: Program> Objects<'a, P> {
         self.images.staging()
     }
 
+    /// The staging buffer and the program, for an action that needs both.
+    pub fn staging_and_program(&mut self) -> (&mut [u8; STAGING], &mut P) {
+        (self.images.staging(), &mut self.program)
+    }
+
     /// How an action went, and what the slots hold now. The next action is there to be taken.
     pub fn finished(&mut self, outcome: Result<(), SlotError>, stored: StoredImages) {
         let floor = self.images.life().floor();
@@ -179,7 +184,7 @@ impl<'a, P: Program> Objects<'a, P> {
     fn readable(&self, field: Field) -> u32 {
         match field {
             Field::Image(ImageField::Active) => self.images.active_length(),
-            Field::History => self.program.history().map_or(0, history::length),
+            Field::History => self.program.history(history::length).unwrap_or(0),
             Field::Configuration(_) => self.refused.name().len() as u32,
             _ => 0,
         }
@@ -329,7 +334,7 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
             Field::Image(ImageField::Active) => {
                 self.images.is_same_image(offset) && self.program.read_image(offset, out)
             }
-            Field::History => self.program.history().is_some_and(|steps| history::read(steps, offset, out)),
+            Field::History => self.program.history(|steps| history::read(steps, offset, out)).unwrap_or(false),
             Field::Configuration(ConfigurationField::RefusedSetting) => {
                 history::copy(self.refused.name().as_bytes(), offset, out)
             }

@@ -32,8 +32,9 @@ pub trait Program {
     /// Fills `out` with bytes of the stored image in use, from `offset` on; false where they cannot be read.
     fn read_image(&mut self, offset: u32, out: &mut [u8]) -> bool;
 
-    /// The steps before a fault, while one is latched.
-    fn history(&self) -> Option<&History>;
+    /// Reads the steps before a fault, while one is latched; none otherwise. `read` is short: it may hold the control step up, which
+    /// then keeps the bridge off.
+    fn history<R>(&self, read: impl FnOnce(&History) -> R) -> Option<R>;
 
     /// The network tells something. Of a transition the objects know already.
     fn event(&mut self, event: Event);

@@ -199,6 +199,21 @@ fn emcy_can_be_switched_off_and_moved_while_it_is_off() {
 }
 
 #[test]
+fn an_error_passive_controller_is_reported_once_and_so_is_its_recovery() {
+    let mut node = Node::operational();
+    for _ in 0..3 {
+        node.server.error_passive(true);
+    }
+    // Communication error, and so the generic bit.
+    assert_eq!(node.task(), [frame(0x85, &[0x20, 0x81, 0x11, 0, 0, 0, 0, 0])]);
+    for _ in 0..3 {
+        node.server.error_passive(false);
+    }
+    assert_eq!(node.task(), [frame(0x85, &[0; 8])]);
+    assert_eq!(node.shared.state(), NmtState::Operational);
+}
+
+#[test]
 fn bus_off_counts_as_a_communication_error() {
     let mut node = Node::operational();
     node.server.bus_off_recovered(&mut node.dictionary);

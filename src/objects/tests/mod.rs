@@ -77,8 +77,8 @@ impl Program for Memory {
         true
     }
 
-    fn history(&self) -> Option<&History> {
-        self.history.as_ref()
+    fn history<R>(&self, read: impl FnOnce(&History) -> R) -> Option<R> {
+        self.history.as_ref().map(read)
     }
 
     fn event(&mut self, _event: Event) {}

@@ -241,14 +241,44 @@ impl Slots {
     pub fn load(&mut self, flash: &mut impl SlotFlash, buffer: &mut [u8]) -> Result<Option<usize>, SlotError> {
         let Some(active) = self.active() else { return Ok(None) };
         match self.copy(flash, active, buffer) {
-            Err(SlotError::Damaged { slot }) => {
-                self.set(slot, SlotState::Damaged);
-                let Some(other) = self.active() else { return Ok(None) };
-                retire(flash, &self.layout, slot)?;
-                self.copy(flash, other, buffer).map(Some)
-            }
+            Err(SlotError::Damaged { slot }) => match self.fall_back(flash, slot)? {
+                Some(other) => self.copy(flash, other, buffer).map(Some),
+                None => Ok(None),
+            },
             result => result.map(Some),
         }
+    }
+
+    /// The newest slot whose payload is whole at this moment, for whoever reads it in place; none where there is none. What is damaged
+    /// is dealt with as by [`Slots::load`].
+    pub fn usable(&mut self, flash: &mut impl SlotFlash) -> Result<Option<Slot>, SlotError> {
+        let Some(active) = self.active() else { return Ok(None) };
+        if self.is_whole(flash, active) {
+            return Ok(Some(active));
+        }
+        let other = self.fall_back(flash, active)?;
+        Ok(other.filter(|other| self.is_whole(flash, *other)))
+    }
+
+    /// Gives a damaged slot up for the other one, if that is whole.
+    fn fall_back(&mut self, flash: &mut impl SlotFlash, damaged: Slot) -> Result<Option<Slot>, SlotError> {
+        self.set(damaged, SlotState::Damaged);
+        let Some(other) = self.active() else { return Ok(None) };
+        retire(flash, &self.layout, damaged)?;
+        Ok(Some(other))
+    }
+
+    /// Whether the payload of `slot` still has its checksum.
+    pub fn is_whole(&self, flash: &mut impl SlotFlash, slot: Slot) -> bool {
+        let SlotState::Whole { sequence, length, checksum } = self.state(slot) else { return false };
+        fits(flash, &self.layout, slot, Header { length, sequence, checksum })
+    }
+
+    /// Where the payload of `slot` lies, in bytes from the first page; none where the slot has none.
+    pub fn range(&self, slot: Slot) -> Option<core::ops::Range<usize>> {
+        let SlotState::Whole { length, .. } = self.state(slot) else { return None };
+        let start = (self.layout.first_word(slot) + HEADER_WORDS) * DOUBLE_WORD;
+        Some(start..start + usize::from(length))
     }
 
     /// Copies the payload of `slot` to the start of `buffer`; its length.

@@ -79,8 +79,8 @@ impl Program for VirtualProgram {
         }
     }
 
-    fn history(&self) -> Option<&History> {
-        self.history.as_ref()
+    fn history<R>(&self, read: impl FnOnce(&History) -> R) -> Option<R> {
+        self.history.as_ref().map(read)
     }
 
     fn event(&mut self, event: Event) {

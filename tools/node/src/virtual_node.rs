@@ -7,9 +7,7 @@ use crate::images::{SlotImages, model};
 use crate::program::VirtualProgram;
 use bus::Frame;
 use joint_firmware::canopen::{self, Identity, NO_NODE_ID, NmtState, Receiver, Route, SdoSettings, Server};
-use joint_firmware::friction::FrictionModel;
-use joint_firmware::friction::regime::Memory;
-use joint_firmware::friction::state::JointState;
+use joint_firmware::joint::shadow::Shadow;
 use joint_firmware::joint::{Joint, Telemetry};
 use joint_firmware::objects::{FrictionStatistics, Images, JointImage, Objects, Observed, Shared, Start, Stored};
 use joint_firmware::parameters::authentication::STAGING;
@@ -17,7 +15,6 @@ use joint_firmware::parameters::certificate::Limits;
 use joint_firmware::parameters::image::{Effort, Target};
 use joint_firmware::parameters::life_cycle::{Action, LifeCycle, Mode, Requirements};
 use joint_firmware::parameters::slots::SlotError;
-use joint_firmware::quantity::{Acceleration, Position, Temperature, Torque, Velocity};
 use plant::virtual_joint::{Setup, VirtualJointError};
 use plant::{ActuatorParameters, VirtualJoint};
 use std::collections::VecDeque;
@@ -28,6 +25,8 @@ const DEVICE_TYPE: u32 = 0x0002_0192;
 const VENDOR: u32 = 0;
 /// Product of the virtual joint: "VJnt".
 pub const PRODUCT: u32 = 0x564A_6E74;
+/// Evaluations of a model in shadow a second: after each millisecond of control steps.
+const SHADOW_RATE: u32 = 1_000;
 /// Frames that wait for the task; an SDO block and some more.
 const QUEUE: usize = 160;
 
@@ -54,13 +53,6 @@ pub enum NodeError {
     /// No node id.
     #[error("node id {0} is outside 1 to 127, and not 255 for none")]
     NodeId(u8),
-}
-
-/// A friction model that is computed beside the one that acts.
-#[derive(Clone, Debug)]
-struct Shadow {
-    model: FrictionModel,
-    memory: Memory,
 }
 
 /// A joint on the bus.
@@ -315,33 +307,15 @@ impl VirtualNode {
 
     fn run(&mut self, mode: Mode, length: usize) -> Result<(), SlotError> {
         // It was verified a moment ago.
-        let model = model(&self.objects.staging()[..length], self.rate);
+        let image = &self.objects.staging()[..length];
         match mode {
-            Mode::Shadow => self.shadow = model.map(|model| Shadow { model, memory: Memory::default() }),
+            Mode::Shadow => self.shadow = model(image, SHADOW_RATE).map(Shadow::new),
             Mode::Trial => {
+                let model = model(image, self.rate);
                 self.shadow = None;
                 self.joint.set_friction(model);
             }
         }
         Ok(())
-    }
-}
-
-impl Shadow {
-    /// What the model would add; a thousand times a second, for the velocity that was asked for or else measured.
-    fn torque(&mut self, telemetry: &Telemetry) -> Torque {
-        let q16 = |value: f32| (value * 65_536.0) as i32;
-        let motion = &telemetry.motion;
-        let state = JointState {
-            position: Position::from_bits(q16(motion.position)),
-            velocity: Velocity::from_bits(q16(telemetry.wanted.velocity.unwrap_or(motion.velocity))),
-            acceleration: Acceleration::from_bits(q16(motion.acceleration)),
-            theoretical_torque: Torque::from_bits(q16(telemetry.wanted.torque)),
-            measured_torque: Torque::from_bits(q16(telemetry.measured_torque)),
-            temperature: Temperature::from_bits(q16(telemetry.gear_temperature)),
-            coupled_velocity: Velocity::ZERO,
-        };
-        let estimate = self.model.step(&state, &mut self.memory);
-        Torque::from_bits(estimate.physical.to_bits().saturating_add(estimate.network.to_bits()))
     }
 }

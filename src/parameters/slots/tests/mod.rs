@@ -100,6 +100,24 @@ fn rolling_back_swaps_the_two_contents() {
 }
 
 #[test]
+fn a_payload_can_be_read_in_place_and_a_damaged_one_gives_way_to_the_other() {
+    let mut flash = stored(&[b"the one before it", b"the newest content"]);
+    let mut slots = Slots::open(&mut flash, layout()).expect("opens");
+    let in_place = |slots: &mut Slots, flash: &mut Flash| {
+        let slot = slots.usable(flash).expect("reads")?;
+        let range = slots.range(slot).expect("a range");
+        let words: Vec<u8> = (0..2 * PAGE_WORDS).flat_map(|word| flash.read(word).expect("whole")).collect();
+        Some(words[range].to_vec())
+    };
+    assert_eq!(in_place(&mut slots, &mut flash).as_deref(), Some(&b"the newest content"[..]));
+    flash.rot(layout().first_word(Slot::Second) + HEADER_WORDS, 3);
+    assert_eq!(in_place(&mut slots, &mut flash).as_deref(), Some(&b"the one before it"[..]));
+    assert_eq!((slots.range(Slot::Second), slots.is_whole(&mut flash, Slot::Second)), (None, false));
+    flash.rot(layout().first_word(Slot::First) + HEADER_WORDS, 3);
+    assert_eq!(in_place(&mut slots, &mut flash), None);
+}
+
+#[test]
 fn content_of_another_kind_is_not_taken() {
     let mut flash = stored(&[b"friction"]);
     let other = Layout::new(0, 1, 2).expect("a layout");

@@ -1,0 +1,314 @@
+//! FDCAN1 at 1 Mbit/s with classic frames: the receive interrupt, and the queues between it and the task below.
+//!
+//! What has to be quick happens in the interrupt, second in priority to the control interrupt alone: NMT, SYNC, RPDOs, and the
+//! synchronous TPDOs. For the task it leaves what is addressed to this node's SDO server, and LSS.
+//!
+//! embassy's driver sets the controller up: clock, pins, bit timing, message RAM, filters. Its interrupt handler is not used, because
+//! frames would wait in its channel until a task runs; this one reads the controller's FIFO itself, in order. Frames leave in order
+//! too (FIFO, not queue): segments of one SDO block have one identifier, and the controller's queue would send those by place.
+//!
+//! Filters are masks: embassy 0.6.0 has the bounds of its range filter swapped.
+
+use super::control;
+use super::shared::Publisher;
+use core::cell::{Cell, RefCell, UnsafeCell};
+use core::mem::MaybeUninit;
+use core::sync::atomic::{AtomicU32, Ordering};
+use cortex_m::peripheral::NVIC;
+use critical_section::Mutex;
+use embassy_stm32::can::config::{GlobalFilter, NonMatchingFilter, TxBufferMode};
+use embassy_stm32::can::filter::{Action, FilterType, StandardFilter, StandardFilterSlot};
+use embassy_stm32::can::{CanConfigurator, IT0InterruptHandler, IT1InterruptHandler, RxPin, TxPin};
+use embassy_stm32::interrupt::typelevel::{Binding, FDCAN1_IT0, FDCAN1_IT1};
+use embassy_stm32::interrupt::{InterruptExt, Priority};
+use embassy_stm32::peripherals::FDCAN1;
+use embassy_stm32::{Peri, interrupt, pac};
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::channel::Channel;
+use embassy_time::Instant;
+use heapless::Deque;
+use joint_firmware::canopen::{self, Frame, Receiver, Route};
+use joint_firmware::joint::Demand;
+use joint_firmware::objects::{JointImage, Observed};
+
+const BIT_RATE: u32 = 1_000_000;
+/// Segments of a downloaded block.
+pub const BLOCK: u8 = 24;
+/// Frames that wait for the task: a block, the request behind it, and LSS.
+const TO_TASK: usize = BLOCK as usize + 4;
+/// Frames that wait for the controller, beside the three that it holds.
+const TO_BUS: usize = 16;
+/// Elements of a receive FIFO (RM0440, message RAM).
+const FIFO: u8 = 3;
+/// Ranges of identifiers with which nobody addresses a joint, as value and mask: answers of SDO servers and LSS slaves. PDOs may not have them
+/// (CiA 301, restricted CAN-IDs).
+const IGNORED: [(u16, u16); 2] = [(0x580, 0x780), (0x7E4, 0x7FF)];
+
+/// Everything that the receive interrupt owns.
+struct Bus {
+    shared: &'static canopen::Shared,
+    receiver: Receiver<'static>,
+    image: JointImage<'static>,
+    demand: Publisher<Demand>,
+    feedforward: f32,
+}
+
+struct Owned(UnsafeCell<MaybeUninit<Bus>>);
+// SAFETY: written once before the interrupt is enabled, afterwards used by that interrupt alone.
+unsafe impl Sync for Owned {}
+static BUS: Owned = Owned(UnsafeCell::new(MaybeUninit::uninit()));
+
+static RECEIVED: Channel<CriticalSectionRawMutex, Frame, TO_TASK> = Channel::new();
+static SENDING: Mutex<RefCell<Deque<Frame, TO_BUS>>> = Mutex::new(RefCell::new(Deque::new()));
+/// What the slower tasks know of the joint.
+static OBSERVED: Mutex<Cell<Option<Observed>>> = Mutex::new(Cell::new(None));
+
+/// Frames that were not taken or not sent, since the start.
+struct Drops {
+    controller: AtomicU32,
+    task: AtomicU32,
+    bus: AtomicU32,
+}
+static DROPS: Drops = Drops { controller: AtomicU32::new(0), task: AtomicU32::new(0), bus: AtomicU32::new(0) };
+
+/// Frames that found no room, since the start; each wraps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
+pub struct Dropped {
+    /// In the controller: the interrupt came too late.
+    pub controller: u32,
+    /// On the way to the task.
+    pub task: u32,
+    /// On the way to the bus.
+    pub bus: u32,
+}
+
+/// How the controller takes part in the bus (ISO 11898-1, fault confinement).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
+pub enum Condition {
+    /// All is well, or nearly.
+    Active,
+    /// Many errors: it may not disturb others any more.
+    Passive,
+    /// Too many errors: it takes no part.
+    Off,
+}
+
+/// Says that the interrupts are handled. The first by this module; the second is never raised, as everything is on line 0.
+#[derive(Clone, Copy)]
+struct Handled;
+// SAFETY: the handler below serves the interrupt.
+unsafe impl Binding<FDCAN1_IT0, IT0InterruptHandler<FDCAN1>> for Handled {}
+// SAFETY: no interrupt source is routed to line 1, and it is masked before the controller starts.
+unsafe impl Binding<FDCAN1_IT1, IT1InterruptHandler<FDCAN1>> for Handled {}
+
+/// The controller with its pins, stopped.
+pub fn configure(
+    can: Peri<'static, FDCAN1>,
+    receive: Peri<'static, impl RxPin<FDCAN1>>,
+    transmit: Peri<'static, impl TxPin<FDCAN1>>,
+) -> CanConfigurator<'static> {
+    let mut controller = CanConfigurator::new(can, receive, transmit, Handled);
+    interrupt::FDCAN1_IT0.disable();
+    interrupt::FDCAN1_IT1.disable();
+    controller.set_bitrate(BIT_RATE);
+    let filter = GlobalFilter {
+        handle_standard_frames: NonMatchingFilter::IntoRxFifo0,
+        handle_extended_frames: NonMatchingFilter::Reject,
+        reject_remote_standard_frames: true,
+        reject_remote_extended_frames: true,
+    };
+    let config = controller
+        .config()
+        .set_global_filter(filter)
+        .set_tx_buffer_mode(TxBufferMode::Fifo)
+        .set_automatic_bus_off_recovery(false);
+    controller.set_config(config);
+    for ((filter, mask), slot) in IGNORED.into_iter().zip(0u8..) {
+        let filter = StandardFilter { filter: FilterType::BitMask { filter, mask }, action: Action::Reject };
+        controller.properties().set_standard_filter(StandardFilterSlot::from(slot), filter);
+    }
+    controller
+}
+
+/// Takes part in the bus from now on. Called once.
+pub fn start(
+    controller: CanConfigurator<'static>,
+    shared: &'static canopen::Shared,
+    image: JointImage<'static>,
+    demand: Publisher<Demand>,
+) {
+    let bus = Bus { shared, receiver: Receiver::new(shared), image, demand, feedforward: 0.0 };
+    // SAFETY: the interrupt is masked, and this runs once: there is one publisher of demands.
+    unsafe { (*BUS.0.get()).write(bus) };
+    // Dropped, the driver would reset the controller.
+    core::mem::forget(controller.into_normal_mode());
+    pac::FDCAN1.ie().modify(|w| w.set_rfle(0, true));
+    interrupt::FDCAN1_IT0.set_priority(Priority::P4);
+    // SAFETY: the handler's state is complete.
+    unsafe { interrupt::FDCAN1_IT0.enable() };
+}
+
+/// Has the interrupt run: a transition of the task's, or a set-point that came by SDO, reaches the joint.
+pub fn attend() {
+    NVIC::pend(pac::Interrupt::FDCAN1_IT0);
+}
+
+/// What TPDOs carry of the joint from now on; the control step's part is taken from its own report.
+pub fn observe(observed: &Observed) {
+    critical_section::with(|section| OBSERVED.borrow(section).set(Some(*observed)));
+}
+
+/// What was told by [`observe`], with the newest control step.
+pub fn observed() -> Option<Observed> {
+    let observed = critical_section::with(|section| OBSERVED.borrow(section).get())?;
+    Some(match control::report() {
+        Some(report) => Observed { telemetry: report.telemetry, latched: report.latched, ..observed },
+        None => observed,
+    })
+}
+
+/// The next frame for the task.
+pub async fn next() -> Frame {
+    RECEIVED.receive().await
+}
+
+/// Sends a frame; where the queue is full it is dropped and counted.
+pub fn send(frame: Frame) {
+    critical_section::with(|section| {
+        let mut sending = SENDING.borrow_ref_mut(section);
+        if sending.push_back(frame).is_err() {
+            count(&DROPS.bus);
+        }
+        transmit(&mut sending);
+    });
+}
+
+/// Whether [`send`] has room for another frame.
+pub fn has_room() -> bool {
+    critical_section::with(|section| !SENDING.borrow_ref(section).is_full())
+}
+
+/// Frames dropped so far.
+pub fn dropped() -> Dropped {
+    let Drops { controller, task, bus } = &DROPS;
+    let [controller, task, bus] = [controller, task, bus].map(|count| count.load(Ordering::Relaxed));
+    Dropped { controller, task, bus }
+}
+
+/// How the controller takes part in the bus.
+pub fn condition() -> Condition {
+    let status = pac::FDCAN1.psr().read();
+    match (status.bo(), status.ep()) {
+        (true, _) => Condition::Off,
+        (false, true) => Condition::Passive,
+        (false, false) => Condition::Active,
+    }
+}
+
+/// Begins to return from bus-off: the controller takes part again once it has seen the bus idle for 129 times 11 bits. What waited
+/// to be sent is old by then and is thrown away.
+pub fn recover() {
+    critical_section::with(|section| SENDING.borrow_ref_mut(section).clear());
+    pac::FDCAN1.cccr().modify(|w| w.set_init(false));
+}
+
+fn count(counter: &AtomicU32) {
+    counter.store(counter.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
+}
+
+/// First word of the message RAM, and words from there to the first element of receive FIFO 0 and of the transmit FIFO; an
+/// element has 18 words (RM0440, message RAM).
+const RECEIVE: usize = 0xB0 / 4;
+const TRANSMIT: usize = 0x278 / 4;
+const ELEMENT: usize = 18;
+/// Identifier in the first word of an element, number of bytes in the second.
+const ID: u32 = 18;
+const LENGTH: u32 = 16;
+
+fn element(first: usize, number: u8) -> *mut u32 {
+    let ram: *mut u32 = pac::FDCANRAM1.as_ptr().cast();
+    // In the message RAM for every number of an element, which is a field of two bits.
+    ram.wrapping_add(first + ELEMENT * usize::from(number % FIFO))
+}
+
+/// The oldest received frame; none where there is none.
+fn receive() -> Option<Frame> {
+    let can = pac::FDCAN1;
+    let status = can.rxfs(0).read();
+    if status.ffl() == 0 {
+        return None;
+    }
+    let place = element(RECEIVE, status.fgi());
+    // SAFETY: four words of an element of the message RAM, which is the reader's until it is acknowledged.
+    let [identifier, length, low, high] = unsafe {
+        [
+            place.read_volatile(),
+            place.wrapping_add(1).read_volatile(),
+            place.wrapping_add(2).read_volatile(),
+            place.wrapping_add(3).read_volatile(),
+        ]
+    };
+    can.rxfa(0).write(|w| w.set_fai(status.fgi()));
+    let data = (u64::from(low) | u64::from(high) << 32).to_le_bytes();
+    // A classic frame's length code may be more than 8 and means 8 then.
+    let length = ((length >> LENGTH & 0xF) as usize).min(data.len());
+    Frame::new((identifier >> ID & 0x7FF) as u16, data.get(..length)?)
+}
+
+/// Hands frames to the controller as long as it takes them.
+fn transmit(sending: &mut Deque<Frame, TO_BUS>) {
+    let can = pac::FDCAN1;
+    while !can.txfqs().read().tfqf()
+        && let Some(frame) = sending.pop_front()
+    {
+        let number = can.txfqs().read().tfqpi();
+        let place = element(TRANSMIT, number);
+        let mut data = [0; 8];
+        data.iter_mut().zip(frame.data()).for_each(|(place, byte)| *place = *byte);
+        let data = u64::from_le_bytes(data);
+        let words =
+            [u32::from(frame.id()) << ID, (frame.data().len() as u32) << LENGTH, data as u32, (data >> 32) as u32];
+        for (word, offset) in words.into_iter().zip(0..) {
+            // SAFETY: four words of an element of the message RAM, which is the writer's until it is requested.
+            unsafe { place.wrapping_add(offset).write_volatile(word) };
+        }
+        can.txbar().write(|w| w.set_ar(number.into(), true));
+    }
+}
+
+impl Bus {
+    fn take(&mut self, frame: &Frame) {
+        if let Some(observed) = observed() {
+            self.image.observe(&Observed { feedforward_torque: self.feedforward, ..observed });
+        }
+        let now = Instant::now().as_micros() as u32;
+        match self.receiver.receive(frame, now, &mut self.image, send) {
+            Route::Server if RECEIVED.try_send(*frame).is_err() => count(&DROPS.task),
+            Route::Server | Route::Done => {}
+        }
+    }
+}
+
+/// Line 0 of the controller: frames received, a frame sent, bus-off.
+#[unsafe(no_mangle)]
+extern "C" fn FDCAN1_IT0() {
+    let can = pac::FDCAN1;
+    let flags = can.ir().read();
+    // Flags clear where a one is written. Frames that arrive from here on raise the interrupt again.
+    can.ir().write_value(flags);
+    // SAFETY: enabled only after `start` has written it; this handler does not nest.
+    let bus = unsafe { (*BUS.0.get()).assume_init_mut() };
+    if flags.rfl(0) {
+        count(&DROPS.controller);
+    }
+    // A full FIFO, and as many that arrive meanwhile.
+    for _ in 0..2 * FIFO {
+        let Some(frame) = receive() else { break };
+        bus.take(&frame);
+    }
+    critical_section::with(|section| transmit(&mut SENDING.borrow_ref_mut(section)));
+    bus.image.follow(bus.shared.state());
+    let demand = bus.image.demand();
+    bus.feedforward = demand.command.torque;
+    bus.demand.publish(&demand);
+}

@@ -1,0 +1,135 @@
+//! The joint on the bus: what the receive interrupt leaves, SDO, LSS, heartbeats, EMCYs, the life of images; thread mode.
+//!
+//! The proof of an image takes up to 0.1 s, writing one to flash some 50 ms. Meanwhile this task sends no heartbeat; NMT, SYNC and RPDOs act in the
+//! interrupt all the same.
+
+use super::program::{BoardProgram, model};
+use super::shadow;
+use crate::board::can::{self, Condition};
+use crate::board::faults;
+use embassy_time::{Duration, Instant, with_timeout};
+use joint_firmware::canopen::{Frame, Server};
+use joint_firmware::objects::{Objects, StoredImages};
+use joint_firmware::parameters::life_cycle::{Action, Mode};
+use joint_firmware::parameters::slots::SlotError;
+
+/// How often timers are looked at where nothing arrives.
+const TICK: Duration = Duration::from_millis(1);
+/// How long the node stays away after bus-off: whatever disturbs the bus is given time to end.
+const AWAY: Duration = Duration::from_millis(100);
+
+/// The task's part of the node.
+pub struct Node {
+    server: Server<'static>,
+    objects: Objects<'static, BoardProgram>,
+    stored: StoredImages,
+    /// What the control step has not taken yet.
+    waiting: Option<Action>,
+    /// As it was when looked at last, and since when.
+    condition: (Condition, Instant),
+}
+
+/// Serves the bus for ever.
+#[embassy_executor::task]
+pub async fn serve(node: &'static mut Node) {
+    loop {
+        let frame = with_timeout(TICK, can::next()).await.ok();
+        node.work(frame);
+        if node.objects.program().restart {
+            faults::restart();
+        }
+    }
+}
+
+fn now() -> u32 {
+    Instant::now().as_micros() as u32
+}
+
+impl Node {
+    /// Before the receive interrupt is enabled.
+    pub fn new(server: Server<'static>, objects: Objects<'static, BoardProgram>, stored: StoredImages) -> Self {
+        Self { server, objects, stored, waiting: None, condition: (Condition::Active, Instant::now()) }
+    }
+
+    fn work(&mut self, frame: Option<Frame>) {
+        if let Some(observed) = can::observed() {
+            self.objects.poll(Instant::now().as_millis(), &observed);
+        }
+        self.act();
+        if let Some(frame) = frame {
+            if let Some(answer) = self.server.receive(&frame, now(), &mut self.objects) {
+                can::send(answer);
+            }
+            self.act();
+        }
+        self.mind_the_bus();
+        while let Some(emergency) = self.objects.take_emergency() {
+            self.server.emergency(emergency.code, emergency.register, emergency.information);
+        }
+        while can::has_room()
+            && let Some(frame) = self.server.poll(now(), &mut self.objects)
+        {
+            can::send(frame);
+        }
+        // A set-point that came by SDO, a transition of the server's own.
+        can::attend();
+    }
+
+    /// Reports an error-passive controller, and brings it back from bus-off.
+    fn mind_the_bus(&mut self) {
+        let condition = can::condition();
+        let (before, since) = self.condition;
+        if condition == before && (condition != Condition::Off || since.elapsed() < AWAY) {
+            return;
+        }
+        self.condition = (condition, Instant::now());
+        if condition == before {
+            can::recover();
+            return;
+        }
+        if before == Condition::Off {
+            self.server.bus_off_recovered(&mut self.objects);
+        }
+        self.server.error_passive(condition != Condition::Active);
+    }
+
+    /// Does what the life of an image asks for, until it asks for nothing or the control step has to be waited for.
+    fn act(&mut self) {
+        loop {
+            let action = self.waiting.take().unwrap_or_else(|| self.objects.take_action());
+            if action == Action::Nothing {
+                return;
+            }
+            let Some(outcome) = self.carry_out(action) else {
+                self.waiting = Some(action);
+                return;
+            };
+            self.objects.finished(outcome, self.stored);
+        }
+    }
+
+    /// How an action went; none while the control step has not taken what it was offered before.
+    fn carry_out(&mut self, action: Action) -> Option<Result<(), SlotError>> {
+        let configuration = *self.objects.configuration();
+        let (staging, program) = self.objects.staging_and_program();
+        let outcome = match action {
+            Action::Nothing => return None,
+            Action::Run { mode: Mode::Shadow, length } => {
+                shadow::replace(model(staging.get(..length)?, shadow::RATE));
+                return Some(Ok(()));
+            }
+            Action::Run { mode: Mode::Trial, length } => {
+                shadow::replace(None);
+                return program.run(&configuration, staging.get(..length)?).then_some(Ok(()));
+            }
+            Action::Revert | Action::Activate => {
+                shadow::replace(None);
+                return program.run_stored(&configuration).then_some(Ok(()));
+            }
+            Action::Store { length } => program.store.store_image(staging.get(..length)?),
+            Action::RollBack => program.store.roll_back(staging),
+        };
+        self.stored = program.store.stored_images();
+        Some(outcome)
+    }
+}

@@ -1,0 +1,82 @@
+//! A joint on a CAN bus: its configuration and friction model come from flash, its commands from the bus.
+
+mod bus;
+mod node;
+mod program;
+mod shadow;
+mod store;
+
+use super::NotStarted;
+use crate::board::control::{Commands, Report};
+use crate::board::flash::Parameters;
+use crate::board::{can, control};
+use bus::Node;
+use embassy_executor::Spawner;
+use embassy_stm32::Peri;
+use embassy_stm32::can::CanConfigurator;
+use embassy_stm32::peripherals::FLASH;
+use joint_firmware::motor::thermal::ThermalSettings;
+use joint_firmware::objects::{FrictionStatistics, Observed};
+use program::BoardProgram;
+use store::Store;
+
+/// What of the board belongs to the bus.
+pub struct Parts {
+    /// The CAN controller.
+    pub can: CanConfigurator<'static>,
+    /// Where parameters lie.
+    pub flash: Peri<'static, FLASH>,
+}
+
+/// The joint's place on the bus.
+pub struct Connection {
+    node: &'static mut Node,
+}
+
+/// Offers the first configuration and starts the receive interrupt. Returns what the thermal model needs, too.
+pub fn start(commands: Commands, parts: Parts) -> Result<(Connection, ThermalSettings), NotStarted> {
+    let mut program = BoardProgram::new(commands.active, Store::open(Parameters::new(parts.flash))?);
+    let (stored, configuration) = program.stored();
+    let thermal = program.begin(&configuration)?;
+    let node = node::start(program, &stored, &configuration, commands.demand, parts.can);
+    Ok((Connection { node }, thermal))
+}
+
+impl Connection {
+    /// Once the executors run.
+    pub fn spawn(self, slow: Spawner) -> Watching {
+        // Spawned once, so its only place is free.
+        slow.spawn(defmt::unwrap!(bus::serve(self.node)));
+        Watching { statistics: FrictionStatistics::default() }
+    }
+}
+
+/// What the bus shows of the joint beside its control steps.
+pub struct Watching {
+    statistics: FrictionStatistics,
+}
+
+impl Watching {
+    /// Every millisecond: computes the model in shadow, and leaves for the bus what is known of the joint. Temperatures in °C.
+    pub fn look(&mut self, bridge_temperature: f32, winding_temperature: f32) {
+        let Some(Report { telemetry, latched, .. }) = control::report() else { return };
+        let mut seen = telemetry;
+        if let Some(torque) = shadow::torque(&seen) {
+            seen.compensated.output.shadow = torque;
+        }
+        self.statistics.note(&seen);
+        can::observe(&Observed {
+            telemetry,
+            latched,
+            feedforward_torque: 0.0,
+            winding_temperature,
+            bridge_temperature,
+            friction: self.statistics,
+        });
+    }
+}
+
+/// Logs the state of the bus.
+pub fn log() {
+    defmt::info!("bus {}, dropped {}", can::condition(), can::dropped());
+}

@@ -1,0 +1,147 @@
+//! What the board does for the objects: configurations and friction models to the control step, records to flash. Thread mode.
+
+use super::store::{Guard, Store};
+use crate::board::{self, BoardConfiguration, Offering, Prepared};
+use joint_firmware::canopen::{Event, Reset};
+use joint_firmware::friction::FrictionModel;
+use joint_firmware::joint::Active;
+use joint_firmware::joint::configuration::{Configuration, ConfigurationError};
+use joint_firmware::joint::history::History;
+use joint_firmware::motor::thermal::ThermalSettings;
+use joint_firmware::objects::{NotConfigured, Program, Stored};
+use joint_firmware::parameters::authentication::Key;
+use joint_firmware::parameters::image::Image;
+use joint_firmware::parameters::slots::SlotError;
+
+/// The program around the objects.
+pub struct BoardProgram {
+    /// To the control step.
+    pub active: Offering<Active>,
+    /// The flash.
+    pub store: Store,
+    /// As kept in flash.
+    pub guard: Guard,
+    /// The master asked for a start of the whole program.
+    pub restart: bool,
+}
+
+impl BoardProgram {
+    /// With what the flash holds.
+    pub fn new(active: Offering<Active>, mut store: Store) -> Self {
+        let guard = store.guard();
+        Self { active, store, guard, restart: false }
+    }
+
+    /// The stored record, or none, and the configuration to start with: the board's own where none is stored, or where the stored one
+    /// is refused.
+    #[inline(never)]
+    pub fn stored(&mut self) -> (Stored, Configuration) {
+        let BoardConfiguration { bridge, joint } = &board::CONFIGURATION;
+        let stored = self.store.record().and_then(|record| Stored::decode(record, joint)).unwrap_or(Stored::NOTHING);
+        let configuration = stored.configuration(joint);
+        if configuration.prepare(bridge).is_ok() {
+            return (stored, configuration);
+        }
+        defmt::error!("the stored configuration is refused: the board's own is in use");
+        (stored, Configuration { node_id: configuration.node_id, ..*joint })
+    }
+
+    /// Offers the first configuration, with the friction model in flash. Returns what the thermal model needs.
+    pub fn begin(&mut self, configuration: &Configuration) -> Result<ThermalSettings, ConfigurationError> {
+        let model = self.store.image().and_then(|image| model(image, board::CONTROL_HZ));
+        // Nothing has been offered, so there is a place.
+        let prepared = defmt::unwrap!(prepare(&mut self.active, configuration, model))?;
+        let thermal = prepared.value().thermal;
+        prepared.offer();
+        Ok(thermal)
+    }
+
+    /// Has the control step take the friction model of an image with the configuration in use; false while it has not taken what it was
+    /// offered before.
+    pub fn run(&mut self, configuration: &Configuration, image: &[u8]) -> bool {
+        self.offer(configuration, model(image, board::CONTROL_HZ))
+    }
+
+    /// The same with the image in flash, or none where there is none.
+    pub fn run_stored(&mut self, configuration: &Configuration) -> bool {
+        let model = self.store.image().and_then(|image| model(image, board::CONTROL_HZ));
+        self.offer(configuration, model)
+    }
+
+    fn offer(&mut self, configuration: &Configuration, model: Option<FrictionModel>) -> bool {
+        // The configuration was prepared before, when it came into use.
+        match prepare(&mut self.active, configuration, model) {
+            Some(Ok(prepared)) => {
+                prepared.offer();
+                true
+            }
+            _ => false,
+        }
+    }
+}
+
+/// The friction model of an image's bytes for `rate` evaluations a second; none where they are no image.
+///
+/// A function of its own, so that the decoded image's 2 KiB of stack are free again afterwards.
+#[inline(never)]
+pub fn model(image: &[u8], rate: u32) -> Option<FrictionModel> {
+    Some(FrictionModel::new(&Image::decode(image).ok()?.friction, rate))
+}
+
+/// A function of its own, as above.
+#[inline(never)]
+fn prepare<'a>(
+    active: &'a mut Offering<Active>,
+    configuration: &Configuration,
+    model: Option<FrictionModel>,
+) -> Option<Result<Prepared<'a, Active>, ConfigurationError>> {
+    active.prepare(|_| configuration.prepare(&board::CONFIGURATION.bridge).map(|active| active.with_friction(model)))
+}
+
+impl Program for BoardProgram {
+    fn configure(&mut self, configuration: &Configuration) -> Result<(), NotConfigured> {
+        let bridge = &board::CONFIGURATION.bridge;
+        let prepared = self.active.prepare(|in_use| {
+            let model = in_use.and_then(|active| active.friction.clone());
+            configuration.prepare(bridge).map(|active| active.with_friction(model))
+        });
+        prepared.ok_or(NotConfigured::Busy)?.map_err(NotConfigured::Refused)?.offer();
+        Ok(())
+    }
+
+    fn store(&mut self, record: &[u8]) -> Result<(), SlotError> {
+        self.store.store_record(record)
+    }
+
+    fn keep(&mut self, floor: u32, failures: u16) -> Result<(), SlotError> {
+        let guard = Guard { floor, failures, key: self.guard.key.clone() };
+        self.store.keep(&guard)?;
+        self.guard = guard;
+        Ok(())
+    }
+
+    fn provision(&mut self, key: &Key) -> Result<(), SlotError> {
+        let guard = Guard { key: Some(key.clone()), ..self.guard };
+        self.store.keep(&guard)?;
+        self.guard = guard;
+        Ok(())
+    }
+
+    fn read_image(&mut self, offset: u32, out: &mut [u8]) -> bool {
+        let bytes = self.store.piece_of_image(offset as usize, out.len());
+        bytes.map(|bytes| out.iter_mut().zip(bytes).for_each(|(place, byte)| *place = *byte)).is_some()
+    }
+
+    fn history<R>(&self, read: impl FnOnce(&History) -> R) -> Option<R> {
+        board::control::history(read)
+    }
+
+    fn event(&mut self, event: Event) {
+        match event {
+            // The interrupt tells the joint.
+            Event::State(_) => board::can::attend(),
+            Event::Reset(Reset::Node) => self.restart = true,
+            _ => {}
+        }
+    }
+}

@@ -1,0 +1,133 @@
+//! What the board keeps in flash: friction images, the stored record of objects, the key with what guards it. Thread mode.
+//!
+//! | pages | kind | content |
+//! |---|---|---|
+//! | 0, 1 | 1 | friction image |
+//! | 2, 3 | 2 | record of object 1010h ([`Stored`](joint_firmware::objects::Stored)) |
+//! | 4, 5 | 3 | guard: floor (4 bytes), wrong tags (2), whether there is a key (1), reserved (1), key (32), all little-endian |
+
+use crate::board::flash::Parameters;
+use joint_firmware::objects::StoredImages;
+use joint_firmware::parameters::Summary;
+use joint_firmware::parameters::authentication::{KEY, Key, STAGING};
+use joint_firmware::parameters::image::Image;
+use joint_firmware::parameters::slots::{Layout, Slot, SlotError, Slots, WriteError};
+
+/// What guards the images.
+#[derive(Clone, Debug, Default)]
+pub struct Guard {
+    /// Lowest version that is taken.
+    pub floor: u32,
+    /// Wrong tags in a row.
+    pub failures: u16,
+    /// The key, once there is one.
+    pub key: Option<Key>,
+}
+
+const GUARD: usize = 8 + KEY;
+
+impl Guard {
+    fn encode(&self) -> [u8; GUARD] {
+        let mut bytes = [0; GUARD];
+        let [a, b, c, d] = self.floor.to_le_bytes();
+        let [low, high] = self.failures.to_le_bytes();
+        let head = [a, b, c, d, low, high, self.key.is_some().into(), 0];
+        let key = self.key.as_ref().map_or([0; KEY], Key::to_bytes);
+        bytes.iter_mut().zip(head.into_iter().chain(key)).for_each(|(place, byte)| *place = byte);
+        bytes
+    }
+
+    fn decode(bytes: &[u8; GUARD]) -> Self {
+        let (&[a, b, c, d, low, high, present, _], key) = bytes.split_first_chunk().unwrap_or((&[0; 8], &[]));
+        let key = key.first_chunk().filter(|_| present != 0).and_then(|key| Key::new(*key).ok());
+        Self { floor: u32::from_le_bytes([a, b, c, d]), failures: u16::from_le_bytes([low, high]), key }
+    }
+}
+
+/// The pairs of slots.
+pub struct Store {
+    flash: Parameters,
+    images: Slots,
+    records: Slots,
+    guards: Slots,
+}
+
+/// Two pages from page `first` on.
+const fn layout(first: usize, kind: u32) -> Layout {
+    match Layout::new(first, 1, kind) {
+        Some(layout) => layout,
+        None => panic!("a slot has at least one page"),
+    }
+}
+const IMAGES: Layout = layout(0, 1);
+const RECORDS: Layout = layout(2, 2);
+const GUARDS: Layout = layout(4, 3);
+
+impl Store {
+    /// Finds out what the pages hold, and decides what a loss of power left undecided.
+    pub fn open(mut flash: Parameters) -> Result<Self, WriteError> {
+        let images = Slots::open(&mut flash, IMAGES)?;
+        let records = Slots::open(&mut flash, RECORDS)?;
+        let guards = Slots::open(&mut flash, GUARDS)?;
+        Ok(Self { flash, images, records, guards })
+    }
+
+    /// What the image slots hold.
+    pub fn stored_images(&mut self) -> StoredImages {
+        let (active, previous) = (self.images.active(), self.images.previous());
+        StoredImages { active: self.summary(active), previous: self.summary(previous) }
+    }
+
+    fn summary(&mut self, slot: Option<Slot>) -> Option<(Summary, Slot)> {
+        let slot = slot.filter(|slot| self.images.is_whole(&mut self.flash, *slot))?;
+        let bytes = self.flash.bytes().get(self.images.range(slot)?)?;
+        Some((Image::summary(bytes).ok()?, slot))
+    }
+
+    /// The image in use; none where there is none, or it has been damaged.
+    pub fn image(&mut self) -> Option<&[u8]> {
+        let slot = self.images.usable(&mut self.flash).ok()??;
+        self.flash.bytes().get(self.images.range(slot)?)
+    }
+
+    /// `length` bytes of the image in use from `offset` on; none where there are not so many. The image carries its own checksum.
+    pub fn piece_of_image(&self, offset: usize, length: usize) -> Option<&[u8]> {
+        let image = self.flash.bytes().get(self.images.range(self.images.active()?)?)?;
+        image.get(offset..offset.checked_add(length)?)
+    }
+
+    /// Stores an image.
+    pub fn store_image(&mut self, image: &[u8]) -> Result<(), SlotError> {
+        self.images.store(&mut self.flash, image)
+    }
+
+    /// Makes the previous image the one in use; `buffer` is overwritten.
+    pub fn roll_back(&mut self, buffer: &mut [u8; STAGING]) -> Result<(), SlotError> {
+        self.images.roll_back(&mut self.flash, buffer)
+    }
+
+    /// The stored record; none where there is none.
+    pub fn record(&mut self) -> Option<&[u8]> {
+        let slot = self.records.usable(&mut self.flash).ok()??;
+        self.flash.bytes().get(self.records.range(slot)?)
+    }
+
+    /// Stores a record.
+    pub fn store_record(&mut self, record: &[u8]) -> Result<(), SlotError> {
+        self.records.store(&mut self.flash, record)
+    }
+
+    /// What guards the images.
+    pub fn guard(&mut self) -> Guard {
+        let mut bytes = [0; GUARD];
+        match self.guards.load(&mut self.flash, &mut bytes) {
+            Ok(Some(GUARD)) => Guard::decode(&bytes),
+            _ => Guard::default(),
+        }
+    }
+
+    /// Keeps what guards the images.
+    pub fn keep(&mut self, guard: &Guard) -> Result<(), SlotError> {
+        self.guards.store(&mut self.flash, &guard.encode())
+    }
+}
