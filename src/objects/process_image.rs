@@ -154,3 +154,35 @@ impl ProcessImage for JointImage<'_> {
         self.coupled_sequence = self.coupled_sequence.wrapping_add(1);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The transition forgets set-points, and the guard does not rely on it: here the state alone changes.
+    #[test]
+    fn no_set_point_counts_outside_operational_even_if_it_was_not_forgotten() {
+        let shared = Shared::new();
+        shared.set_rated_torque(10.0);
+        let mut image = JointImage::new(&shared);
+        image.state_changed(NmtState::Operational);
+        for (index, value) in [(0x6040, 0x0F), (0x6071, 500)] {
+            image.receive(MappedObject::new(index, 0, 16), value);
+        }
+        image.received(0);
+        let asked = image.demand();
+        assert!(asked.controlword == Controlword(0x0F) && (asked.command.torque - 5.0).abs() < 1e-5);
+        for state in [NmtState::Stopped, NmtState::PreOperational, NmtState::Initialising] {
+            image.state = state;
+            let demand = image.demand();
+            assert_eq!(
+                (demand.controlword, demand.command),
+                (Controlword::QUICK_STOP, Command::default()),
+                "{state:?}"
+            );
+        }
+        // The set-points are still there: it is the guard that held them back.
+        image.state = NmtState::Operational;
+        assert_eq!(image.demand(), asked);
+    }
+}
