@@ -12,6 +12,8 @@
 //!  - [`Shared`], a static, which both borrow: the NMT state, the PDO parameters, instants. See there why no lock is
 //!    needed.
 //!
+//! What both send waits in a [`TransmitQueue`], which defines what happens on a bus that has no room.
+//!
 //! ```text
 //!  FDCAN interrupt   frame -> Receiver::receive(frame, now, &mut image, send) -> Done | Server -> bounded queue
 //!  task              queue -> Server::receive(frame, now, &mut dictionary) -> answer
@@ -57,6 +59,7 @@ mod sdo;
 mod server;
 mod shared;
 mod time;
+mod transmit_queue;
 
 #[cfg(test)]
 mod tests;
@@ -71,6 +74,7 @@ pub use receiver::{Receiver, Route};
 pub use sdo::SdoSettings;
 pub use server::Server;
 pub use shared::{NO_NODE_ID, Shared};
+pub use transmit_queue::{Buffers, PATIENCE, TransmitQueue, URGENT};
 
 /// Identifiers of the predefined connection set, CiA 301 section 7.3.3; the node id is added to the last three.
 const NMT: u16 = 0x000;

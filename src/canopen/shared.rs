@@ -9,6 +9,8 @@
 //!    not exist (bit 31 of its COB-ID), which is CiA 301's own procedure; the COB-ID is written last (release) and
 //!    read first (acquire).
 
+use super::HEARTBEAT;
+use super::frame::Frame;
 use super::nmt::{NmtState, Reset};
 use super::parameters::{CONSUMERS, INVALID, MAPPED, PDOS, PdoParameters};
 use super::pdo::MappedObject;
@@ -85,6 +87,16 @@ impl Shared {
     /// the next SYNC (type 0) allows. Any context.
     pub fn trigger(&self, pdo: u8) {
         self.events.fetch_or(bit(pdo), Ordering::Relaxed);
+    }
+
+    /// Whether a frame of this node makes the one before it with the same identifier worthless: TPDOs, and heartbeats but for the boot-up
+    /// message. Any context.
+    pub fn is_renewable(&self, frame: &Frame) -> bool {
+        let heartbeat = HEARTBEAT | u16::from(self.node_id());
+        match frame.id() {
+            id if id == heartbeat => frame.data() != [NmtState::Initialising as u8],
+            id => self.transmit.iter().any(|registers| registers.id() == Some(id)),
+        }
     }
 
     pub(super) fn epoch(&self) -> Epoch {
