@@ -16,7 +16,7 @@ use crate::canopen::{Abort, Access, CommunicationParameters, Entry, Event, Group
 use crate::joint::configuration::Configuration;
 use crate::joint::state_machine::State;
 use crate::parameters::authentication::{KEY, STAGING};
-use crate::parameters::life_cycle::{Action, Refusal};
+use crate::parameters::life_cycle::{Action, LifeCycle, Refusal};
 use crate::parameters::slots::SlotError;
 use core::cell::Cell;
 use heapless::Deque;
@@ -83,6 +83,22 @@ impl<'a, P: Program> Objects<'a, P> {
         };
         objects.publish();
         objects
+    }
+
+    /// Begins anew, as at power-on: for a program that goes on running when the node is reset
+    /// ([`Event::Reset`](crate::canopen::Event::Reset)). What is staged, tried, or waits to be reported is forgotten.
+    pub fn restart(&mut self, life: LifeCycle, stored_images: StoredImages, start: &Start) {
+        let Start { configuration, stored, single_bank } = *start;
+        self.images.restart(life, stored_images);
+        (self.configuration, self.staged, self.refused) = (configuration, configuration, Refused::default());
+        (self.stored, self.single_bank, self.heartbeat_lost) = (stored, single_bank, false);
+        for (range, value) in Range::ALL.into_iter().zip(stored.ranges()) {
+            self.shared.set_range(range, value);
+        }
+        self.shared.set_rated_torque(configuration.limits.torque);
+        self.reports = Reports::default();
+        self.emergencies.clear();
+        self.publish();
     }
 
     /// The program around the objects.

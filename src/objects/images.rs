@@ -57,6 +57,13 @@ impl<'a> Images<'a> {
         Self { staging, life, key, stored, action: Action::Nothing, upload: None, key_bytes, reading: None }
     }
 
+    /// As [`Images::new`], with the key that there is.
+    pub(super) fn restart(&mut self, life: LifeCycle, stored: StoredImages) {
+        (self.life, self.stored) = (life, stored);
+        (self.action, self.upload, self.reading) = (Action::Nothing, None, None);
+        self.key_bytes = [0; KEY];
+    }
+
     pub(super) fn state(&self) -> u8 {
         // Nothing staged beside an image in use is what a joint starts with, too.
         match self.life.state() {

@@ -11,16 +11,26 @@
 //!
 //! - [`VirtualNode`]: the whole node; frames and time passed in, so that tests run it faster than real time
 //! - [`serve`]: the node on a bus, in real time
+//! - [`PacedNodes`]: several nodes on one modelled wire, in simulated time
+//! - [`Storage`]: what outlasts a loss of power, in memory or in files
 //! - [`flash`]: a flash with the rules of the STM32G4's
+//! - [`hostile`]: server and objects without the joint, and a judge of what arbitrary frames do to them
 
 #![forbid(unsafe_code)]
 
 pub mod flash;
+pub mod hostile;
 mod images;
+mod paced;
 mod program;
+mod sample_image;
 mod serve;
+mod storage;
 mod virtual_node;
 
 pub use images::SlotImages;
+pub use paced::{PacedEvent, PacedNodes, REACTION, TASK};
+pub use sample_image::SampleImage;
 pub use serve::{ServeError, serve};
+pub use storage::{Storage, StorageError};
 pub use virtual_node::{NodeError, Options, VirtualNode};

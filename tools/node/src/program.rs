@@ -1,11 +1,11 @@
-//! What a board's program does for the objects, done for the simulated joint: swaps wait for the next control step, records live in memory.
+//! What a board's program does for the objects, done for the simulated joint: swaps wait for the next control step.
 
-use crate::images::SlotImages;
-use joint_firmware::canopen::Event;
+use crate::storage::Storage;
+use joint_firmware::canopen::{Event, Reset};
 use joint_firmware::joint::Active;
 use joint_firmware::joint::configuration::{BridgeConfiguration, Configuration};
 use joint_firmware::joint::history::History;
-use joint_firmware::objects::{NotConfigured, Program};
+use joint_firmware::objects::{NotConfigured, Program, Stored};
 use joint_firmware::parameters::authentication::Key;
 use joint_firmware::parameters::slots::SlotError;
 
@@ -15,30 +15,27 @@ pub struct VirtualProgram {
     bridge: BridgeConfiguration,
     /// Prepared, for the next control step.
     pub next: Option<Active>,
-    pub images: SlotImages,
-    /// What 1010h stored; outlasts a reset of the node, not of the program.
-    pub record: Option<Vec<u8>>,
-    pub floor: u32,
-    pub failures: u16,
-    pub key: Option<Key>,
+    pub storage: Storage,
     /// The steps before the latched fault.
     pub history: Option<History>,
-    /// What the network told since the last look.
-    pub events: Vec<Event>,
+    /// The network asked for a reset of the node.
+    pub reset: bool,
 }
 
 impl VirtualProgram {
-    pub fn new(bridge: BridgeConfiguration, images: SlotImages) -> Self {
-        Self {
-            bridge,
-            next: None,
-            images,
-            record: None,
-            floor: 0,
-            failures: 0,
-            key: None,
-            history: None,
-            events: Vec::new(),
+    pub fn new(bridge: BridgeConfiguration, storage: Storage) -> Self {
+        Self { bridge, next: None, storage, history: None, reset: false }
+    }
+
+    /// What is stored, and the configuration that a joint starts with: the board's where the stored one is refused.
+    pub fn power_on(&mut self, defaults: &Configuration) -> (Stored, Configuration) {
+        let record = self.storage.configuration();
+        let stored = record.and_then(|record| Stored::decode(&record, defaults)).unwrap_or(Stored::NOTHING);
+        let configuration = stored.configuration(defaults);
+        if configuration.prepare(&self.bridge).is_ok() {
+            (stored, configuration)
+        } else {
+            (stored, Configuration { node_id: stored.node_id, ..*defaults })
         }
     }
 }
@@ -53,22 +50,19 @@ impl Program for VirtualProgram {
     }
 
     fn store(&mut self, record: &[u8]) -> Result<(), SlotError> {
-        self.record = Some(record.to_vec());
-        Ok(())
+        self.storage.store_configuration(record)
     }
 
     fn keep(&mut self, floor: u32, failures: u16) -> Result<(), SlotError> {
-        (self.floor, self.failures) = (floor, failures);
-        Ok(())
+        self.storage.store_counts(floor, failures)
     }
 
     fn provision(&mut self, key: &Key) -> Result<(), SlotError> {
-        self.key = Some(key.clone());
-        Ok(())
+        self.storage.store_key(key)
     }
 
     fn read_image(&mut self, offset: u32, out: &mut [u8]) -> bool {
-        let bytes = self.images.active().unwrap_or_default();
+        let bytes = self.storage.images.active().unwrap_or_default();
         let start = offset as usize;
         match bytes.get(start..start.saturating_add(out.len())) {
             Some(piece) => {
@@ -84,6 +78,6 @@ impl Program for VirtualProgram {
     }
 
     fn event(&mut self, event: Event) {
-        self.events.push(event);
+        self.reset |= event == Event::Reset(Reset::Node);
     }
 }

@@ -5,11 +5,16 @@
 use crate::flash::Flash;
 use crate::images::{SlotImages, model};
 use crate::program::VirtualProgram;
+use crate::storage::Storage;
 use bus::Frame;
-use joint_firmware::canopen::{self, Identity, NO_NODE_ID, NmtState, Receiver, Route, SdoSettings, Server};
+use joint_firmware::canopen::{
+    self, Buffers, Identity, NO_NODE_ID, NmtState, PDOS, Receiver, Route, SdoSettings, Server, TransmitQueue,
+};
+use joint_firmware::joint::configuration::Configuration;
 use joint_firmware::joint::shadow::Shadow;
+use joint_firmware::joint::state_machine::State;
 use joint_firmware::joint::{Joint, Telemetry};
-use joint_firmware::objects::{FrictionStatistics, Images, JointImage, Objects, Observed, Shared, Start, Stored};
+use joint_firmware::objects::{FrictionStatistics, Images, JointImage, Objects, Observed, Shared, Start, StoredImages};
 use joint_firmware::parameters::authentication::STAGING;
 use joint_firmware::parameters::certificate::Limits;
 use joint_firmware::parameters::image::{Effort, Target};
@@ -18,6 +23,7 @@ use joint_firmware::parameters::slots::SlotError;
 use plant::virtual_joint::{Setup, VirtualJointError};
 use plant::{ActuatorParameters, VirtualJoint};
 use std::collections::VecDeque;
+use std::time::Duration;
 
 /// Device profile 402, a servo drive.
 const DEVICE_TYPE: u32 = 0x0002_0192;
@@ -29,11 +35,15 @@ pub const PRODUCT: u32 = 0x564A_6E74;
 const SHADOW_RATE: u32 = 1_000;
 /// Frames that wait for the task; an SDO block and some more.
 const QUEUE: usize = 160;
+/// Frames that wait for the controller.
+const TRANSMIT: usize = 16;
+/// Places that the task leaves to what the receive interrupt sends: the TPDOs.
+const RESERVED: usize = PDOS;
 
 /// Which node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Options {
-    /// 1 to 127, or 255: silent until LSS gives it one.
+    /// 1 to 127, or 255: silent until LSS gives it one. One that LSS has stored comes first.
     pub node_id: u8,
     /// Serial number, 1018h:4.
     pub serial: u32,
@@ -59,6 +69,8 @@ pub enum NodeError {
 #[derive(Debug)]
 pub struct VirtualNode {
     joint: VirtualJoint,
+    setup: Setup,
+    requirements: Requirements,
     rate: u32,
     bus: &'static canopen::Shared,
     receiver: Receiver<'static>,
@@ -69,10 +81,14 @@ pub struct VirtualNode {
     statistics: FrictionStatistics,
     shadow: Option<Shadow>,
     queue: VecDeque<Frame>,
-    /// Frames for the bus, oldest first.
-    sent: VecDeque<Frame>,
+    /// Frames for the bus.
+    sent: TransmitQueue<TRANSMIT>,
+    /// The task has more to send than there was room for.
+    unfinished: bool,
     dropped: u64,
     steps: u64,
+    /// Control step until which the task has no time.
+    busy_until: u64,
 }
 
 fn text(parameters: &ActuatorParameters) -> String {
@@ -80,7 +96,8 @@ fn text(parameters: &ActuatorParameters) -> String {
 }
 
 impl VirtualNode {
-    /// A joint at rest, in PRE-OPERATIONAL once time passes. It stays in memory for as long as the program runs.
+    /// A joint at rest, in PRE-OPERATIONAL once time passes, with nothing but images stored. It stays in memory for as long as the program
+    /// runs.
     ///
     /// # Errors
     /// What plant or firmware refuse.
@@ -88,14 +105,30 @@ impl VirtualNode {
         parameters: ActuatorParameters,
         setup: &Setup,
         options: &Options,
-        mut images: SlotImages,
+        images: SlotImages,
+    ) -> Result<Self, NodeError> {
+        Self::with_storage(parameters, setup, options, Storage::with(images).map_err(NodeError::Slots)?)
+    }
+
+    /// The same joint with everything that it has stored, as after a loss of power. Where a configuration is stored it acts instead of `setup`'s.
+    ///
+    /// # Errors
+    /// What plant or firmware refuse.
+    pub fn with_storage(
+        parameters: ActuatorParameters,
+        setup: &Setup,
+        options: &Options,
+        storage: Storage,
     ) -> Result<Self, NodeError> {
         if !matches!(options.node_id, 1..=127 | NO_NODE_ID) {
             return Err(NodeError::NodeId(options.node_id));
         }
-        let mut joint = VirtualJoint::new(parameters, setup, parameters.joint.thermal.ambient, options.seed)?;
         let rate = setup.bridge.rate as u32;
-        joint.set_friction(images.model(rate));
+        let mut program = VirtualProgram::new(setup.bridge, storage);
+        let (stored, configuration) = program.power_on(&setup.configuration);
+        let started = Setup { configuration, ..*setup };
+        let mut joint = VirtualJoint::new(parameters, &started, parameters.joint.thermal.ambient, options.seed)?;
+        joint.set_friction(program.storage.images.model(rate));
 
         // The firmware keeps these in statics.
         let bus: &canopen::Shared = Box::leak(Box::new(canopen::Shared::new()));
@@ -110,8 +143,6 @@ impl VirtualNode {
             revision: 1,
             serial: options.serial,
         }));
-        let stored_images = images.stored();
-        let floor = [stored_images.active, stored_images.previous].iter().flatten().map(|(s, _)| s.version).max();
         let requirements = Requirements {
             target: Target { product: PRODUCT, serial: options.serial },
             effort: Effort::NewtonMetre,
@@ -123,25 +154,30 @@ impl VirtualNode {
             },
             rate,
         };
-        let life = LifeCycle::new(requirements, floor.unwrap_or(0), 0, 0);
-        let images_of_client = Images::new(Box::leak(Box::new([0; STAGING])), life, None, stored_images);
-        let start = Start { configuration: setup.configuration, stored: Stored::NOTHING, single_bank: true };
-        let program = VirtualProgram::new(setup.bridge, images);
+        let (life, stored_images) = life(requirements, &mut program.storage, 0);
+        let key = program.storage.key();
+        let images = Images::new(Box::leak(Box::new([0; STAGING])), life, key, stored_images);
+        let start = Start { configuration, stored, single_bank: true };
+        let node_id = if stored.node_id == NO_NODE_ID { options.node_id } else { stored.node_id };
         Ok(Self {
             joint,
+            setup: *setup,
+            requirements,
             rate,
             bus,
             receiver: Receiver::new(bus),
-            server: Server::new(bus, identity, SdoSettings::default(), options.node_id),
+            server: Server::new(bus, identity, SdoSettings::default(), node_id),
             image: JointImage::new(shared),
-            objects: Objects::new(shared, program, images_of_client, &start),
+            objects: Objects::new(shared, program, images, &start),
             observed: Observed::default(),
             statistics: FrictionStatistics::default(),
             shadow: None,
             queue: VecDeque::new(),
-            sent: VecDeque::new(),
+            sent: TransmitQueue::new(),
+            unfinished: false,
             dropped: 0,
             steps: 0,
+            busy_until: 0,
         })
     }
 
@@ -160,9 +196,20 @@ impl VirtualNode {
         self.bus.state()
     }
 
-    /// What a loss of power leaves: the slots' flash.
+    /// What a loss of power leaves of the images: the slots' flash.
     pub fn flash(&mut self) -> Flash {
-        self.objects.program().images.flash().clone()
+        self.objects.program().storage.images.flash().clone()
+    }
+
+    /// What a loss of power leaves.
+    pub fn storage(&mut self) -> Storage {
+        self.objects.program().storage.clone()
+    }
+
+    /// Configuration that the joint runs with.
+    #[must_use]
+    pub fn configuration(&self) -> &Configuration {
+        self.objects.configuration()
     }
 
     /// The joint behind the node.
@@ -183,6 +230,24 @@ impl VirtualNode {
         self.dropped
     }
 
+    /// TPDOs and heartbeats that were overwritten by newer ones because the bus had no room for them.
+    #[must_use]
+    pub fn overwritten(&self) -> u32 {
+        self.sent.overwritten()
+    }
+
+    /// Frames of this node that found no room on the way to the controller.
+    #[must_use]
+    pub fn unsent(&self) -> u32 {
+        self.sent.dropped()
+    }
+
+    /// Requests that wait for the task, [`VirtualNode::work`].
+    #[must_use]
+    pub fn requests(&self) -> usize {
+        self.queue.len()
+    }
+
     /// Control steps a second.
     #[must_use]
     pub fn rate(&self) -> u32 {
@@ -191,10 +256,16 @@ impl VirtualNode {
 
     /// A frame from the bus: what acts in the receive interrupt acts now.
     pub fn receive(&mut self, frame: &Frame) {
+        // TPDOs tell of the last control step, not of what the task last looked at.
+        self.observed.telemetry = *self.joint.joint().telemetry();
         self.image.observe(&self.observed);
         let now = self.now();
         let sent = &mut self.sent;
-        match self.receiver.receive(frame, now, &mut self.image, |frame| sent.push_back(frame)) {
+        let send = |frame| {
+            // Counted where there is no room.
+            let _ = sent.push(frame, true, now);
+        };
+        match self.receiver.receive(frame, now, &mut self.image, send) {
             Route::Server if self.queue.len() < QUEUE => self.queue.push_back(*frame),
             Route::Server => self.dropped += 1,
             Route::Done => {}
@@ -202,14 +273,36 @@ impl VirtualNode {
         self.image.follow(self.bus.state());
     }
 
+    /// The task is busy for `time` from now on: what it does in no simulated time, as verifying an image, takes it time on a board. Control
+    /// steps and the receive interrupt go on.
+    pub fn occupy(&mut self, time: Duration) {
+        self.busy_until = self.steps + (time.as_secs_f64() * f64::from(self.rate)) as u64;
+    }
+
     /// The task's work; at least once a millisecond of simulated time, and after frames that want an answer.
     pub fn work(&mut self) {
-        let now = self.now();
+        if self.steps < self.busy_until {
+            return;
+        }
         self.objects.poll(self.microseconds() / 1_000, &self.observed);
         self.act();
+        self.answer();
+        self.restart();
+        self.swap();
+        self.image.follow(self.bus.state());
+    }
+
+    /// Requests and what the server sends by itself, for as long as there is room for it.
+    fn answer(&mut self) {
+        let now = self.now();
+        self.unfinished = false;
         loop {
             while let Some(emergency) = self.objects.take_emergency() {
                 self.server.emergency(emergency.code, emergency.register, emergency.information);
+            }
+            if self.sent.room() <= RESERVED {
+                self.unfinished = true;
+                return;
             }
             let frame = match self.queue.pop_front() {
                 Some(frame) => {
@@ -222,13 +315,35 @@ impl VirtualNode {
                 }
                 None => match self.server.poll(now, &mut self.objects) {
                     Some(frame) => Some(frame),
-                    None => break,
+                    None => return,
                 },
             };
-            self.sent.extend(frame);
+            if let Some(frame) = frame {
+                // There is room.
+                let _ = self.sent.push(frame, self.bus.is_renewable(&frame), now);
+            }
         }
-        self.swap();
-        self.image.follow(self.bus.state());
+    }
+
+    /// A reset of the node reaches the application as soon as nothing is under current: the stored configuration and image act.
+    fn restart(&mut self) {
+        let state = self.joint.joint().telemetry().state;
+        let off = matches!(state, State::NotReadyToSwitchOn | State::SwitchOnDisabled | State::Fault);
+        if !off || !std::mem::take(&mut self.objects.program().reset) {
+            return;
+        }
+        let now = self.microseconds() / 1_000;
+        let defaults = self.setup.configuration;
+        let program = self.objects.program();
+        let (stored, configuration) = program.power_on(&defaults);
+        let (life, stored_images) = life(self.requirements, &mut program.storage, now);
+        let model = program.storage.images.model(self.rate);
+        // Refused only where even the defaults are, with which the joint began.
+        program.next = configuration.prepare(&self.setup.bridge).ok();
+        self.objects.restart(life, stored_images, &Start { configuration, stored, single_bank: true });
+        self.joint.set_friction(model);
+        self.shadow = None;
+        self.statistics = FrictionStatistics::default();
     }
 
     /// Swaps a prepared configuration in: here is always between two control steps.
@@ -240,7 +355,16 @@ impl VirtualNode {
 
     /// The next frame for the bus.
     pub fn take_frame(&mut self) -> Option<Frame> {
-        self.sent.pop_front()
+        self.take_frame_for(Buffers { all: usize::MAX, occupied: 0 })
+    }
+
+    /// The next frame for a controller with these transmit buffers.
+    pub fn take_frame_for(&mut self, buffers: Buffers) -> Option<Frame> {
+        let frame = self.sent.pop(self.now(), buffers);
+        if self.unfinished && self.sent.room() > RESERVED {
+            self.answer();
+        }
+        frame
     }
 
     /// Control steps, with the task's work after each millisecond.
@@ -287,20 +411,20 @@ impl VirtualNode {
                 Action::Run { mode, length } => self.run(mode, length),
                 Action::Revert | Action::Activate => {
                     self.shadow = None;
-                    let model = self.objects.program().images.model(self.rate);
+                    let model = self.objects.program().storage.images.model(self.rate);
                     self.joint.set_friction(model);
                     Ok(())
                 }
                 Action::Store { length } => {
                     let image = self.objects.staging()[..length].to_vec();
-                    self.objects.program().images.store(&image)
+                    self.objects.program().storage.images.store(&image)
                 }
                 Action::RollBack => {
                     let mut buffer = *self.objects.staging();
-                    self.objects.program().images.roll_back(&mut buffer)
+                    self.objects.program().storage.images.roll_back(&mut buffer)
                 }
             };
-            let stored = self.objects.program().images.stored();
+            let stored = self.objects.program().storage.images.stored();
             self.objects.finished(outcome, stored);
         }
     }
@@ -318,4 +442,12 @@ impl VirtualNode {
         }
         Ok(())
     }
+}
+
+/// The life cycle of a joint that starts at `now`, ms, and what its slots hold.
+fn life(requirements: Requirements, storage: &mut Storage, now: u64) -> (LifeCycle, StoredImages) {
+    let stored = storage.images.stored();
+    let versions = [stored.active, stored.previous].into_iter().flatten().map(|(summary, _)| summary.version);
+    let (floor, failures) = storage.counts();
+    (LifeCycle::new(requirements, versions.fold(floor, u32::max), failures, now), stored)
 }

@@ -1,17 +1,14 @@
 //! The virtual joint driven over the bus alone, in simulated time: SDO, PDO, NMT, and images from upload to flash and back.
 
-mod support;
-
 use bus::Frame;
 use bus::client::sdo::{Failure, Method, Settings, Transfer};
 use bus::client::{Abort, Command, Emergency, NmtState, Object, Target};
 use joint_firmware::joint::state_machine::State;
 use joint_firmware::parameters::authentication::Key;
-use node::{Options, SlotImages, VirtualNode};
+use node::{Options, SampleImage, SlotImages, Storage, VirtualNode};
 use plant::ActuatorParameters;
 use plant::virtual_joint::Setup;
 use std::time::Duration;
-use support::image;
 
 const ID: u8 = 5;
 /// Control steps in a millisecond.
@@ -31,10 +28,15 @@ impl Master {
     }
 
     fn with(images: SlotImages) -> Self {
+        Self::powered(Storage::with(images).unwrap())
+    }
+
+    /// After a loss of power that left this.
+    fn powered(storage: Storage) -> Self {
         let parameters = ActuatorParameters::reference().aligned().without_payload();
         let setup = Setup::of(&parameters);
         let options = Options { node_id: ID, serial: 12, seed: 1 };
-        let node = VirtualNode::new(parameters, &setup, &options, images).unwrap();
+        let node = VirtualNode::with_storage(parameters, &setup, &options, storage).unwrap();
         let mut master = Self { node, heard: vec![], counter: 0 };
         // The joint measures its current sensors' offsets.
         master.wait(200);
@@ -189,7 +191,7 @@ fn nmt_stop_in_motion_brakes_the_joint_and_set_points_no_longer_count() {
 #[test]
 fn an_image_goes_from_upload_by_way_of_a_trial_to_flash_and_back() {
     let mut master = Master::new();
-    let (first, second) = (image(1, 0.25), image(2, 0.5));
+    let (first, second) = (SampleImage::constant(1, 0.25), SampleImage::constant(2, 0.5));
     master.download(0x2210, 0, &first).unwrap();
     master.image(1).unwrap();
     assert_eq!((master.number(0x2212, 2), master.number(0x2212, 3)), (2, 0));
@@ -233,7 +235,7 @@ fn an_image_goes_from_upload_by_way_of_a_trial_to_flash_and_back() {
 #[test]
 fn a_shadow_is_computed_and_has_no_effect() {
     let mut master = Master::new();
-    master.download(0x2210, 0, &image(1, 0.5)).unwrap();
+    master.download(0x2210, 0, &SampleImage::constant(1, 0.5)).unwrap();
     master.image(1).unwrap();
     master.download(0x2212, 7, &60_000u32.to_le_bytes()).unwrap();
     master.image(6).unwrap();
@@ -249,11 +251,11 @@ fn a_shadow_is_computed_and_has_no_effect() {
 #[test]
 fn a_damaged_an_old_and_an_unsigned_image_are_refused_and_nothing_changes() {
     let mut master = Master::new();
-    let good = image(3, 0.25);
+    let good = SampleImage::constant(3, 0.25);
     master.download(0x2210, 0, &good).unwrap();
     master.image(1).unwrap();
     master.image(3).unwrap();
-    let mut damaged = image(4, 0.5);
+    let mut damaged = SampleImage::constant(4, 0.5);
     damaged[60] ^= 4;
     let key = Key::new(std::array::from_fn(|i| i as u8)).unwrap();
     let refused = |master: &mut Master, upload: &[u8]| {
@@ -265,12 +267,12 @@ fn a_damaged_an_old_and_an_unsigned_image_are_refused_and_nothing_changes() {
         assert!(master.image(1).is_err());
         master.number(0x2212, 3)
     };
-    let codes = [refused(&mut master, &damaged), refused(&mut master, &image(2, 0.5))];
+    let codes = [refused(&mut master, &damaged), refused(&mut master, &SampleImage::constant(2, 0.5))];
     master.download(0x2215, 6, &key.to_bytes()).unwrap();
-    let unsigned = refused(&mut master, &image(4, 0.5));
+    let unsigned = refused(&mut master, &SampleImage::constant(4, 0.5));
     assert!(codes[0] != 0 && codes[1] != 0 && unsigned != 0 && codes[0] != codes[1] && codes[1] != unsigned);
 
-    let mut signed = image(4, 0.5);
+    let mut signed = SampleImage::constant(4, 0.5);
     signed.extend(key.sign(&signed));
     master.download(0x2210, 0, &signed).unwrap();
     master.image(1).unwrap();
@@ -278,4 +280,87 @@ fn a_damaged_an_old_and_an_unsigned_image_are_refused_and_nothing_changes() {
     assert_eq!(master.number(0x2213, 1), 4);
     // A key is written once.
     assert!(master.download(0x2215, 6, &[7; 32]).is_err());
+}
+
+const DEADLINE: f32 = 0.25;
+
+/// Sets and takes a command deadline, and stores it with a heartbeat of 70 ms.
+fn stored(master: &mut Master) {
+    master.download(0x2103, 11, &DEADLINE.to_le_bytes()).unwrap();
+    master.download(0x2100, 1, &[1]).unwrap();
+    master.download(0x1017, 0, &70u16.to_le_bytes()).unwrap();
+    master.download(0x1010, 1, b"save").unwrap();
+}
+
+fn settings(master: &mut Master) -> (f32, i64) {
+    (f32::from_bits(master.number(0x2103, 11) as u32), master.number(0x1017, 0))
+}
+
+#[test]
+fn images_configuration_counts_and_key_survive_a_loss_of_power_in_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let power_on = || Master::powered(Storage::open(folder.path()).unwrap());
+    let mut master = power_on();
+    assert_eq!(settings(&mut master), (0.1, 0));
+    stored(&mut master);
+    let key = Key::new(std::array::from_fn(|i| i as u8)).unwrap();
+    master.download(0x2215, 6, &key.to_bytes()).unwrap();
+    let mut signed = SampleImage::constant(7, 0.25);
+    signed.extend(key.sign(&signed));
+    master.download(0x2210, 0, &signed).unwrap();
+    master.image(1).unwrap();
+    master.image(3).unwrap();
+    // A forged one, to have something counted.
+    let mut forged = SampleImage::constant(8, 0.25);
+    forged.extend([0; 32]);
+    master.download(0x2210, 0, &forged).unwrap();
+    assert!(master.image(1).is_err());
+
+    let mut master = power_on();
+    assert_eq!(settings(&mut master), (DEADLINE, 70));
+    assert_eq!((master.number(0x2213, 1), master.number(0x2215, 3), master.number(0x2215, 4)), (7, 7, 1));
+    assert_eq!((master.number(0x2215, 1), master.number(0x2215, 2)), (1, key.id().into()));
+    // The configuration acts: 0.2 s of silence are no fault now.
+    master.enabled();
+    master.drive(15, 0, 10);
+    master.wait(200);
+    assert_eq!(master.state(), State::OperationEnabled);
+    master.wait(100);
+    assert_ne!(master.state(), State::OperationEnabled);
+}
+
+#[test]
+fn what_is_not_stored_and_what_is_restored_ends_with_a_reset_of_the_node() {
+    let mut master = Master::new();
+    stored(&mut master);
+    master.download(0x2103, 11, &0.5f32.to_le_bytes()).unwrap();
+    master.download(0x2100, 1, &[1]).unwrap();
+    master.download(0x2210, 0, &SampleImage::constant(1, 0.25)).unwrap();
+    master.image(1).unwrap();
+    master.command(Command::ResetNode);
+    master.wait(5);
+    assert_eq!(settings(&mut master), (DEADLINE, 70));
+    assert_eq!(master.number(0x2212, 2), 0, "nothing is staged");
+    // Restored defaults come with the next reset, not before.
+    master.download(0x1011, 1, b"load").unwrap();
+    assert_eq!(settings(&mut master), (DEADLINE, 70));
+    master.command(Command::ResetNode);
+    master.wait(5);
+    assert_eq!(settings(&mut master), (0.1, 0));
+}
+
+#[test]
+fn a_reset_of_the_node_in_motion_waits_until_the_joint_has_braked() {
+    let mut master = Master::new();
+    stored(&mut master);
+    master.download(0x2103, 11, &0.5f32.to_le_bytes()).unwrap();
+    master.download(0x2100, 1, &[1]).unwrap();
+    master.enabled();
+    master.drive(15, 500, 600);
+    master.command(Command::ResetNode);
+    master.wait(2);
+    assert_eq!(master.state(), State::QuickStopActive);
+    assert_eq!(settings(&mut master).0, 0.5);
+    master.wait(1_000);
+    assert_eq!((master.state(), settings(&mut master).0), (State::SwitchOnDisabled, DEADLINE));
 }

@@ -2,10 +2,8 @@
 //!
 //! Without Python, or where python-canopen cannot be installed, this is reported as ignored by name; with `CI` set it runs, and fails.
 
-mod support;
-
 use libtest_mimic::{Arguments, Failed, Trial};
-use node::{Options, SlotImages, VirtualNode, serve};
+use node::{Options, SampleImage, SlotImages, VirtualNode, serve};
 use plant::ActuatorParameters;
 use plant::virtual_joint::Setup;
 use std::path::{Path, PathBuf};
@@ -57,7 +55,7 @@ fn drive(python: Option<&Path>) -> Result<(), Failed> {
     let mut joint = VirtualNode::new(parameters, &Setup::of(&parameters), &options, SlotImages::empty()?)?;
     let folder = tempfile::tempdir()?;
     let image = folder.path().join("friction.img");
-    std::fs::write(&image, support::image(9, 0.25))?;
+    std::fs::write(&image, SampleImage::constant(9, 0.25))?;
 
     let stop = AtomicBool::new(false);
     let output = std::thread::scope(|scope| {
