@@ -4,8 +4,9 @@
 //! synchronous TPDOs. For the task it leaves what is addressed to this node's SDO server, and LSS.
 //!
 //! embassy's driver sets the controller up: clock, pins, bit timing, message RAM, filters. Its interrupt handler is not used, because
-//! frames would wait in its channel until a task runs; this one reads the controller's FIFO itself, in order. Frames leave in order
-//! too (FIFO, not queue): segments of one SDO block have one identifier, and the controller's queue would send those by place.
+//! frames would wait in its channel until a task runs; this one reads the controller's FIFO itself, in order. What is sent waits in a
+//! [`TransmitQueue`]; the controller's three buffers are a FIFO, not a queue: segments of one SDO block have one identifier, and a
+//! queue would send those by place.
 //!
 //! Filters are masks: embassy 0.6.0 has the bounds of its range filter swapped.
 
@@ -26,8 +27,7 @@ use embassy_stm32::{Peri, interrupt, pac};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
 use embassy_time::Instant;
-use heapless::Deque;
-use joint_firmware::canopen::{self, Frame, Receiver, Route};
+use joint_firmware::canopen::{self, Buffers, Frame, PDOS, Receiver, Route, TransmitQueue};
 use joint_firmware::joint::Demand;
 use joint_firmware::objects::{JointImage, Observed};
 
@@ -38,7 +38,9 @@ pub const BLOCK: u8 = 24;
 const TO_TASK: usize = BLOCK as usize + 4;
 /// Frames that wait for the controller, beside the three that it holds.
 const TO_BUS: usize = 16;
-/// Elements of a receive FIFO (RM0440, message RAM).
+/// Places of these that the task leaves to what the receive interrupt sends: the TPDOs.
+const RESERVED: usize = PDOS;
+/// Elements of a receive FIFO, and of the transmit FIFO (RM0440, message RAM).
 const FIFO: u8 = 3;
 /// Ranges of identifiers with which nobody addresses a joint, as value and mask: answers of SDO servers and LSS slaves. PDOs may not have them
 /// (CiA 301, restricted CAN-IDs).
@@ -59,17 +61,16 @@ unsafe impl Sync for Owned {}
 static BUS: Owned = Owned(UnsafeCell::new(MaybeUninit::uninit()));
 
 static RECEIVED: Channel<CriticalSectionRawMutex, Frame, TO_TASK> = Channel::new();
-static SENDING: Mutex<RefCell<Deque<Frame, TO_BUS>>> = Mutex::new(RefCell::new(Deque::new()));
+static SENDING: Mutex<RefCell<TransmitQueue<TO_BUS>>> = Mutex::new(RefCell::new(TransmitQueue::new()));
 /// What the slower tasks know of the joint.
 static OBSERVED: Mutex<Cell<Option<Observed>>> = Mutex::new(Cell::new(None));
 
-/// Frames that were not taken or not sent, since the start.
+/// Frames that were not taken, since the start.
 struct Drops {
     controller: AtomicU32,
     task: AtomicU32,
-    bus: AtomicU32,
 }
-static DROPS: Drops = Drops { controller: AtomicU32::new(0), task: AtomicU32::new(0), bus: AtomicU32::new(0) };
+static DROPS: Drops = Drops { controller: AtomicU32::new(0), task: AtomicU32::new(0) };
 
 /// Frames that found no room, since the start; each wraps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
@@ -80,6 +81,8 @@ pub struct Dropped {
     pub task: u32,
     /// On the way to the bus.
     pub bus: u32,
+    /// TPDOs and heartbeats that newer ones replaced on the way to the bus.
+    pub overwritten: u32,
 }
 
 /// How the controller takes part in the bus (ISO 11898-1, fault confinement).
@@ -172,27 +175,35 @@ pub async fn next() -> Frame {
     RECEIVED.receive().await
 }
 
-/// Sends a frame; where the queue is full it is dropped and counted.
-pub fn send(frame: Frame) {
+/// Sends a frame of the node `shared`; where the queue is full it is dropped and counted.
+pub fn send(frame: Frame, shared: &canopen::Shared) {
+    let now = now();
     critical_section::with(|section| {
         let mut sending = SENDING.borrow_ref_mut(section);
-        if sending.push_back(frame).is_err() {
-            count(&DROPS.bus);
-        }
-        transmit(&mut sending);
+        // The queue counts what it drops.
+        let _ = sending.push(frame, shared.is_renewable(&frame), now);
+        transmit(&mut sending, now);
     });
 }
 
-/// Whether [`send`] has room for another frame.
+/// Whether [`send`] has room for another frame of the task's.
 pub fn has_room() -> bool {
-    critical_section::with(|section| !SENDING.borrow_ref(section).is_full())
+    critical_section::with(|section| SENDING.borrow_ref(section).room() > RESERVED)
+}
+
+/// Time as the node counts it, µs; wraps.
+pub fn now() -> u32 {
+    Instant::now().as_micros() as u32
 }
 
 /// Frames dropped so far.
 pub fn dropped() -> Dropped {
-    let Drops { controller, task, bus } = &DROPS;
-    let [controller, task, bus] = [controller, task, bus].map(|count| count.load(Ordering::Relaxed));
-    Dropped { controller, task, bus }
+    let [controller, task] = [&DROPS.controller, &DROPS.task].map(|count| count.load(Ordering::Relaxed));
+    let (bus, overwritten) = critical_section::with(|section| {
+        let sending = SENDING.borrow_ref(section);
+        (sending.dropped(), sending.overwritten())
+    });
+    Dropped { controller, task, bus, overwritten }
 }
 
 /// How the controller takes part in the bus.
@@ -205,10 +216,8 @@ pub fn condition() -> Condition {
     }
 }
 
-/// Begins to return from bus-off: the controller takes part again once it has seen the bus idle for 129 times 11 bits. What waited
-/// to be sent is old by then and is thrown away.
+/// Begins to return from bus-off: the controller takes part again once it has seen the bus idle for 129 times 11 bits.
 pub fn recover() {
-    critical_section::with(|section| SENDING.borrow_ref_mut(section).clear());
     pac::FDCAN1.cccr().modify(|w| w.set_init(false));
 }
 
@@ -256,11 +265,13 @@ fn receive() -> Option<Frame> {
 }
 
 /// Hands frames to the controller as long as it takes them.
-fn transmit(sending: &mut Deque<Frame, TO_BUS>) {
+fn transmit(sending: &mut TransmitQueue<TO_BUS>, now: u32) {
     let can = pac::FDCAN1;
-    while !can.txfqs().read().tfqf()
-        && let Some(frame) = sending.pop_front()
-    {
+    let all = usize::from(FIFO);
+    // As many as there are buffers: each turn takes one of them.
+    for _ in 0..all {
+        let occupied = can.txbrp().read().0.count_ones() as usize;
+        let Some(frame) = sending.pop(now, Buffers { all, occupied }).filter(|_| occupied < all) else { break };
         let number = can.txfqs().read().tfqpi();
         let place = element(TRANSMIT, number);
         let mut data = [0; 8];
@@ -281,8 +292,8 @@ impl Bus {
         if let Some(observed) = observed() {
             self.image.observe(&Observed { feedforward_torque: self.feedforward, ..observed });
         }
-        let now = Instant::now().as_micros() as u32;
-        match self.receiver.receive(frame, now, &mut self.image, send) {
+        let shared = self.shared;
+        match self.receiver.receive(frame, now(), &mut self.image, |frame| send(frame, shared)) {
             Route::Server if RECEIVED.try_send(*frame).is_err() => count(&DROPS.task),
             Route::Server | Route::Done => {}
         }
@@ -306,7 +317,8 @@ extern "C" fn FDCAN1_IT0() {
         let Some(frame) = receive() else { break };
         bus.take(&frame);
     }
-    critical_section::with(|section| transmit(&mut SENDING.borrow_ref_mut(section)));
+    let now = now();
+    critical_section::with(|section| transmit(&mut SENDING.borrow_ref_mut(section), now));
     bus.image.follow(bus.shared.state());
     let demand = bus.image.demand();
     bus.feedforward = demand.command.torque;

@@ -6,9 +6,10 @@
 use super::program::{BoardProgram, model};
 use super::shadow;
 use crate::board::can::{self, Condition};
-use crate::board::faults;
+use crate::board::{control, faults};
 use embassy_time::{Duration, Instant, with_timeout};
-use joint_firmware::canopen::{Frame, Server};
+use joint_firmware::canopen::{self, Frame, Server};
+use joint_firmware::joint::state_machine::State;
 use joint_firmware::objects::{Objects, StoredImages};
 use joint_firmware::parameters::life_cycle::{Action, Mode};
 use joint_firmware::parameters::slots::SlotError;
@@ -20,6 +21,7 @@ const AWAY: Duration = Duration::from_millis(100);
 
 /// The task's part of the node.
 pub struct Node {
+    shared: &'static canopen::Shared,
     server: Server<'static>,
     objects: Objects<'static, BoardProgram>,
     stored: StoredImages,
@@ -35,20 +37,27 @@ pub async fn serve(node: &'static mut Node) {
     loop {
         let frame = with_timeout(TICK, can::next()).await.ok();
         node.work(frame);
-        if node.objects.program().restart {
+        // The transition stopped the joint; a start in the middle of that would let it fall.
+        if node.objects.program().restart && control::report().is_none_or(|report| is_off(report.telemetry.state)) {
             faults::restart();
         }
     }
 }
 
-fn now() -> u32 {
-    Instant::now().as_micros() as u32
+/// Nothing is under current.
+const fn is_off(state: State) -> bool {
+    matches!(state, State::NotReadyToSwitchOn | State::SwitchOnDisabled | State::Fault)
 }
 
 impl Node {
     /// Before the receive interrupt is enabled.
-    pub fn new(server: Server<'static>, objects: Objects<'static, BoardProgram>, stored: StoredImages) -> Self {
-        Self { server, objects, stored, waiting: None, condition: (Condition::Active, Instant::now()) }
+    pub fn new(
+        shared: &'static canopen::Shared,
+        server: Server<'static>,
+        objects: Objects<'static, BoardProgram>,
+        stored: StoredImages,
+    ) -> Self {
+        Self { shared, server, objects, stored, waiting: None, condition: (Condition::Active, Instant::now()) }
     }
 
     fn work(&mut self, frame: Option<Frame>) {
@@ -57,8 +66,8 @@ impl Node {
         }
         self.act();
         if let Some(frame) = frame {
-            if let Some(answer) = self.server.receive(&frame, now(), &mut self.objects) {
-                can::send(answer);
+            if let Some(answer) = self.server.receive(&frame, can::now(), &mut self.objects) {
+                can::send(answer, self.shared);
             }
             self.act();
         }
@@ -67,9 +76,9 @@ impl Node {
             self.server.emergency(emergency.code, emergency.register, emergency.information);
         }
         while can::has_room()
-            && let Some(frame) = self.server.poll(now(), &mut self.objects)
+            && let Some(frame) = self.server.poll(can::now(), &mut self.objects)
         {
-            can::send(frame);
+            can::send(frame, self.shared);
         }
         // A set-point that came by SDO, a transition of the server's own.
         can::attend();

@@ -65,7 +65,7 @@ pub fn start(
     let start = Start { configuration: *configuration, stored: *stored, single_bank: board::SINGLE_BANK };
     let settings = SdoSettings { block_size: can::BLOCK, ..SdoSettings::default() };
     let server = Server::new(&BUS, identity, settings, configuration.node_id);
-    let node = NODE.init(Node::new(server, Objects::new(&OBJECTS, program, images_of_client, &start), images));
+    let node = NODE.init(Node::new(&BUS, server, Objects::new(&OBJECTS, program, images_of_client, &start), images));
     can::start(controller, &BUS, JointImage::new(&OBJECTS), demand);
     node
 }

@@ -68,8 +68,8 @@ impl Program for Watched {
         true
     }
 
-    fn history(&self) -> Option<&History> {
-        None
+    fn history<R>(&self, read: impl FnOnce(&History) -> R) -> Option<R> {
+        None.map(read)
     }
 
     fn event(&mut self, _event: Event) {}
