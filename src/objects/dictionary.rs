@@ -200,6 +200,7 @@ impl<'a, P: Program> Objects<'a, P> {
     fn readable(&self, field: Field) -> u32 {
         match field {
             Field::Image(ImageField::Active) => self.images.active_length(),
+            Field::Image(ImageField::Staging) => self.images.life().length() as u32,
             Field::History => self.program.history(history::length).unwrap_or(0),
             Field::Configuration(_) => self.refused.name().len() as u32,
             _ => 0,
@@ -350,6 +351,7 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
             Field::Image(ImageField::Active) => {
                 self.images.is_same_image(offset) && self.program.read_image(offset, out)
             }
+            Field::Image(ImageField::Staging) => self.images.read_staged(offset, out),
             Field::History => self.program.history(|steps| history::read(steps, offset, out)).unwrap_or(false),
             Field::Configuration(ConfigurationField::RefusedSetting) => {
                 history::copy(self.refused.name().as_bytes(), offset, out)

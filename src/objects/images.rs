@@ -222,6 +222,12 @@ impl<'a> Images<'a> {
         self.key_bytes = [0; KEY];
     }
 
+    /// Bytes of what is staged; false where less is staged than is asked for.
+    pub(super) fn read_staged(&self, offset: u32, out: &mut [u8]) -> bool {
+        let staged = self.staging.get(..self.life.length()).unwrap_or_default();
+        super::history::copy(staged, offset, out)
+    }
+
     /// Bytes of the stored image in use.
     pub(super) fn active_length(&self) -> u32 {
         self.stored.active.map_or(0, |(summary, _)| summary.length)

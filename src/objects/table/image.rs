@@ -5,8 +5,8 @@ use crate::objects::field::{Actual, Field::Actual as A, Field::Image as I, Image
 
 room! {
     0x2210 "image staging" {
-        0, "image staging", Domain, WO, UNMAPPED, I(ImageField::Staging); "", 1.0, ANY;
-            "Upload: an image, and behind it its tag where there is one; at most 2048 bytes"
+        0, "image staging", Domain, RW, UNMAPPED, I(ImageField::Staging); "", 1.0, ANY;
+            "Upload: an image, and behind it its tag where there is one; at most 2048 bytes. What is staged can be read back"
     }
     0x2211 "active image" {
         0, "active image", Domain, RO, UNMAPPED, I(ImageField::Active); "", 1.0, ANY;

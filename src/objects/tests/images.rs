@@ -82,6 +82,16 @@ fn an_upload_is_counted_and_its_checksum_told() {
 }
 
 #[test]
+fn what_is_staged_can_be_read_back_until_it_is_forgotten() {
+    let mut node = Node::new();
+    assert_eq!(node.upload(0x2210, 0), Ok(vec![]));
+    node.download(0x2210, 0, b"123456789").unwrap();
+    assert_eq!(node.upload(0x2210, 0), Ok(b"123456789".to_vec()));
+    command(&mut node, 5).unwrap();
+    assert_eq!(node.upload(0x2210, 0), Ok(vec![]));
+}
+
+#[test]
 fn a_trial_ends_with_its_time_and_can_begin_again() {
     let bytes = image(1);
     let mut node = verified(&bytes);
