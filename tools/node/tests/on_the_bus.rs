@@ -81,7 +81,9 @@ impl Master {
             if let Some(outcome) = transfer.outcome() {
                 return outcome.clone();
             }
-            self.wait(1);
+            if answers.is_empty() {
+                self.wait(1);
+            }
         }
     }
 
@@ -280,6 +282,23 @@ fn a_damaged_an_old_and_an_unsigned_image_are_refused_and_nothing_changes() {
     assert_eq!(master.number(0x2213, 1), 4);
     // A key is written once.
     assert!(master.download(0x2215, 6, &[7; 32]).is_err());
+}
+
+#[test]
+fn an_sdo_of_every_length_goes_both_ways_segmented_and_by_block() {
+    let mut master = Master::new();
+    let pattern: Vec<u8> = (0..4_096u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 13) as u8).collect();
+    let staging = Object { node: ID, index: 0x2210, sub_index: 0 };
+    for length in 1..=2_048 {
+        let data = &pattern[length..2 * length];
+        for method in [Method::Automatic, Method::Segmented, Method::Block] {
+            master.transfer(Transfer::download(staging, data, method, Settings::default())).unwrap();
+            let back = master.transfer(Transfer::upload(staging, method, Settings::default())).unwrap();
+            assert!(back == data, "{length} bytes, {method:?}");
+        }
+    }
+    let whole = Transfer::download(staging, &pattern[..2_049], Method::Block, Settings::default());
+    assert_eq!(master.transfer(whole), Err(Failure::Aborted(Abort::TOO_LONG)));
 }
 
 const DEADLINE: f32 = 0.25;

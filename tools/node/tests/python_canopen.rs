@@ -1,26 +1,30 @@
-//! python-canopen drives the virtual joint, in real time, with the example that is shipped.
+//! python-canopen drives the virtual joint, in real time: with the example that is shipped, and through everything that it can do.
 //!
-//! Without Python, or where python-canopen cannot be installed, this is reported as ignored by name; with `CI` set it runs, and fails.
+//! Without Python, or where python-canopen cannot be installed, these are reported as ignored by name; with `CI` set they run, and fail.
+//! With `EVERY_LENGTH` set, SDO transfers have every length from 1 to 2048 bytes; that takes minutes.
 
+mod client;
+
+use client::Joint;
 use libtest_mimic::{Arguments, Failed, Trial};
-use node::{Options, SampleImage, SlotImages, VirtualNode, serve};
-use plant::ActuatorParameters;
-use plant::virtual_joint::Setup;
+use node::SampleImage;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 const GROUP: &str = "239.74.163.2";
-const NODE: u8 = 5;
 
 fn main() {
     let arguments = Arguments::from_args();
     let must_run = std::env::var_os("CI").is_some();
     let python = if arguments.list { None } else { python() };
     let ignored = !must_run && python.is_none();
-    let trial =
-        Trial::test("python_canopen_enables_turns_and_feeds_an_image_to_the_joint", move || drive(python.as_deref()));
-    libtest_mimic::run(&arguments, vec![trial.with_ignored_flag(ignored)]).exit();
+    let (one, two) = (python.clone(), python);
+    let trials = vec![
+        Trial::test("python_canopen_enables_turns_and_feeds_an_image_to_the_joint", move || drive(one.as_deref())),
+        Trial::test("python_canopen_can_do_everything_with_the_joint", move || conformance(two.as_deref())),
+    ];
+    let trials = trials.into_iter().map(|trial| trial.with_ignored_flag(ignored)).collect();
+    libtest_mimic::run(&arguments, trials).exit();
 }
 
 /// A Python with python-canopen, made once in the build directory.
@@ -46,37 +50,34 @@ fn python() -> Option<PathBuf> {
     works().then_some(python)
 }
 
-fn drive(python: Option<&Path>) -> Result<(), Failed> {
+/// A script on a bus of its own with a joint; what it printed.
+fn run(python: Option<&Path>, script: &str, images: &[Vec<u8>], more: &[&str]) -> Result<String, Failed> {
     let python = python.ok_or("there is no python3 with venv, or python-canopen could not be installed")?;
     let port = std::net::UdpSocket::bind("0.0.0.0:0")?.local_addr()?.port();
-    let bus = bus::open(&format!("udp:{GROUP}:{port}"))?;
-    let parameters = ActuatorParameters::reference().aligned().without_payload();
-    let options = Options { node_id: NODE, serial: 12, seed: 1 };
-    let mut joint = VirtualNode::new(parameters, &Setup::of(&parameters), &options, SlotImages::empty()?)?;
+    let mut joint = Joint::new(&format!("udp:{GROUP}:{port}"))?;
+    let mut command = Command::new(python);
+    command.arg(Path::new(env!("CARGO_MANIFEST_DIR")).join(script));
+    command.args([GROUP, &port.to_string(), &client::NODE.to_string()]);
     let folder = tempfile::tempdir()?;
-    let image = folder.path().join("friction.img");
-    std::fs::write(&image, SampleImage::constant(9, 0.25))?;
+    joint.run(command, folder.path(), images, more)
+}
 
-    let stop = AtomicBool::new(false);
-    let output = std::thread::scope(|scope| {
-        scope.spawn(|| serve(&mut joint, &*bus, &stop));
-        let output = Command::new(python)
-            .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/drive.py"))
-            .args([GROUP, &port.to_string(), &NODE.to_string()])
-            .arg(&image)
-            .output();
-        stop.store(true, Ordering::Relaxed);
-        output
-    })?;
-    let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    let problem = || Failed::from(format!("{text}{}", String::from_utf8_lossy(&output.stderr)));
+fn drive(python: Option<&Path>) -> Result<(), Failed> {
+    let text = run(python, "examples/drive.py", &[SampleImage::constant(9, 0.25)], &[])?;
     let lines: Vec<&str> = text.lines().collect();
-    let [name, moving, silent, version, same] = lines[..] else { return Err(problem()) };
+    let [name, moving, silent, version, same] = lines[..] else { return Err(text.into()) };
     let velocity = |line: &str| line.split_whitespace().nth(3).and_then(|word| word.parse::<i32>().ok());
     let well = name.starts_with("name virtual joint")
         && velocity(moving).is_some_and(|velocity| (450..=550).contains(&velocity))
         && silent.contains("0x8100")
         && version == "image version 9 state 7"
         && same == "read back True";
-    if well { Ok(()) } else { Err(problem()) }
+    if well { Ok(()) } else { Err(text.into()) }
+}
+
+fn conformance(python: Option<&Path>) -> Result<(), Failed> {
+    let images = [SampleImage::constant(1, 0.25), SampleImage::constant(2, 0.5)];
+    let every: &[&str] = if std::env::var_os("EVERY_LENGTH").is_some() { &["every"] } else { &[] };
+    let text = run(python, "tests/conformance.py", &images, every)?;
+    if text.lines().last() == Some("done") { Ok(()) } else { Err(text.into()) }
 }

@@ -1,0 +1,56 @@
+//! A virtual joint on a bus in real time, and a foreign client that runs beside it.
+
+use libtest_mimic::Failed;
+use node::{Options, SlotImages, VirtualNode, serve};
+use plant::ActuatorParameters;
+use plant::virtual_joint::Setup;
+use std::path::Path;
+use std::process::Command;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Its node id.
+pub const NODE: u8 = 5;
+
+/// The joint and its bus.
+pub struct Joint {
+    node: VirtualNode,
+    bus: Arc<dyn bus::Transport>,
+}
+
+impl Joint {
+    pub fn new(bus: &str) -> Result<Self, Failed> {
+        let parameters = ActuatorParameters::reference().aligned().without_payload();
+        let options = Options { node_id: NODE, serial: 12, seed: 1 };
+        let node = VirtualNode::new(parameters, &Setup::of(&parameters), &options, SlotImages::empty()?)?;
+        Ok(Self { node, bus: bus::open(bus)? })
+    }
+
+    /// Runs `command` with paths of `images` and what `more` says behind its arguments, while the joint is on the bus; what it printed.
+    pub fn run(
+        &mut self,
+        mut command: Command,
+        folder: &Path,
+        images: &[Vec<u8>],
+        more: &[&str],
+    ) -> Result<String, Failed> {
+        for (number, image) in images.iter().enumerate() {
+            let path = folder.join(format!("{number}.img"));
+            std::fs::write(&path, image)?;
+            command.arg(path);
+        }
+        command.args(more);
+        let (node, bus, stop) = (&mut self.node, &*self.bus, AtomicBool::new(false));
+        let output = std::thread::scope(|scope| {
+            scope.spawn(|| serve(node, bus, &stop));
+            let output = command.output();
+            stop.store(true, Ordering::Relaxed);
+            output
+        })?;
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        match output.status.success() {
+            true => Ok(text),
+            false => Err(format!("{text}{}", String::from_utf8_lossy(&output.stderr)).into()),
+        }
+    }
+}

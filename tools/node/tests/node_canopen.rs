@@ -1,0 +1,63 @@
+//! node-canopen (npm: canopen) drives the virtual joint, in real time, through everything that it can do; over slcan by TCP.
+//!
+//! Without Node.js, or where node-canopen cannot be installed (its checksum is a native module, which npm builds), this is reported as ignored by
+//! name; with `CI` set it runs, and fails. With `EVERY_LENGTH` set, SDO transfers have every length from 1 to 2048 bytes.
+
+mod client;
+
+use client::Joint;
+use libtest_mimic::{Arguments, Failed, Trial};
+use node::SampleImage;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+const PACKAGE: &str = "canopen@6.2.1";
+
+fn main() {
+    let arguments = Arguments::from_args();
+    let must_run = std::env::var_os("CI").is_some();
+    let modules = if arguments.list { Err("only listed".into()) } else { modules() };
+    let ignored = !must_run && modules.is_err();
+    let trial = Trial::test("node_canopen_can_do_everything_with_the_joint", move || conformance(&modules));
+    libtest_mimic::run(&arguments, vec![trial.with_ignored_flag(ignored)]).exit();
+}
+
+/// A folder with node-canopen, made once in the build directory; or why there is none.
+fn modules() -> Result<PathBuf, String> {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("node-canopen");
+    let works = || {
+        let loads = Command::new("node").args(["-e", "require('canopen')"]).current_dir(&folder).output();
+        loads.is_ok_and(|output| output.status.success())
+    };
+    if folder.join("package.json").exists() && works() {
+        return Ok(folder);
+    }
+    std::fs::create_dir_all(&folder).map_err(|error| error.to_string())?;
+    std::fs::write(folder.join("package.json"), "{ \"private\": true }").map_err(|error| error.to_string())?;
+    // npm may ask for consent to build the native module: `rebuild` is that consent.
+    let mut said = String::new();
+    for arguments in [&["install", "--no-audit", "--no-fund", PACKAGE][..], &["rebuild", "node-crc"]] {
+        let output = Command::new("npm").args(arguments).current_dir(&folder).output();
+        match output {
+            Ok(output) => said.push_str(&String::from_utf8_lossy(&output.stderr)),
+            Err(error) => return Err(format!("npm cannot be run: {error}")),
+        }
+        if works() {
+            return Ok(folder);
+        }
+    }
+    Err(format!("node-canopen could not be installed: {said}"))
+}
+
+fn conformance(modules: &Result<PathBuf, String>) -> Result<(), Failed> {
+    let modules = modules.as_ref()?;
+    let port = std::net::TcpListener::bind("127.0.0.1:0")?.local_addr()?.port();
+    let mut joint = Joint::new(&format!("slcan:listen://127.0.0.1:{port}"))?;
+    let mut command = Command::new("node");
+    command.arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/conformance.js"));
+    command.arg(modules).args([port.to_string(), client::NODE.to_string()]);
+    let images = [SampleImage::constant(1, 0.25), SampleImage::constant(2, 0.5)];
+    let every: &[&str] = if std::env::var_os("EVERY_LENGTH").is_some() { &["every"] } else { &[] };
+    let text = joint.run(command, tempfile::tempdir()?.path(), &images, every)?;
+    if text.lines().last() == Some("done") { Ok(()) } else { Err(text.into()) }
+}
