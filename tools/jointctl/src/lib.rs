@@ -5,7 +5,7 @@
 //! model on validation data is quantised, certified and judged by the same `no_std` code that the board runs.
 //!
 //! Beside it, [`simulation`] closes the firmware's control step over a simulated actuator, [`joint_text`] is a joint's configuration
-//! as a file, and [`excite`] finds motions that identify a joint.
+//! as a file, and [`excite`] finds motions that identify a joint. [`remote`] is a joint over a bus.
 
 pub mod augment;
 pub mod certificate_search;
@@ -33,6 +33,7 @@ pub mod output;
 pub mod presets;
 pub mod progress;
 pub mod quantize;
+pub mod remote;
 pub mod report;
 pub mod rigid;
 pub mod samples;

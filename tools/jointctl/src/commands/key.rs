@@ -3,6 +3,7 @@
 use super::CommandError;
 use super::fit::bytes;
 use super::image::{read, verify};
+use super::remote::Where;
 use crate::key_file;
 use crate::output::write_file;
 use clap::{Args, Subcommand};
@@ -15,6 +16,14 @@ pub enum KeyCommand {
     New {
         /// File to write; an existing one is never overwritten
         file: PathBuf,
+    },
+    /// Give a key to a joint that has none; it cannot be changed afterwards
+    Give {
+        /// The key
+        file: PathBuf,
+        /// Which joint.
+        #[command(flatten)]
+        on: Where,
     },
     /// Print a key's number, by which a joint names it; it says nothing of the key
     Number {
@@ -31,6 +40,11 @@ impl KeyCommand {
                 let key = key_file::create(file)?;
                 println!("key {:08x} written: {}", key.id(), file.display());
                 println!("Whoever has this file can change the compensation of every joint that has the key.");
+            }
+            Self::Give { file, on } => {
+                let key = key_file::read(file)?;
+                on.joint()?.give_key(&key)?;
+                println!("node {}: takes images with a tag of key {:08x} only, from now on", on.node, key.id());
             }
             Self::Number { file } => println!("{:08x}", key_file::read(file)?.id()),
         }

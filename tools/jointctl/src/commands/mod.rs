@@ -2,13 +2,18 @@
 
 pub mod bus;
 pub mod demo;
+pub mod drive;
 pub mod evaluate;
 pub mod excite;
 pub mod fit;
 pub mod image;
 pub mod joint;
+pub mod keep;
 pub mod key;
+pub mod objects;
+pub mod remote;
 pub mod sim;
+pub mod upload;
 
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
@@ -43,6 +48,30 @@ pub enum Command {
     Sim(sim::Sim),
     /// Find the joints on a CAN bus
     Scan(bus::Scan),
+    /// Give node ids to the new joints on a CAN bus
+    Address(keep::Address),
+    /// A joint on one page
+    Info(objects::Info),
+    /// Read objects of a joint by name or index
+    Get(objects::Get),
+    /// Write objects of a joint by name or index
+    Set(objects::Set),
+    /// Enable a joint without torque until Ctrl-C, then disable it
+    Enable(drive::Enable),
+    /// Brake a joint and switch it off, whoever commands it
+    Disable(drive::Disable),
+    /// Enable a joint, move it for a time, disable it
+    Move(drive::Move),
+    /// Bring a parameter image into a joint: verified, in shadow, on trial or for good
+    Upload(upload::Upload),
+    /// Go back to the image that a joint had before
+    Rollback(upload::RollBack),
+    /// Forget the image that is staged in a joint; ends its trial or shadow
+    Discard(upload::Discard),
+    /// Have a joint keep its configuration over a loss of power
+    Store(keep::Keep),
+    /// Have a joint forget its configuration: defaults after the next reset
+    Restore(keep::Keep),
     /// Write a motion that identifies a joint, or check one
     Excite(excite::Excite),
 }
@@ -121,6 +150,9 @@ pub enum CommandError {
     /// The CAN bus, or a node on it.
     #[error("{0}")]
     Bus(String),
+    /// A joint over a bus.
+    #[error(transparent)]
+    Remote(#[from] crate::remote::RemoteError),
     /// Arguments that contradict each other.
     #[error("{0}")]
     Arguments(String),
@@ -137,6 +169,18 @@ pub fn run(arguments: Arguments) -> Result<(), CommandError> {
         Command::Sign(sign) => sign.run(),
         Command::Sim(sim) => sim.run(),
         Command::Scan(scan) => scan.run(),
+        Command::Address(address) => address.run(),
+        Command::Info(info) => info.run(),
+        Command::Get(get) => get.run(),
+        Command::Set(set) => set.run(),
+        Command::Enable(enable) => enable.run(),
+        Command::Disable(disable) => disable.run(),
+        Command::Move(motion) => motion.run(),
+        Command::Upload(upload) => upload.run(),
+        Command::Rollback(back) => back.run(),
+        Command::Discard(discard) => discard.run(),
+        Command::Store(keep) => keep.store(),
+        Command::Restore(keep) => keep.restore(),
         Command::Excite(excite) => excite.run(),
     }
 }

@@ -1,0 +1,91 @@
+//! `jointctl store`, `restore`, `address`: what a joint keeps over a loss of power.
+
+use super::CommandError;
+use super::remote::Where;
+use crate::remote::{RemoteError, address, configuration};
+use bus::client::Network;
+use clap::{Args, ValueEnum};
+use joint_firmware::canopen::Group;
+use std::time::Duration;
+
+/// Which parameters.
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+enum Parameters {
+    /// Both
+    #[default]
+    All,
+    /// PDOs, heartbeat and what else lies at 1000h to 1FFFh
+    Communication,
+    /// Configuration, compensation, impedance ranges
+    Application,
+}
+
+impl From<Parameters> for Group {
+    fn from(parameters: Parameters) -> Self {
+        match parameters {
+            Parameters::All => Self::All,
+            Parameters::Communication => Self::Communication,
+            Parameters::Application => Self::Application,
+        }
+    }
+}
+
+/// Arguments of `store` and `restore`.
+#[derive(Debug, Args)]
+pub struct Keep {
+    /// Which parameters
+    #[arg(value_enum, default_value_t)]
+    parameters: Parameters,
+    /// Which joint.
+    #[command(flatten)]
+    on: Where,
+}
+
+impl Keep {
+    /// Runs `store`.
+    pub fn store(&self) -> Result<(), CommandError> {
+        let joint = self.on.joint()?;
+        configuration::store(&joint, self.parameters.into())?;
+        println!("node {}: stored", joint.id());
+        Ok(())
+    }
+
+    /// Runs `restore`.
+    pub fn restore(&self) -> Result<(), CommandError> {
+        let joint = self.on.joint()?;
+        configuration::restore(&joint, self.parameters.into())?;
+        println!("node {}: defaults after its next reset", joint.id());
+        Ok(())
+    }
+}
+
+/// Arguments of `address`.
+#[derive(Debug, Args)]
+pub struct Address {
+    /// The bus, as of `scan`
+    #[arg(long, value_name = "BUS")]
+    bus: String,
+    /// The first node id to give; those that are taken are left out
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    first: u8,
+    /// The joints forget their node ids at the next loss of power
+    #[arg(long)]
+    forget: bool,
+    /// How long a joint may take to answer each of a scan's 133 questions, ms
+    #[arg(long, value_name = "MS", default_value_t = 20)]
+    wait: u64,
+}
+
+impl Address {
+    /// Runs the command.
+    pub fn run(&self) -> Result<(), CommandError> {
+        let network = Network::new(bus::open(&self.bus).map_err(RemoteError::from)?);
+        let wait = Duration::from_millis(self.wait.clamp(1, 10_000));
+        let mut tell = |done: &address::Addressed| println!("node {}: {}", done.node, done.address);
+        let count = address::assign(&network, self.first, !self.forget, wait, &mut tell)?;
+        if count == 0 {
+            println!("{}: no joint without a node id", self.bus);
+        }
+        Ok(())
+    }
+}

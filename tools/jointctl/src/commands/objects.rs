@@ -1,0 +1,113 @@
+//! `jointctl info`, `get`, `set`: a joint's objects, by the names of docs/objects.md or by index.
+
+use super::CommandError;
+use super::remote::Where;
+use crate::output::write_file;
+use crate::remote::entry::Entry;
+use crate::remote::{Value, configuration, info};
+use clap::Args;
+use std::path::PathBuf;
+
+/// Arguments of `info`.
+#[derive(Debug, Args)]
+pub struct Info {
+    /// Which joint.
+    #[command(flatten)]
+    on: Where,
+}
+
+impl Info {
+    /// Runs the command.
+    pub fn run(&self) -> Result<(), CommandError> {
+        print!("{}", info::page(&self.on.joint()?)?);
+        Ok(())
+    }
+}
+
+/// Arguments of `get`.
+#[derive(Debug, Args)]
+pub struct Get {
+    /// Names or indices: torque-limit, limits (all of a record), 6064, 2103:1
+    #[arg(value_name = "NAME|INDEX[:SUB]", required_unless_present = "list")]
+    objects: Vec<String>,
+    /// The bus: socketcan:can0, slcan:/dev/ttyACM0, slcan:tcp://host:port, udp:239.74.163.2:43113
+    #[arg(long, value_name = "BUS", required_unless_present = "list")]
+    bus: Option<String>,
+    /// Node id of the joint, 1 to 127
+    #[arg(long, value_name = "N", required_unless_present = "list")]
+    node: Option<u8>,
+    /// Write the bytes of the one object to a file: an image, a fault history
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Name all objects, with index, type, access, unit and limits; needs no bus
+    #[arg(long, conflicts_with_all = ["objects", "bus", "node", "out"])]
+    list: bool,
+}
+
+impl Get {
+    /// Runs the command.
+    pub fn run(&self) -> Result<(), CommandError> {
+        let (Some(bus), Some(node)) = (&self.bus, self.node) else {
+            Entry::all().filter(Entry::is_content).for_each(|entry| println!("{}", entry.listed()));
+            return Ok(());
+        };
+        let named = self.objects.iter().map(|name| Entry::find(name)).collect::<Result<Vec<_>, _>>()?;
+        let joint = Where { bus: bus.clone(), node }.joint()?;
+        if let Some(path) = &self.out {
+            let [entry] = named.concat()[..] else {
+                return Err(CommandError::Arguments("--out takes the bytes of one object".into()));
+            };
+            let bytes = joint.node().upload(entry.object.index, entry.object.sub_index);
+            let bytes = bytes.map_err(crate::remote::RemoteError::from)?;
+            write_file(path, &bytes)?;
+            println!("{}: {} bytes written: {}", entry.described(), bytes.len(), path.display());
+            return Ok(());
+        }
+        for entries in named {
+            let record = entries.len() > 1;
+            // Of a record what can be read; what was named by itself is asked for, and the joint says why not.
+            for entry in entries.into_iter().filter(|entry| !record || entry.is_readable()) {
+                match info::show_entry(&joint, entry) {
+                    Ok(shown) => println!("{:<32} {shown}", entry.described()),
+                    Err(error) if record => println!("{:<32} {error}", entry.described()),
+                    Err(error) => return Err(error.into()),
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Arguments of `set`.
+#[derive(Debug, Args)]
+pub struct Set {
+    /// Names or indices, each with its value in the unit of docs/objects.md; settings that depend on each other together
+    #[arg(value_name = "NAME|INDEX[:SUB] VALUE", num_args = 2.., required = true, allow_negative_numbers = true)]
+    objects: Vec<String>,
+    /// Which joint.
+    #[command(flatten)]
+    on: Where,
+}
+
+impl Set {
+    /// Runs the command.
+    pub fn run(&self) -> Result<(), CommandError> {
+        let mut wanted: Vec<(Entry, Value)> = Vec::new();
+        for pair in self.objects.chunks(2) {
+            let [name, value] = pair else {
+                let text = format!("'{}' has no value: names and values come in pairs", pair.concat());
+                return Err(CommandError::Arguments(text));
+            };
+            let entry = Entry::one(name)?;
+            let value = entry.parse(value)?;
+            entry.encode(&value)?;
+            wanted.push((entry, value));
+        }
+        let joint = self.on.joint()?;
+        configuration::set(&joint, &wanted)?;
+        for (entry, _) in wanted.iter().filter(|(entry, _)| entry.is_readable()) {
+            println!("{:<32} {}", entry.described(), info::show_entry(&joint, *entry)?);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,59 @@
+//! Node ids for new joints: LSS fastscan finds those that have none, identical or not, one after another; host.
+
+use super::error::RemoteError;
+use bus::client::lss::Address;
+use bus::client::sdo::Settings;
+use bus::client::{ClientError, Network};
+use std::time::Duration;
+
+/// How long a node that has an id may take to say so.
+const PROBE: Duration = Duration::from_millis(50);
+
+/// A joint that got its node id.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Addressed {
+    /// Its node id now.
+    pub node: u8,
+    /// What tells it from every other.
+    pub address: Address,
+}
+
+/// Whether some node has this id.
+fn is_taken(network: &Network, id: u8) -> Result<bool, RemoteError> {
+    let node = network.node(id)?.with_settings(Settings { timeout: PROBE, ..Settings::default() });
+    match node.upload(0x1000, 0) {
+        Ok(_) => Ok(true),
+        Err(ClientError::NoAnswer { .. }) => Ok(false),
+        Err(error @ ClientError::Bus(_)) => Err(error.into()),
+        // Whoever refuses is there.
+        Err(_) => Ok(true),
+    }
+}
+
+/// Gives every joint without a node id the next free one from `first` on, and has it keep it where `store`. `wait` is how long a node
+/// may take to answer each of a scan's 133 questions. Tells each as soon as it is done: where a later one fails, the earlier stay.
+pub fn assign(
+    network: &Network,
+    first: u8,
+    store: bool,
+    wait: Duration,
+    tell: &mut dyn FnMut(&Addressed),
+) -> Result<usize, RemoteError> {
+    if !matches!(first, 1..=127) {
+        return Err(ClientError::NodeId(first).into());
+    }
+    let (mut next, mut count) = (first, 0);
+    while let Some(address) = network.fastscan(wait)? {
+        while next <= 127 && is_taken(network, next)? {
+            next += 1;
+        }
+        if next > 127 {
+            return Err(RemoteError::NoFreeId { first, address: address.to_string() });
+        }
+        network.assign(next, store)?;
+        tell(&Addressed { node: next, address });
+        next += 1;
+        count += 1;
+    }
+    Ok(count)
+}

@@ -1,0 +1,105 @@
+//! Settings of a joint: changed as a whole, stored, restored; host.
+//!
+//! Settings of the configuration (2101h to 2106h) are staged by being written and taken together by a command. [`set`] does both, and
+//! forgets what it staged where the joint refuses it: a joint never stays half configured.
+
+use super::entry::Entry;
+use super::error::RemoteError;
+use super::joint::RemoteJoint;
+use super::value::Value;
+use bus::client::{Abort, ClientError};
+use joint_firmware::canopen::{Access, Group};
+use joint_firmware::objects::field::{ConfigurationField, Field, ImageField};
+
+/// Commands of object 2100h:1.
+const TAKE: u64 = 1;
+const FORGET: u64 = 2;
+
+/// Writes objects, in their order. Settings of the configuration among them are taken together, or none of them is.
+pub fn set(joint: &RemoteJoint, wanted: &[(Entry, Value)]) -> Result<(), RemoteError> {
+    let refuse =
+        |entry: &Entry, problem: &str| RemoteError::Value { object: entry.described(), problem: problem.into() };
+    // Everything that can be seen from here is refused before anything is sent.
+    for (entry, value) in wanted {
+        match (entry.object.field, entry.object.access) {
+            (Field::Image(ImageField::Staging), _) => return Err(refuse(entry, "`jointctl upload` writes it")),
+            (Field::Image(ImageField::Key), _) => return Err(refuse(entry, "`jointctl key give` writes it")),
+            (_, Access::ReadOnly) => return Err(refuse(entry, "is read-only")),
+            _ => {}
+        }
+        entry.encode(value)?;
+    }
+    let is_setting = |entry: &Entry| matches!(entry.object.field, Field::Setting(_));
+    let stages = wanted.iter().any(|(entry, _)| is_setting(entry));
+    if stages {
+        if joint.raw(Field::Configuration(ConfigurationField::Changed))? != 0 {
+            return Err(RemoteError::Staged { node: joint.id() });
+        }
+        joint.require_off("a change of the configuration")?;
+        let settings = wanted.iter().filter(|(entry, _)| is_setting(entry));
+        let taken = stage(joint, settings);
+        if taken.is_err() {
+            // Where this fails too, the first error is the one that says why.
+            let _ = joint.write_raw(Field::Configuration(ConfigurationField::Command), FORGET);
+        }
+        taken?;
+    }
+    for (entry, value) in wanted.iter().filter(|(entry, _)| !is_setting(entry)) {
+        joint.write(*entry, value).map_err(|error| match entry.object.field {
+            Field::Compensation(_) => explained(joint, error),
+            _ => error,
+        })?;
+    }
+    Ok(())
+}
+
+fn stage<'a>(joint: &RemoteJoint, settings: impl Iterator<Item = &'a (Entry, Value)>) -> Result<(), RemoteError> {
+    for (entry, value) in settings {
+        joint.write(*entry, value)?;
+    }
+    let taken = joint.write_raw(Field::Configuration(ConfigurationField::Command), TAKE);
+    taken.map_err(|error| explained(joint, error))
+}
+
+/// The setting that was refused, and what would be possible; where the joint does not say, the error itself.
+fn explained(joint: &RemoteJoint, error: RemoteError) -> RemoteError {
+    if !matches!(error, RemoteError::Client(ClientError::Aborted { abort: Abort::VALUE, .. })) {
+        return error;
+    }
+    let details = || -> Result<RemoteError, RemoteError> {
+        let number = |part| joint.number(Field::Configuration(part));
+        let name = joint.read(Entry::of(Field::Configuration(ConfigurationField::RefusedSetting)))?;
+        match name {
+            Value::Text(setting) if !setting.is_empty() => Ok(RemoteError::Setting {
+                node: joint.id(),
+                setting,
+                value: number(ConfigurationField::RefusedValue)?,
+                low: number(ConfigurationField::Lowest)?,
+                high: number(ConfigurationField::Highest)?,
+            }),
+            _ => Ok(error.clone()),
+        }
+    };
+    details().unwrap_or(error)
+}
+
+/// Which sub-index of 1010h and 1011h.
+fn sub_index(group: Group) -> u8 {
+    match group {
+        Group::All => 1,
+        Group::Communication => 2,
+        Group::Application => 3,
+    }
+}
+
+/// Keeps what is in use over a loss of power (1010h). The motor has to be off.
+pub fn store(joint: &RemoteJoint, group: Group) -> Result<(), RemoteError> {
+    joint.require_off("storing")?;
+    Ok(joint.node().download(0x1010, sub_index(group), b"save")?)
+}
+
+/// Forgets what was stored (1011h): the joint has its defaults after the next reset. The motor has to be off.
+pub fn restore(joint: &RemoteJoint, group: Group) -> Result<(), RemoteError> {
+    joint.require_off("restoring")?;
+    Ok(joint.node().download(0x1011, sub_index(group), b"load")?)
+}

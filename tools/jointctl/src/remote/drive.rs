@@ -1,0 +1,166 @@
+//! State machine and faults of a joint, as its objects tell them; host.
+
+use super::error::RemoteError;
+use super::joint::RemoteJoint;
+use bus::client::{Command, NmtState, Target};
+use joint_firmware::joint::fault::Fault;
+use joint_firmware::joint::state_machine::State;
+use joint_firmware::objects::field::{Actual, Field};
+use std::time::{Duration, Instant};
+
+/// How long an NMT command may take to be seen.
+const NMT: Duration = Duration::from_secs(1);
+/// How long a joint may take to brake: the longest braking time of a configuration.
+const BRAKING: Duration = Duration::from_secs(11);
+/// Between two looks at a node.
+const LOOK: Duration = Duration::from_millis(5);
+
+const STATES: [State; 8] = [
+    State::NotReadyToSwitchOn,
+    State::SwitchOnDisabled,
+    State::ReadyToSwitchOn,
+    State::SwitchedOn,
+    State::OperationEnabled,
+    State::QuickStopActive,
+    State::FaultReactionActive,
+    State::Fault,
+];
+
+/// The profile's words for a state.
+pub fn name(state: State) -> &'static str {
+    match state {
+        State::NotReadyToSwitchOn => "not ready to switch on",
+        State::SwitchOnDisabled => "disabled (switch on disabled)",
+        State::ReadyToSwitchOn => "ready to switch on",
+        State::SwitchedOn => "switched on",
+        State::OperationEnabled => "enabled (operation enabled)",
+        State::QuickStopActive => "braking (quick stop active)",
+        State::FaultReactionActive => "braking because of a fault",
+        State::Fault => "in a fault",
+    }
+}
+
+/// Faults in words, with the code that 603Fh has for each.
+pub fn list(faults: &[Fault]) -> String {
+    let words = |fault: &Fault| format!("{fault} ({:04X}h)", fault.error_code());
+    faults.iter().map(words).collect::<Vec<_>>().join(", ")
+}
+
+/// The state in a statusword, object 6041h.
+pub fn state_of(statusword: u16) -> State {
+    let tells = |state: &State| match state {
+        // These say nothing about quick stop.
+        State::NotReadyToSwitchOn | State::SwitchOnDisabled | State::FaultReactionActive | State::Fault => {
+            statusword & 0x4F == state.statusword() & 0x4F
+        }
+        _ => statusword & 0x6F == state.statusword(),
+    };
+    STATES.into_iter().find(tells).unwrap_or_default()
+}
+
+/// The faults in object 2021h:4: bit n - 1 for fault n.
+pub fn faults_of(bits: u16) -> Vec<Fault> {
+    Fault::ALL.into_iter().filter(|fault| bits >> (*fault as u32 - 1) & 1 != 0).collect()
+}
+
+impl RemoteJoint {
+    /// State of the state machine.
+    pub fn state(&self) -> Result<State, RemoteError> {
+        Ok(state_of(self.raw(Field::Actual(Actual::Statusword))? as u16))
+    }
+
+    /// Faults since the last acknowledgement.
+    pub fn faults(&self) -> Result<Vec<Fault>, RemoteError> {
+        Ok(faults_of(self.raw(Field::Actual(Actual::LatchedFaults))? as u16))
+    }
+
+    /// Refuses where the motor may be under current.
+    pub fn require_off(&self, what: &'static str) -> Result<(), RemoteError> {
+        match self.state()? {
+            State::NotReadyToSwitchOn | State::SwitchOnDisabled | State::Fault => Ok(()),
+            state => Err(RemoteError::Armed { node: self.id(), what, state }),
+        }
+    }
+
+    /// Waits for a state; a fault, where it is not waited for, ends the waiting.
+    pub fn await_state(&self, wanted: State, timeout: Duration) -> Result<(), RemoteError> {
+        let began = Instant::now();
+        loop {
+            let state = self.state()?;
+            if state == wanted {
+                return Ok(());
+            }
+            if state == State::Fault {
+                return Err(RemoteError::Fault { node: self.id(), faults: self.faults()? });
+            }
+            if began.elapsed() > timeout {
+                let within_ms = timeout.as_millis() as u64;
+                return Err(RemoteError::State { node: self.id(), state, wanted, within_ms });
+            }
+            std::thread::sleep(LOOK);
+        }
+    }
+
+    /// Sends an NMT command and makes sure that it acted. In PRE-OPERATIONAL and STOPPED a joint brakes and switches off by itself.
+    pub fn nmt(&self, command: Command, wanted: NmtState) -> Result<(), RemoteError> {
+        let heartbeats = self.network().heartbeats();
+        let node = self.id();
+        self.network().command(command, Target::Node(node))?;
+        // A node without heartbeats does not tell its state; its answers to SDO at least come after the command.
+        let period = u16::from_le_bytes(self.node().number(0x1017, 0)?);
+        if period == 0 {
+            return Ok(());
+        }
+        let deadline = Instant::now() + NMT + Duration::from_millis(period.into());
+        let mut last = None;
+        while let Some(received) = heartbeats.next(deadline.saturating_duration_since(Instant::now()))? {
+            match bus::client::heartbeat::parse(&received.frame) {
+                Some((from, state)) if from == node && state == wanted => return Ok(()),
+                Some((from, state)) if from == node => last = Some(state),
+                _ => {}
+            }
+        }
+        let state = last.unwrap_or(NmtState::Initialising);
+        Err(RemoteError::Nmt { node, state, wanted, within_ms: NMT.as_millis() as u64 + u64::from(period) })
+    }
+
+    /// Brakes and switches off, whoever commands the joint: outside OPERATIONAL no set-point counts. The state that it ends in:
+    /// [`State::SwitchOnDisabled`], or [`State::Fault`] where there is one.
+    pub fn disable(&self) -> Result<State, RemoteError> {
+        self.nmt(Command::EnterPreOperational, NmtState::PreOperational)?;
+        let began = Instant::now();
+        loop {
+            let state = self.state()?;
+            match state {
+                State::SwitchOnDisabled | State::Fault | State::NotReadyToSwitchOn => return Ok(state),
+                _ if began.elapsed() > BRAKING => {
+                    let (wanted, within_ms) = (State::SwitchOnDisabled, BRAKING.as_millis() as u64);
+                    return Err(RemoteError::State { node: self.id(), state, wanted, within_ms });
+                }
+                _ => std::thread::sleep(LOOK),
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_state_is_told_by_its_statusword_whatever_the_other_bits_are() {
+        for state in STATES {
+            for others in [0, 0x0210, 0xFF90] {
+                assert_eq!(state_of(state.statusword() | others), state);
+            }
+        }
+    }
+
+    #[test]
+    fn a_bit_stands_for_each_fault_in_the_order_of_the_documentation() {
+        assert_eq!(faults_of(0), []);
+        assert_eq!(faults_of(0x2001), [Fault::OverCurrent, Fault::StaleCommand]);
+        assert_eq!(faults_of(u16::MAX), Fault::ALL);
+        assert_eq!(list(&faults_of(0x2000)), "command deadline missed (8100h)");
+    }
+}

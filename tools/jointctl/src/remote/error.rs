@@ -1,0 +1,232 @@
+//! What can go wrong between this program and a joint, in one line each: what, where, which limit; host.
+
+use bus::BusError;
+use bus::client::ClientError;
+use joint_firmware::canopen::NmtState;
+use joint_firmware::joint::fault::Fault;
+use joint_firmware::joint::state_machine::State;
+
+/// Why something did not happen.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum RemoteError {
+    /// The bus.
+    #[error(transparent)]
+    Bus(#[from] BusError),
+    /// The node, or the way to it.
+    #[error(transparent)]
+    Client(#[from] ClientError),
+    /// A node that is something else.
+    #[error(
+        "node {node} is no joint: its device type (1000h) is {device_type:08X}h, a joint's is {:08X}h",
+        super::joint::DEVICE_TYPE
+    )]
+    NoJoint {
+        /// Node id.
+        node: u8,
+        /// What it says it is.
+        device_type: u32,
+    },
+    /// No object has this name.
+    #[error("'{name}' is no object of a joint{}", suggestion(near))]
+    UnknownName {
+        /// What was asked for.
+        name: String,
+        /// Names that are like it.
+        near: Vec<String>,
+    },
+    /// Several objects have this name.
+    #[error("'{name}' is the name of several objects: {}", names.join(", "))]
+    AmbiguousName {
+        /// What was asked for.
+        name: String,
+        /// Their full names.
+        names: Vec<String>,
+    },
+    /// A record, where one of its entries is meant.
+    #[error("'{name}' is a record; its entries are {}", names.join(", "))]
+    Record {
+        /// What was asked for.
+        name: String,
+        /// Its entries.
+        names: Vec<String>,
+    },
+    /// A value that the object does not take.
+    #[error("{object}: {problem}")]
+    Value {
+        /// The object, with its index.
+        object: String,
+        /// Why not.
+        problem: String,
+    },
+    /// A setting that does not fit the others.
+    #[error(
+        "node {node}: {setting} of {value} is outside {low} to {high}, with the other settings as they are; nothing was changed"
+    )]
+    Setting {
+        /// Node id.
+        node: u8,
+        /// Its name.
+        setting: String,
+        /// What was asked for.
+        value: f64,
+        /// Least that is possible.
+        low: f64,
+        /// Greatest that is possible.
+        high: f64,
+    },
+    /// Somebody has staged settings and not taken them.
+    #[error(
+        "node {node}: settings were staged and neither taken nor forgotten; `jointctl set configuration.command 2` forgets them"
+    )]
+    Staged {
+        /// Node id.
+        node: u8,
+    },
+    /// Not while the motor may be under current.
+    #[error("node {node}: {what} is possible with the motor off only, and the joint is {}; `jointctl disable` switches it off", super::drive::name(*state))]
+    Armed {
+        /// Node id.
+        node: u8,
+        /// What was asked for.
+        what: &'static str,
+        /// The joint's state.
+        state: State,
+    },
+    /// A fault has to be acknowledged.
+    #[error(
+        "node {node} is in a fault: {}. Once its cause is gone, `jointctl enable --reset` acknowledges it",
+        super::drive::list(faults)
+    )]
+    Fault {
+        /// Node id.
+        node: u8,
+        /// The latched faults.
+        faults: Vec<Fault>,
+    },
+    /// The joint does not get to where it was told to go.
+    #[error("node {node} is {}, and did not become {} within {within_ms} ms", super::drive::name(*state), super::drive::name(*wanted))]
+    State {
+        /// Node id.
+        node: u8,
+        /// Where it is.
+        state: State,
+        /// Where it should be.
+        wanted: State,
+        /// How long it was waited for, ms.
+        within_ms: u64,
+    },
+    /// The joint stopped by itself.
+    #[error("node {node} stopped following its commands: it is {}{}", super::drive::name(*state), fault_list(faults))]
+    Stopped {
+        /// Node id.
+        node: u8,
+        /// Where it is.
+        state: State,
+        /// The latched faults.
+        faults: Vec<Fault>,
+    },
+    /// Somebody else tells the joint what to do.
+    #[error(
+        "another client sends set-points to node {node} (identifier {identifier:03X}h); the joint was disabled. Stop that client first"
+    )]
+    OtherMaster {
+        /// Node id.
+        node: u8,
+        /// Identifier of the foreign frame.
+        identifier: u16,
+    },
+    /// The node is not where PDOs count.
+    #[error("node {node} is {state:?}, and did not become {wanted:?} within {within_ms} ms")]
+    Nmt {
+        /// Node id.
+        node: u8,
+        /// Its NMT state.
+        state: NmtState,
+        /// The NMT state that was asked for.
+        wanted: NmtState,
+        /// How long it was waited for, ms.
+        within_ms: u64,
+    },
+    /// Beyond a limit of the joint.
+    #[error("{what} of {value} {unit} is outside {low} to {high} {unit}, the limits of node {node} ({object})")]
+    Limit {
+        /// Node id.
+        node: u8,
+        /// What was asked for.
+        what: &'static str,
+        /// How much.
+        value: f64,
+        /// Lowest.
+        low: f64,
+        /// Highest.
+        high: f64,
+        /// Unit of these.
+        unit: &'static str,
+        /// The objects that say so.
+        object: String,
+    },
+    /// The joint does not take an image a step further.
+    #[error("node {node} does not {step} the image: {text} (refusal {code:04X}h). {unchanged}")]
+    Refused {
+        /// Node id.
+        node: u8,
+        /// Which step.
+        step: &'static str,
+        /// Number of the reason, object 2212h:3.
+        code: u16,
+        /// The reason.
+        text: String,
+        /// What is in use.
+        unchanged: String,
+    },
+    /// Something else about an image.
+    #[error("node {node}: {problem}")]
+    Image {
+        /// Node id.
+        node: u8,
+        /// What.
+        problem: String,
+    },
+    /// More signals than TPDOs carry.
+    #[error("{signals} signals of {bits} bits do not fit into {} TPDOs of 64 bits", joint_firmware::canopen::PDOS)]
+    TooManySignals {
+        /// How many.
+        signals: usize,
+        /// Their lengths together.
+        bits: u32,
+    },
+    /// A time or rate that makes no sense.
+    #[error("{what} is {value} {unit}, must lie in {low} to {high} {unit}")]
+    Range {
+        /// What.
+        what: &'static str,
+        /// How much.
+        value: f64,
+        /// Least.
+        low: f64,
+        /// Most.
+        high: f64,
+        /// Unit of these.
+        unit: &'static str,
+    },
+    /// Node ids have run out.
+    #[error("no node id from {first} to 127 is free for the joint with {address}")]
+    NoFreeId {
+        /// From where on was looked for.
+        first: u8,
+        /// LSS address.
+        address: String,
+    },
+}
+
+fn suggestion(near: &[String]) -> String {
+    match near {
+        [] => "; `jointctl get --list` names them all".into(),
+        [one] => format!("; did you mean {one}?"),
+        [rest @ .., last] => format!("; did you mean {} or {last}?", rest.join(", ")),
+    }
+}
+
+fn fault_list(faults: &[Fault]) -> String {
+    if faults.is_empty() { String::new() } else { format!(", {}", super::drive::list(faults)) }
+}

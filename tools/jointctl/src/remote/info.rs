@@ -1,0 +1,206 @@
+//! A joint on one page: what an engineer looks at first; host.
+
+use super::drive;
+use super::entry::Entry;
+use super::error::RemoteError;
+use super::image::{ImageStatus, StoredImage};
+use super::joint::RemoteJoint;
+use super::motion;
+use super::value::Value;
+use joint_firmware::objects::field::{Actual, Field, ImageField, SetPoint};
+use joint_firmware::objects::settings::Setting;
+use joint_firmware::parameters::life_cycle::State;
+use std::fmt::Write;
+
+/// Signals by the number that a reason has for them, object 2200h:8.
+const SIGNALS: [&str; 6] =
+    ["position", "velocity", "theoretical torque", "measured torque", "temperature", "acceleration"];
+
+/// The page; reads some fifty objects.
+pub fn page(joint: &RemoteJoint) -> Result<String, RemoteError> {
+    let mut page = String::new();
+    let mut line = |title: &str, text: String| {
+        // Writing to a string does not fail.
+        let _ = writeln!(page, "{title:<14}{text}");
+    };
+    let text = |index| joint.node().upload(index, 0).map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
+    let word = |sub_index| joint.node().number(0x1018, sub_index).map(u32::from_le_bytes);
+    line("node", format!("{}: {}", joint.id(), text(0x1008)?));
+    line(
+        "identity",
+        format!(
+            "product {:08X}h, revision {}, serial number {}, vendor {:08X}h",
+            word(2)?,
+            word(3)?,
+            word(4)?,
+            word(1)?
+        ),
+    );
+    line("program", format!("{} on {}", text(0x100A)?, text(0x1009)?));
+    line("state", motion::left(joint, joint.state()?)?);
+    line("mode", mode(joint.raw(Field::SetPoint(SetPoint::Mode))? as i8));
+    let faults = joint.faults()?;
+    line("faults", if faults.is_empty() { "none".into() } else { drive::list(&faults) });
+
+    let actual = |actual| show(joint, Field::Actual(actual));
+    line("position", format!("{}, velocity {}", actual(Actual::Position)?, actual(Actual::Velocity)?));
+    let rated = joint.number(Field::Actual(Actual::RatedTorque))?;
+    let torque = |signal| joint.number(Field::Actual(signal)).map(|part| part * rated);
+    line("torque", format!("{:.3} Nm of at most {rated} Nm", torque(Actual::Torque)?));
+    line("bus voltage", actual(Actual::BusVoltage)?);
+    line(
+        "temperatures",
+        format!(
+            "winding {}, bridge {}, gear {}",
+            actual(Actual::WindingTemperature)?,
+            actual(Actual::BridgeTemperature)?,
+            actual(Actual::GearTemperature)?
+        ),
+    );
+
+    let ImageStatus { state, left, active, previous } = joint.image_status()?;
+    line("image", stored(active));
+    line("previous", stored(previous));
+    line("life cycle", life(state, left));
+    line("authentication", authentication(joint)?);
+    let setting = |setting| show(joint, Field::Setting(setting));
+    let compensation = |setting| show(joint, Field::Compensation(setting));
+    line(
+        "compensation",
+        format!(
+            "requested {}, acting {}: {}",
+            model(joint.raw(Field::Compensation(Setting::Request))?),
+            model(joint.raw(Field::Actual(Actual::ActingModel))?),
+            reason(joint.raw(Field::Actual(Actual::Reason))? as u8)
+        ),
+    );
+    line(
+        "",
+        format!(
+            "gain {}, clamp {}, left the trained range {} times, shadow RMS {}",
+            compensation(Setting::CompensationGain)?,
+            compensation(Setting::Clamp)?,
+            joint.raw(Field::Actual(Actual::Violations))?,
+            actual(Actual::ShadowRms)?
+        ),
+    );
+    line(
+        "limits",
+        format!(
+            "torque {}, velocity {}, position {} to {}",
+            setting(Setting::TorqueLimit)?,
+            setting(Setting::VelocityLimit)?,
+            setting(Setting::LowestPosition)?,
+            setting(Setting::HighestPosition)?
+        ),
+    );
+    line(
+        "",
+        format!(
+            "current {}, bus {} to {}, command deadline {}",
+            setting(Setting::CurrentLimit)?,
+            setting(Setting::LowestBusVoltage)?,
+            setting(Setting::HighestBusVoltage)?,
+            setting(Setting::CommandDeadline)?
+        ),
+    );
+    line(
+        "drive",
+        format!(
+            "gear ratio {}, {} pole pairs, {} at the rotor, stiffness {}, damping {}",
+            setting(Setting::GearRatio)?,
+            joint.raw(Field::Setting(Setting::PolePairs))?,
+            setting(Setting::TorqueConstant)?,
+            setting(Setting::Stiffness)?,
+            setting(Setting::Damping)?
+        ),
+    );
+    Ok(page)
+}
+
+/// A value with its unit.
+pub fn show(joint: &RemoteJoint, field: Field) -> Result<String, RemoteError> {
+    let entry = Entry::of(field);
+    Ok(entry.show(&joint.read(entry)?))
+}
+
+/// The value of an object as it is printed: parts of the rated torque in Nm, too.
+pub fn show_entry(joint: &RemoteJoint, entry: Entry) -> Result<String, RemoteError> {
+    let value = joint.read(entry)?;
+    let shown = entry.show(&value);
+    Ok(match (entry.text.unit, &value) {
+        ("of 6076h", Value::Real(part)) => {
+            format!("{shown}, {:.3} Nm", part * joint.number(Field::Actual(Actual::RatedTorque))?)
+        }
+        _ => shown,
+    })
+}
+
+fn mode(number: i8) -> String {
+    match number {
+        8 => "position".into(),
+        9 => "velocity".into(),
+        10 => "torque".into(),
+        -1 => "impedance".into(),
+        _ => format!("{number}"),
+    }
+}
+
+fn stored(image: Option<StoredImage>) -> String {
+    let Some(StoredImage { version, checksum, network, slot, created }) = image else { return "none".into() };
+    let model = if network { "physical and network" } else { "physical" };
+    let created = if created == 0 { String::new() } else { format!(", created {created} s after 1970") };
+    format!("version {version}, {model}, CRC-32 {checksum:08X}h, slot {slot}{created}")
+}
+
+/// Where a staged image stands, in words.
+pub fn life(state: State, left: f64) -> String {
+    match state {
+        State::Empty => "nothing staged, none in use".into(),
+        State::Staged => "an image is staged, not verified".into(),
+        State::Verified => "an image is verified, not in use".into(),
+        State::Shadow => format!("an image is computed in shadow for another {left:.1} s"),
+        State::Trial => format!("an image is on trial for another {left:.1} s"),
+        State::Storing => "flash is being written".into(),
+        State::Committed => "stored, not in use yet".into(),
+        State::Active => "in use, nothing staged".into(),
+    }
+}
+
+fn authentication(joint: &RemoteJoint) -> Result<String, RemoteError> {
+    let raw = |field| joint.raw(Field::Image(field));
+    let floor = raw(ImageField::Floor)?;
+    if raw(ImageField::KeyPresent)? == 0 {
+        return Ok(format!("no key: images need no tag; version {floor} or newer"));
+    }
+    let mut text = format!("key {:08x}: images need its tag; version {floor} or newer", raw(ImageField::KeyNumber)?);
+    let (failures, left) = (raw(ImageField::Failures)?, joint.number(Field::Image(ImageField::Lockout))?);
+    if failures > 0 {
+        let _ = write!(text, "; {failures} wrong tags in a row, locked for {left:.1} s");
+    }
+    Ok(text)
+}
+
+fn model(number: u64) -> &'static str {
+    match number {
+        0 => "nothing",
+        1 => "the physical model",
+        2 => "the physical model and the network",
+        3 => "the physical model, the network in shadow",
+        _ => "a model that this program does not know",
+    }
+}
+
+/// Object 2200h:8 in words.
+fn reason(number: u8) -> String {
+    let signal = |at: u8| SIGNALS.get(usize::from(at)).copied().unwrap_or("a signal");
+    match number {
+        0 => "as requested".into(),
+        1 => "switched off".into(),
+        2 => "there is no image".into(),
+        3 => "the image has no network here".into(),
+        16..=31 => format!("{} is outside the trained range", signal(number - 16)),
+        32..=47 => format!("{} is far outside the trained range", signal(number - 32)),
+        _ => format!("reason {number}"),
+    }
+}

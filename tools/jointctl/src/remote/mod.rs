@@ -1,0 +1,36 @@
+//! The joint over a bus, as a CANopen client sees it; host.
+//!
+//! ```text
+//! RemoteJoint::open("udp:239.74.163.2:43113", 5)     one node, checked to be a joint
+//!   .read / .write (Entry)                           any object, by the one table: names, types, units, limits
+//!   Telemetry::begin(&joint, &signals)               TPDOs packed with what is wanted, decoded into SI values, a sample a SYNC
+//!   Stream::begin(&joint, mode, rate)                enabled, with set-points at a rate; ends disabled whatever happens
+//! ```
+//!
+//! - [`entry`], [`value`]: objects by name, and their values as people write and read them
+//! - [`joint`]: the node; [`drive`]: its state machine and faults
+//! - [`pdo`]: what PDOs carry; [`telemetry`]: out of the joint; [`stream`]: into it; [`motion`]: `jointctl move`
+//! - [`image`]: the life of a parameter image, [`refusal`] its numbers in words; [`configuration`]: settings, stored and restored
+//! - [`address`]: node ids for new joints; [`info`]: a joint on one page
+
+pub mod address;
+pub mod configuration;
+pub mod drive;
+pub mod entry;
+pub mod error;
+pub mod image;
+pub mod info;
+pub mod joint;
+pub mod motion;
+pub mod pdo;
+pub mod refusal;
+pub mod stream;
+pub mod telemetry;
+pub mod value;
+
+pub use entry::Entry;
+pub use error::RemoteError;
+pub use joint::RemoteJoint;
+pub use stream::Stream;
+pub use telemetry::{Sample, Signal, Telemetry};
+pub use value::Value;

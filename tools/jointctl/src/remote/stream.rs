@@ -1,0 +1,302 @@
+//! Set-points at a rate, into an enabled joint; host, a thread of its own.
+//!
+//! The thread renews the command, so that the joint's command deadline holds as long as this program runs and the bus works. Where it
+//! ends, by [`Stream::end`], an error or a panic, the joint brakes along its quick-stop ramp and is left disabled, in PRE-OPERATIONAL;
+//! where this program is killed or the bus is cut, the joint brakes by itself once its command deadline is over.
+
+use super::entry::Entry;
+use super::error::RemoteError;
+use super::joint::RemoteJoint;
+use super::pdo::{Change, Direction, Pdo, pack};
+use bus::Frame;
+use bus::client::{ClientError, Command as Nmt, NmtState, Subscription, Target};
+use joint_firmware::canopen::{MappedObject, PdoParameters};
+use joint_firmware::joint::state_machine::{Controlword, State};
+use joint_firmware::joint::{Command, Mode};
+use joint_firmware::objects::field::{Actual, Field, RANGES, Range, SetPoint};
+use joint_firmware::objects::settings::Setting;
+use joint_firmware::objects::{default_communication, impedance_frame};
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// Set-points a second: least and most.
+pub const RATES: [f64; 2] = [1.0, 1_000.0];
+/// How long each step to "operation enabled" may take.
+const STEP: Duration = Duration::from_secs(1);
+/// RPDOs of the joint: drive and torque and position; velocity with a counter; impedance frame.
+const DRIVE: u8 = 0;
+const VELOCITY: u8 = 1;
+const IMPEDANCE: u8 = 2;
+
+/// The number of a mode in object 6060h.
+fn mode_number(mode: Mode) -> i8 {
+    match mode {
+        Mode::Position => 8,
+        Mode::Velocity => 9,
+        Mode::Torque => 10,
+        Mode::Impedance => -1,
+    }
+}
+
+/// What is sent, as a function of the time since it began.
+type Source = Box<dyn FnMut(Duration) -> Command + Send>;
+
+/// What the thread sends.
+struct Sent {
+    controlword: Controlword,
+    source: Source,
+    began: Instant,
+    failure: Option<RemoteError>,
+}
+
+/// From a command to frames.
+struct Encoder {
+    pdos: Vec<(u16, PdoParameters)>,
+    mode: Mode,
+    rated_torque: f64,
+    ranges: [f32; RANGES],
+    counter: u8,
+}
+
+impl Encoder {
+    fn frames(&mut self, controlword: Controlword, command: &Command) -> Vec<Frame> {
+        self.counter = self.counter.wrapping_add(1);
+        let value = |object: MappedObject| {
+            let Some(entry) = Entry::at(object.index(), object.sub_index()) else { return 0 };
+            match entry.object.field {
+                Field::SetPoint(SetPoint::Controlword) => controlword.0.into(),
+                Field::SetPoint(SetPoint::Mode) => mode_number(self.mode) as u8 as u64,
+                Field::SetPoint(SetPoint::Counter) => self.counter.into(),
+                Field::SetPoint(SetPoint::TargetTorque) => {
+                    entry.saturate(f64::from(command.torque) / self.rated_torque)
+                }
+                Field::SetPoint(SetPoint::TargetPosition) => entry.saturate(command.position.into()),
+                Field::SetPoint(SetPoint::TargetVelocity) => entry.saturate(command.velocity.into()),
+                Field::SetPoint(SetPoint::ImpedanceFrame) => impedance_frame(command, self.ranges),
+                _ => 0,
+            }
+        };
+        let frame = |(identifier, parameters): &(u16, PdoParameters)| Frame::new(*identifier, &pack(parameters, value));
+        self.pdos.iter().filter_map(frame).collect()
+    }
+}
+
+/// Set-points on their way to a joint.
+pub struct Stream {
+    joint: RemoteJoint,
+    sent: Arc<Mutex<Sent>>,
+    changes: Vec<Change>,
+    stop: Option<Sender<()>>,
+    thread: Option<JoinHandle<()>>,
+    ended: bool,
+}
+
+impl std::fmt::Debug for Stream {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.debug_struct("Stream").field("joint", &self.joint).finish_non_exhaustive()
+    }
+}
+
+fn lock(sent: &Mutex<Sent>) -> MutexGuard<'_, Sent> {
+    sent.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Stream {
+    /// Enables the joint in a mode and holds it: no torque, no velocity, or the position where it is. `rate` set-points a second, at
+    /// least two within the joint's command deadline. `acknowledge` resets a fault whose cause is gone; without it a fault is an error.
+    pub fn begin(joint: &RemoteJoint, mode: Mode, rate: f64, acknowledge: bool) -> Result<Self, RemoteError> {
+        let deadline = joint.number(Field::Setting(Setting::CommandDeadline))?;
+        let [low, high] = RATES;
+        let low = low.max(2.0 / deadline);
+        if !(low..=high).contains(&rate) {
+            return Err(RemoteError::Range { what: "the rate of set-points", value: rate, low, high, unit: "Hz" });
+        }
+        let faults = joint.faults()?;
+        if joint.state()? == State::Fault && !acknowledge {
+            return Err(RemoteError::Fault { node: joint.id(), faults });
+        }
+        let encoder_of = |changes: &[Change]| -> Result<Encoder, RemoteError> {
+            let mut ranges = [0.0; RANGES];
+            for (value, range) in ranges.iter_mut().zip(Range::ALL) {
+                *value = joint.number(Field::Range(range))? as f32;
+            }
+            Ok(Encoder {
+                pdos: changes.iter().map(|change| (change.identifier(), *change.parameters())).collect(),
+                mode,
+                rated_torque: joint.number(Field::Actual(Actual::RatedTorque))?,
+                ranges,
+                counter: joint.raw(Field::SetPoint(SetPoint::Counter))? as u8,
+            })
+        };
+        let position = joint.number(Field::Actual(Actual::Position))? as f32;
+        let hold = Command { mode, position, ..Command::default() };
+        let sent = Sent {
+            controlword: Controlword::DISABLE_VOLTAGE,
+            source: Box::new(move |_| hold),
+            began: Instant::now(),
+            failure: None,
+        };
+        let mut stream = Self {
+            joint: joint.clone(),
+            sent: Arc::new(Mutex::new(sent)),
+            changes: Vec::new(),
+            stop: None,
+            thread: None,
+            ended: false,
+        };
+        // From here on a failure puts back what was changed, and leaves the joint disabled.
+        let defaults = default_communication(joint.id()).receive;
+        let needed: &[u8] = match mode {
+            Mode::Torque | Mode::Position => &[DRIVE],
+            Mode::Velocity => &[VELOCITY],
+            Mode::Impedance => &[DRIVE, IMPEDANCE],
+        };
+        for pdo in Pdo::all(Direction::Receive).into_iter().filter(|pdo| needed.contains(&pdo.number)) {
+            if let Some(wanted) = defaults.get(usize::from(pdo.number)) {
+                stream.changes.push(pdo.ensure(joint, wanted)?);
+            }
+        }
+        joint.write_raw(Field::SetPoint(SetPoint::Mode), mode_number(mode) as u8 as u64)?;
+        joint.nmt(Nmt::Start, NmtState::Operational)?;
+        let encoder = encoder_of(&stream.changes)?;
+        stream.start(encoder, Duration::from_secs_f64(1.0 / rate));
+        stream.enable(acknowledge)?;
+        Ok(stream)
+    }
+
+    fn start(&mut self, mut encoder: Encoder, period: Duration) {
+        let (stop, stopped) = channel::<()>();
+        let identifiers = encoder.pdos.iter().map(|(identifier, _)| *identifier).collect::<Vec<_>>();
+        // One's own frames are not heard: these are somebody else's.
+        let foreign = self.joint.network().subscribe(move |frame| identifiers.contains(&frame.id()));
+        let (joint, sent) = (self.joint.clone(), Arc::clone(&self.sent));
+        self.thread = Some(std::thread::spawn(move || {
+            let mut due = Instant::now();
+            // The caller's end of the channel closes with the stream.
+            while let Err(RecvTimeoutError::Timeout) =
+                stopped.recv_timeout(due.saturating_duration_since(Instant::now()))
+            {
+                let frames = {
+                    let mut sent = lock(&sent);
+                    let elapsed = sent.began.elapsed();
+                    let command = (sent.source)(elapsed);
+                    encoder.frames(sent.controlword, &command)
+                };
+                if let Err(error) = send(&joint, &frames, &foreign) {
+                    lock(&sent).failure = Some(error);
+                    return;
+                }
+                // A host that comes late leaves set-points out.
+                due = (due + period).max(Instant::now());
+            }
+        }));
+        self.stop = Some(stop);
+    }
+
+    fn enable(&self, acknowledge: bool) -> Result<(), RemoteError> {
+        if acknowledge && self.joint.state()? == State::Fault {
+            self.command_state(Controlword::FAULT_RESET, State::SwitchOnDisabled)?;
+        }
+        // From wherever somebody left it.
+        self.command_state(Controlword::DISABLE_VOLTAGE, State::SwitchOnDisabled)?;
+        for (word, state) in [
+            (Controlword::SHUTDOWN, State::ReadyToSwitchOn),
+            (Controlword::SWITCH_ON, State::SwitchedOn),
+            (Controlword::ENABLE_OPERATION, State::OperationEnabled),
+        ] {
+            self.command_state(word, state)?;
+        }
+        Ok(())
+    }
+
+    fn command_state(&self, controlword: Controlword, wanted: State) -> Result<(), RemoteError> {
+        lock(&self.sent).controlword = controlword;
+        let deadline = Instant::now() + STEP;
+        loop {
+            self.failure()?;
+            let state = self.joint.state()?;
+            if state == wanted {
+                return Ok(());
+            }
+            if Instant::now() > deadline {
+                let node = self.joint.id();
+                return Err(match state {
+                    State::Fault => RemoteError::Fault { node, faults: self.joint.faults()? },
+                    _ => RemoteError::State { node, state, wanted, within_ms: STEP.as_millis() as u64 },
+                });
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+
+    fn failure(&self) -> Result<(), RemoteError> {
+        match &lock(&self.sent).failure {
+            Some(error) => Err(error.clone()),
+            None => Ok(()),
+        }
+    }
+
+    /// From now on this is asked of the joint. Its mode is that of [`Stream::begin`].
+    pub fn set(&self, command: Command) {
+        self.play(move |_| command);
+    }
+
+    /// From now on this is asked of the joint, as a function of the time since now. It runs in the sending thread, once a period, and
+    /// has to be quick.
+    pub fn play(&self, source: impl FnMut(Duration) -> Command + Send + 'static) {
+        let mut sent = lock(&self.sent);
+        sent.source = Box::new(source);
+        sent.began = Instant::now();
+    }
+
+    /// Whether set-points still go out and the joint follows them; asks the joint.
+    pub fn check(&self) -> Result<(), RemoteError> {
+        self.failure()?;
+        match self.joint.state()? {
+            State::OperationEnabled => Ok(()),
+            state => Err(RemoteError::Stopped { node: self.joint.id(), state, faults: self.joint.faults()? }),
+        }
+    }
+
+    /// Brakes, switches off and puts the RPDOs back as they were; the state that the joint is left in.
+    pub fn end(mut self) -> Result<State, RemoteError> {
+        self.finish()
+    }
+
+    fn finish(&mut self) -> Result<State, RemoteError> {
+        self.ended = true;
+        lock(&self.sent).controlword = Controlword::QUICK_STOP;
+        // Outside OPERATIONAL the joint asks itself for the quick stop, and nobody's set-points count.
+        let disabled = self.joint.disable();
+        self.stop.take();
+        if let Some(thread) = self.thread.take() {
+            // It panics only where a source does, which has been reported.
+            let _ = thread.join();
+        }
+        if disabled.is_err() {
+            // The one frame that may still arrive where answers do not.
+            let _ = self.joint.network().command(Nmt::EnterPreOperational, Target::Node(self.joint.id()));
+        }
+        let state = disabled?;
+        self.changes.iter().try_for_each(|change| change.undo(&self.joint))?;
+        Ok(state)
+    }
+}
+
+impl Drop for Stream {
+    fn drop(&mut self) {
+        if !self.ended {
+            // Whatever brought us here is what is reported.
+            let _ = self.finish();
+        }
+    }
+}
+
+fn send(joint: &RemoteJoint, frames: &[Frame], foreign: &Subscription) -> Result<(), RemoteError> {
+    if let Some(received) = foreign.try_next()? {
+        return Err(RemoteError::OtherMaster { node: joint.id(), identifier: received.frame.id() });
+    }
+    frames.iter().try_for_each(|frame| joint.network().send(frame)).map_err(|error: ClientError| error.into())
+}

@@ -1,0 +1,126 @@
+//! Settings, stored and restored, node ids, and the page.
+
+use crate::served::{NODE, Served};
+use bus::client::{Command, Network};
+use joint_firmware::canopen::{Group, NO_NODE_ID};
+use joint_firmware::joint::Mode;
+use jointctl::remote::configuration::{restore, set, store};
+use jointctl::remote::{Entry, RemoteError, RemoteJoint, Stream, address, info};
+use std::time::Duration;
+
+fn change(joint: &RemoteJoint, pairs: &[(&str, &str)]) -> Result<(), RemoteError> {
+    let pairs = pairs.iter().map(|(name, text)| {
+        let entry = Entry::one(name)?;
+        Ok((entry, entry.parse(text)?))
+    });
+    set(joint, &pairs.collect::<Result<Vec<_>, RemoteError>>()?)
+}
+
+fn shown(joint: &RemoteJoint, name: &str) -> String {
+    info::show_entry(joint, Entry::one(name).unwrap()).unwrap()
+}
+
+#[test]
+fn settings_are_taken_together_or_not_at_all() {
+    let served = Served::joints(&[NODE]);
+    let joint = served.joint();
+    let before = shown(&joint, "lowest-position");
+    change(&joint, &[("lowest-position", "-1.5"), ("highest-position", "2.5"), ("compensation-gain", "0.5")])
+        .unwrap_err();
+    assert_eq!(shown(&joint, "lowest-position"), before, "a name that does not exist stops it all");
+    change(&joint, &[("lowest-position", "-1.5"), ("highest-position", "2.5"), ("gain", "0.5")]).unwrap();
+    assert_eq!((shown(&joint, "highest-position"), shown(&joint, "gain")), ("2.5 rad".into(), "0.5".into()));
+    assert_eq!(shown(&joint, "configuration.changed"), "no");
+
+    // Each within its range, together impossible: the joint says which and why.
+    let message = change(&joint, &[("stiffness", "10"), ("lowest-position", "3")]).unwrap_err().to_string();
+    assert!(message.contains("position") && message.contains("nothing was changed"), "{message}");
+    assert_eq!(
+        (shown(&joint, "lowest-position"), shown(&joint, "configuration.changed")),
+        ("-1.5 rad".into(), "no".into())
+    );
+    let message = change(&joint, &[("torque-limit", "5000")]).unwrap_err().to_string();
+    assert_eq!(message, "torque-limit (2103h:1): 5000 Nm is outside 0.01 to 2000 Nm");
+    let message = change(&joint, &[("statusword", "1")]).unwrap_err().to_string();
+    assert_eq!(message, "statusword (6041h:0): is read-only");
+
+    let stream = Stream::begin(&joint, Mode::Torque, 100.0, false).unwrap();
+    let message = change(&joint, &[("stiffness", "10")]).unwrap_err().to_string();
+    assert!(message.contains("motor off only"), "{message}");
+    // The compensation's settings act in motion, too.
+    change(&joint, &[("gain", "0.25")]).unwrap();
+    stream.end().unwrap();
+
+    joint.node().download(0x2104, 3, &10f32.to_le_bytes()).unwrap();
+    let message = change(&joint, &[("damping", "1")]).unwrap_err().to_string();
+    assert!(message.contains("staged") && message.contains("configuration.command 2"), "{message}");
+}
+
+#[test]
+fn what_is_stored_outlasts_a_reset_and_what_is_restored_does_not() {
+    let served = Served::joints(&[NODE]);
+    let joint = served.joint();
+    let period = || shown(&joint, "producer-heartbeat-time");
+    let reset = || joint.network().reset_and_wait(Command::ResetCommunication, NODE, Duration::from_secs(2)).unwrap();
+    change(&joint, &[("producer-heartbeat-time", "0.25")]).unwrap();
+    reset();
+    assert_eq!(period(), "0.000 s");
+    change(&joint, &[("producer-heartbeat-time", "0.25")]).unwrap();
+    store(&joint, Group::Communication).unwrap();
+    reset();
+    assert_eq!(period(), "0.250 s");
+    restore(&joint, Group::All).unwrap();
+    reset();
+    assert_eq!(period(), "0.000 s");
+    // A joint with a heartbeat tells its state, and is believed rather than assumed to have acted.
+    change(&joint, &[("producer-heartbeat-time", "0.05")]).unwrap();
+    joint.disable().unwrap();
+    let stream = Stream::begin(&joint, Mode::Torque, 100.0, false).unwrap();
+    assert!(store(&joint, Group::All).unwrap_err().to_string().contains("storing is possible with the motor off only"));
+    stream.end().unwrap();
+}
+
+#[test]
+fn new_joints_get_the_node_ids_that_are_free() {
+    let served = Served::joints(&[NODE, NO_NODE_ID, NO_NODE_ID]);
+    let network = Network::new(bus::open(served.bus()).unwrap());
+    let mut told = Vec::new();
+    let mut tell = |done: &address::Addressed| told.push((done.node, done.address.serial));
+    let count = address::assign(&network, NODE - 1, true, Duration::from_millis(10), &mut tell).unwrap();
+    told.sort_unstable_by_key(|(_, serial)| *serial);
+    assert_eq!((count, told.iter().map(|(_, serial)| *serial).collect::<Vec<_>>()), (2, vec![13, 14]));
+    let mut ids = told.iter().map(|(node, _)| *node).collect::<Vec<_>>();
+    ids.sort_unstable();
+    assert_eq!(ids, [NODE - 1, NODE + 1]);
+    for (node, serial) in told {
+        let joint = RemoteJoint::on(&network, node).unwrap();
+        assert_eq!(
+            shown(&joint, "serial-number"),
+            if serial > 9 { format!("{serial} ({serial:X}h)") } else { serial.to_string() }
+        );
+    }
+    assert_eq!(address::assign(&network, 1, true, Duration::from_millis(10), &mut |_| {}).unwrap(), 0);
+    assert!(address::assign(&network, 0, true, Duration::from_millis(10), &mut |_| {}).is_err());
+}
+
+#[test]
+fn the_page_says_what_an_engineer_looks_for_first() {
+    let served = Served::joints(&[NODE]);
+    let page = info::page(&served.joint()).unwrap();
+    for expected in [
+        "node          5: virtual joint",
+        "serial number 12",
+        "state         disabled (switch on disabled)",
+        "faults        none",
+        " V\n",
+        "winding ",
+        "image         none",
+        "no key",
+        "acting nothing: ",
+        "command deadline 0.1 s",
+        "gear ratio ",
+    ] {
+        assert!(page.contains(expected), "{expected} in\n{page}");
+    }
+    assert!(page.lines().count() < 30 && page.lines().all(|line| line.len() < 130), "{page}");
+}

@@ -1,0 +1,265 @@
+//! Bad input: each kind ends in one line that names what and where, and leaves the joint as it was.
+
+use crate::served::{NODE, Served, image};
+use bus::client::{ClientError, Network};
+use bus::{BusError, Frame, Transport};
+use joint_firmware::joint::Mode;
+use joint_firmware::joint::state_machine::State as Drive;
+use joint_firmware::parameters::authentication::Key;
+use joint_firmware::parameters::life_cycle::State;
+use jointctl::progress::Silent;
+use jointctl::remote::image::Use;
+use jointctl::remote::{RemoteError, RemoteJoint, Stream};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, Instant};
+
+/// A joint that has version 3 in use, and what it must still have afterwards.
+struct InService {
+    served: Served,
+    joint: RemoteJoint,
+    stored: Vec<u8>,
+}
+
+impl InService {
+    fn new() -> Self {
+        let served = Served::joints(&[NODE]);
+        let joint = served.joint();
+        let stored = image(3, 0.25, 0);
+        joint.upload_image(&stored, Use::Commit, &Silent).unwrap();
+        Self { served, joint, stored }
+    }
+
+    fn unchanged(&self) {
+        let joint = self.served.joint();
+        let status = joint.image_status().unwrap();
+        assert_eq!((status.active.unwrap().version, status.previous), (3, None));
+        assert_eq!(joint.active_image().unwrap(), self.stored);
+        assert_eq!(joint.state().unwrap(), Drive::SwitchOnDisabled);
+    }
+
+    fn refused(&self, upload: &[u8], expected: &[&str]) {
+        for usage in [Use::Verify, Use::Shadow(1.0), Use::Trial(1.0), Use::Commit] {
+            let message = self.joint.upload_image(upload, usage, &Silent).unwrap_err().to_string();
+            assert!(!message.contains('\n') && message.starts_with("node 5"), "{message}");
+            for expected in expected {
+                assert!(message.contains(expected), "{expected} in {message}");
+            }
+        }
+        self.unchanged();
+    }
+}
+
+#[test]
+fn a_wrong_node_id_is_told_from_a_bus_where_nobody_is() {
+    let served = Served::joints(&[NODE]);
+    for id in [0, 128, 255] {
+        let message = RemoteJoint::open(served.bus(), id).unwrap_err().to_string();
+        assert_eq!(message, format!("{id} is no node id: they are 1 to 127"));
+    }
+    // A neighbour is heard.
+    let network = Network::new(bus::open(served.bus()).unwrap());
+    RemoteJoint::on(&network, NODE).unwrap();
+    let message = RemoteJoint::on(&network, NODE + 1).unwrap_err().to_string();
+    assert!(
+        message.contains("of node 6: no answer within 1000 ms") && message.contains("(5): is the node id right?"),
+        "{message}"
+    );
+}
+
+#[test]
+fn no_answer_says_for_how_long_and_what_to_look_at() {
+    let began = Instant::now();
+    let message = RemoteJoint::open("virtual:nobody-is-here", NODE).unwrap_err().to_string();
+    assert!(message.contains("1000h:0 of node 5: no answer within 1000 ms. Nothing at all was heard"), "{message}");
+    assert!(began.elapsed() < Duration::from_secs(3));
+}
+
+#[test]
+fn a_node_that_is_no_joint_is_left_alone() {
+    use bus::client::Object;
+    // Answers every SDO read with the device type of an I/O module, CiA 401.
+    let (host, other) = (bus::open("virtual:not-a-joint").unwrap(), bus::open("virtual:not-a-joint").unwrap());
+    let answering = std::thread::spawn(move || {
+        let request = other.receive(Duration::from_secs(5)).unwrap().unwrap();
+        let object = Object { node: NODE, index: 0x1000, sub_index: 0 };
+        assert_eq!(request.data().get(..4), Some(&[0x40, 0x00, 0x10, object.sub_index][..]));
+        other.send(&Frame::new(0x580 + u16::from(NODE), &[0x43, 0x00, 0x10, 0, 0x91, 1, 0, 0]).unwrap()).unwrap();
+    });
+    let message = RemoteJoint::on(&Network::new(host), NODE).unwrap_err().to_string();
+    assert_eq!(message, "node 5 is no joint: its device type (1000h) is 00000191h, a joint's is 00020192h");
+    answering.join().unwrap();
+}
+
+#[test]
+fn a_damaged_image_is_refused_and_the_one_in_use_stays() {
+    let joint = InService::new();
+    let mut damaged = image(4, 0.5, 0);
+    damaged[60] ^= 4;
+    joint.refused(&damaged, &["does not accept the image", "checksum", "refusal 0205h", "Version 3 stays in use"]);
+    joint.refused(b"this is a letter, not an image of parameters; it has more bytes than a header", &["0203h"]);
+    joint.refused(&image(4, 0.5, 0)[..100], &["02", "stays in use"]);
+    joint.refused(&[0; 3_000], &["has 3000 bytes, must be 1 to 2048"]);
+    joint.refused(&[], &["has 0 bytes"]);
+}
+
+#[test]
+fn an_image_for_another_joint_or_of_the_past_is_refused_with_both_numbers() {
+    let joint = InService::new();
+    joint.refused(&image(4, 0.5, 99), &["image for serial number 99, this joint has 12", "0502h"]);
+    joint.refused(&image(2, 0.5, 0), &["image version 2, must be at least 3", "0401h"]);
+}
+
+#[test]
+fn a_wrong_key_is_refused_counted_and_locks_out() {
+    let joint = InService::new();
+    let key = Key::new(std::array::from_fn(|i| i as u8)).unwrap();
+    let other = Key::new(std::array::from_fn(|i| 31 - i as u8)).unwrap();
+    joint.joint.give_key(&key).unwrap();
+    let message = joint.joint.give_key(&other).unwrap_err().to_string();
+    assert!(message.contains(&format!("it has key {:08x} already", key.id())), "{message}");
+
+    let plain = image(4, 0.5, 0);
+    joint.refused(&plain, &["the joint has a key, but no tag", "0301h"]);
+    let signed = |key: &Key| [&plain[..], &key.sign(&plain)[..]].concat();
+    let mut messages = Vec::new();
+    for _ in 0..6 {
+        messages.push(joint.joint.upload_image(&signed(&other), Use::Commit, &Silent).unwrap_err().to_string());
+    }
+    assert!(messages[0].contains("the tag is not that of this image and key (1 in a row)"), "{}", messages[0]);
+    assert!(messages[5].contains("wrong tags in a row: nothing is verified for another"), "{}", messages[5]);
+    joint.unchanged();
+}
+
+#[test]
+fn a_signed_image_of_the_right_key_is_taken() {
+    let joint = InService::new();
+    let key = Key::new(std::array::from_fn(|i| i as u8)).unwrap();
+    joint.joint.give_key(&key).unwrap();
+    let plain = image(4, 0.5, 0);
+    let signed = [&plain[..], &key.sign(&plain)[..]].concat();
+    let status = joint.joint.upload_image(&signed, Use::Commit, &Silent).unwrap();
+    assert_eq!(status.active.unwrap().version, 4);
+    // The same again is the same version: taken.
+    assert_eq!(joint.joint.upload_image(&signed, Use::Verify, &Silent).unwrap().state, State::Verified);
+}
+
+/// An adapter that is pulled out after some frames.
+#[derive(Debug)]
+struct Unplugged {
+    bus: Arc<dyn Transport>,
+    left: AtomicU32,
+}
+
+impl Unplugged {
+    fn gone(&self) -> BusError {
+        BusError::Gone {
+            bus: self.bus.name().into(),
+            problem: "the adapter was pulled out".into(),
+            advice: "Plug it in",
+        }
+    }
+}
+
+impl Transport for Unplugged {
+    fn name(&self) -> &str {
+        self.bus.name()
+    }
+
+    fn send(&self, frame: &Frame) -> Result<(), BusError> {
+        let left = self.left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(1));
+        left.map_err(|_| self.gone())?;
+        self.bus.send(frame)
+    }
+
+    fn receive(&self, timeout: Duration) -> Result<Option<Frame>, BusError> {
+        if self.left.load(Ordering::Relaxed) == 0 { Err(self.gone()) } else { self.bus.receive(timeout) }
+    }
+}
+
+#[test]
+fn a_bus_that_is_unplugged_at_any_frame_of_an_upload_leaves_the_old_image_or_the_new_one() {
+    let (mut old, mut new) = (0, 0);
+    let next = image(4, 0.5, 0);
+    let joint = InService::new();
+    for frames in 1..200 {
+        let transport = Unplugged { bus: bus::open(joint.served.bus()).unwrap(), left: AtomicU32::new(frames) };
+        let outcome = RemoteJoint::on(&Network::new(Arc::new(transport)), NODE)
+            .and_then(|client| client.upload_image(&next, Use::Commit, &Silent));
+        let error = match outcome {
+            Err(error) => error,
+            // So many frames are enough.
+            Ok(status) => {
+                assert_eq!(status.active.unwrap().version, 4);
+                break;
+            }
+        };
+        let message = error.to_string();
+        assert!(message.contains("is gone: the adapter was pulled out"), "{frames} frames: {message}");
+        let watcher = joint.served.joint();
+        match watcher.image_status().unwrap().active.unwrap().version {
+            3 => {
+                old += 1;
+                assert_eq!(watcher.active_image().unwrap(), joint.stored);
+            }
+            4 => {
+                new += 1;
+                assert_eq!(watcher.active_image().unwrap(), next);
+            }
+            other => panic!("version {other}"),
+        }
+    }
+    println!(
+        "unplugged after 1 to {} frames: {old} times the old image, {new} times the new one, 0 times another",
+        old + new
+    );
+    assert!(old > 20 && new > 0, "{old} {new}");
+}
+
+#[test]
+fn two_clients_at_once_are_told_of_each_other_and_the_image_stays() {
+    let joint = InService::new();
+    let other = joint.served.joint();
+    let stop = std::sync::atomic::AtomicBool::new(false);
+    let error = std::thread::scope(|scope| {
+        scope.spawn(|| {
+            while !stop.load(Ordering::Relaxed) {
+                // It loses too, and tries again.
+                let _ = other.node().upload(0x1008, 0);
+            }
+        });
+        let errors = (0..200).find_map(|_| {
+            joint
+                .joint
+                .upload_image(&image(2, 0.5, 0), Use::Verify, &Silent)
+                .err()
+                .filter(|error| matches!(error, RemoteError::Client(ClientError::OtherClient { .. })))
+        });
+        stop.store(true, Ordering::Relaxed);
+        errors
+    });
+    let message = error.expect("200 uploads met another client").to_string();
+    assert!(message.contains("of node 5: another client is talking to this node's SDO server"), "{message}");
+    joint.unchanged();
+}
+
+#[test]
+fn two_masters_of_one_joint_end_in_a_joint_that_is_disabled() {
+    let served = Served::joints(&[NODE]);
+    let (joint, other) = (served.joint(), served.joint());
+    let stream = Stream::begin(&joint, Mode::Torque, 100.0, false).unwrap();
+    let second = Stream::begin(&other, Mode::Torque, 100.0, false);
+    let messages = [second.map(|second| second.check()).map_or_else(Err, |checked| checked), stream.check()];
+    assert!(
+        messages.iter().any(|outcome| matches!(outcome, Err(RemoteError::OtherMaster { node: NODE, .. }))),
+        "{messages:?}"
+    );
+    drop(stream);
+    assert_eq!(joint.state().unwrap(), Drive::SwitchOnDisabled);
+}
+
+#[test]
+fn a_string_that_is_no_bus_is_answered_with_those_that_are() {
+    let message = RemoteJoint::open("can0", NODE).unwrap_err().to_string();
+    assert!(message.starts_with("bus 'can0': a kind and a colon are missing. Buses are socketcan:can0, "), "{message}");
+}

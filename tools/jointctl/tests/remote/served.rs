@@ -1,0 +1,101 @@
+//! Virtual joints on a bus within this process.
+
+use joint_firmware::friction::domain::{Domain, Range};
+use joint_firmware::friction::physical::{Coefficients, PhysicalParameters, Terms};
+use joint_firmware::friction::regime::Selector;
+use joint_firmware::friction::state::{JointState, SIGNALS};
+use joint_firmware::friction::{FrictionModel, FrictionParameters, ParameterSet};
+use joint_firmware::parameters::certificate::Limits;
+use joint_firmware::parameters::image::{Effort, GoldenVector, Image, MAX_LENGTH, Target};
+use jointctl::remote::RemoteJoint;
+use node::{Options, SlotImages, VirtualNode, serve};
+use plant::ActuatorParameters;
+use plant::virtual_joint::Setup;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::thread::JoinHandle;
+
+/// Node id of the first joint.
+pub const NODE: u8 = 5;
+
+/// Joints that run until this is dropped.
+pub struct Served {
+    bus: String,
+    stop: Arc<AtomicBool>,
+    threads: Vec<JoinHandle<()>>,
+}
+
+impl Served {
+    /// A joint for each node id, on a bus that nobody else has.
+    pub fn joints(nodes: &[u8]) -> Self {
+        static BUSES: AtomicU64 = AtomicU64::new(0);
+        let bus = format!("virtual:remote-{}", BUSES.fetch_add(1, Ordering::Relaxed));
+        Self::on(&bus, nodes)
+    }
+
+    /// The same on a bus that is named.
+    pub fn on(bus: &str, nodes: &[u8]) -> Self {
+        let stop = Arc::new(AtomicBool::new(false));
+        let threads = nodes.iter().zip(12..).map(|(&node_id, serial)| {
+            let transport = bus::open(bus).unwrap();
+            let stop = Arc::clone(&stop);
+            let parameters = ActuatorParameters::reference().aligned().without_payload();
+            let options = Options { node_id, serial, seed: 1 };
+            let images = SlotImages::empty().unwrap();
+            let mut joint = VirtualNode::new(parameters, &Setup::of(&parameters), &options, images).unwrap();
+            // The current sensors' offsets are measured before anybody asks.
+            joint.advance(4_000);
+            // A bus that is gone is what some tests are about.
+            std::thread::spawn(move || drop(serve(&mut joint, &*transport, &stop)))
+        });
+        let threads = threads.collect();
+        Self { bus: bus.into(), stop, threads }
+    }
+
+    pub fn bus(&self) -> &str {
+        &self.bus
+    }
+
+    /// A client of its own for the first joint.
+    pub fn joint(&self) -> RemoteJoint {
+        RemoteJoint::open(&self.bus, NODE).unwrap()
+    }
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        for thread in self.threads.drain(..) {
+            let _ = thread.join();
+        }
+    }
+}
+
+/// An image with a constant friction of `level` Nm, for the joint with `serial`, 0 for any.
+pub fn image(version: u32, level: f64, serial: u32) -> Vec<u8> {
+    // Full scale of a constant: see the image's layout.
+    let coefficients =
+        Coefficients::from_array(std::array::from_fn(|i| if i == 0 { (level * 65_536.0) as i32 } else { 0 }));
+    let set = ParameterSet { physical: PhysicalParameters { terms: Terms::ALL, coefficients }, network: None };
+    let range = Range { low: -(100 << 16), high: 100 << 16 };
+    let friction = FrictionParameters {
+        domain: Domain { ranges: [range; SIGNALS], margin: 0, reference_temperature: 0 },
+        selector: Selector::default(),
+        sets: [set, ParameterSet::default(), ParameterSet::default(), ParameterSet::default()],
+    };
+    let signals = [7; SIGNALS];
+    let expected = FrictionModel::new(&friction, 20_000).evaluate(0, &JointState::from_signals(signals));
+    let image = Image {
+        version,
+        target: Target { product: 0, serial },
+        created: 0,
+        effort: Effort::NewtonMetre,
+        data_hash: [0; 16],
+        friction,
+        limits: Limits { output: 2 << 16, torque_gain: 1 << 15, velocity_slope: 1 << 24 },
+        golden: [GoldenVector { set: 0, signals, expected }].into_iter().collect(),
+    };
+    let mut buffer = [0; MAX_LENGTH];
+    let length = image.encode(&mut buffer).unwrap();
+    buffer[..length].to_vec()
+}
