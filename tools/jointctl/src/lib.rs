@@ -5,7 +5,8 @@
 //! model on validation data is quantised, certified and judged by the same `no_std` code that the board runs.
 //!
 //! Beside it, [`simulation`] closes the firmware's control step over a simulated actuator, [`joint_text`] is a joint's configuration
-//! as a file, and [`excite`] finds motions that identify a joint. [`remote`] is a joint over a bus.
+//! as a file, and [`excite`] finds motions that identify a joint. [`remote`] is a joint over a bus,
+//! [`describe`] tells other people's tools of it.
 
 pub mod augment;
 pub mod certificate_search;
@@ -13,6 +14,7 @@ pub mod classify;
 pub mod clean;
 pub mod commands;
 pub mod dataset;
+pub mod describe;
 pub mod differentiate;
 pub mod equalise;
 pub mod evaluate;

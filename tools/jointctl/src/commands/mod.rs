@@ -2,6 +2,7 @@
 
 pub mod bus;
 pub mod demo;
+pub mod describe;
 pub mod drive;
 pub mod evaluate;
 pub mod excite;
@@ -72,6 +73,10 @@ pub enum Command {
     Store(keep::Keep),
     /// Have a joint forget its configuration: defaults after the next reset
     Restore(keep::Keep),
+    /// Write the electronic data sheet of a joint, for CANopen masters
+    Eds(describe::Eds),
+    /// Write the frames of joints as a DBC file, for what shows CAN traffic
+    Dbc(describe::Dbc),
     /// Write a motion that identifies a joint, or check one
     Excite(excite::Excite),
 }
@@ -181,6 +186,8 @@ pub fn run(arguments: Arguments) -> Result<(), CommandError> {
         Command::Discard(discard) => discard.run(),
         Command::Store(keep) => keep.store(),
         Command::Restore(keep) => keep.restore(),
+        Command::Eds(eds) => eds.run(),
+        Command::Dbc(dbc) => dbc.run(),
         Command::Excite(excite) => excite.run(),
     }
 }

@@ -118,28 +118,35 @@ impl RemoteJoint {
 
     /// Brings an image, and its tag where there is one, into the joint, and on as far as is asked for.
     pub fn upload_image(&self, upload: &[u8], usage: Use, progress: &dyn Progress) -> Result<ImageStatus, RemoteError> {
-        let time = Entry::of(Field::Image(ImageField::TrialTime));
         // What can be seen to fail fails before the first byte.
-        if let Use::Shadow(seconds) | Use::Trial(seconds) = usage {
-            time.encode(&Value::Real(seconds))?;
-        }
-        if usage == Use::Commit {
-            self.require_off("storing an image")?;
-        }
+        self.check_use(usage)?;
         if upload.is_empty() || upload.len() > STAGING {
             let problem = format!("the image has {} bytes, must be 1 to {STAGING}", upload.len());
             return Err(RemoteError::Image { node: self.id(), problem });
         }
-        let staged =
-            matches!(self.image_state()?, State::Verified | State::Shadow | State::Trial) && self.holds(upload)?;
-        if staged {
-            progress.stage("already in the joint, verified");
-        } else {
-            progress.stage(&format!("upload {} bytes", upload.len()));
-            self.stage(upload)?;
-            progress.stage("verify");
-            self.image_command(Command::Verify, upload)?;
+        progress.stage(&format!("upload {} bytes", upload.len()));
+        self.stage(upload)?;
+        progress.stage("verify");
+        self.image_command(Command::Verify, upload)?;
+        self.use_image(upload, usage, progress)
+    }
+
+    fn check_use(&self, usage: Use) -> Result<(), RemoteError> {
+        match usage {
+            Use::Verify => Ok(()),
+            Use::Shadow(seconds) | Use::Trial(seconds) => {
+                let time = Entry::of(Field::Image(ImageField::TrialTime));
+                time.encode(&Value::Real(seconds)).map(drop)
+            }
+            Use::Commit => self.require_off("storing an image"),
         }
+    }
+
+    /// Takes the image that this program uploaded and that the joint verified a step further, from shadow to trial say, without
+    /// sending it again. Whose image is staged no object tells: the checksum of the staged bytes is the same for all whole images
+    /// without a tag, because their own is part of them.
+    pub fn use_image(&self, upload: &[u8], usage: Use, progress: &dyn Progress) -> Result<ImageStatus, RemoteError> {
+        self.check_use(usage)?;
         match usage {
             Use::Verify => {}
             Use::Shadow(seconds) | Use::Trial(seconds) => {
@@ -148,7 +155,7 @@ impl RemoteJoint {
                     _ => (Command::Trial, "trial"),
                 };
                 progress.stage(name);
-                self.write(time, &Value::Real(seconds))?;
+                self.write(Entry::of(Field::Image(ImageField::TrialTime)), &Value::Real(seconds))?;
                 self.image_command(command, upload)?;
             }
             Use::Commit => {
@@ -167,7 +174,7 @@ impl RemoteJoint {
         let Entry { object, .. } = Entry::of(Field::Image(ImageField::Staging));
         let sent = self.node().download_by(object.index, object.sub_index, upload, Method::Block);
         sent.map_err(|error| self.explain(error.into(), Attempt { command: None, upload }))?;
-        if self.holds(upload)? {
+        if self.received(upload)? {
             return Ok(());
         }
         let problem =
@@ -176,8 +183,8 @@ impl RemoteJoint {
         Err(RemoteError::Image { node: self.id(), problem })
     }
 
-    /// Whether the staging buffer holds these bytes.
-    fn holds(&self, upload: &[u8]) -> Result<bool, RemoteError> {
+    /// Whether the staging buffer has as many bytes as these, and whole ones.
+    fn received(&self, upload: &[u8]) -> Result<bool, RemoteError> {
         let raw = |field| self.raw(Field::Image(field));
         Ok(raw(ImageField::Length)? == upload.len() as u64
             && raw(ImageField::Checksum)? == u64::from(CRC.checksum(upload)))

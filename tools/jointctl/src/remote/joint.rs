@@ -24,7 +24,13 @@ impl RemoteJoint {
     /// Finds a joint on a bus that is open: several may share it.
     pub fn on(network: &Network, node: u8) -> Result<Self, RemoteError> {
         let joint = Self { node: network.node(node)? };
-        let device_type = u32::from_le_bytes(joint.node.number(0x1000, 0)?);
+        let device_type = || joint.node.number(0x1000, 0).map(u32::from_le_bytes);
+        let device_type = match device_type() {
+            // A client that vanished within a block leaves the node waiting for the rest: it takes the first request for data, and
+            // says so by an abort once its own time-out is over.
+            Err(ClientError::NoAnswer { heard, .. }) if heard.contains(&node) => device_type()?,
+            answer => answer?,
+        };
         if device_type == DEVICE_TYPE { Ok(joint) } else { Err(RemoteError::NoJoint { node, device_type }) }
     }
 

@@ -86,6 +86,9 @@ impl Attempt<'_> {
     /// The error for a number that the joint told.
     pub fn refused(&self, joint: &RemoteJoint, code: u16) -> RemoteError {
         let text = match self.reproduce(joint, code) {
+            Ok(Some(Refusal::State { command: None, state })) => {
+                format!("{}; `jointctl discard` ends that", Refusal::State { command: None, state })
+            }
             Ok(Some(refusal)) if refusal.code() == code => refusal.to_string(),
             // Whether its details can be read makes no difference to the refusal.
             _ => words(code).to_owned(),

@@ -16,8 +16,9 @@ use joint_firmware::joint::{Command, Mode};
 use joint_firmware::objects::field::{Actual, Field, RANGES, Range, SetPoint};
 use joint_firmware::objects::settings::Setting;
 use joint_firmware::objects::{default_communication, impedance_frame};
+use std::sync::atomic::{AtomicU16, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -43,12 +44,12 @@ fn mode_number(mode: Mode) -> i8 {
 /// What is sent, as a function of the time since it began.
 type Source = Box<dyn FnMut(Duration) -> Command + Send>;
 
-/// What the thread sends.
-struct Sent {
-    controlword: Controlword,
-    source: Source,
-    began: Instant,
-    failure: Option<RemoteError>,
+/// What the thread and everyone else share.
+#[derive(Debug)]
+struct Shared {
+    controlword: AtomicU16,
+    /// Why the thread ended.
+    failure: Mutex<Option<RemoteError>>,
 }
 
 /// From a command to frames.
@@ -86,9 +87,10 @@ impl Encoder {
 /// Set-points on their way to a joint.
 pub struct Stream {
     joint: RemoteJoint,
-    sent: Arc<Mutex<Sent>>,
+    shared: Arc<Shared>,
     changes: Vec<Change>,
-    stop: Option<Sender<()>>,
+    /// To the thread, which ends when it is dropped.
+    sources: Option<Sender<Source>>,
     thread: Option<JoinHandle<()>>,
     ended: bool,
 }
@@ -99,17 +101,14 @@ impl std::fmt::Debug for Stream {
     }
 }
 
-fn lock(sent: &Mutex<Sent>) -> MutexGuard<'_, Sent> {
-    sent.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
 impl Stream {
     /// Enables the joint in a mode and holds it: no torque, no velocity, or the position where it is. `rate` set-points a second, at
     /// least two within the joint's command deadline. `acknowledge` resets a fault whose cause is gone; without it a fault is an error.
     pub fn begin(joint: &RemoteJoint, mode: Mode, rate: f64, acknowledge: bool) -> Result<Self, RemoteError> {
         let deadline = joint.number(Field::Setting(Setting::CommandDeadline))?;
         let [low, high] = RATES;
-        let low = low.max(2.0 / deadline);
+        // Upwards, and a REAL32's 0.1 s as the 0.1 s that it means.
+        let low = low.max((2.0 / deadline - 1e-3).ceil());
         if !(low..=high).contains(&rate) {
             return Err(RemoteError::Range { what: "the rate of set-points", value: rate, low, high, unit: "Hz" });
         }
@@ -132,17 +131,12 @@ impl Stream {
         };
         let position = joint.number(Field::Actual(Actual::Position))? as f32;
         let hold = Command { mode, position, ..Command::default() };
-        let sent = Sent {
-            controlword: Controlword::DISABLE_VOLTAGE,
-            source: Box::new(move |_| hold),
-            began: Instant::now(),
-            failure: None,
-        };
+        let shared = Shared { controlword: AtomicU16::new(Controlword::DISABLE_VOLTAGE.0), failure: Mutex::default() };
         let mut stream = Self {
             joint: joint.clone(),
-            sent: Arc::new(Mutex::new(sent)),
+            shared: Arc::new(shared),
             changes: Vec::new(),
-            stop: None,
+            sources: None,
             thread: None,
             ended: false,
         };
@@ -161,38 +155,39 @@ impl Stream {
         joint.write_raw(Field::SetPoint(SetPoint::Mode), mode_number(mode) as u8 as u64)?;
         joint.nmt(Nmt::Start, NmtState::Operational)?;
         let encoder = encoder_of(&stream.changes)?;
-        stream.start(encoder, Duration::from_secs_f64(1.0 / rate));
+        stream.start(encoder, hold, Duration::from_secs_f64(1.0 / rate));
         stream.enable(acknowledge)?;
         Ok(stream)
     }
 
-    fn start(&mut self, mut encoder: Encoder, period: Duration) {
-        let (stop, stopped) = channel::<()>();
+    fn start(&mut self, mut encoder: Encoder, hold: Command, period: Duration) {
+        let (sources, inbox) = channel::<Source>();
         let identifiers = encoder.pdos.iter().map(|(identifier, _)| *identifier).collect::<Vec<_>>();
         // One's own frames are not heard: these are somebody else's.
         let foreign = self.joint.network().subscribe(move |frame| identifiers.contains(&frame.id()));
-        let (joint, sent) = (self.joint.clone(), Arc::clone(&self.sent));
+        let (joint, shared) = (self.joint.clone(), Arc::clone(&self.shared));
         self.thread = Some(std::thread::spawn(move || {
-            let mut due = Instant::now();
-            // The caller's end of the channel closes with the stream.
-            while let Err(RecvTimeoutError::Timeout) =
-                stopped.recv_timeout(due.saturating_duration_since(Instant::now()))
-            {
-                let frames = {
-                    let mut sent = lock(&sent);
-                    let elapsed = sent.began.elapsed();
-                    let command = (sent.source)(elapsed);
-                    encoder.frames(sent.controlword, &command)
-                };
-                if let Err(error) = send(&joint, &frames, &foreign) {
-                    lock(&sent).failure = Some(error);
-                    return;
+            let mut source: Source = Box::new(move |_| hold);
+            let mut began = Instant::now();
+            let mut due = began;
+            loop {
+                match inbox.recv_timeout(due.saturating_duration_since(Instant::now())) {
+                    Ok(next) => (source, began) = (next, Instant::now()),
+                    Err(RecvTimeoutError::Disconnected) => return,
+                    Err(RecvTimeoutError::Timeout) => {
+                        let command = source(began.elapsed());
+                        let controlword = Controlword(shared.controlword.load(Ordering::Relaxed));
+                        if let Err(error) = send(&joint, &encoder.frames(controlword, &command), &foreign) {
+                            *shared.failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+                            return;
+                        }
+                        // A host that comes late leaves set-points out.
+                        due = (due + period).max(Instant::now());
+                    }
                 }
-                // A host that comes late leaves set-points out.
-                due = (due + period).max(Instant::now());
             }
         }));
-        self.stop = Some(stop);
+        self.sources = Some(sources);
     }
 
     fn enable(&self, acknowledge: bool) -> Result<(), RemoteError> {
@@ -212,7 +207,7 @@ impl Stream {
     }
 
     fn command_state(&self, controlword: Controlword, wanted: State) -> Result<(), RemoteError> {
-        lock(&self.sent).controlword = controlword;
+        self.shared.controlword.store(controlword.0, Ordering::Relaxed);
         let deadline = Instant::now() + STEP;
         loop {
             self.failure()?;
@@ -232,7 +227,7 @@ impl Stream {
     }
 
     fn failure(&self) -> Result<(), RemoteError> {
-        match &lock(&self.sent).failure {
+        match &*self.shared.failure.lock().unwrap_or_else(PoisonError::into_inner) {
             Some(error) => Err(error.clone()),
             None => Ok(()),
         }
@@ -246,9 +241,10 @@ impl Stream {
     /// From now on this is asked of the joint, as a function of the time since now. It runs in the sending thread, once a period, and
     /// has to be quick.
     pub fn play(&self, source: impl FnMut(Duration) -> Command + Send + 'static) {
-        let mut sent = lock(&self.sent);
-        sent.source = Box::new(source);
-        sent.began = Instant::now();
+        if let Some(sources) = &self.sources {
+            // A thread that has ended has said why.
+            let _ = sources.send(Box::new(source));
+        }
     }
 
     /// Whether set-points still go out and the joint follows them; asks the joint.
@@ -267,10 +263,10 @@ impl Stream {
 
     fn finish(&mut self) -> Result<State, RemoteError> {
         self.ended = true;
-        lock(&self.sent).controlword = Controlword::QUICK_STOP;
+        self.shared.controlword.store(Controlword::QUICK_STOP.0, Ordering::Relaxed);
         // Outside OPERATIONAL the joint asks itself for the quick stop, and nobody's set-points count.
         let disabled = self.joint.disable();
-        self.stop.take();
+        self.sources.take();
         if let Some(thread) = self.thread.take() {
             // It panics only where a source does, which has been reported.
             let _ = thread.join();

@@ -31,8 +31,8 @@ impl Value {
     }
 }
 
-/// Bits and sign of the whole numbers.
-pub(super) fn integer(data_type: DataType) -> Option<(u32, bool)> {
+/// Bits and sign of a type of whole numbers.
+pub fn integer(data_type: DataType) -> Option<(u32, bool)> {
     Some(match data_type {
         DataType::I8 => (8, true),
         DataType::I16 => (16, true),

@@ -39,16 +39,16 @@ fn an_image_is_verified_shadowed_tried_committed_and_rolled_back() {
     assert_eq!((status.state, status.active.unwrap().version, status.previous), (State::Active, 1, None));
     assert_eq!(joint.active_image().unwrap(), first);
 
-    // In motion: what is staged and verified is not sent again.
+    // In motion, from shadow to trial without sending it again.
     let stream = Stream::begin(&joint, Mode::Velocity, 100.0, false).unwrap();
     stream.set(Command { mode: Mode::Velocity, velocity: 0.2, ..Command::default() });
     assert_eq!(joint.upload_image(&second, Use::Verify, &Silent).unwrap().state, State::Verified);
-    let status = joint.upload_image(&second, Use::Shadow(60.0), &stages).unwrap();
-    assert_eq!(stages.take(), ["already in the joint, verified", "shadow"]);
+    let status = joint.use_image(&second, Use::Shadow(60.0), &stages).unwrap();
+    assert_eq!(stages.take(), ["shadow"]);
     assert!(status.state == State::Shadow && status.left > 50.0, "{status:?}");
-    let status = joint.upload_image(&second, Use::Trial(60.0), &Silent).unwrap();
+    let status = joint.use_image(&second, Use::Trial(60.0), &Silent).unwrap();
     assert!(status.state == State::Trial && status.active.unwrap().version == 1, "{status:?}");
-    let message = joint.upload_image(&second, Use::Commit, &Silent).unwrap_err().to_string();
+    let message = joint.use_image(&second, Use::Commit, &Silent).unwrap_err().to_string();
     assert!(message.contains("with the motor off only") && message.contains("operation enabled"), "{message}");
     let message = joint.upload_image(&image(3, 0.1, 0), Use::Verify, &Silent).unwrap_err().to_string();
     assert!(
@@ -58,7 +58,7 @@ fn an_image_is_verified_shadowed_tried_committed_and_rolled_back() {
     assert_eq!(joint.state().unwrap(), Drive::OperationEnabled);
     stream.end().unwrap();
 
-    let status = joint.upload_image(&second, Use::Commit, &Silent).unwrap();
+    let status = joint.use_image(&second, Use::Commit, &Silent).unwrap();
     assert_eq!((status.active.unwrap().version, status.previous.unwrap().version), (2, 1));
     let status = joint.roll_back_image().unwrap();
     assert_eq!((status.active.unwrap().version, joint.active_image().unwrap()), (1, first));

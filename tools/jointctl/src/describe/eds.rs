@@ -1,0 +1,239 @@
+//! The electronic data sheet of a joint, CiA 306-1; host.
+//!
+//! `Unit`, `Factor` and `Description` are no keys of CiA 306: python-canopen reads them, others pass them over. Limits are raw values, as
+//! the object has them on the bus.
+
+use super::plain;
+use crate::remote::Entry;
+use joint_firmware::canopen::{Access, CommunicationParameters, PDOS, PdoParameters};
+use joint_firmware::objects::default_communication;
+use joint_firmware::objects::field::Field;
+use joint_firmware::objects::table::DataType;
+use std::fmt::Write;
+use std::time::Duration;
+
+/// Object types of CiA 306.
+const DOMAIN: u8 = 2;
+const VARIABLE: u8 = 7;
+const RECORD: u8 = 9;
+
+/// The file's content. `name` is that of the file, `now` the time since 1970-01-01 UTC for the file's dates.
+pub fn text(name: &str, now: Duration) -> String {
+    let mut text = String::new();
+    // Writing to a string does not fail.
+    let _ = write(&mut text, name, now);
+    text
+}
+
+fn write(text: &mut String, name: &str, now: Duration) -> std::fmt::Result {
+    let (date, time) = (date(now), time(now));
+    writeln!(text, "[FileInfo]\nFileName={}\nFileVersion=1\nFileRevision=0\nEDSVersion=4.0", plain(name))?;
+    writeln!(text, "Description=Robot joint with learned friction compensation, CiA 402 subset")?;
+    for what in ["Creation", "Modification"] {
+        writeln!(text, "{what}Time={time}\n{what}Date={date}")?;
+    }
+    let program = concat!("jointctl ", env!("CARGO_PKG_VERSION"));
+    writeln!(text, "CreatedBy={program}\nModifiedBy={program}\n")?;
+
+    writeln!(
+        text,
+        "[DeviceInfo]\nVendorName=\nVendorNumber=0\nProductName=joint\nProductNumber=0\nRevisionNumber=1\nOrderCode="
+    )?;
+    for rate in [10, 20, 50, 125, 250, 500, 800, 1000] {
+        writeln!(text, "BaudRate_{rate}={}", u8::from(rate == 1000))?;
+    }
+    writeln!(text, "SimpleBootUpMaster=0\nSimpleBootUpSlave=1\nGranularity=8\nDynamicChannelsSupported=0")?;
+    writeln!(text, "CompactPDO=0\nGroupMessaging=0\nNrOfRXPDO={PDOS}\nNrOfTXPDO={PDOS}\nLSS_Supported=1\n")?;
+    writeln!(text, "[DummyUsage]")?;
+    for dummy in 1..=7 {
+        // Every whole number can be skipped in an RPDO; a BOOLEAN, of one bit, cannot.
+        writeln!(text, "Dummy{dummy:04}={}", u8::from(dummy != 1))?;
+    }
+    writeln!(text)?;
+
+    let entries = Entry::all().collect::<Vec<_>>();
+    let mut indices = entries.iter().map(|entry| entry.object.index).collect::<Vec<_>>();
+    indices.dedup();
+    let is_mandatory = |index: &u16| matches!(*index, 0x1000 | 0x1001 | 0x1018);
+    let is_manufacturers = |index: &u16| (0x2000..0x6000).contains(index);
+    list(text, "MandatoryObjects", indices.iter().copied().filter(is_mandatory))?;
+    let is_optional = |index: &u16| !is_mandatory(index) && !is_manufacturers(index);
+    list(text, "OptionalObjects", indices.iter().copied().filter(is_optional))?;
+    list(text, "ManufacturerObjects", indices.iter().copied().filter(is_manufacturers))?;
+
+    let defaults = default_communication(0);
+    for index in indices {
+        let of_index = entries.iter().filter(|entry| entry.object.index == index).collect::<Vec<_>>();
+        match of_index[..] {
+            [] => {}
+            [entry] => object(text, &format!("{index:04X}"), entry.text.object, entry, &defaults)?,
+            [first, ..] => {
+                writeln!(text, "[{index:04X}]\nParameterName={}", plain(first.text.object))?;
+                writeln!(text, "ObjectType=0x{RECORD:X}\nSubNumber=0x{:X}\n", of_index.len())?;
+                for entry in of_index {
+                    object(
+                        text,
+                        &format!("{index:04X}sub{:X}", entry.object.sub_index),
+                        entry.text.name,
+                        entry,
+                        &defaults,
+                    )?;
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+fn list(text: &mut String, title: &str, indices: impl Iterator<Item = u16>) -> std::fmt::Result {
+    let indices = indices.collect::<Vec<_>>();
+    writeln!(text, "[{title}]\nSupportedObjects={}", indices.len())?;
+    for (index, number) in indices.iter().zip(1..) {
+        writeln!(text, "{number}=0x{index:04X}")?;
+    }
+    writeln!(text)
+}
+
+fn object(
+    text: &mut String,
+    section: &str,
+    name: &str,
+    entry: &Entry,
+    defaults: &CommunicationParameters,
+) -> std::fmt::Result {
+    let object = entry.object;
+    let object_type = if object.data_type == DataType::Domain { DOMAIN } else { VARIABLE };
+    let constant = matches!(object.field, Field::Constant(_) | Field::Highest(_));
+    // CiA 306: a value that may be written both ways says which PDO it may be part of.
+    let access = match (object.access, object.mappable.receive, object.mappable.transmit) {
+        (Access::ReadOnly, ..) if constant && !object.mappable.transmit => "const",
+        (Access::ReadOnly, ..) => "ro",
+        (Access::WriteOnly, ..) => "wo",
+        (Access::ReadWrite, true, false) => "rww",
+        (Access::ReadWrite, false, true) => "rwr",
+        (Access::ReadWrite, ..) => "rw",
+    };
+    let mapped = u8::from(object.mappable.receive || object.mappable.transmit);
+    writeln!(text, "[{section}]\nParameterName={}\nObjectType=0x{object_type:X}", plain(name))?;
+    writeln!(text, "DataType=0x{:04X}\nAccessType={access}\nPDOMapping={mapped}", object.data_type as u8)?;
+    if let Some(default) = default(entry, defaults) {
+        writeln!(text, "DefaultValue={default}")?;
+    }
+    if let Some((low, high)) = entry.text.limits {
+        let raw = |value: f64| match object.data_type {
+            DataType::F32 => value.to_string(),
+            _ => format!("{:.0}", value / entry.text.scale),
+        };
+        writeln!(text, "LowLimit={}\nHighLimit={}", raw(low), raw(high))?;
+    }
+    if !entry.text.unit.is_empty() {
+        writeln!(text, "Unit={}", plain(entry.text.unit))?;
+    }
+    if entry.text.scale != 1.0 {
+        writeln!(text, "Factor={:e}", entry.text.scale)?;
+    }
+    if !entry.text.description.is_empty() {
+        writeln!(text, "Description={}", plain(entry.text.description))?;
+    }
+    writeln!(text)
+}
+
+/// What a joint has that nobody has set up; none where that is a matter of the joint.
+fn default(entry: &Entry, defaults: &CommunicationParameters) -> Option<String> {
+    let object = entry.object;
+    // Parameters were made for node id 0: what depends on it is said as CiA 306 does.
+    let by_node = |cob_id: u32| Some(format!("$NODEID+0x{cob_id:X}"));
+    let number = |number: u32| Some(format!("0x{number:X}"));
+    match (object.field, object.index, object.sub_index) {
+        (Field::Constant(value), ..) => Some(value.to_string()),
+        (Field::Highest(highest), ..) => number(highest.into()),
+        (Field::Server, 0x1000, 0) => number(crate::remote::joint::DEVICE_TYPE),
+        (Field::Server, 0x1005, 0) => number(defaults.sync_cob_id),
+        (Field::Server, 0x1014, 0) => by_node(defaults.emergency_cob_id),
+        (Field::Server, 0x1015, 0) => number(defaults.emergency_inhibit.into()),
+        (Field::Server, 0x1016, 1..) => number(0),
+        (Field::Server, 0x1017, 0) => number(defaults.heartbeat.into()),
+        (Field::Server, 0x1029, 1) => number(defaults.error_behaviour.into()),
+        (Field::Server, 0x1200, 1) => by_node(0x600),
+        (Field::Server, 0x1200, 2) => by_node(0x580),
+        (Field::Server, 0x1400..=0x15FF | 0x1800..=0x19FF, sub_index @ 1..) => {
+            let parameters = pdo(object.index, defaults)?;
+            match sub_index {
+                1 => by_node(parameters.cob_id),
+                2 => number(parameters.transmission.into()),
+                3 => number(parameters.inhibit.into()),
+                _ => number(parameters.event_timer.into()),
+            }
+        }
+        (Field::Server, 0x1600..=0x17FF | 0x1A00..=0x1BFF, 0) => number(pdo(object.index, defaults)?.count.into()),
+        (Field::Server, 0x1600..=0x17FF | 0x1A00..=0x1BFF, sub_index) => {
+            number(pdo(object.index, defaults)?.mapping.get(usize::from(sub_index) - 1)?.0)
+        }
+        // The number of entries that CiA 301 calls highest sub-index supported; that of 1003h counts errors.
+        (Field::Server, 0x1003, 0) => number(0),
+        (Field::Server, index, 0) if entry.text.description.is_empty() => {
+            let highest =
+                Entry::all().filter(|other| other.object.index == index).map(|other| other.object.sub_index).max();
+            number(highest?.into())
+        }
+        _ => None,
+    }
+}
+
+fn pdo(index: u16, defaults: &CommunicationParameters) -> Option<&PdoParameters> {
+    let all = if index < 0x1800 { &defaults.receive } else { &defaults.transmit };
+    all.get(usize::from(index & 0x1FF))
+}
+
+/// mm-dd-yyyy, as CiA 306 writes it. Days to a date: H. Hinnant, "chrono-compatible low-level date algorithms", civil_from_days.
+fn date(now: Duration) -> String {
+    let days = now.as_secs() / 86_400 + 719_468;
+    let (era, of_era) = (days / 146_097, days % 146_097);
+    let year = (of_era - of_era / 1_460 + of_era / 36_524 - of_era / 146_096) / 365;
+    let of_year = of_era - (365 * year + year / 4 - year / 100);
+    let from_march = (5 * of_year + 2) / 153;
+    let day = of_year - (153 * from_march + 2) / 5 + 1;
+    let month = if from_march < 10 { from_march + 3 } else { from_march - 9 };
+    let year = year + era * 400 + u64::from(month <= 2);
+    format!("{month:02}-{day:02}-{year:04}")
+}
+
+/// hh:mmAM, as CiA 306 writes it.
+fn time(now: Duration) -> String {
+    let minutes = now.as_secs() % 86_400 / 60;
+    let (hours, minutes) = (minutes / 60, minutes % 60);
+    let half = if hours < 12 { "AM" } else { "PM" };
+    format!("{:02}:{minutes:02}{half}", (hours + 11) % 12 + 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_moment_is_written_as_the_standard_wants_it() {
+        let at = |seconds| (date(Duration::from_secs(seconds)), time(Duration::from_secs(seconds)));
+        assert_eq!(at(0), ("01-01-1970".into(), "12:00AM".into()));
+        assert_eq!(at(951_827_696), ("02-29-2000".into(), "12:34PM".into()));
+        assert_eq!(at(1_700_000_000), ("11-14-2023".into(), "10:13PM".into()));
+    }
+
+    #[test]
+    fn the_file_is_ascii_and_has_a_section_for_every_entry() {
+        let text = text("joint.eds", Duration::ZERO);
+        assert!(text.is_ascii());
+        for entry in Entry::all() {
+            let (index, sub_index) = (entry.object.index, entry.object.sub_index);
+            let section = format!("\n[{index:04X}sub{sub_index:X}]\n");
+            assert!(text.contains(&section) || text.contains(&format!("\n[{index:04X}]\n")), "{section}");
+        }
+        let of = |section: &str| {
+            let (_, rest) = text.split_once(&format!("[{section}]\n")).unwrap();
+            rest.split_once("\n\n").unwrap().0.to_owned()
+        };
+        assert!(of("1A00sub3").contains("DefaultValue=0x60640020"), "{}", of("1A00sub3"));
+        assert!(of("1403sub1").contains("DefaultValue=$NODEID+0x80000500"), "{}", of("1403sub1"));
+        assert!(of("2212sub7").contains("LowLimit=1\nHighLimit=3600000\nUnit=s\nFactor=1e-3"), "{}", of("2212sub7"));
+        assert!(of("6060").contains("AccessType=rww\nPDOMapping=1\nLowLimit=-1\nHighLimit=10"), "{}", of("6060"));
+    }
+}

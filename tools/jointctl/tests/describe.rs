@@ -1,0 +1,82 @@
+//! What `jointctl eds` and `jointctl dbc` write, loaded by python-canopen and cantools and compared with a virtual joint.
+//!
+//! Without Python, or where these cannot be installed, this is reported as ignored by name; with `CI` set it runs, and fails.
+
+use jointctl::remote::Entry;
+use libtest_mimic::{Arguments, Failed, Trial};
+use node::{Options, SlotImages, VirtualNode, serve};
+use plant::ActuatorParameters;
+use plant::virtual_joint::Setup;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+const GROUP: &str = "239.74.163.2";
+const NODE: u8 = 7;
+
+fn main() {
+    let arguments = Arguments::from_args();
+    let must_run = std::env::var_os("CI").is_some();
+    let python = if arguments.list { None } else { python() };
+    let ignored = !must_run && python.is_none();
+    let name = "python_canopen_loads_the_eds_and_cantools_the_dbc_and_both_agree_with_a_joint";
+    let trial = Trial::test(name, move || compare(python.as_deref()));
+    libtest_mimic::run(&arguments, vec![trial.with_ignored_flag(ignored)]).exit();
+}
+
+/// A Python with python-canopen and cantools, made once in the build directory.
+fn python() -> Option<PathBuf> {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("python-describe");
+    let python = folder.join("bin/python3");
+    let works = || {
+        let imports = Command::new(&python).args(["-c", "import canopen, can, msgpack, cantools"]).output();
+        imports.is_ok_and(|output| output.status.success())
+    };
+    if !works() {
+        let made = Command::new("python3").args(["-m", "venv"]).arg(&folder).output().ok()?;
+        if !made.status.success() {
+            return None;
+        }
+        let packages = ["canopen==2.4.1", "python-can==4.6.1", "msgpack==1.2.4", "cantools==41.0.0"];
+        Command::new(&python)
+            .args(["-m", "pip", "install", "--quiet", "--timeout", "10"])
+            .args(packages)
+            .output()
+            .ok()?;
+    }
+    works().then_some(python)
+}
+
+fn compare(python: Option<&Path>) -> Result<(), Failed> {
+    let python = python.ok_or("there is no python3 with venv, or python-canopen or cantools could not be installed")?;
+    let folder = tempfile::tempdir()?;
+    for arguments in [vec!["eds", "joint.eds"], vec!["dbc", "joint.dbc", "--node", "7", "--node", "8"]] {
+        let written = Command::new(env!("CARGO_BIN_EXE_jointctl")).current_dir(&folder).args(&arguments).output()?;
+        if !written.status.success() {
+            return Err(String::from_utf8_lossy(&written.stderr).into_owned().into());
+        }
+    }
+    let port = std::net::UdpSocket::bind("0.0.0.0:0")?.local_addr()?.port();
+    let bus = bus::open(&format!("udp:{GROUP}:{port}"))?;
+    let parameters = ActuatorParameters::reference().aligned().without_payload();
+    let options = Options { node_id: NODE, serial: 12, seed: 1 };
+    let mut joint = VirtualNode::new(parameters, &Setup::of(&parameters), &options, SlotImages::empty()?)?;
+
+    let stop = AtomicBool::new(false);
+    let output = std::thread::scope(|scope| {
+        scope.spawn(|| serve(&mut joint, &*bus, &stop));
+        let output = Command::new(python)
+            .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/describe.py"))
+            .args([folder.path().join("joint.eds"), folder.path().join("joint.dbc")])
+            .args([GROUP, &port.to_string(), &NODE.to_string(), &Entry::all().count().to_string()])
+            .output();
+        stop.store(true, Ordering::Relaxed);
+        output
+    })?;
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    if output.status.success() {
+        print!("{text}");
+        return Ok(());
+    }
+    Err(format!("{text}{}", String::from_utf8_lossy(&output.stderr)).into())
+}
