@@ -4,6 +4,7 @@ use super::CommandError;
 use bus::Frame;
 use bus::client::{ClientError, Network, Node, cob_id};
 use clap::Args;
+use joint_firmware::canopen::NO_NODE_ID;
 use joint_firmware::parameters::image::Image;
 use node::{NodeError, Options, SlotImages, VirtualNode, serve};
 use plant::ActuatorParameters;
@@ -12,6 +13,8 @@ use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+/// Serial number of the first joint that has no node id.
+const WITHOUT_ID: u32 = 1_000;
 /// How long `scan` listens for an answer, and for each further one.
 const PATIENCE: Duration = Duration::from_millis(500);
 /// Request of an SDO upload of object 1000h, which every node has (CiA 301, 7.2.4.3.5).
@@ -27,6 +30,9 @@ pub struct OnBus {
     /// Node id on the bus, 1 to 127, or 255 for one that LSS has to give; repeatable, a joint each
     #[arg(long, value_name = "N", default_values_t = [1], requires = "bus")]
     node: Vec<u8>,
+    /// Serial number of the first joint, the others count up [default: the node id; without one, 1000 and up]
+    #[arg(long, value_name = "N", requires = "bus")]
+    serial: Option<u32>,
     /// Leave the bus after this time, s
     #[arg(long, value_name = "S", requires = "bus")]
     duration: Option<f64>,
@@ -56,11 +62,20 @@ impl OnBus {
         let failed = |error: &dyn std::fmt::Display| CommandError::Bus(error.to_string());
         std::thread::scope(|scope| {
             let mut joints = Vec::new();
-            for &id in &self.node {
+            for (&id, place) in self.node.iter().zip(0..) {
                 let transport = bus::open(name).map_err(|error| failed(&error))?;
-                let options = Options { node_id: id, serial: id.into(), seed: id.into() };
+                // Joints without node ids are told apart by their serial numbers alone.
+                let serial = match self.serial {
+                    Some(first) => first.wrapping_add(place),
+                    None if id == NO_NODE_ID => WITHOUT_ID + place,
+                    None => id.into(),
+                };
+                let options = Options { node_id: id, serial, seed: serial.into() };
                 let mut joint = joint(plant, setup, &options, image).map_err(|error| failed(&error))?;
-                eprintln!("node {id} on {name}: virtual joint, serial {}", options.serial);
+                match id {
+                    NO_NODE_ID => eprintln!("{name}: virtual joint without a node id, serial {serial}"),
+                    id => eprintln!("node {id} on {name}: virtual joint, serial {serial}"),
+                }
                 let stop = &stop;
                 joints.push(scope.spawn(move || {
                     let left = serve(&mut joint, &*transport, stop);

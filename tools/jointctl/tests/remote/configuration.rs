@@ -117,7 +117,7 @@ fn the_page_says_what_an_engineer_looks_for_first() {
         "image         none",
         "no key",
         "acting nothing: ",
-        "command deadline 0.1 s",
+        "command deadline 0.5 s",
         "gear ratio ",
     ] {
         assert!(page.contains(expected), "{expected} in\n{page}");

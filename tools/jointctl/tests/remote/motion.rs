@@ -65,7 +65,7 @@ fn a_motion_beyond_a_limit_is_refused_by_name_before_the_joint_is_enabled() {
     assert!(message.contains("--duration is 0 s"), "{message}");
     let slow = Motion { rate: 2.0, ..motion(Command::default(), 1.0) };
     let message = run(&joint, &slow).unwrap_err().to_string();
-    assert!(message.contains("rate of set-points is 2 Hz, must lie in 20 to 1000 Hz"), "{message}");
+    assert!(message.contains("rate of set-points is 2 Hz, must lie in 4 to 1000 Hz"), "{message}");
     assert_eq!(joint.state().unwrap(), State::SwitchOnDisabled);
 }
 

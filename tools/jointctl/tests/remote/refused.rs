@@ -249,7 +249,7 @@ fn two_masters_of_one_joint_end_in_a_joint_that_is_disabled() {
     let (joint, other) = (served.joint(), served.joint());
     let stream = Stream::begin(&joint, Mode::Torque, 100.0, false).unwrap();
     let second = Stream::begin(&other, Mode::Torque, 100.0, false);
-    let messages = [second.map(|second| second.check()).map_or_else(Err, |checked| checked), stream.check()];
+    let messages = [second.and_then(|second| second.check()), stream.check()];
     assert!(
         messages.iter().any(|outcome| matches!(outcome, Err(RemoteError::OtherMaster { node: NODE, .. }))),
         "{messages:?}"

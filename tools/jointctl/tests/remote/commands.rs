@@ -1,0 +1,168 @@
+//! The program itself, with a joint behind slcan over TCP: what it prints, and the exit codes.
+
+use crate::served::{NODE, Served, image};
+use std::io::Read;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::Duration;
+
+/// A joint at an address of its own, and a folder.
+struct Desk {
+    _served: Served,
+    client: String,
+    folder: tempfile::TempDir,
+}
+
+impl Desk {
+    fn new() -> Self {
+        let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+        let served = Served::on(&format!("slcan:listen://127.0.0.1:{port}"), &[NODE]);
+        Self { _served: served, client: format!("slcan:tcp://127.0.0.1:{port}"), folder: tempfile::tempdir().unwrap() }
+    }
+
+    fn command(&self, arguments: &[&str], node: &str) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_jointctl"));
+        command.current_dir(&self.folder).args(arguments).args(["--bus", &self.client, "--node", node]);
+        command
+    }
+
+    fn run(&self, arguments: &[&str]) -> Output {
+        self.command(arguments, &NODE.to_string()).output().unwrap()
+    }
+
+    fn prints(&self, arguments: &[&str], expected: &[&str]) {
+        let output = self.run(arguments);
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(output.status.success(), "{arguments:?} {}", String::from_utf8_lossy(&output.stderr));
+        for expected in expected {
+            assert!(text.contains(expected), "{arguments:?}: {expected} in {text}");
+        }
+    }
+
+    fn fails(&self, arguments: &[&str], expected: &[&str]) {
+        refused(&self.run(arguments), arguments, expected);
+    }
+
+    fn write(&self, name: &str, bytes: &[u8]) {
+        std::fs::write(self.folder.path().join(name), bytes).unwrap();
+    }
+}
+
+/// One line that says what and where, and exit code 1.
+fn refused(output: &Output, arguments: &[&str], expected: &[&str]) {
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    let last = text.lines().last().unwrap_or_default();
+    assert_eq!(output.status.code(), Some(1), "{arguments:?}: {text}");
+    assert_eq!(text.matches("error: ").count(), 1, "{arguments:?}: {text}");
+    for expected in expected {
+        assert!(last.starts_with("error: ") && last.contains(expected), "{arguments:?}: {expected} in {text}");
+    }
+}
+
+#[test]
+fn a_joint_is_looked_at_set_moved_and_fed_from_the_command_line() {
+    let desk = Desk::new();
+    desk.write("first.img", &image(1, 0.25, 0));
+    desk.write("second.img", &image(2, 0.5, 0));
+    desk.prints(&["info"], &["node          5: virtual joint", "image         none"]);
+    desk.prints(
+        &["get", "bus-voltage", "gear", "6041"],
+        &["bus-voltage (2021h:1)", " V\n", "gear-ratio", "statusword (6041h:0)"],
+    );
+    desk.prints(&["set", "gain", "0.5", "requested-model", "1"], &["gain (2200h:3)", " 0.5\n"]);
+    desk.prints(&["store"], &["node 5: stored"]);
+    desk.prints(&["move", "velocity", "-0.4", "--duration", "1"], &["rad/s", "node 5: disabled"]);
+    desk.prints(&["upload", "first.img", "--commit"], &["version 1 is stored; in use"]);
+    desk.prints(&["upload", "second.img"], &["version 1 is stored; an image is verified", "Not in use"]);
+    desk.prints(&["upload", "second.img", "--trial", "60"], &["on trial for another "]);
+    desk.prints(&["discard"], &["version 1 is stored; in use, nothing staged"]);
+    desk.prints(&["upload", "second.img", "--commit"], &["version 2 is stored; in use"]);
+    desk.prints(&["get", "2211", "--out", "read.img"], &["written: read.img"]);
+    assert_eq!(std::fs::read(desk.folder.path().join("read.img")).unwrap(), image(2, 0.5, 0));
+    desk.prints(&["rollback"], &["version 1 is stored; in use"]);
+    desk.prints(&["disable"], &["node 5: disabled"]);
+}
+
+#[test]
+fn what_goes_wrong_ends_in_one_line_and_exit_code_1() {
+    let desk = Desk::new();
+    desk.write("first.img", &image(1, 0.25, 0));
+    desk.write("other.img", &image(1, 0.25, 99));
+    let mut damaged = image(1, 0.25, 0);
+    damaged[40] ^= 1;
+    desk.write("damaged.img", &damaged);
+    desk.write("joint.key", "00112233445566778899aabbccddeeff00112233445566778899aabbccddee11".as_bytes());
+    desk.write("wrong.key", "11112233445566778899aabbccddeeff00112233445566778899aabbccddee11".as_bytes());
+    let missing = desk.command(&["info"], "9").output().unwrap();
+    refused(&missing, &["info"], &["1000h:0 of node 9: no answer within 1000 ms"]);
+    let no_id = desk.command(&["info"], "200").output().unwrap();
+    refused(&no_id, &["info"], &["200 is no node id: they are 1 to 127"]);
+    desk.fails(&["get", "torque-limt"], &["'torque-limt' is no object of a joint; did you mean torque-limit"]);
+    desk.fails(&["get", "2212:1"], &["2212h:1 of node 5 refused: 06010001h, Attempt to read a write only object"]);
+    desk.fails(&["set", "torque-limit", "5000"], &["5000 Nm is outside 0.01 to 2000 Nm"]);
+    desk.fails(&["set", "gain", "0.5", "clamp"], &["'clamp' has no value"]);
+    desk.fails(
+        &["move", "velocity", "1e3", "--duration", "1"],
+        &["a velocity of 1000 rad/s is outside", "velocity-limit (2103h:2)"],
+    );
+    desk.fails(&["upload", "nowhere.img"], &["cannot read nowhere.img"]);
+    desk.fails(&["upload", "damaged.img", "--commit"], &["node 5 does not accept the image", "0205h"]);
+    desk.fails(&["upload", "other.img", "--commit"], &["image for serial number 99, this joint has 12"]);
+    desk.fails(&["rollback"], &["node 5 does not roll back the image", "0905h"]);
+    desk.prints(&["key", "give", "joint.key"], &["node 5: takes images with a tag of key"]);
+    let signed = Command::new(env!("CARGO_BIN_EXE_jointctl"))
+        .current_dir(&desk.folder)
+        .args(["sign", "first.img", "--key", "wrong.key"])
+        .output()
+        .unwrap();
+    assert!(signed.status.success(), "{}", String::from_utf8_lossy(&signed.stderr));
+    desk.fails(
+        &["upload", "first.signed", "--commit"],
+        &["the tag is not that of this image and key (1 in a row)", "0302h"],
+    );
+    desk.prints(&["get", "2213:1"], &["active-images-identity.version (2213h:1) 0\n"]);
+    let nonsense =
+        Command::new(env!("CARGO_BIN_EXE_jointctl")).args(["info", "--bus", "can0", "--node", "5"]).output().unwrap();
+    refused(&nonsense, &["--bus can0"], &["bus 'can0': a kind and a colon are missing"]);
+}
+
+/// Waits until the joint is enabled: only then has the program caught interrupts and begun.
+fn enabled(desk: &Desk) -> Child {
+    let mut command = desk.command(&["enable"], &NODE.to_string());
+    let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    std::thread::sleep(Duration::from_millis(1_500));
+    child
+}
+
+fn finished(child: &mut Child) -> (Option<i32>, String) {
+    let code = child.wait().unwrap().code();
+    let mut text = String::new();
+    child.stdout.take().unwrap().read_to_string(&mut text).unwrap();
+    child.stderr.take().unwrap().read_to_string(&mut text).unwrap();
+    (code, text)
+}
+
+#[test]
+#[cfg(unix)]
+fn ctrl_c_and_termination_leave_the_joint_disabled() {
+    let desk = Desk::new();
+    for signal in ["-INT", "-TERM"] {
+        let mut child = enabled(&desk);
+        assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
+        let (code, text) = finished(&mut child);
+        assert!(code == Some(0) && text.contains("node 5: ended early; disabled"), "{signal} {code:?} {text}");
+        desk.prints(&["get", "error-code"], &[" 0\n"]);
+    }
+}
+
+#[test]
+fn an_adapter_that_goes_away_while_the_joint_is_enabled_is_reported() {
+    let desk = Desk::new();
+    let mut child = enabled(&desk);
+    // The adapter hangs up. What the joint does then by itself: see the master that dies.
+    drop(desk);
+    let (code, text) = finished(&mut child);
+    assert!(
+        code == Some(1) && text.contains("error: bus 'slcan:tcp://") && text.contains("is gone"),
+        "{code:?} {text}"
+    );
+}
