@@ -6,6 +6,7 @@ use crate::output::write_file;
 use crate::remote::entry::Entry;
 use crate::remote::{Value, configuration, info};
 use clap::Args;
+use std::io::Write;
 use std::path::PathBuf;
 
 /// Arguments of `info`.
@@ -48,7 +49,9 @@ impl Get {
     /// Runs the command.
     pub fn run(&self) -> Result<(), CommandError> {
         let (Some(bus), Some(node)) = (&self.bus, self.node) else {
-            Entry::all().filter(Entry::is_content).for_each(|entry| println!("{}", entry.listed()));
+            let lines = Entry::all().filter(Entry::is_content).map(|entry| format!("{}\n", entry.listed()));
+            // Whoever closes the pipe, as `head` does, has seen enough.
+            let _ = std::io::stdout().write_all(lines.collect::<String>().as_bytes());
             return Ok(());
         };
         let named = self.objects.iter().map(|name| Entry::find(name)).collect::<Result<Vec<_>, _>>()?;
@@ -63,17 +66,19 @@ impl Get {
             println!("{}: {} bytes written: {}", entry.described(), bytes.len(), path.display());
             return Ok(());
         }
+        let mut text = String::new();
         for entries in named {
             let record = entries.len() > 1;
             // Of a record what can be read; what was named by itself is asked for, and the joint says why not.
             for entry in entries.into_iter().filter(|entry| !record || entry.is_readable()) {
-                match info::show_entry(&joint, entry) {
-                    Ok(shown) => println!("{:<32} {shown}", entry.described()),
-                    Err(error) if record => println!("{:<32} {error}", entry.described()),
-                    Err(error) => return Err(error.into()),
-                }
+                let shown = match info::show_entry(&joint, entry) {
+                    Err(error) if record => error.to_string(),
+                    shown => shown?,
+                };
+                text.push_str(&format!("{:<32} {shown}\n", entry.described()));
             }
         }
+        let _ = std::io::stdout().write_all(text.as_bytes());
         Ok(())
     }
 }

@@ -15,6 +15,9 @@ pub enum RemoteError {
     /// The node, or the way to it.
     #[error(transparent)]
     Client(#[from] ClientError),
+    /// Nobody has this node id, or the node is silent. Many nodes send nothing unless they are asked.
+    #[error("{0} `jointctl scan` asks every node id")]
+    Silent(ClientError),
     /// A node that is something else.
     #[error(
         "node {node} is no joint: its device type (1000h) is {device_type:08X}h, a joint's is {:08X}h",

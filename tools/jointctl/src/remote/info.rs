@@ -21,7 +21,7 @@ pub fn page(joint: &RemoteJoint) -> Result<String, RemoteError> {
     let mut page = String::new();
     let mut line = |title: &str, text: String| {
         // Writing to a string does not fail.
-        let _ = writeln!(page, "{title:<14}{text}");
+        let _ = writeln!(page, "{title:<16}{text}");
     };
     let text = |index| joint.node().upload(index, 0).map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
     let word = |sub_index| joint.node().number(0x1018, sub_index).map(u32::from_le_bytes);
@@ -69,7 +69,10 @@ pub fn page(joint: &RemoteJoint) -> Result<String, RemoteError> {
         "compensation",
         format!(
             "requested {}, acting {}: {}",
-            model(joint.raw(Field::Compensation(Setting::Request))?),
+            match joint.raw(Field::Compensation(Setting::Request))? {
+                0 => "off",
+                request => model(request),
+            },
             model(joint.raw(Field::Actual(Actual::ActingModel))?),
             reason(joint.raw(Field::Actual(Actual::Reason))? as u8)
         ),

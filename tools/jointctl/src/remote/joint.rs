@@ -28,9 +28,13 @@ impl RemoteJoint {
         let device_type = match device_type() {
             // A client that vanished within a block leaves the node waiting for the rest: it takes the first request for data, and
             // says so by an abort once its own time-out is over.
-            Err(ClientError::NoAnswer { heard, .. }) if heard.contains(&node) => device_type()?,
-            answer => answer?,
+            Err(ClientError::NoAnswer { heard, .. }) if heard.contains(&node) => device_type(),
+            answer => answer,
         };
+        let device_type = device_type.map_err(|error| match error {
+            ClientError::NoAnswer { .. } => RemoteError::Silent(error),
+            error => error.into(),
+        })?;
         if device_type == DEVICE_TYPE { Ok(joint) } else { Err(RemoteError::NoJoint { node, device_type }) }
     }
 

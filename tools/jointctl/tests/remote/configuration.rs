@@ -108,13 +108,13 @@ fn the_page_says_what_an_engineer_looks_for_first() {
     let served = Served::joints(&[NODE]);
     let page = info::page(&served.joint()).unwrap();
     for expected in [
-        "node          5: virtual joint",
+        "node            5: virtual joint",
         "serial number 12",
-        "state         disabled (switch on disabled)",
-        "faults        none",
+        "state           disabled (switch on disabled)",
+        "faults          none",
         " V\n",
         "winding ",
-        "image         none",
+        "image           none",
         "no key",
         "acting nothing: ",
         "command deadline 0.5 s",
