@@ -154,26 +154,30 @@ def enable(mode):
     until(lambda: seen.get("statusword", 0) & 0x6F == 0x40, each=lambda: command(0x00))
     write("b", mode, 0x6060)
     for controlword, state in ((0x06, 0x21), (0x07, 0x23), (0x0F, 0x27)):
-        reached = until(lambda: seen["statusword"] & 0x6F == state, 3.0, lambda: command(controlword))
+        reached = until(lambda: seen["statusword"] & 0x6F == state, 10.0, lambda: command(controlword))
         check(reached, f"controlword {controlword:#04x} leads to {state:#04x} in mode {mode}")
     check(number("b", 0x6061) == mode, f"mode {mode} is shown")
 
 
+# A machine that runs many tests lets this program wait for longer than a joint without commands does before it brakes.
+default = number("f", 0x2103, 11)
+write("f", 1.0, 0x2103, 11)
+write("B", 1, 0x2100, 1)
 node.nmt.state = "OPERATIONAL"
 check(until(lambda: "position" in seen and "velocity" in seen, each=cycle), "SYNC is answered by TPDO 1 and TPDO 2")
 check(abs(seen["position"] - number("i", 0x6064)) < 2000, "TPDO and SDO tell the same position")
 
 enable(TORQUE)
-check(until(lambda: seen["velocity"] > 100, 3.0, lambda: command(0x0F, 60)), "a positive torque accelerates")
-check(until(lambda: seen["velocity"] < -100, 3.0, lambda: command(0x0F, -60)), "a negative one the other way")
+check(until(lambda: seen["velocity"] > 100, 10.0, lambda: command(0x0F, 60)), "a positive torque accelerates")
+check(until(lambda: seen["velocity"] < -100, 10.0, lambda: command(0x0F, -60)), "a negative one the other way")
 
 enable(VELOCITY)
-check(until(lambda: 480 < seen["velocity"] < 520, 3.0, lambda: turn(500)), "a velocity is followed")
-check(until(lambda: abs(seen["velocity"]) < 20, 3.0, lambda: turn(0)), "and so is zero")
+check(until(lambda: 480 < seen["velocity"] < 520, 10.0, lambda: turn(500)), "a velocity is followed")
+check(until(lambda: abs(seen["velocity"]) < 20, 10.0, lambda: turn(0)), "and so is zero")
 
 enable(POSITION)
 target = seen["position"] + 200_000
-reached = until(lambda: abs(seen["position"] - target) < 10_000, 5.0, lambda: command(0x0F, 0, target))
+reached = until(lambda: abs(seen["position"] - target) < 10_000, 10.0, lambda: command(0x0F, 0, target))
 check(reached, "a position is reached")
 
 until(lambda: seen["statusword"] & 0x6F == 0x40, each=lambda: command(0x00))
@@ -195,35 +199,36 @@ def impedance():
     cycle()
 
 
-reached = until(lambda: abs(seen["position"] * 1e-6 - target) < 0.03, 5.0, impedance)
+reached = until(lambda: abs(seen["position"] * 1e-6 - target) < 0.03, 10.0, impedance)
 check(reached, "an impedance frame pulls the joint to its position")
 
 # A fault, by silence.
 emergencies.clear()
-check(until(lambda: 0x8100 in emergencies, 3.0), "without commands the joint reports EMCY 8100h")
+check(until(lambda: 0x8100 in emergencies), "without commands the joint reports EMCY 8100h")
 check(number("B", 0x1001) & 0x10 and number("H", 0x603F) == 0x8100, "error register and error code say the same")
 check(number("I", 0x1003, 1) & 0xFFFF == 0x8100, "and the history of errors")
 check(len(node.sdo.upload(0x2300, 0)) == 64 * 36, "the steps before the fault can be read")
-until(lambda: seen["statusword"] & 0x6F == 0x40, 3.0, lambda: command(0x80))
-check(until(lambda: 0 in emergencies, 3.0, lambda: command(0x00)), "a reset of the fault is EMCY 0000h")
+until(lambda: seen["statusword"] & 0x6F == 0x40, 10.0, lambda: command(0x80))
+check(until(lambda: 0 in emergencies, 10.0, lambda: command(0x00)), "a reset of the fault is EMCY 0000h")
 
 # Heartbeats both ways.
 write("H", 50, 0x1017)
 time.sleep(0.1)
 heartbeats.clear()
+began = time.monotonic()
 time.sleep(1.0)
-check(15 <= len(heartbeats) <= 25 and set(heartbeats) == {5}, "a heartbeat every 50 ms says OPERATIONAL")
-write("I", 127 << 16 | 300, 0x1016, 1)
+due = (time.monotonic() - began) / 0.05
+check(0.5 * due <= len(heartbeats) <= 1.2 * due and set(heartbeats) == {5}, "a heartbeat every 50 ms says OPERATIONAL")
+write("I", 127 << 16 | 1000, 0x1016, 1)
 for _ in range(10):
     network.send_message(0x77F, [5])
     time.sleep(0.05)
 check(heartbeats[-1] == 5 and 0x8130 not in emergencies, "a master that is heard is not missed")
-check(until(lambda: 0x8130 in emergencies, 3.0), "a master that falls silent is: EMCY 8130h")
-check(until(lambda: heartbeats[-1] == 0x7F, 3.0), "and the joint leaves OPERATIONAL")
+check(until(lambda: 0x8130 in emergencies, 10.0), "a master that falls silent is: EMCY 8130h")
+check(until(lambda: heartbeats[-1] == 0x7F, 10.0), "and the joint leaves OPERATIONAL")
 write("I", 0, 0x1016, 1)
 
 # Store and restore.
-default = number("f", 0x2103, 11)
 write("f", 0.25, 0x2103, 11)
 check(number("B", 0x2100, 7) == 1, "a setting is staged")
 write("B", 1, 0x2100, 1)
@@ -280,7 +285,7 @@ try:
     check(False, "a damaged image is refused")
 except canopen.SdoAbortedError as refused:
     check(refused.code == 0x08000020 and number("H", 0x2212, 3) != 0, "a damaged image is refused, with a reason")
-check(until(lambda: 0x6320 in emergencies, 3.0), "and reported by EMCY 6320h")
+check(until(lambda: 0x6320 in emergencies, 10.0), "and reported by EMCY 6320h")
 image(5)
 image(4)
 check(number("I", 0x2213, 1) == 1 and number("I", 0x2214, 1) == 2, "a roll back brings the first image back")

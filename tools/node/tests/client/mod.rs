@@ -22,7 +22,10 @@ impl Joint {
     pub fn new(bus: &str) -> Result<Self, Failed> {
         let parameters = ActuatorParameters::reference().aligned().without_payload();
         let options = Options { node_id: NODE, serial: 12, seed: 1 };
-        let node = VirtualNode::new(parameters, &Setup::of(&parameters), &options, SlotImages::empty()?)?;
+        let mut setup = Setup::of(&parameters);
+        // A client on a busy machine sends nothing for longer than the 0.1 s after which the joint would brake.
+        setup.configuration.limits.command_deadline = 0.5;
+        let node = VirtualNode::new(parameters, &setup, &options, SlotImages::empty()?)?;
         Ok(Self { node, bus: bus::open(bus)? })
     }
 
