@@ -2,7 +2,7 @@
 
 use super::error::RemoteError;
 use super::joint::RemoteJoint;
-use bus::client::{Command, NmtState, Target};
+use bus::client::{ClientError, Command, NmtState, Target};
 use joint_firmware::joint::fault::Fault;
 use joint_firmware::joint::state_machine::State;
 use joint_firmware::objects::field::{Actual, Field};
@@ -11,9 +11,9 @@ use std::time::{Duration, Instant};
 /// How long an NMT command may take to be seen.
 const NMT: Duration = Duration::from_secs(1);
 /// How long a joint may take to brake: the longest braking time of a configuration.
-const BRAKING: Duration = Duration::from_secs(11);
+pub(super) const BRAKING: Duration = Duration::from_secs(11);
 /// Between two looks at a node.
-const LOOK: Duration = Duration::from_millis(5);
+pub(super) const LOOK: Duration = Duration::from_millis(5);
 
 const STATES: [State; 8] = [
     State::NotReadyToSwitchOn,
@@ -125,12 +125,27 @@ impl RemoteJoint {
     }
 
     /// Brakes and switches off, whoever commands the joint: outside OPERATIONAL no set-point counts. The state that it ends in:
-    /// [`State::SwitchOnDisabled`], or [`State::Fault`] where there is one.
+    /// [`State::SwitchOnDisabled`], or [`State::Fault`] where there is one: a joint that brakes for longer than its command deadline has
+    /// one. [`Stream::end`](super::Stream::end) brakes without.
     pub fn disable(&self) -> Result<State, RemoteError> {
-        self.nmt(Command::EnterPreOperational, NmtState::PreOperational)?;
         let began = Instant::now();
+        let disturbed = |error: &RemoteError| {
+            matches!(error, RemoteError::Client(ClientError::OtherClient { .. })) && began.elapsed() < BRAKING
+        };
+        match self.nmt(Command::EnterPreOperational, NmtState::PreOperational) {
+            // It was sent; what was disturbed is the question after it.
+            Err(error) if disturbed(&error) => {}
+            sent => sent?,
+        }
         loop {
-            let state = self.state()?;
+            let state = match self.state() {
+                // A joint is not left half braked because somebody else asks it something.
+                Err(error) if disturbed(&error) => {
+                    std::thread::sleep(LOOK);
+                    continue;
+                }
+                state => state?,
+            };
             match state {
                 State::SwitchOnDisabled | State::Fault | State::NotReadyToSwitchOn => return Ok(state),
                 _ if began.elapsed() > BRAKING => {

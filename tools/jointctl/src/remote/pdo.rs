@@ -96,8 +96,12 @@ impl Pdo {
         let before = self.read(joint)?;
         let cob_id = if before.cob_id & INVALID == 0 { before.cob_id } else { wanted.cob_id };
         let wanted = PdoParameters { cob_id, ..*wanted };
-        if !same(&before, &wanted) {
-            self.write(joint, &wanted)?;
+        if !same(&before, &wanted)
+            && let Err(error) = self.write(joint, &wanted)
+        {
+            // Half a mapping is none; the error that is reported is the first one.
+            let _ = self.write(joint, &before);
+            return Err(error);
         }
         Ok(Change { pdo: self, before, now: wanted })
     }

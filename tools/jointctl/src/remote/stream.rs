@@ -4,6 +4,7 @@
 //! ends, by [`Stream::end`], an error or a panic, the joint brakes along its quick-stop ramp and is left disabled, in PRE-OPERATIONAL;
 //! where this program is killed or the bus is cut, the joint brakes by itself once its command deadline is over.
 
+use super::drive::{BRAKING, LOOK};
 use super::entry::Entry;
 use super::error::RemoteError;
 use super::joint::RemoteJoint;
@@ -92,6 +93,8 @@ pub struct Stream {
     /// To the thread, which ends when it is dropped.
     sources: Option<Sender<Source>>,
     thread: Option<JoinHandle<()>>,
+    /// Whether the joint may follow this program. One that does not is not this one's to disable.
+    commanding: bool,
     ended: bool,
 }
 
@@ -138,6 +141,7 @@ impl Stream {
             changes: Vec::new(),
             sources: None,
             thread: None,
+            commanding: false,
             ended: false,
         };
         // From here on a failure puts back what was changed, and leaves the joint disabled.
@@ -153,6 +157,7 @@ impl Stream {
             }
         }
         joint.write_raw(Field::SetPoint(SetPoint::Mode), mode_number(mode) as u8 as u64)?;
+        stream.commanding = true;
         joint.nmt(Nmt::Start, NmtState::Operational)?;
         let encoder = encoder_of(&stream.changes)?;
         stream.start(encoder, hold, Duration::from_secs_f64(1.0 / rate));
@@ -222,7 +227,7 @@ impl Stream {
                     _ => RemoteError::State { node, state, wanted, within_ms: STEP.as_millis() as u64 },
                 });
             }
-            std::thread::sleep(Duration::from_millis(2));
+            std::thread::sleep(LOOK);
         }
     }
 
@@ -263,8 +268,21 @@ impl Stream {
 
     fn finish(&mut self) -> Result<State, RemoteError> {
         self.ended = true;
+        if !self.commanding {
+            self.changes.iter().try_for_each(|change| change.undo(&self.joint))?;
+            return self.joint.state();
+        }
         self.shared.controlword.store(Controlword::QUICK_STOP.0, Ordering::Relaxed);
-        // Outside OPERATIONAL the joint asks itself for the quick stop, and nobody's set-points count.
+        // With set-points that go on: outside OPERATIONAL a joint that brakes for longer than its command deadline has a fault.
+        let began = Instant::now();
+        while self.thread.is_some() && self.failure().is_ok() && began.elapsed() < BRAKING {
+            match self.joint.state() {
+                Ok(State::OperationEnabled | State::QuickStopActive) => std::thread::sleep(LOOK),
+                // Another client's question is in the way, and over soon.
+                Err(RemoteError::Client(ClientError::OtherClient { .. })) => std::thread::sleep(LOOK),
+                _ => break,
+            }
+        }
         let disabled = self.joint.disable();
         self.sources.take();
         if let Some(thread) = self.thread.take() {

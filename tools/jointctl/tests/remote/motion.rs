@@ -4,7 +4,7 @@ use crate::served::{NODE, Served};
 use joint_firmware::joint::state_machine::State;
 use joint_firmware::joint::{Command, Mode};
 use jointctl::remote::motion::{Motion, Observation, Outcome};
-use jointctl::remote::{RemoteError, RemoteJoint, Stream};
+use jointctl::remote::{Entry, RemoteError, RemoteJoint, Stream, configuration};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 
@@ -78,6 +78,21 @@ fn an_interrupt_in_motion_leaves_the_joint_disabled_and_without_a_fault() {
     let command = Command { mode: Mode::Velocity, velocity: 1.0, ..Command::default() };
     let outcome = motion(command, 60.0).run(&joint, &running, &mut |_| {}).unwrap();
     assert!(!outcome.complete && outcome.last.unwrap().velocity > 0.5);
+    assert_eq!((outcome.state, joint.faults().unwrap()), (State::SwitchOnDisabled, vec![]));
+}
+
+#[test]
+fn braking_may_take_longer_than_the_command_deadline() {
+    let served = Served::joints(&[NODE]);
+    let joint = served.joint();
+    let wanted = [("command-deadline", "0.3"), ("quick-stop-deceleration", "1.5")].map(|(name, text)| {
+        let entry = Entry::one(name).unwrap();
+        (entry, entry.parse(text).unwrap())
+    });
+    configuration::set(&joint, &wanted).unwrap();
+    let command = Command { mode: Mode::Velocity, velocity: 1.0, ..Command::default() };
+    let outcome = run(&joint, &motion(command, 1.0)).unwrap().0;
+    assert!(outcome.last.unwrap().velocity > 0.9, "{}", outcome.last.unwrap());
     assert_eq!((outcome.state, joint.faults().unwrap()), (State::SwitchOnDisabled, vec![]));
 }
 
