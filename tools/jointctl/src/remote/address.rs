@@ -8,6 +8,8 @@ use std::time::Duration;
 
 /// How long a node that has an id may take to say so.
 const PROBE: Duration = Duration::from_millis(50);
+/// How often it is asked whether there is a node without an id.
+const QUESTIONS: u32 = 5;
 
 /// A joint that got its node id.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,6 +32,16 @@ fn is_taken(network: &Network, id: u8) -> Result<bool, RemoteError> {
     }
 }
 
+/// The next node without an id. That there is none is believed after several questions: one answer comes late easily.
+fn find(network: &Network, wait: Duration) -> Result<Option<Address>, RemoteError> {
+    for _ in 0..QUESTIONS {
+        if let Some(address) = network.fastscan(wait)? {
+            return Ok(Some(address));
+        }
+    }
+    Ok(None)
+}
+
 /// Gives every joint without a node id the next free one from `first` on, and has it keep it where `store`. `wait` is how long a node
 /// may take to answer each of a scan's 133 questions. Tells each as soon as it is done: where a later one fails, the earlier stay.
 pub fn assign(
@@ -43,7 +55,7 @@ pub fn assign(
         return Err(ClientError::NodeId(first).into());
     }
     let (mut next, mut count) = (first, 0);
-    while let Some(address) = network.fastscan(wait)? {
+    while let Some(address) = find(network, wait)? {
         while next <= 127 && is_taken(network, next)? {
             next += 1;
         }
