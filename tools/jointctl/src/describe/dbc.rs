@@ -225,7 +225,7 @@ mod tests {
             " SG_ position_actual_value : 32|32@1- (0.000001,0) [-2147.483648|2147.483647] \"rad\" master",
             " SG_ torque_actual_value : 16|16@1- (0.001,0) [-32.768|32.767] \"of rated torque\" master",
             "BO_ 1030 joint6_RPDO3: 8 master",
-            " SG_ impedance_stiffness : 27|12@0+ (0.122100122100122,0) [0|500] \"Nm/rad\" joint6",
+            " SG_ impedance_stiffness : 27|12@0+ (0.1221001221001,0) [0|500] \"Nm/rad\" joint6",
             "VAL_ 1157 acting_model 0 \"nothing\" 1 \"physical\" 2 \"physical and network\" ;",
         ] {
             assert!(text.contains(line), "{line}\n{text}");
