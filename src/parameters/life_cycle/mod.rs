@@ -26,7 +26,8 @@ pub use verification::{Requirements, Verified};
 /// Longest trial, ms: an hour.
 pub const MAX_TRIAL_MS: u32 = 3_600_000;
 
-const CRC: crc::Crc<u32, crc::NoTable> = crc::Crc::<u32, crc::NoTable>::new(&crc::CRC_32_ISO_HDLC);
+/// Of what was verified. Not the CRC that an image ends with: over an image and its own CRC that one is the same for all of them.
+const CRC: crc::Crc<u32, crc::NoTable> = crc::Crc::<u32, crc::NoTable>::new(&crc::CRC_32_ISCSI);
 
 /// What a client asks for, with the number that it writes to object 2212:1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -256,6 +256,10 @@ fn what_changes_after_verification_is_neither_run_nor_stored() {
             assert_eq!(joint.command(command), Err(Refusal::Changed), "bit {bit}");
         }
     }
+    // Another image, as good as the one that was verified.
+    let mut joint = Joint::verified(&bytes);
+    joint.staging[..bytes.len()].copy_from_slice(&encoded(&image(2)));
+    assert_eq!(joint.command(Command::Commit), Err(Refusal::Changed));
     let mut joint = Joint::verified(&bytes);
     joint.life.receive(&mut joint.staging, b"").expect("a piece");
     assert_eq!(joint.life.state(), State::Staged);
