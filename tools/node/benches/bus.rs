@@ -199,7 +199,7 @@ fn main() {
     println!(
         "# On the bus\n\nLoad and latency are written by `cargo bench -p node --bench bus`: simulation, no hardware. Classic CAN at 1 Mbit/s with every \
          bit of every\nframe, stuff bits and arbitration ([`bus::pacing`](../tools/bus/src/pacing/mod.rs)); the joints are whole virtual joints \
-         with the firmware's\nserver, objects and control step. Assumed, because no board has CAN yet: the receive interrupt has done its work \
+         with the firmware's\nserver, objects and control step. Assumed, because no board has been measured: the receive interrupt has done its work \
          {} us after a\nframe's last bit, the task gets to a request {} us later, three transmit buffers.\n",
         REACTION.as_micros(),
         TASK.as_micros()
