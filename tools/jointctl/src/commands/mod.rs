@@ -11,8 +11,11 @@ pub mod image;
 pub mod joint;
 pub mod keep;
 pub mod key;
+pub mod monitor;
 pub mod objects;
+pub mod record;
 pub mod remote;
+pub mod retrain;
 pub mod sim;
 pub mod upload;
 
@@ -63,6 +66,12 @@ pub enum Command {
     Disable(drive::Disable),
     /// Enable a joint, move it for a time, disable it
     Move(drive::Move),
+    /// Watch a joint in the terminal: curves, state, faults
+    Monitor(monitor::Monitor),
+    /// Record what a joint does, as a data set for `fit`
+    Record(record::Record),
+    /// Learn the friction of a joint anew: excite, record, fit, compare, commit where it is better
+    Retrain(retrain::Retrain),
     /// Bring a parameter image into a joint: verified, in shadow, on trial or for good
     Upload(upload::Upload),
     /// Go back to the image that a joint had before
@@ -158,6 +167,9 @@ pub enum CommandError {
     /// A joint over a bus.
     #[error(transparent)]
     Remote(#[from] crate::remote::RemoteError),
+    /// A round of learning on a joint.
+    #[error(transparent)]
+    Retrain(#[from] crate::remote::retrain::RetrainError),
     /// Arguments that contradict each other.
     #[error("{0}")]
     Arguments(String),
@@ -181,6 +193,9 @@ pub fn run(arguments: Arguments) -> Result<(), CommandError> {
         Command::Enable(enable) => enable.run(),
         Command::Disable(disable) => disable.run(),
         Command::Move(motion) => motion.run(),
+        Command::Monitor(monitor) => monitor.run(),
+        Command::Record(record) => record.run(),
+        Command::Retrain(retrain) => retrain.run(),
         Command::Upload(upload) => upload.run(),
         Command::Rollback(back) => back.run(),
         Command::Discard(discard) => discard.run(),

@@ -138,6 +138,20 @@ pub enum RemoteError {
         /// Identifier of the foreign frame.
         identifier: u16,
     },
+    /// A joint that does not answer SYNC.
+    #[error("node {node}: no samples within {within_ms} ms")]
+    NoSamples {
+        /// Node id.
+        node: u8,
+        /// How long they were waited for, ms.
+        within_ms: u64,
+    },
+    /// Two producers of SYNC.
+    #[error("another client sends SYNC on the bus of node {node}; stop it, or follow it (`jointctl record --follow`)")]
+    OtherSync {
+        /// Node id.
+        node: u8,
+    },
     /// The node is not where PDOs count.
     #[error("node {node} is {state:?}, and did not become {wanted:?} within {within_ms} ms")]
     Nmt {

@@ -11,6 +11,7 @@
 //! - [`joint`]: the node; [`drive`]: its state machine and faults
 //! - [`pdo`]: what PDOs carry; [`telemetry`]: out of the joint; [`stream`]: into it; [`motion`]: `jointctl move`
 //! - [`image`]: the life of a parameter image, [`refusal`] its numbers in words; [`configuration`]: settings, stored and restored
+//! - [`record`]: samples as a data set; [`retrain`]: a joint's friction learned anew, from excitation to commit
 //! - [`address`]: node ids for new joints; [`info`]: a joint on one page
 
 pub mod address;
@@ -23,7 +24,10 @@ pub mod info;
 pub mod joint;
 pub mod motion;
 pub mod pdo;
+pub mod record;
 pub mod refusal;
+pub mod retrain;
+pub mod route;
 pub mod stream;
 pub mod telemetry;
 pub mod value;

@@ -6,5 +6,6 @@ mod configuration;
 mod images;
 mod motion;
 mod refused;
+mod retrain;
 mod served;
 mod telemetry;

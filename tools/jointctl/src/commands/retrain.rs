@@ -1,0 +1,94 @@
+//! `jointctl retrain`: the whole round on a joint over a bus: excite, record, fit, compare, commit.
+
+use super::CommandError;
+use super::fit::write;
+use super::remote::{Where, catch_interrupts, running};
+use crate::fit::Options;
+use crate::key_file;
+use crate::progress::Terminal;
+use crate::remote::retrain::{RetrainError, Round};
+use crate::report::verdict;
+use clap::Args;
+use std::path::PathBuf;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+/// Arguments of `retrain`.
+#[derive(Debug, Args)]
+pub struct Retrain {
+    /// Which joint.
+    #[command(flatten)]
+    on: Where,
+    /// Folder for recording, image and report; files of the same names are replaced, others are left alone
+    /// [default: retrain-N]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Duration of each of the two motions that are recorded, s
+    #[arg(long, value_name = "S", default_value_t = 10.0)]
+    duration: f64,
+    /// Duration of the motion that the image before and the new one are judged by, s
+    #[arg(long, value_name = "S", default_value_t = 6.0)]
+    validation: f64,
+    /// Set-points and samples a second
+    #[arg(long, value_name = "HZ", default_value_t = 250.0)]
+    rate: f64,
+    /// Networks trained from different first weights; 0 trains none
+    #[arg(long, value_name = "N", default_value_t = 4)]
+    restarts: usize,
+    /// Seed of everything random
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// The joint's key, where it has one
+    #[arg(long, value_name = "FILE")]
+    key: Option<PathBuf>,
+    /// Acknowledge a fault whose cause is gone first
+    #[arg(long)]
+    reset: bool,
+}
+
+impl Retrain {
+    /// Runs the command.
+    pub fn run(&self) -> Result<(), CommandError> {
+        let key = self.key.as_deref().map(key_file::read).transpose()?;
+        let joint = self.on.joint()?;
+        let out = self.out.clone().unwrap_or_else(|| PathBuf::from(format!("retrain-{}", joint.id())));
+        let options = Options {
+            trainer: Options::default().trainer.filter(|_| self.restarts > 0),
+            restarts: self.restarts.max(1),
+            seed: self.seed,
+            reference: false,
+            // A clock before 1970 is no clock.
+            created: SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs()),
+            ..Options::default()
+        };
+        let round = Round {
+            excitation: self.duration,
+            validation: self.validation,
+            rate: self.rate,
+            options,
+            key,
+            acknowledge: self.reset,
+            out: out.clone(),
+        };
+        catch_interrupts()?;
+        let progress = Terminal::new();
+        let written = |fitted: &_| write(fitted, &out).map_err(|error| RetrainError::Report(error.to_string()));
+        let outcome = round.run(&joint, &running, &written, &progress);
+        progress.finish();
+        let outcome = outcome?;
+        println!("{} samples recorded, {} SYNCs without one", outcome.samples.0, outcome.samples.1);
+        println!("{}", verdict(&outcome.fitted.report).sentence);
+        println!("\n{:<34}{:>10}{:>10}", "on the joint, RMS", "before", "now");
+        let (before, after) = (outcome.before, outcome.after);
+        for (name, before, after) in [
+            ("unexplained torque, Nm", before.residual, after.residual),
+            ("distance from the reference, mrad", 1e3 * before.tracking, 1e3 * after.tracking),
+        ] {
+            println!("{name:<34}{before:>10.4}{after:>10.4}");
+        }
+        println!("In shadow the new image was {:.4} Nm (RMS) from what acted.\n", before.shadow);
+        let version = outcome.status.active.map_or(0, |image| image.version);
+        println!("node {}: version {version} is stored and in use where compensation is requested", joint.id());
+        println!("Written: {}", out.join("report.html").display());
+        Ok(())
+    }
+}

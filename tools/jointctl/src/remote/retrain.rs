@@ -1,0 +1,303 @@
+//! A joint's friction learned anew, from excitation to commit; host.
+//!
+//! ```text
+//! excite and record   Fourier series in impedance mode, without compensation
+//! fit                 the pipeline of `jointctl fit`, on the recording
+//! verify, shadow      a second motion with what is stored, the new image beside it without effect
+//! trial               the same motion with the new image
+//! compare, commit     where what neither feed-forward nor compensation explain (2020h:2) falls; with the motor off
+//! ```
+//!
+//! Both motions carry the torque of the rigid body that was identified, so that what is left is friction. Whatever fails, the joint is
+//! left disabled, with the stored image that it had, nothing on trial, and the compensation that was requested before.
+
+use super::configuration;
+use super::entry::Entry;
+use super::error::RemoteError;
+use super::image::{ImageStatus, Use};
+use super::joint::RemoteJoint;
+use super::record::{SIGNALS, description};
+use super::route::{Route, Travelled};
+use super::value::Value;
+use crate::commands::fit::bytes;
+use crate::dataset::{DatasetError, prepare};
+use crate::excite::{Bounds, Effort, Excitation, ExciteError, optimise};
+use crate::fit::{FitError, Fitted, Options, fit};
+use crate::output::{OutputError, OutputFile, write_directory};
+use crate::progress::Progress;
+use crate::rigid::{RigidParameters, RigidRegressor};
+use joint_firmware::objects::field::{Actual, ConfigurationField, Field, ImageField, Range};
+use joint_firmware::objects::settings::Setting;
+use joint_firmware::parameters::authentication::Key;
+use joint_firmware::parameters::life_cycle::State;
+use std::path::PathBuf;
+
+/// Part of the joint's limits of position and velocity that the motion uses: the rest is left to the controller, which does not know
+/// gravity yet.
+pub const SHARE: f64 = 0.6;
+/// Largest acceleration, rad/s²: faster motion tells inertia better, and friction no better.
+pub const ACCELERATION: f64 = 20.0;
+/// Part of the velocity of the first series that the second one uses: where friction bends most.
+const SLOW: f64 = 0.15;
+/// Part of the residual by which it has to fall: less is noise.
+pub const LEAST_GAIN: f64 = 0.02;
+/// Longer than the motion that a shadow or trial is for, s.
+const SPARE: f64 = 20.0;
+/// Requests of object 2200h:1.
+const OFF: u64 = 0;
+const PHYSICAL_AND_NETWORK: u64 = 2;
+
+/// Why a round ended without a new image. The joint is as it was.
+#[derive(Debug, thiserror::Error)]
+pub enum RetrainError {
+    /// The joint.
+    #[error(transparent)]
+    Remote(#[from] RemoteError),
+    /// No excitation within the limits.
+    #[error("excitation: {0}")]
+    Excite(#[from] ExciteError),
+    /// The recording.
+    #[error(transparent)]
+    Dataset(#[from] DatasetError),
+    /// The fit.
+    #[error(transparent)]
+    Fit(#[from] FitError),
+    /// Files.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    /// The image, or the report.
+    #[error("{0}")]
+    Report(String),
+    /// The joint takes signed images only, or other ones.
+    #[error("node {node}: {problem}")]
+    Key {
+        /// Node id.
+        node: u8,
+        /// What is missing.
+        problem: String,
+    },
+    /// Somebody's image is on its way.
+    #[error("node {node}: {}; `jointctl discard` ends it", super::info::life(*state, 0.0))]
+    Busy {
+        /// Node id.
+        node: u8,
+        /// Where it stands.
+        state: State,
+    },
+    /// Ended by the user.
+    #[error("ended early; node {node} is disabled and keeps the image that it had")]
+    Interrupted {
+        /// Node id.
+        node: u8,
+    },
+    /// The new image is no improvement.
+    #[error(
+        "node {node} keeps the image that it had: the new one leaves {after:.4} Nm unexplained, the old state {before:.4} Nm; \
+         at least {:.0} % less is needed",
+        100.0 * LEAST_GAIN
+    )]
+    NotBetter {
+        /// Node id.
+        node: u8,
+        /// Residual torque before, RMS, Nm.
+        before: f64,
+        /// With the new image, RMS, Nm.
+        after: f64,
+    },
+}
+
+/// A round.
+#[derive(Clone, Debug)]
+pub struct Round {
+    /// Duration of each of the two series of the excitation, s; and of the one that both images are judged by.
+    pub excitation: f64,
+    /// See [`Round::excitation`].
+    pub validation: f64,
+    /// Set-points and samples a second.
+    pub rate: f64,
+    /// Of the fit; the version is chosen by what the joint has.
+    pub options: Options,
+    /// Signs the image.
+    pub key: Option<Key>,
+    /// A fault whose cause is gone is acknowledged first.
+    pub acknowledge: bool,
+    /// Folder for the recording and what the fit writes.
+    pub out: PathBuf,
+}
+
+/// What one motion showed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shown {
+    /// What neither feed-forward nor compensation explain, RMS, Nm.
+    pub residual: f64,
+    /// Distance from the reference, RMS, rad.
+    pub tracking: f64,
+    /// How far the image in shadow is from what acts, RMS, Nm: what the joint says of itself (2200h:7).
+    pub shadow: f64,
+}
+
+impl Shown {
+    fn of(travelled: &Travelled) -> Self {
+        Self {
+            residual: travelled.rms(Actual::Residual),
+            tracking: travelled.tracking_rms(),
+            shadow: travelled.rms(Actual::ShadowRms),
+        }
+    }
+}
+
+/// What came of a round that was committed.
+#[derive(Debug)]
+pub struct Outcome {
+    /// The fit.
+    pub fitted: Fitted,
+    /// Samples of the excitation, and SYNCs without one.
+    pub samples: (usize, u64),
+    /// With what was stored before, or without any compensation.
+    pub before: Shown,
+    /// With the new image.
+    pub after: Shown,
+    /// Where images stand now.
+    pub status: ImageStatus,
+}
+
+/// What has to be as it was at the end.
+struct Tidy<'a> {
+    joint: &'a RemoteJoint,
+    request: u64,
+    staged: bool,
+}
+
+impl Tidy<'_> {
+    fn request(&self, request: u64) -> Result<(), RemoteError> {
+        let entry = Entry::of(Field::Compensation(Setting::Request));
+        configuration::set(self.joint, &[(entry, Value::Integer(request.into()))])
+    }
+}
+
+impl Drop for Tidy<'_> {
+    fn drop(&mut self) {
+        // Whatever brought us here is what is reported.
+        if self.staged {
+            let _ = self.joint.discard_image();
+        }
+        let _ = self.request(self.request);
+    }
+}
+
+impl Round {
+    /// Runs it for as long as `running` says so.
+    pub fn run(
+        &self,
+        joint: &RemoteJoint,
+        running: &dyn Fn() -> bool,
+        write: &dyn Fn(&Fitted) -> Result<(), RetrainError>,
+        progress: &dyn Progress,
+    ) -> Result<Outcome, RetrainError> {
+        let node = joint.id();
+        let version = self.check(joint)?;
+        let bounds = bounds(joint)?;
+        progress.stage("search an excitation");
+        let series = |bounds: &Bounds, duration, seed| -> Result<Excitation, ExciteError> {
+            Ok(optimise(bounds, &Effort { duration, seed, ..Effort::QUICK })?.excitation)
+        };
+        let slow = Bounds { velocity: SLOW * bounds.velocity, ..bounds };
+        let seed = self.options.seed;
+        let excitation = vec![series(&bounds, self.excitation, seed)?, series(&slow, self.excitation, seed + 1)?];
+        let validation = vec![series(&bounds, self.validation, seed + 2)?];
+        let speed = 0.5 * bounds.velocity;
+        let request = joint.raw(Field::Compensation(Setting::Request))?;
+        let mut tidy = Tidy { joint, request, staged: false };
+        let travel = |route: &Route, signals: &[Actual], acknowledge| {
+            let travelled = route.travel(joint, signals, self.rate, acknowledge, running)?;
+            travelled.ok_or(RetrainError::Interrupted { node })
+        };
+
+        progress.stage("excite and record");
+        tidy.request(OFF)?;
+        let route = Route { series: excitation, speed, rigid: RigidParameters::default() };
+        let recording = travel(&route, &SIGNALS, self.acknowledge)?.recording;
+        let samples = (recording.samples.len(), recording.unanswered());
+        let files = [
+            OutputFile::new("log.csv", recording.table()),
+            OutputFile::new("dataset.toml", description(node, "log.csv")),
+        ];
+        write_directory(&self.out, &files)?;
+        let mut prepared = prepare(&self.out.join("dataset.toml"))?;
+        let fitted = fit(&mut prepared, &Options { version, ..self.options.clone() }, progress)?;
+        write(&fitted)?;
+        if !running() {
+            return Err(RetrainError::Interrupted { node });
+        }
+
+        let mut upload = bytes(&fitted.image, &self.out).map_err(|error| RetrainError::Report(error.to_string()))?;
+        if let Some(key) = &self.key {
+            upload.extend_from_slice(&key.sign(&upload));
+        }
+        tidy.request(PHYSICAL_AND_NETWORK)?;
+        tidy.staged = true;
+        joint.upload_image(&upload, Use::Verify, progress)?;
+        let route = Route { series: validation, speed, rigid: rigid(&fitted) };
+        let signals = [&SIGNALS[..], &[Actual::Residual, Actual::ShadowRms]].concat();
+        let time = self.validation + SPARE;
+        joint.use_image(&upload, Use::Shadow(time), progress)?;
+        let before = Shown::of(&travel(&route, &signals, false)?);
+        joint.use_image(&upload, Use::Trial(time), progress)?;
+        let after = Shown::of(&travel(&route, &signals, false)?);
+        // Not a number is no improvement either.
+        if !(after.residual <= (1.0 - LEAST_GAIN) * before.residual) {
+            return Err(RetrainError::NotBetter { node, before: before.residual, after: after.residual });
+        }
+        let status = joint.use_image(&upload, Use::Commit, progress)?;
+        tidy.staged = false;
+        Ok(Outcome { fitted, samples, before, after, status })
+    }
+
+    /// Refuses what can be seen to fail before anything moves; the version of the new image.
+    fn check(&self, joint: &RemoteJoint) -> Result<u32, RetrainError> {
+        let node = joint.id();
+        if joint.raw(Field::Configuration(ConfigurationField::Changed))? != 0 {
+            return Err(RemoteError::Staged { node }.into());
+        }
+        joint.require_off("learning anew")?;
+        let status = joint.image_status()?;
+        if matches!(status.state, State::Shadow | State::Trial | State::Storing) {
+            return Err(RetrainError::Busy { node, state: status.state });
+        }
+        let refuse = |problem| Err(RetrainError::Key { node, problem });
+        let number = joint.raw(Field::Image(ImageField::KeyNumber))?;
+        match (joint.raw(Field::Image(ImageField::KeyPresent))? != 0, &self.key) {
+            (true, None) => return refuse(format!("it takes images with a tag of key {number:08x} only: --key FILE")),
+            (true, Some(key)) if u64::from(key.id()) != number => {
+                return refuse(format!("it has key {number:08x}, the file key {:08x}", key.id()));
+            }
+            _ => {}
+        }
+        let floor = joint.raw(Field::Image(ImageField::Floor))? as u32;
+        Ok(floor.max(status.active.map_or(0, |image| image.version)).saturating_add(1))
+    }
+}
+
+/// What the motion may use of the joint.
+fn bounds(joint: &RemoteJoint) -> Result<Bounds, RemoteError> {
+    let setting = |setting| joint.number(Field::Setting(setting));
+    let range = joint.number(Field::Range(Range::Position))?;
+    let (low, high) = (setting(Setting::LowestPosition)?.max(-range), setting(Setting::HighestPosition)?.min(range));
+    let (centre, half) = (0.5 * (low + high), 0.5 * SHARE * (high - low));
+    let velocity = setting(Setting::VelocityLimit)?.min(joint.number(Field::Range(Range::Velocity))?);
+    Ok(Bounds {
+        position: (centre - half, centre + half),
+        velocity: SHARE * velocity,
+        acceleration: setting(Setting::Acceleration)?.min(ACCELERATION),
+    })
+}
+
+/// The rigid body as it was identified.
+fn rigid(fitted: &Fitted) -> RigidParameters {
+    let mut rigid = RigidParameters::default();
+    for regressor in RigidRegressor::ALL {
+        let found = fitted.report.parameters.iter().find(|parameter| parameter.symbol == regressor.symbol());
+        *rigid.coefficient_mut(regressor) = found.map_or(0.0, |parameter| parameter.value);
+    }
+    rigid
+}

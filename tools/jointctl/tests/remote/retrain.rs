@@ -1,0 +1,96 @@
+//! A recording as a data set, and the whole round on a joint: excite, record, fit, compare, commit.
+
+use crate::served::{NODE, Served, image};
+use joint_firmware::joint::state_machine::State;
+use joint_firmware::joint::{Command, Mode};
+use joint_firmware::objects::field::{Actual, Field};
+use joint_firmware::objects::settings::Setting;
+use joint_firmware::parameters::life_cycle::State as Life;
+use jointctl::fit::Options;
+use jointctl::presets::Preset;
+use jointctl::progress::Silent;
+use jointctl::remote::image::Use;
+use jointctl::remote::record::{Pace, Recorder, SIGNALS, description};
+use jointctl::remote::retrain::{RetrainError, Round};
+use jointctl::remote::{RemoteError, Stream};
+use std::path::Path;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, Instant};
+
+/// The smallest round that still learns.
+fn round(out: &Path) -> Round {
+    let options = Options { presets: vec![Preset::CoulombViscous], trainer: None, ..Options::default() };
+    Round { excitation: 4.0, validation: 2.5, rate: 200.0, options, key: None, acknowledge: false, out: out.to_owned() }
+}
+
+#[test]
+fn a_round_lowers_what_is_unexplained_and_commits_a_newer_version_and_a_second_one_that_cannot_is_refused() {
+    let served = Served::joints(&[NODE]);
+    let joint = served.joint();
+    let request = || joint.raw(Field::Compensation(Setting::Request)).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    // What a joint has before: a friction that is not its own.
+    joint.upload_image(&image(6, 0.05, 0), Use::Commit, &Silent).unwrap();
+    let requested = request();
+    let outcome = round(folder.path()).run(&joint, &|| true, &|_| Ok(()), &Silent).unwrap();
+    let (before, after) = (outcome.before, outcome.after);
+    assert!(after.residual < 0.7 * before.residual, "{before:?} {after:?}");
+    assert!(before.shadow > 0.0, "{before:?}");
+    assert_eq!((outcome.status.state, outcome.status.active.unwrap().version), (Life::Active, 7));
+    assert_eq!(outcome.status.previous.unwrap().version, 6);
+    assert_eq!((joint.state().unwrap(), request()), (State::SwitchOnDisabled, requested));
+    assert!(folder.path().join("log.csv").exists() && folder.path().join("dataset.toml").exists());
+}
+
+#[test]
+fn an_interrupted_round_leaves_the_joint_disabled_with_the_image_that_it_had() {
+    let served = Served::joints(&[NODE]);
+    let joint = served.joint();
+    let stored = image(6, 0.05, 0);
+    joint.upload_image(&stored, Use::Commit, &Silent).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let looks = AtomicU32::new(0);
+    let running = || looks.fetch_add(1, Ordering::Relaxed) < 100;
+    let error = round(folder.path()).run(&joint, &running, &|_| Ok(()), &Silent).unwrap_err();
+    assert!(matches!(error, RetrainError::Interrupted { node: NODE }), "{error}");
+    assert_eq!((joint.state().unwrap(), joint.image_state().unwrap()), (State::SwitchOnDisabled, Life::Active));
+    assert_eq!(joint.active_image().unwrap(), stored);
+}
+
+#[test]
+fn a_recording_of_a_motion_is_a_data_set() {
+    let served = Served::joints(&[NODE]);
+    let joint = served.joint();
+    let mut recorder = Recorder::begin(&joint, &SIGNALS, Pace::Send(200.0)).unwrap();
+    let stream = Stream::begin(&joint, Mode::Velocity, 100.0, false).unwrap();
+    stream.play(|elapsed| {
+        let velocity = (6.0 * elapsed.as_secs_f32()).sin();
+        Command { mode: Mode::Velocity, velocity, ..Command::default() }
+    });
+    let began = Instant::now();
+    while began.elapsed() < Duration::from_secs(3) {
+        recorder.next(Duration::from_secs(1)).unwrap();
+    }
+    stream.end().unwrap();
+    let recording = recorder.end().unwrap();
+    let velocity = recording.column(Actual::Velocity).into_iter().fold(0.0, f64::max);
+    assert!(recording.samples.len() > 300 && velocity > 0.5, "{} {velocity}", recording.samples.len());
+
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("log.csv"), recording.table()).unwrap();
+    let described = folder.path().join("dataset.toml");
+    std::fs::write(&described, description(NODE, "log.csv")).unwrap();
+    let prepared = jointctl::dataset::prepare(&described).unwrap();
+    assert!(prepared.samples.len() > 300, "{}", prepared.samples.len());
+}
+
+#[test]
+fn two_producers_of_sync_are_told_of() {
+    let served = Served::joints(&[NODE]);
+    let (joint, other) = (served.joint(), served.joint());
+    let mut recorder = Recorder::begin(&joint, &SIGNALS, Pace::Send(100.0)).unwrap();
+    other.network().sync().unwrap();
+    let error =
+        std::iter::repeat_with(|| recorder.next(Duration::from_secs(1)).map(drop)).take(200).find_map(Result::err);
+    assert!(matches!(error, Some(RemoteError::OtherSync { node: NODE })), "{error:?}");
+}
