@@ -19,7 +19,6 @@ use super::joint::RemoteJoint;
 use super::record::{SIGNALS, description};
 use super::route::{Route, Travelled};
 use super::value::Value;
-use crate::commands::fit::bytes;
 use crate::dataset::{DatasetError, prepare};
 use crate::excite::{Bounds, Effort, Excitation, ExciteError, optimise};
 use crate::fit::{FitError, Fitted, Options, fit};
@@ -29,6 +28,7 @@ use crate::rigid::{RigidParameters, RigidRegressor};
 use joint_firmware::objects::field::{Actual, ConfigurationField, Field, ImageField, Range};
 use joint_firmware::objects::settings::Setting;
 use joint_firmware::parameters::authentication::Key;
+use joint_firmware::parameters::image::MAX_LENGTH;
 use joint_firmware::parameters::life_cycle::State;
 use std::path::PathBuf;
 
@@ -230,7 +230,9 @@ impl Round {
             return Err(RetrainError::Interrupted { node });
         }
 
-        let mut upload = bytes(&fitted.image, &self.out).map_err(|error| RetrainError::Report(error.to_string()))?;
+        let mut buffer = [0; MAX_LENGTH];
+        let length = fitted.image.encode(&mut buffer).map_err(|error| RetrainError::Report(error.to_string()))?;
+        let mut upload = buffer[..length].to_vec();
         if let Some(key) = &self.key {
             upload.extend_from_slice(&key.sign(&upload));
         }
@@ -245,7 +247,8 @@ impl Round {
         joint.use_image(&upload, Use::Trial(time), progress)?;
         let after = Shown::of(&travel(&route, &signals, false)?);
         // Not a number is no improvement either.
-        if !(after.residual <= (1.0 - LEAST_GAIN) * before.residual) {
+        let better = after.residual <= (1.0 - LEAST_GAIN) * before.residual;
+        if !better {
             return Err(RetrainError::NotBetter { node, before: before.residual, after: after.residual });
         }
         let status = joint.use_image(&upload, Use::Commit, progress)?;

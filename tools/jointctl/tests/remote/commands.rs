@@ -72,10 +72,7 @@ fn a_joint_is_looked_at_set_moved_and_fed_from_the_command_line() {
     desk.prints(&["store"], &["node 5: stored"]);
     desk.prints(&["move", "velocity", "-0.4", "--duration", "1"], &["rad/s", "node 5: disabled"]);
     desk.prints(&["monitor", "--once"], &["state         disabled", "position      ", "gear "]);
-    desk.prints(
-        &["record", "--out", "log.csv", "--duration", "1"],
-        &[" samples in ", "Written: log.csv"],
-    );
+    desk.prints(&["record", "--out", "log.csv", "--duration", "1"], &[" samples in ", "Written: log.csv"]);
     desk.fails(&["record", "--out", "log.csv", "--duration", "1"], &["log.csv exists; --replace replaces"]);
     desk.prints(&["upload", "first.img", "--commit"], &["version 1 is stored; in use"]);
     desk.prints(&["upload", "second.img"], &["version 1 is stored; an image is verified", "Not in use"]);
