@@ -112,8 +112,13 @@ fn a_second_client_is_noticed_and_nothing_is_half_done() {
             })
         }
     });
-    std::thread::sleep(20 * MS);
-    other.send(&Frame::new(0x605, &[0x40, 0, 0x10, 0, 0, 0, 0, 0]).unwrap()).unwrap();
+    // Between two transfers it disturbs nobody: it asks until it has come in between.
+    while !upload.is_finished() {
+        std::thread::sleep(7 * MS);
+        other.send(&Frame::new(0x605, &[0x40, 0, 0x10, 0, 0, 0, 0, 0]).unwrap()).unwrap();
+    }
+    // The answer to the last question has passed.
+    std::thread::sleep(100 * MS);
     let error = upload.join().unwrap().unwrap();
     assert!(matches!(error, ClientError::OtherClient { .. }), "{error}");
     assert!(error.to_string().contains("2001h:0 of node 5") && error.to_string().contains("another client"), "{error}");
