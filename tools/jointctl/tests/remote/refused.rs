@@ -263,29 +263,6 @@ fn two_masters_of_one_joint_end_in_a_joint_that_is_disabled() {
 }
 
 #[test]
-fn a_client_that_never_gets_to_command_the_joint_leaves_it_to_whoever_does() {
-    let served = Served::joints(&[NODE]);
-    let (joint, network) = (served.joint(), Network::new(bus::open(served.bus()).unwrap()));
-    let stream = Stream::begin(&joint, Mode::Torque, 100.0, false).unwrap();
-    let other = RemoteJoint::on(&network, NODE).unwrap();
-    // Too slow a rate is refused after the joint was asked for its deadline.
-    assert!(matches!(Stream::begin(&other, Mode::Torque, 1.0, false), Err(RemoteError::Range { .. })));
-    // A mapping that the joint refuses is put back as it was.
-    let pdo = jointctl::remote::pdo::Pdo::all(jointctl::remote::pdo::Direction::Transmit)[3];
-    let before = pdo.read(&other).unwrap();
-    let impossible = [joint_firmware::canopen::MappedObject::new(0x1018, 1, 32)];
-    let wanted = joint_firmware::canopen::PdoParameters::new(0x485, &impossible);
-    assert!(pdo.ensure(&other, &wanted).is_err());
-    let after = pdo.read(&other).unwrap();
-    assert_eq!(
-        (after.cob_id, after.count, after.mapping, after.event_timer),
-        (before.cob_id, before.count, before.mapping, before.event_timer)
-    );
-    stream.check().unwrap();
-    assert_eq!(stream.end().unwrap(), Drive::SwitchOnDisabled);
-}
-
-#[test]
 fn a_string_that_is_no_bus_is_answered_with_those_that_are() {
     let message = RemoteJoint::open("can0", NODE).unwrap_err().to_string();
     assert!(message.starts_with("bus 'can0': a kind and a colon are missing. Buses are socketcan:can0, "), "{message}");
