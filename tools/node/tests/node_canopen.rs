@@ -37,7 +37,12 @@ fn modules() -> Result<PathBuf, String> {
     // npm may ask for consent to build the native module: `rebuild` is that consent.
     let mut said = String::new();
     for arguments in [&["install", "--no-audit", "--no-fund", PACKAGE][..], &["rebuild", "node-crc"]] {
-        let output = Command::new("npm").args(arguments).current_dir(&folder).output();
+        let mut npm = Command::new("npm");
+        npm.args(arguments).current_dir(&folder);
+        if let Some(prefix) = headers() {
+            npm.env("npm_config_nodedir", prefix);
+        }
+        let output = npm.output();
         match output {
             Ok(output) => said.push_str(&String::from_utf8_lossy(&output.stderr)),
             Err(error) => return Err(format!("npm cannot be run: {error}")),
@@ -47,6 +52,13 @@ fn modules() -> Result<PathBuf, String> {
         }
     }
     Err(format!("node-canopen could not be installed: {said}"))
+}
+
+/// Where Node's own headers are installed beside it, so that none have to be downloaded.
+fn headers() -> Option<PathBuf> {
+    let node = Command::new("node").args(["-p", "process.execPath"]).output().ok()?;
+    let prefix = Path::new(std::str::from_utf8(&node.stdout).ok()?.trim()).parent()?.parent()?.to_owned();
+    prefix.join("include/node/node.h").exists().then_some(prefix)
 }
 
 fn conformance(modules: &Result<PathBuf, String>) -> Result<(), Failed> {
