@@ -1,7 +1,7 @@
 //! The pages of the flash that hold parameters; thread mode.
 //!
 //! embassy's driver erases and writes, with interrupts enabled. Where code and parameters share a bank, whatever fetches from flash
-//! stands still meanwhile, some 20 ms for a page: such a board writes with the motor off.
+//! stands still meanwhile, some 20 ms for a page (from memory, not measured): such a board writes with the motor off.
 
 use super::{FLASH_START, faults};
 use core::ptr::addr_of;
