@@ -139,6 +139,17 @@ impl Faults {
     /// No fault.
     pub const NONE: Self = Self(0);
 
+    /// One bit a fault, at its number.
+    #[inline(always)]
+    pub(super) const fn bits(self) -> u32 {
+        self.0
+    }
+
+    /// The set with these [bits](Self::bits).
+    pub(super) const fn from_bits(bits: u32) -> Self {
+        Self(bits)
+    }
+
     /// Adds a fault where a condition holds.
     #[inline(always)]
     pub fn set(&mut self, fault: Fault, present: bool) {

@@ -1,13 +1,17 @@
 //! The last steps before a fault, kept for whoever asks what happened; control step writes, task reads.
+//!
+//! A step takes 20 bytes. All of its numbers but the position are cut to their upper halves: a sign, the whole range of a
+//! single-precision number and 8 significant bits, so that they are up to 0.8 % too small in magnitude; what is not a number remains none.
 
-use super::fault::Faults;
+use super::fault::{Fault, Faults};
 use super::state_machine::State;
+use crate::dsp::pkhtb;
 use crate::motor::transform::Dq;
 
 /// Steps that are kept.
 pub const LENGTH: usize = 64;
 
-/// One control step as the history keeps it.
+/// One control step as it is noted, and as the history gives it back.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Snapshot {
     /// State after the step.
@@ -28,10 +32,56 @@ pub struct Snapshot {
     pub bus_voltage: f32,
 }
 
+/// A snapshot as it is kept.
+#[derive(Clone, Copy, Debug)]
+struct Packed {
+    /// [`Faults`], and the state from bit [`STATE_BIT`] on.
+    state: u32,
+    position: f32,
+    /// Velocity and commanded torque, compensation torque and current d, current q and supply: the first one's upper half in the
+    /// lower half of the word.
+    pairs: [u32; 3],
+}
+
+/// Bits below are faults, which are numbered from 1 on.
+const STATE_BIT: u32 = 24;
+const _: () = assert!(Fault::ALL.len() < STATE_BIT as usize);
+
+impl Packed {
+    #[inline(always)]
+    fn new(snapshot: &Snapshot) -> Self {
+        let pair = |first: f32, second: f32| pkhtb(first.to_bits() as i32, second.to_bits() as i32);
+        Self {
+            state: snapshot.faults.bits() | (snapshot.state as u32) << STATE_BIT,
+            position: snapshot.position,
+            pairs: [
+                pair(snapshot.velocity, snapshot.commanded_torque),
+                pair(snapshot.compensation_torque, snapshot.current.d),
+                pair(snapshot.current.q, snapshot.bus_voltage),
+            ],
+        }
+    }
+
+    fn snapshot(&self) -> Snapshot {
+        let pair = |word: u32| (f32::from_bits(word << 16), f32::from_bits(word & 0xffff_0000));
+        let [(velocity, commanded_torque), (compensation_torque, d), (q, bus_voltage)] = self.pairs.map(pair);
+        Snapshot {
+            state: State::at(self.state >> STATE_BIT),
+            faults: Faults::from_bits(self.state & ((1 << STATE_BIT) - 1)),
+            position: self.position,
+            velocity,
+            commanded_torque,
+            compensation_torque,
+            current: Dq { d, q },
+            bus_voltage,
+        }
+    }
+}
+
 /// A ring of the last [`LENGTH`] steps that stands still from a fault on, until it is released.
 #[derive(Clone, Copy, Debug)]
 pub struct History {
-    ring: [Snapshot; LENGTH],
+    ring: [Packed; LENGTH],
     /// Where the next step goes.
     next: usize,
     frozen: bool,
@@ -40,23 +90,14 @@ pub struct History {
 impl Default for History {
     fn default() -> Self {
         // A constant: made step by step, the ring would lie on the stack of whoever makes a joint.
-        const EMPTY: History = History { ring: [Snapshot::NONE; LENGTH], next: 0, frozen: false };
+        const EMPTY: History = History { ring: [Packed::NONE; LENGTH], next: 0, frozen: false };
         EMPTY
     }
 }
 
-impl Snapshot {
-    /// Before the first step.
-    const NONE: Self = Self {
-        state: State::NotReadyToSwitchOn,
-        faults: Faults::NONE,
-        position: 0.0,
-        velocity: 0.0,
-        commanded_torque: 0.0,
-        compensation_torque: 0.0,
-        current: Dq { d: 0.0, q: 0.0 },
-        bus_voltage: 0.0,
-    };
+impl Packed {
+    /// Before the first step: not ready, no fault, all zeros.
+    const NONE: Self = Self { state: 0, position: 0.0, pairs: [0; 3] };
 }
 
 impl History {
@@ -68,7 +109,7 @@ impl History {
         }
         self.frozen = !snapshot.faults.is_empty();
         if let Some(place) = self.ring.get_mut(self.next) {
-            *place = snapshot;
+            *place = Packed::new(&snapshot);
         }
         self.next = (self.next + 1) % LENGTH;
     }
@@ -84,16 +125,16 @@ impl History {
     }
 
     /// The steps, oldest first; the last one is the newest, or the one with the fault.
-    pub fn iter(&self) -> impl Iterator<Item = &Snapshot> {
+    pub fn iter(&self) -> impl Iterator<Item = Snapshot> {
         let (newer, older) = self.ring.split_at_checked(self.next).unwrap_or((&self.ring, &[]));
-        older.iter().chain(newer)
+        older.iter().chain(newer).map(Packed::snapshot)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::joint::fault::Fault;
+    use proptest::prelude::*;
 
     #[test]
     fn the_step_with_the_fault_is_the_last_and_stays_until_released() {
@@ -109,5 +150,42 @@ mod tests {
         history.release();
         history.note(Snapshot { position: -1.0, ..Snapshot::default() });
         assert_eq!(history.iter().last().unwrap().position, -1.0);
+    }
+
+    proptest! {
+        #[test]
+        fn a_step_comes_back_with_eight_significant_bits_whatever_it_holds(
+            state in 0u32..8, fault in prop::option::of(0..Fault::ALL.len()), position: f32, numbers in [any::<f32>(); 6],
+        ) {
+            let mut faults = Faults::NONE;
+            if let Some(fault) = fault {
+                faults.set(Fault::ALL[fault], true);
+            }
+            let [velocity, commanded_torque, compensation_torque, d, q, bus_voltage] = numbers;
+            let current = Dq { d, q };
+            let noted = Snapshot {
+                state: State::at(state), faults, position, velocity, commanded_torque, compensation_torque, current, bus_voltage,
+            };
+            let mut history = History::default();
+            history.note(noted);
+            let kept = history.iter().last().unwrap();
+            prop_assert_eq!((kept.state, kept.faults), (noted.state, noted.faults));
+            prop_assert_eq!(kept.position.to_bits(), noted.position.to_bits());
+            let kept = [
+                kept.velocity, kept.commanded_torque, kept.compensation_torque, kept.current.d, kept.current.q,
+                kept.bus_voltage,
+            ];
+            for (kept, noted) in kept.into_iter().zip(numbers) {
+                let least = noted.abs() * (1.0 - 1.0 / 128.0);
+                let near = kept.is_sign_positive() == noted.is_sign_positive()
+                    && (least..=noted.abs()).contains(&kept.abs());
+                prop_assert!(near || noted.is_nan() && kept.is_nan() || noted.is_subnormal(), "{} {}", kept, noted);
+            }
+        }
+    }
+
+    #[test]
+    fn the_history_takes_twenty_bytes_a_step() {
+        assert_eq!(size_of::<History>() - size_of::<usize>() * 2, 20 * LENGTH);
     }
 }

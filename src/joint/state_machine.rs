@@ -131,6 +131,20 @@ impl StateMachine {
 }
 
 impl State {
+    /// The state with this number; the last one where there is none.
+    pub(super) const fn at(number: u32) -> Self {
+        match number {
+            0 => Self::NotReadyToSwitchOn,
+            1 => Self::SwitchOnDisabled,
+            2 => Self::ReadyToSwitchOn,
+            3 => Self::SwitchedOn,
+            4 => Self::OperationEnabled,
+            5 => Self::QuickStopActive,
+            6 => Self::FaultReactionActive,
+            _ => Self::Fault,
+        }
+    }
+
     /// The statusword's bits that tell the state (object 6041h, mask 006Fh), quick stop bit included.
     pub const fn statusword(self) -> u16 {
         match self {

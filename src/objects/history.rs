@@ -23,7 +23,7 @@ pub(super) fn read(history: &History, offset: u32, out: &mut [u8]) -> bool {
     out.iter_mut().all(|place| bytes.next().map(|byte| *place = byte).is_some())
 }
 
-fn encode(step: &Snapshot) -> [u8; STEP] {
+fn encode(step: Snapshot) -> [u8; STEP] {
     let mut bytes = [0; STEP];
     let faults = u32::from(fault_bits(step.faults));
     let numbers = [
