@@ -72,6 +72,24 @@ pub fn interpolate(table: &[i32; TABLE_LEN], x: i32) -> i32 {
     word.wrapping_add((word as i16 as i32) * fraction)
 }
 
+/// Words in half a table, of an odd function.
+pub const HALF_TABLE_LEN: usize = TABLE_LEN / 2;
+
+/// [`interpolate`] in the half of an odd function's table that lies right of zero; the same bits as in the whole one.
+#[inline(always)]
+pub fn interpolate_odd(table: &[i32; HALF_TABLE_LEN], x: i32) -> i32 {
+    let sign = x >> 31;
+    // Left of zero the complement: its step and fraction count from the step's right end, which is the mirrored one's left.
+    let magnitude = (x ^ sign) as u32;
+    let step = (magnitude >> 20).min(255);
+    let fraction = (magnitude >> 8 & 0xfff) as i32;
+    let word = table[step as usize];
+    let slope = word as i16 as i32;
+    // A word's lower half is its slope, which counts as one step of the fraction, but not on the way back.
+    let value = word.wrapping_add(slope * fraction).wrapping_sub(slope & sign);
+    (value ^ sign).wrapping_sub(sign)
+}
+
 /// Rounds a product sum with 47 fractional bits to Q16.16, half up; saturates.
 #[inline(always)]
 pub fn narrow(sum: i64) -> i32 {

@@ -1,18 +1,21 @@
 //! The smooth functions of the friction model: tanh, the Stribeck bump, atan, sine; control step.
 //!
-//! Each is a table of 512 words for [`interpolate`], computed at compile time from its power series, so every machine holds
-//! the same words. Knots are raised by a sixteenth of step^2 times the curvature: that halves the largest error of a
-//! chord. Within a table the interpolation is continuous and follows the knots exactly, therefore it is monotone
-//! wherever the knots are; the certificate relies on that.
+//! Each is a table for [`interpolate`], computed at compile time from its power series, so every machine holds the same words. Knots
+//! are raised by a sixteenth of step^2 times the curvature: that halves the largest error of a chord. Within a table the
+//! interpolation is continuous and follows the knots exactly, therefore it is monotone wherever the knots are; the
+//! certificate relies on that.
+//!
+//! All of them are odd, so half a table is enough: 256 words. Only tanh, which a network looks up 15 times in a step, has all its 512 words:
+//! the sign takes six instructions.
 
-use crate::dsp::{TABLE_LEN, interpolate, smmul};
+use crate::dsp::{HALF_TABLE_LEN, TABLE_LEN, interpolate, interpolate_odd, smmul};
 
 /// Words cover [-8, 8): a step of 1/32. Argument of [`tanh`] in Q25.
-pub static TANH: [i32; TABLE_LEN] = table(Shape::Tanh, 1.0 / 32.0);
-/// Words cover [-4, 4): a step of 1/64. Argument of [`stribeck`] in Q26.
-pub static STRIBECK: [i32; TABLE_LEN] = table(Shape::Stribeck, 1.0 / 64.0);
-/// Words cover [-1, 1): a step of 1/256. Holds atan in quarter turns.
-static ATAN: [i32; TABLE_LEN] = table(Shape::Atan, 1.0 / 256.0);
+pub static TANH: [i32; TABLE_LEN] = table(Shape::Tanh, -256, 1.0 / 32.0);
+/// Words cover [0, 4): a step of 1/64. Argument of [`stribeck`] in Q26.
+static STRIBECK: [i32; HALF_TABLE_LEN] = table(Shape::Stribeck, 0, 1.0 / 64.0);
+/// Words cover [0, 1): a step of 1/256. Holds atan in quarter turns.
+static ATAN: [i32; HALF_TABLE_LEN] = table(Shape::Atan, 0, 1.0 / 256.0);
 
 /// Hyperbolic tangent: argument in Q25 (saturates beyond +-8), result in Q31. Error: 7e-5 maximum, 2.2e-5 RMS.
 #[inline(always)]
@@ -24,7 +27,14 @@ pub fn tanh(x: i32) -> i32 {
 /// Q31. Error: 1e-4 maximum.
 #[inline(always)]
 pub fn stribeck(u: i32) -> i32 {
-    interpolate(&STRIBECK, u)
+    interpolate_odd(&STRIBECK, u)
+}
+
+/// Slope of the bump's table over step `step` (of 1/64; -256 to 255, held there), Q13: for the certificate.
+pub fn stribeck_slope(step: i64) -> i64 {
+    // An odd function's slope is even.
+    let place = if step < 0 { -1 - step } else { step };
+    STRIBECK[place.min(255) as usize & (HALF_TABLE_LEN - 1)] as i16 as i64
 }
 
 /// Arc tangent in quarter turns (1 is pi/2): argument in Q16.16, result in Q31. Error: 2.5e-5 maximum.
@@ -44,7 +54,7 @@ pub fn atan(x: i32) -> i32 {
 /// For x in [0, 1], Q16.16.
 #[inline(always)]
 fn atan_up_to_one(x: u32) -> i32 {
-    interpolate(&ATAN, (x.min(0xffff) << 12) as i32)
+    interpolate_odd(&ATAN, (x.min(0xffff) << 12) as i32)
 }
 
 /// The sines of the first five odd multiples of a phase, Q30. Phase: 2^32 is a turn. Error of the sine of n x: 1e-5 (n^2 + 1)
@@ -85,15 +95,15 @@ impl Shape {
     }
 }
 
-/// Interpolation words for a function sampled at `step`: knot in the upper half (Q15), 16 times the rise to the next
+/// Interpolation words for a function sampled at `step`, from the step with index `first` on: knot in the upper half (Q15), 16 times the rise to the next
 /// knot in the lower half. The word is their sum, so a negative slope borrows from the upper half and the addition
 /// in [`interpolate`] gives it back.
-const fn table(shape: Shape, step: f64) -> [i32; TABLE_LEN] {
-    let mut words = [0; TABLE_LEN];
+const fn table<const LEN: usize>(shape: Shape, first: i32, step: f64) -> [i32; LEN] {
+    let mut words = [0; LEN];
     let mut i = 0;
-    while i < TABLE_LEN {
-        let here = knot(shape, i as i32 - 256, step);
-        let next = knot(shape, i as i32 - 255, step);
+    while i < LEN {
+        let here = knot(shape, first + i as i32, step);
+        let next = knot(shape, first + i as i32 + 1, step);
         words[i] = here * 65536 + 16 * (next - here);
         i += 1;
     }
@@ -214,6 +224,19 @@ mod tests {
         let (worst, _) =
             error(near.chain(far).map(|x| (atan(x) as f64 / Q31, (x as f64 / 65536.0).atan() / FRAC_PI_2)));
         assert!(worst < 2.5e-5, "{worst:e}");
+    }
+
+    #[test]
+    fn half_a_table_gives_what_the_whole_one_would() {
+        let whole: [i32; TABLE_LEN] = table(Shape::Stribeck, -256, 1.0 / 64.0);
+        for (place, word) in whole.into_iter().enumerate() {
+            assert_eq!(stribeck_slope(place as i64 - 256), word as i16 as i64);
+        }
+        let far = (i32::MIN..i32::MAX).step_by(9_973);
+        let near = (-(5 << 26)..(5 << 26)).step_by(101);
+        for u in far.chain(near).chain([i32::MIN, -1, 0, 1, i32::MAX]) {
+            assert_eq!(stribeck(u), interpolate(&whole, u), "{u}");
+        }
     }
 
     #[test]

@@ -4,7 +4,7 @@ use super::bisect;
 use super::interval::Interval;
 use crate::dsp::{narrow, saturate};
 use crate::friction::physical::{Directional, Physical, PreparedTerms, Scaling, Terms, times};
-use crate::friction::smooth::{STRIBECK, TANH, atan, stribeck, tanh};
+use crate::friction::smooth::{TANH, atan, stribeck, stribeck_slope, tanh};
 use crate::friction::state::{SIGNALS, Signal};
 
 /// What holds of the physical model in the whole widened box.
@@ -172,7 +172,7 @@ fn cell_bounds(physical: &PreparedTerms, box_: &[Interval; SIGNALS], v: Interval
 
 /// Slopes of the tanh table over arguments in Q25, Q14. As in the network, but here the argument may span the table.
 fn tanh_slopes(argument: Interval) -> Interval {
-    slopes_between(&TANH, argument, &[-1, 0])
+    slopes_between(tanh_slope, argument, &[-1, 0])
 }
 
 /// Values of the Stribeck bump: it turns at u = +-1 / sqrt 2, in steps 45 and -46.
@@ -185,18 +185,22 @@ fn stribeck_values(u: Interval) -> Interval {
 
 /// Slopes of the Stribeck bump, Q13: steepest at zero, turning where u^2 = 3/2 (steps 78 and -79).
 fn stribeck_slopes(u: Interval) -> Interval {
-    slopes_between(&STRIBECK, u, &[-80, -79, -78, -77, -1, 0, 76, 77, 78, 79])
+    slopes_between(stribeck_slope, u, &[-80, -79, -78, -77, -1, 0, 76, 77, 78, 79])
 }
 
 fn spans(argument: Interval, first: i64, last: i64) -> bool {
     argument.low >> 20 <= last && argument.high >> 20 >= first
 }
 
+/// Slope of the tanh table over a step, -256 to 255.
+fn tanh_slope(step: i64) -> i64 {
+    TANH[(step + 256) as usize & 511] as i16 as i64
+}
+
 /// Slopes of a table over an interval: those of its ends and of the turning steps between, plus the knots' rounding.
-fn slopes_between(table: &[i32; 512], argument: Interval, turns: &[i64]) -> Interval {
+fn slopes_between(slope: fn(i64) -> i64, argument: Interval, turns: &[i64]) -> Interval {
     const ROUNDING: i64 = 32;
     let step = |end: i64| (end >> 20).clamp(-256, 255);
-    let slope = |step: i64| table[(step + 256) as usize & 511] as i16 as i64;
     let (low, high) = (step(argument.low), step(argument.high));
     let mut found = Interval::between(slope(low), slope(high));
     for &turn in turns {
@@ -248,16 +252,16 @@ mod tests {
         }
     }
 
-    fn slope_of(table: &'static [i32; 512]) -> impl Fn(i64) -> Interval {
-        |step| Interval::point(table[(step + 256) as usize] as i16 as i64)
-    }
-
     #[test]
     fn slopes_of_both_tables_are_bounded_over_every_interval() {
-        for_every_interval(slope_of(&TANH), |steps, exact| assert!(tanh_slopes(steps).contains(exact), "{steps:?}"));
-        for_every_interval(slope_of(&STRIBECK), |steps, exact| {
-            assert!(stribeck_slopes(steps).contains(exact), "{steps:?}");
-        });
+        for_every_interval(
+            |step| Interval::point(tanh_slope(step)),
+            |steps, exact| assert!(tanh_slopes(steps).contains(exact), "{steps:?}"),
+        );
+        for_every_interval(
+            |step| Interval::point(stribeck_slope(step)),
+            |steps, exact| assert!(stribeck_slopes(steps).contains(exact), "{steps:?}"),
+        );
     }
 
     #[test]
