@@ -1,9 +1,8 @@
 //! The few DSP operations the control path is made of, each with the same result on every machine; any context.
 //!
 //! Names are those of the ARMv7E-M instructions (ARM DDI 0403, A4.4.3): on the microcontroller each function is that one
-//! instruction, elsewhere it is a portable twin. The compiler finds all of them but SMLAD in the portable form by itself
-//! (checked in the disassembly), so SMLAD alone is written in assembly, and this is the only file of the arithmetic that
-//! contains `unsafe`.
+//! instruction, elsewhere it is a portable twin. The compiler finds most of them in the portable form by itself (checked in the
+//! disassembly). Written in assembly are those that it does not find, or finds only with more around them. This is the only file of the arithmetic that contains `unsafe`.
 
 /// `accumulator + a[low] b[low] + a[high] b[high]` over two signed 16-bit halves; wraps.
 ///
@@ -35,6 +34,56 @@ pub fn smlad(a: u32, b: u32, accumulator: i32) -> i32 {
     let low = (a as i16 as i32) * (b as i16 as i32);
     let high = ((a as i32) >> 16) * ((b as i32) >> 16);
     accumulator.wrapping_add(low).wrapping_add(high)
+}
+
+/// `a[low] b[low] + a[high] b[high]` over two signed 16-bit halves; wraps, as [`smlad`] does.
+#[cfg(target_arch = "arm")]
+#[inline(always)]
+pub fn smuad(a: u32, b: u32) -> i32 {
+    let sum;
+    // SAFETY: as for `smlad`.
+    unsafe {
+        core::arch::asm!(
+            "smuad {sum}, {a}, {b}",
+            sum = lateout(reg) sum,
+            a = in(reg) a,
+            b = in(reg) b,
+            options(pure, nomem, nostack, preserves_flags)
+        );
+    }
+    sum
+}
+
+/// `a[low] b[low] + a[high] b[high]` over two signed 16-bit halves; wraps, as [`smlad`] does.
+#[cfg(not(target_arch = "arm"))]
+#[inline(always)]
+pub fn smuad(a: u32, b: u32) -> i32 {
+    smlad(a, b, 0)
+}
+
+/// `value` shifted right by `distance` with its sign; 32 and more leave nothing but the sign.
+#[cfg(target_arch = "arm")]
+#[inline(always)]
+pub fn asr(value: i32, distance: u8) -> i32 {
+    let shifted;
+    // SAFETY: as for `smlad`; the instruction looks at the lowest byte of the distance's register.
+    unsafe {
+        core::arch::asm!(
+            "asr.w {shifted}, {value}, {distance}",
+            shifted = lateout(reg) shifted,
+            value = in(reg) value,
+            distance = in(reg) u32::from(distance),
+            options(pure, nomem, nostack, preserves_flags)
+        );
+    }
+    shifted
+}
+
+/// `value` shifted right by `distance` with its sign; 32 and more leave nothing but the sign.
+#[cfg(not(target_arch = "arm"))]
+#[inline(always)]
+pub fn asr(value: i32, distance: u8) -> i32 {
+    value >> distance.min(31)
 }
 
 /// `accumulator + floor(a b / 2^32)`; wraps.
@@ -90,10 +139,96 @@ pub fn interpolate_odd(table: &[i32; HALF_TABLE_LEN], x: i32) -> i32 {
     (value ^ sign).wrapping_sub(sign)
 }
 
+/// [`interpolate`] at a product shifted right by `SHIFT` (12 to 24) and held in 32 bits, without doing either.
+#[inline(always)]
+pub fn interpolate_product<const SHIFT: u32>(table: &[i32; TABLE_LEN], product: i64) -> i32 {
+    let step = (product >> 32) as i32 >> (SHIFT - 12);
+    let fraction = (product >> (SHIFT + 8)) as i32 & 0xfff;
+    // Where holding would have changed something, the ends' slopes are zero, and any fraction will do.
+    let word = table[(step.clamp(-256, 255) + 256) as usize & (TABLE_LEN - 1)];
+    word.wrapping_add((word as i16 as i32) * fraction)
+}
+
+/// [`interpolate_odd`] at a product, as [`interpolate_product`] is [`interpolate`].
+#[inline(always)]
+pub fn interpolate_odd_product<const SHIFT: u32>(table: &[i32; HALF_TABLE_LEN], product: i64) -> i32 {
+    let high = (product >> 32) as i32;
+    let sign = high >> 31;
+    let step = ((high ^ sign) as u32 >> (SHIFT - 12)).min(255);
+    let fraction = ((product >> (SHIFT + 8)) as i32 ^ sign) & 0xfff;
+    let word = table[step as usize];
+    let slope = word as i16 as i32;
+    let value = word.wrapping_add(slope * fraction).wrapping_sub(slope & sign);
+    (value ^ sign).wrapping_sub(sign)
+}
+
 /// Rounds a product sum with 47 fractional bits to Q16.16, half up; saturates.
 #[inline(always)]
 pub fn narrow(sum: i64) -> i32 {
     saturate((sum >> 31).wrapping_add((sum >> 30) & 1))
+}
+
+/// [`narrow`] of one product, in half the instructions: of all products only one is too large, by one.
+#[inline(always)]
+pub fn narrow_product(a: i32, b: i32) -> i32 {
+    let rounded = smlal(1 << 30, a, b);
+    let high = (rounded >> 32) as i32;
+    // Twice the upper word, and the lower one's highest bit. Only the largest product saturates, and then upwards, where all bits are set.
+    high.saturating_add(high) | (rounded as u32 >> 31) as i32
+}
+
+/// `accumulator + a b`; wraps.
+///
+/// The portable form is one instruction, too, but the compiler makes three of it where it knows a sign.
+#[cfg(target_arch = "arm")]
+#[inline(always)]
+pub fn smlal(accumulator: i64, a: i32, b: i32) -> i64 {
+    let (mut low, mut high) = (accumulator as u32, (accumulator >> 32) as u32);
+    // SAFETY: as for `smlad`.
+    unsafe {
+        core::arch::asm!(
+            "smlal {low}, {high}, {a}, {b}",
+            low = inout(reg) low,
+            high = inout(reg) high,
+            a = in(reg) a,
+            b = in(reg) b,
+            options(pure, nomem, nostack, preserves_flags)
+        );
+    }
+    ((high as u64) << 32 | low as u64) as i64
+}
+
+/// `accumulator + a b`; wraps.
+#[cfg(not(target_arch = "arm"))]
+#[inline(always)]
+pub fn smlal(accumulator: i64, a: i32, b: i32) -> i64 {
+    accumulator.wrapping_add(a as i64 * b as i64)
+}
+
+/// `a b`.
+#[cfg(target_arch = "arm")]
+#[inline(always)]
+pub fn smull(a: i32, b: i32) -> i64 {
+    let (low, high): (u32, u32);
+    // SAFETY: as for `smlad`.
+    unsafe {
+        core::arch::asm!(
+            "smull {low}, {high}, {a}, {b}",
+            low = out(reg) low,
+            high = out(reg) high,
+            a = in(reg) a,
+            b = in(reg) b,
+            options(pure, nomem, nostack, preserves_flags)
+        );
+    }
+    ((high as u64) << 32 | low as u64) as i64
+}
+
+/// `a b`.
+#[cfg(not(target_arch = "arm"))]
+#[inline(always)]
+pub fn smull(a: i32, b: i32) -> i64 {
+    a as i64 * b as i64
 }
 
 /// The nearest 32-bit value.
@@ -118,6 +253,12 @@ mod tests {
         }
 
         #[test]
+        fn a_shift_is_a_division_rounded_down(value: i32, distance: u8) {
+            let exact = value as i64 >> distance.min(63);
+            prop_assert_eq!(asr(value, distance) as i64, exact);
+        }
+
+        #[test]
         fn narrow_rounds_to_nearest_and_saturates(sum: i64) {
             let exact = (sum as i128 + (1 << 30)) >> 31;
             prop_assert_eq!(narrow(sum) as i128, exact.clamp(i32::MIN as i128, i32::MAX as i128));
@@ -128,6 +269,19 @@ mod tests {
             let word = pkhtb(first, second);
             prop_assert_eq!(word as i16 as i32, first >> 16);
             prop_assert_eq!((word as i32) >> 16, second >> 16);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn one_product_is_narrowed_as_a_sum_is(
+            a in prop_oneof![any::<i32>(), Just(i32::MIN), Just(i32::MAX)],
+            b in prop_oneof![any::<i32>(), Just(i32::MIN), Just(i32::MAX), -3..3i32],
+            accumulator: i64,
+        ) {
+            prop_assert_eq!(narrow_product(a, b), narrow(a as i64 * b as i64));
+            prop_assert_eq!(smlal(accumulator, a, b), accumulator.wrapping_add(smull(a, b)));
+            prop_assert_eq!(smull(a, b), a as i64 * b as i64);
         }
     }
 

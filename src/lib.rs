@@ -17,3 +17,4 @@ pub mod parameters;
 pub mod quantity;
 pub mod reset_record;
 pub mod sensors;
+pub mod sine;

@@ -2,9 +2,11 @@
 //!
 //! The proof walks the machine code from the entries of the control interrupt and of the PWM timer's: every branch and call of
 //! every function that can be reached, through the linker's veneers. A jump that only the running program knows is refused. So
-//! is a constant that is an address in the program's flash, but for the one that is known: the table of sines in `idsp`.
+//! is a constant that is an address in the program's flash, from a literal pool or put together by instructions: data there would make the
+//! interrupt wait while the flash erases. An address that is computed otherwise is not found out.
 //! Needs the target; where it is missing the tests are reported as ignored, by name; with `CI` set they run and fail.
 
+#[allow(dead_code, reason = "each test uses its part")]
 mod thumb;
 
 use libtest_mimic::{Arguments, Failed, Trial};
@@ -17,8 +19,6 @@ const BOARDS: [(&str, [&str; 2]); 2] =
     [("b-g431b-esc1", ["ADC1_2", "TIM1_UP_TIM16"]), ("moteus-r4", ["ADC1_2", "TIM2"])];
 /// Flash of the larger chip; the smaller one's begins at the same address.
 const FLASH: std::ops::Range<u32> = 0x0800_0000..0x0808_0000;
-/// The function whose table is the compiler's to place, 512 B beside other constants of its crate.
-const READS_FLASH: &str = "idsp6cossin";
 
 fn main() {
     let arguments = Arguments::from_args();
@@ -44,7 +44,10 @@ fn target_installed() -> bool {
 fn build(board: &str) -> Result<PathBuf, Failed> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let target = Path::new(env!("CARGO_TARGET_TMPDIR")).join("boards").join(board);
+    let own = format!(".cargo/{board}.toml");
+    let own = root.join(&own).exists().then_some(["--config".to_owned(), own]);
     let output = Command::new(env!("CARGO"))
+        .args(own.into_iter().flatten())
         .args(["build", "--release", "-p", "joint-firmware", "--target", TARGET])
         .args(["--no-default-features", "--features", board])
         .current_dir(root)
@@ -71,8 +74,7 @@ fn faults(path: &Path, entry: &str) -> Result<Vec<String>, Failed> {
             faults.push(format!("{name} lies in flash, at {address:#010x}"));
         }
     }
-    let constants =
-        reached.constants.into_iter().filter(|(word, name)| FLASH.contains(word) && !name.contains(READS_FLASH));
+    let constants = reached.constants.into_iter().filter(|(word, _)| FLASH.contains(word));
     faults.extend(constants.map(|(word, name)| format!("{name} may read flash, at {word:#010x}")));
     Ok(faults)
 }

@@ -79,9 +79,10 @@ fn build_probe() -> Result<PathBuf, Failed> {
     }
     let images = target.join("images.bin");
     std::fs::write(&images, bytes)?;
-    let flags = format!("-C linker=rust-lld -C link-arg=-T{} -C link-arg=--nmagic", folder.join("link.x").display());
+    let flags = "-C linker=rust-lld -C link-arg=--nmagic -C target-cpu=cortex-m4";
+    let flags = format!("{flags} -C link-arg=-T{}", folder.join("link.x").display());
     let output = Command::new(env!("CARGO"))
-        .args(["build", "--release", "--target", TARGET])
+        .args(["build", "--release", "--bin", "probe", "--target", TARGET])
         .current_dir(&folder)
         .env("CARGO_TARGET_DIR", &target)
         .env("PROBE_IMAGES", &images)

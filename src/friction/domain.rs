@@ -93,6 +93,14 @@ pub struct Weights {
     pub outside: Option<Signal>,
 }
 
+impl Weights {
+    /// Nothing fades. No constant: the compiler would read that from flash.
+    #[inline(always)]
+    fn full() -> Self {
+        Self { network: i32::MAX, physical: i32::MAX, outside: None }
+    }
+}
+
 /// A signal's distance from its range, measured in margins.
 #[derive(Clone, Copy, Debug)]
 struct Edge {
@@ -111,6 +119,12 @@ impl Edge {
         let shift = width.leading_zeros();
         let divisor = core::num::NonZeroU64::new((width as u64) << shift).unwrap_or(core::num::NonZeroU64::MIN);
         Self { range, margin: width, shift, per_step: ((1u64 << 63) / divisor).min(u32::MAX as u64) as u32 }
+    }
+
+    /// Whether `value` lies within the range: one comparison, because what is below wraps.
+    #[inline(always)]
+    fn holds(&self, value: i32) -> bool {
+        value.wrapping_sub(self.range.low) as u32 <= self.range.high.wrapping_sub(self.range.low) as u32
     }
 
     /// Parts of the first and of the second margin that `value` has crossed, Q31.
@@ -145,12 +159,24 @@ impl Fade {
 
     /// The weights in a state.
     #[inline]
-    #[expect(clippy::needless_range_loop, reason = "optimised for size, `zip` copies and calls")]
     pub fn weights(&self, signals: &[i32; SIGNALS]) -> Weights {
-        let mut weights = Weights { network: i32::MAX, physical: i32::MAX, outside: None };
+        let [a, b, c, d, e, f] = *signals;
+        let [ea, eb, ec, ed, ee, ef] = &self.edges;
+        let edges = [(ea, a), (eb, b), (ec, c), (ed, d), (ee, e), (ef, f)];
+        // Within the ranges, where signals are as a rule, nothing fades.
+        match edges.into_iter().all(|(edge, signal)| edge.holds(signal)) {
+            true => Weights::full(),
+            false => self.faded(signals),
+        }
+    }
+
+    /// The weights in a state in which at least one signal has left its range.
+    #[inline(never)]
+    #[expect(clippy::needless_range_loop, reason = "optimised for size, `zip` copies and calls")]
+    fn faded(&self, signals: &[i32; SIGNALS]) -> Weights {
+        let mut weights = Weights::full();
         for i in 0..SIGNALS {
-            // Within the range, where signals are as a rule, nothing fades.
-            if self.edges[i].range.nearest(signals[i]) == signals[i] {
+            if self.edges[i].holds(signals[i]) {
                 continue;
             }
             let (first, second) = self.edges[i].crossed(signals[i]);
@@ -200,6 +226,15 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn a_range_holds_what_is_nearest_to_itself(a: i32, b: i32, value: i32, near in -2..2i32) {
+            let range = Range { low: a.min(b), high: a.max(b) };
+            let edge = Edge::new(range, 1 << 16);
+            for value in [value, range.low.saturating_add(near), range.high.saturating_add(near), i32::MIN, i32::MAX] {
+                prop_assert_eq!(edge.holds(value), range.nearest(value) == value);
+            }
+        }
+
         #[test]
         fn a_fade_has_no_step_greater_than_its_slope(half_width in 1..i32::MAX, margin in 1u32..=2 << 16, part in 0.0f64..2.0) {
             let edge = Edge::new(Range { low: -half_width, high: half_width }, margin);

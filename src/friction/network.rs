@@ -9,7 +9,7 @@
 
 use super::domain::{Domain, Range};
 use super::smooth::tanh;
-use crate::dsp::{pkhtb, saturate, smlad, smmla, smmul};
+use crate::dsp::{asr, pkhtb, saturate, smlad, smmla, smmul, smuad};
 use crate::quantity::Torque;
 
 /// Inputs of the network: the first five [`Signal`](super::state::Signal)s.
@@ -48,7 +48,8 @@ pub struct NetworkParameters {
 pub struct InputScale {
     range: Range,
     centre: i32,
-    shift: u32,
+    /// A power of two.
+    factor: i32,
     gain: i32,
 }
 
@@ -57,13 +58,14 @@ impl InputScale {
     pub fn new(range: Range) -> Self {
         let half_width = range.half_width();
         let Some(divisor) = core::num::NonZeroU64::new(half_width as u64) else {
-            return Self { range, centre: range.centre(), shift: 0, gain: 0 };
+            return Self { range, centre: range.centre(), factor: 1, gain: 0 };
         };
         // The centred value is first shifted left until the half width lies in [2^30, 2^31], then multiplied by a gain in
         // (2^29, 2^31): the high word of the product is below 2^29, so that a last shift by two gives Q31.
         let shift = half_width.leading_zeros().saturating_sub(1);
         let gain = (((1u64 << 61) - (1 << 33)) / divisor) >> shift;
-        Self { range, centre: range.centre(), shift, gain: gain.min(i32::MAX as u64) as i32 }
+        let gain = gain.min(i32::MAX as u64) as i32;
+        Self { range, centre: range.centre(), factor: 1i32.wrapping_shl(shift), gain }
     }
 
     /// The scaled inputs that the range can give, Q31: lowest and highest.
@@ -75,7 +77,7 @@ impl InputScale {
     #[inline(always)]
     pub fn apply(&self, value: i32) -> i32 {
         let centred = self.range.nearest(value).wrapping_sub(self.centre);
-        smmul(centred.wrapping_shl(self.shift), self.gain) << 2
+        smmul(centred.wrapping_mul(self.factor), self.gain) << 2
     }
 }
 
@@ -94,44 +96,48 @@ pub struct Network {
 #[derive(Clone, Copy, Debug)]
 pub struct Layers {
     first: [[i32; INPUTS + 1]; NEURONS],
-    hidden: [[PackedNeuron; NEURONS]; 2],
+    hidden: [PackedLayer; 2],
     output: PackedNeuron,
+    output_shift: u8,
     scale: i32,
 }
 
+/// Five neurons, and how far each one's sum is shifted.
 #[derive(Clone, Copy, Debug)]
-struct PackedNeuron {
-    weights: [u32; 3],
-    shift: u32,
+struct PackedLayer {
+    neurons: [PackedNeuron; NEURONS],
+    shifts: [u8; NEURONS],
 }
 
-impl PackedNeuron {
-    fn new(neuron: &Neuron) -> Self {
-        let [a, b, c, d, e, bias] = neuron.weights;
-        let pack = |low: i16, high: i16| low as u16 as u32 | (high as u16 as u32) << 16;
-        let shift = neuron.fraction.saturating_sub(MIN_FRACTION) as u32;
-        Self { weights: [pack(a, b), pack(c, d), pack(e, bias)], shift }
-    }
+/// Weights of a neuron in pairs, the bias last.
+type PackedNeuron = [u32; 3];
 
-    /// The neuron's sum in Q25.
-    #[inline(always)]
-    fn sum(&self, activations: [u32; 3]) -> i32 {
-        let sum = smlad(self.weights[0], activations[0], 0);
-        let sum = smlad(self.weights[1], activations[1], sum);
-        smlad(self.weights[2], activations[2], sum).wrapping_shr(self.shift)
-    }
+fn packed(neuron: &Neuron) -> PackedNeuron {
+    let [a, b, c, d, e, bias] = neuron.weights;
+    let pack = |low: i16, high: i16| low as u16 as u32 | (high as u16 as u32) << 16;
+    [pack(a, b), pack(c, d), pack(e, bias)]
+}
+
+/// Distance by which a neuron's sum is shifted to Q25.
+fn shift(neuron: &Neuron) -> u8 {
+    neuron.fraction.saturating_sub(MIN_FRACTION)
+}
+
+/// A neuron's sum in Q25.
+#[inline(always)]
+fn sum(neuron: &PackedNeuron, shift: u8, activations: [u32; 3]) -> i32 {
+    let [first, second, third] = *neuron;
+    asr(smlad(third, activations[2], smlad(second, activations[1], smuad(first, activations[0]))), shift)
 }
 
 /// The input that multiplies a bias: the largest value of Q15, in the upper half of the third pair.
 const ONE: i32 = 0x7fff_0000;
 
 #[inline(always)]
-fn activate(mut sums: [i32; NEURONS]) -> [u32; 3] {
-    for sum in &mut sums {
-        *sum = tanh(*sum);
-    }
+fn activate(sums: [i32; NEURONS]) -> [u32; 3] {
     let [a, b, c, d, e] = sums;
-    [pkhtb(a, b), pkhtb(c, d), pkhtb(e, ONE)]
+    // In this order only one value at a time waits for its partner.
+    [pkhtb(tanh(a), tanh(b)), pkhtb(tanh(c), tanh(d)), pkhtb(tanh(e), ONE)]
 }
 
 impl Inputs {
@@ -172,29 +178,33 @@ impl Layers {
     pub fn new(parameters: &NetworkParameters) -> Self {
         Self {
             first: parameters.first,
-            hidden: parameters.hidden.map(|layer| layer.map(|neuron| PackedNeuron::new(&neuron))),
-            output: PackedNeuron::new(&parameters.output),
+            hidden: parameters.hidden.map(|layer| PackedLayer {
+                neurons: layer.each_ref().map(packed),
+                shifts: layer.each_ref().map(shift),
+            }),
+            output: packed(&parameters.output),
+            output_shift: shift(&parameters.output),
             scale: parameters.scale,
         }
     }
 
     /// The network's torque for inputs [scaled](Inputs::apply).
+    ///
+    /// Written out neuron by neuron: optimised for size, the compiler keeps a loop, and with it every sum in memory.
     #[inline]
-    #[expect(clippy::needless_range_loop, reason = "optimised for size, `zip` and `map` copy and call")]
     pub fn evaluate(&self, x: &[i32; INPUTS]) -> Torque {
-        let mut sums = [0; NEURONS];
-        for i in 0..NEURONS {
-            let [w0, w1, w2, w3, w4, bias] = self.first[i];
-            sums[i] = smmla(w4, x[4], smmla(w3, x[3], smmla(w2, x[2], smmla(w1, x[1], smmla(w0, x[0], bias)))));
+        let neuron = |weights: &[i32; INPUTS + 1]| {
+            let [w0, w1, w2, w3, w4, bias] = *weights;
+            smmla(w4, x[4], smmla(w3, x[3], smmla(w2, x[2], smmla(w1, x[1], smmla(w0, x[0], bias)))))
+        };
+        let [a, b, c, d, e] = &self.first;
+        let mut activations = activate([neuron(a), neuron(b), neuron(c), neuron(d), neuron(e)]);
+        for PackedLayer { neurons: [a, b, c, d, e], shifts } in &self.hidden {
+            let [sa, sb, sc, sd, se] = *shifts;
+            let neuron = |weights: &PackedNeuron, shift: u8| sum(weights, shift, activations);
+            activations = activate([neuron(a, sa), neuron(b, sb), neuron(c, sc), neuron(d, sd), neuron(e, se)]);
         }
-        let mut activations = activate(sums);
-        for layer in &self.hidden {
-            for i in 0..NEURONS {
-                sums[i] = layer[i].sum(activations);
-            }
-            activations = activate(sums);
-        }
-        Torque::from_bits(to_torque(self.output.sum(activations), self.scale))
+        Torque::from_bits(to_torque(sum(&self.output, self.output_shift, activations), self.scale))
     }
 }
 

@@ -19,9 +19,9 @@
 //! wraps, an image is used only after its certificate has proved that it fits.
 
 use super::domain::{Domain, Range};
-use super::smooth::{atan, odd_sines, stribeck, tanh};
+use super::smooth::{atan, odd_sines, stribeck_of_product, tanh_of_product};
 use super::state::{SIGNALS, Signal};
-use crate::dsp::{narrow, saturate};
+use crate::dsp::{narrow, narrow_product, saturate, smlal, smull};
 use crate::quantity::Torque;
 
 /// Number of position harmonics.
@@ -228,7 +228,8 @@ impl Directional {
 #[derive(Clone, Copy, Debug)]
 pub struct Scaling {
     pub(crate) ranges: [Range; SIGNALS],
-    shifts: [u32; SIGNALS],
+    /// Powers of two.
+    factors: [i32; SIGNALS],
     reference_temperature: i32,
 }
 
@@ -288,33 +289,43 @@ impl Sum {
     /// Adds a coefficient (Q16.16) times a signal (Q31).
     #[inline(always)]
     fn add(&mut self, coefficient: i32, signal: i32) {
-        self.0 = self.0.wrapping_add(coefficient as i64 * signal as i64);
+        self.0 = smlal(self.0, coefficient, signal);
     }
 }
 
 /// Coefficient (Q16.16) times factor (Q16.16), rounded.
 #[inline(always)]
 pub(crate) fn times(coefficient: i32, factor: i32) -> i32 {
-    saturate((coefficient as i64 * factor as i64 + (1 << 15)) >> 16)
+    saturate(smlal(1 << 15, coefficient, factor) >> 16)
 }
 
 impl Scaling {
     /// Prepares the scaling of `domain`.
     pub fn new(domain: &Domain) -> Self {
-        Self { ranges: domain.widened(), shifts: domain.shifts(), reference_temperature: domain.reference_temperature }
+        Self {
+            ranges: domain.widened(),
+            factors: domain.shifts().map(|shift| 1i32.wrapping_shl(shift)),
+            reference_temperature: domain.reference_temperature,
+        }
     }
 
     /// The signals clamped to the widened box and scaled to Q31 of full scale; temperature as difference from the reference.
     #[inline(always)]
     pub fn apply(&self, signals: &[i32; SIGNALS]) -> [i32; SIGNALS] {
-        let mut scaled = [0; SIGNALS];
-        for i in 0..SIGNALS {
-            let range = self.ranges[i];
-            let clamped = range.nearest(signals[i]);
-            let origin = if i == Signal::Temperature as usize { self.reference_temperature } else { 0 };
-            scaled[i] = clamped.saturating_sub(origin).wrapping_shl(self.shifts[i]);
-        }
-        scaled
+        // Written out: optimised for size, the compiler keeps a loop, and with it every signal in memory.
+        let [q, v, load, measured, temperature, a] = *signals;
+        let clamped = |signal: Signal, value: i32| self.ranges[signal as usize].nearest(value);
+        let scaled = |signal: Signal, value: i32| value.wrapping_mul(self.factors[signal as usize]);
+        let plain = |signal: Signal, value: i32| scaled(signal, clamped(signal, value));
+        let th = clamped(Signal::Temperature, temperature).saturating_sub(self.reference_temperature);
+        [
+            plain(Signal::Position, q),
+            plain(Signal::Velocity, v),
+            plain(Signal::TheoreticalTorque, load),
+            plain(Signal::MeasuredTorque, measured),
+            scaled(Signal::Temperature, th),
+            plain(Signal::Acceleration, a),
+        ]
     }
 }
 
@@ -403,20 +414,19 @@ impl PreparedTerms {
         sum.add(c.load, load);
         sum.add(c.rotor_inertia, a);
 
-        let viscous_factor = ONE.saturating_add(narrow(c.viscous_temperature as i64 * th as i64));
+        let viscous_factor = ONE.saturating_add(narrow_product(c.viscous_temperature, th));
         sum.add(times(c.viscous, viscous_factor), v);
         // Only quadratic friction needs v |v|: the high word of their product in Q30, shifted to Q31.
-        sum.add(c.quadratic, saturate((v as i64 * speed as i64) >> 31));
+        sum.add(c.quadratic, saturate(smull(v, speed) >> 31));
 
-        let direction = tanh(saturate((c.coulomb_slope as i64 * v as i64) >> 22));
+        let direction = tanh_of_product(smull(c.coulomb_slope, v));
         let coulomb_factor = ONE
-            .saturating_add(narrow(c.coulomb_temperature as i64 * th as i64))
-            .saturating_add(narrow(c.coulomb_load as i64 * load.saturating_abs() as i64));
+            .saturating_add(narrow_product(c.coulomb_temperature, th))
+            .saturating_add(narrow_product(c.coulomb_load, load.saturating_abs()));
         sum.add(times(self.coulomb.at(v), coulomb_factor), direction);
 
         if self.terms.contains(Terms::STRIBECK) {
-            let u = saturate((c.stribeck_slope as i64 * v as i64) >> 21);
-            sum.add(self.stribeck.at(v), stribeck(u));
+            sum.add(self.stribeck.at(v), stribeck_of_product(smull(c.stribeck_slope, v)));
         }
         if self.terms.contains(Terms::HYSTERESIS) {
             sum.add(self.hysteresis, atan(self.hysteresis_argument(v, a)));
@@ -431,23 +441,22 @@ impl PreparedTerms {
     #[inline(always)]
     pub(crate) fn hysteresis_argument(&self, v: i32, a: i32) -> i32 {
         let c = &self.coefficients;
-        let sign = saturate((c.hysteresis_acceleration_slope as i64 * a as i64) >> 16);
-        let velocity = narrow(c.hysteresis_velocity_slope as i64 * v as i64);
-        velocity.saturating_add(narrow(c.hysteresis_width as i64 * sign as i64))
+        let sign = saturate(smull(c.hysteresis_acceleration_slope, a) >> 16);
+        let velocity = narrow_product(c.hysteresis_velocity_slope, v);
+        velocity.saturating_add(narrow_product(c.hysteresis_width, sign))
     }
 
-    /// The sum of the harmonics, Q16.16.
-    #[inline(always)]
-    #[expect(clippy::needless_range_loop, reason = "optimised for size, `zip` copies and calls")]
+    /// The sum of the harmonics, Q16.16. A function of its own, because not every model has them, and the control interrupt's code is short of
+    /// room.
+    #[inline(never)]
     fn harmonic_amplitude(&self, q: i32, direction: i32) -> i32 {
-        let phase = ((self.harmonic_turns as i64 * q as i64) >> 15) as u32;
-        let sines = odd_sines(phase);
-        let (mut mean, mut difference) = (0i64, 0i64);
-        for j in 0..HARMONICS {
-            mean = mean.wrapping_add(self.harmonic_mean[j] as i64 * sines[j] as i64);
-            difference = difference.wrapping_add(self.harmonic_difference[j] as i64 * sines[j] as i64);
-        }
+        let phase = (smull(self.harmonic_turns, q) >> 15) as u32;
+        let [s1, s3, s5, s7, s9] = odd_sines(phase);
+        let sum = |[b1, b3, b5, b7, b9]: [i32; HARMONICS]| {
+            smlal(smlal(smlal(smlal(smull(b1, s1), b3, s3), b5, s5), b7, s7), b9, s9)
+        };
         let round = |sum: i64| saturate((sum >> 30).wrapping_add((sum >> 29) & 1));
-        round(mean).saturating_add(narrow(round(difference) as i64 * direction as i64))
+        let difference = round(sum(self.harmonic_difference));
+        round(sum(self.harmonic_mean)).saturating_add(narrow_product(difference, direction))
     }
 }

@@ -73,20 +73,14 @@ impl Selector {
     /// Index of the set for this state; between the thresholds of a criterion, as in `previous`.
     #[inline]
     pub fn select(&self, state: &JointState, previous: usize) -> usize {
-        let mut index = 0;
-        for (bit, criterion) in self.criteria.iter().enumerate() {
-            let Some(criterion) = criterion else { break };
+        let upper = |criterion: &Criterion, before: bool| {
             let measure = criterion.measure.of(state);
-            let upper = if measure >= criterion.enter {
-                true
-            } else if measure <= criterion.leave {
-                false
-            } else {
-                previous >> bit & 1 == 1
-            };
-            index |= (upper as usize) << bit;
-        }
-        index
+            measure >= criterion.enter || measure > criterion.leave && before
+        };
+        let [Some(first), second] = &self.criteria else { return 0 };
+        let first = upper(first, previous & 1 != 0) as usize;
+        let Some(second) = second else { return first };
+        first | (upper(second, previous & 2 != 0) as usize) << 1
     }
 }
 
@@ -127,14 +121,16 @@ impl Memory {
 }
 
 /// `weight` (Q31) of the old, the rest of the new; never outside the two.
-#[inline(always)]
+#[inline(never)]
 fn blend(old: Torque, new: Torque, weight: i32) -> Torque {
+    let (old, new) = (old.to_bits(), new.to_bits());
     // Halves, because the difference of two torques takes 33 bits. A weight of zero must give the new value exactly.
-    let half = (old.to_bits() >> 1).wrapping_sub(new.to_bits() >> 1);
-    let part = (smmul(half, weight) as i64) << 2;
-    let blended = new.to_bits() as i64 + part;
-    let (low, high) = if old < new { (old, new) } else { (new, old) };
-    Torque::from_bits(blended.max(low.to_bits() as i64).min(high.to_bits() as i64) as i32)
+    let part = smmul((old >> 1).wrapping_sub(new >> 1), weight);
+    // A quarter of the way from the new towards the old, which has that direction's sign or is zero: at most 2^30.
+    let quarter = part.unsigned_abs();
+    let whole = old.abs_diff(new);
+    let way = if quarter >> 30 != 0 { whole } else { (quarter << 2).min(whole) };
+    Torque::from_bits(if old < new { new.wrapping_sub_unsigned(way) } else { new.wrapping_add_unsigned(way) })
 }
 
 #[cfg(test)]
@@ -213,7 +209,26 @@ mod tests {
         assert_eq!(last, 10_000);
     }
 
+    /// What [`blend`] does, in 64 bits.
+    fn wide_blend(old: i64, new: i64, weight: i64) -> i64 {
+        let half = (old >> 1) - (new >> 1);
+        (new + ((half * weight) >> 32) * 4).max(old.min(new)).min(old.max(new))
+    }
+
     proptest! {
+        #[test]
+        fn a_blend_is_that_of_wider_numbers(
+            old in prop_oneof![any::<i32>(), Just(i32::MIN), Just(i32::MAX)],
+            new in prop_oneof![any::<i32>(), Just(i32::MIN), Just(i32::MAX)],
+            near in -5..5i32,
+            weight in prop_oneof![0..=i32::MAX, Just(i32::MAX)],
+        ) {
+            for new in [new, old.wrapping_add(near)] {
+                let blended = blend(Torque::from_bits(old), Torque::from_bits(new), weight).to_bits();
+                prop_assert_eq!(blended as i64, wide_blend(old as i64, new as i64, weight as i64));
+            }
+        }
+
         #[test]
         fn a_blend_lies_between_its_ends(old: i32, new: i32, weight in 0..=i32::MAX) {
             let blended = blend(Torque::from_bits(old), Torque::from_bits(new), weight).to_bits();

@@ -8,7 +8,10 @@
 //! All of them are odd, so half a table is enough: 256 words. Only tanh, which a network looks up 15 times in a step, has all its 512 words:
 //! the sign takes six instructions.
 
-use crate::dsp::{HALF_TABLE_LEN, TABLE_LEN, interpolate, interpolate_odd, smmul};
+use crate::dsp::{
+    HALF_TABLE_LEN, TABLE_LEN, interpolate, interpolate_odd, interpolate_odd_product, interpolate_product, smmul,
+};
+use crate::sine::cos_sin;
 
 /// Words cover [-8, 8): a step of 1/32. Argument of [`tanh`] in Q25.
 pub static TANH: [i32; TABLE_LEN] = table(Shape::Tanh, -256, 1.0 / 32.0);
@@ -23,11 +26,23 @@ pub fn tanh(x: i32) -> i32 {
     interpolate(&TANH, x)
 }
 
+/// [`tanh`] of a product, Q47: the same bits as for the product cut to Q25 and held in 32 bits.
+#[inline(always)]
+pub fn tanh_of_product(x: i64) -> i32 {
+    interpolate_product::<22>(&TANH, x)
+}
+
 /// Stribeck bump sqrt(2e) u exp(-u^2) (001 eq. 6), +-1 at u = +-1/sqrt 2: argument in Q26 (zero beyond +-4), result in
 /// Q31. Error: 1e-4 maximum.
 #[inline(always)]
 pub fn stribeck(u: i32) -> i32 {
     interpolate_odd(&STRIBECK, u)
+}
+
+/// [`stribeck`] of a product, Q47: the same bits as for the product cut to Q26 and held in 32 bits.
+#[inline(always)]
+pub fn stribeck_of_product(u: i64) -> i32 {
+    interpolate_odd_product::<21>(&STRIBECK, u)
 }
 
 /// Slope of the bump's table over step `step` (of 1/64; -256 to 255, held there), Q13: for the certificate.
@@ -60,21 +75,18 @@ fn atan_up_to_one(x: u32) -> i32 {
 /// The sines of the first five odd multiples of a phase, Q30. Phase: 2^32 is a turn. Error of the sine of n x: 1e-5 (n^2 + 1)
 /// maximum (8e-4 for n = 9, of which the model's factor 4 / (pi n) leaves 1.2e-4 of the amplitude).
 ///
-/// One sine and one cosine from `idsp`, then sin((n+2) x) = 2 cos(2x) sin(n x) - sin((n-2) x): a fifth of five calls.
+/// One sine and one cosine, then sin((n+2) x) = 2 cos(2x) sin(n x) - sin((n-2) x): a fifth of five calls.
 #[inline(always)]
 pub fn odd_sines(phase: u32) -> [i32; 5] {
-    let (_, sine) = idsp::cossin(phase as i32);
-    let (twice, _) = idsp::cossin((phase as i32).wrapping_mul(2));
+    let (_, sine) = cos_sin(phase);
+    let (twice, _) = cos_sin(phase << 1);
+    // cos in Q31 times sine in Q30 leaves Q29 in the upper word; twice that, in Q30, is a shift by two.
+    let next = |now: i32, before: i32| (smmul(twice, now) << 2).wrapping_sub(before);
     let first = sine >> 1;
-    let mut sines = [first; 5];
-    let (mut before, mut now) = (first.wrapping_neg(), first);
-    for place in sines.iter_mut().skip(1) {
-        // cos in Q31 times sine in Q30 leaves Q29 in the upper word; twice that, in Q30, is a shift by two.
-        let next = (smmul(twice, now) << 2).wrapping_sub(before);
-        (before, now) = (now, next);
-        *place = next;
-    }
-    sines
+    let third = next(first, first.wrapping_neg());
+    let fifth = next(third, first);
+    let seventh = next(fifth, third);
+    [first, third, fifth, seventh, next(seventh, fifth)]
 }
 
 /// What a table holds. (A function pointer would say the same, but cannot be called at compile time.)
@@ -236,6 +248,16 @@ mod tests {
         let near = (-(5 << 26)..(5 << 26)).step_by(101);
         for u in far.chain(near).chain([i32::MIN, -1, 0, 1, i32::MAX]) {
             assert_eq!(stribeck(u), interpolate(&whole, u), "{u}");
+        }
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn a_product_is_looked_up_where_its_upper_bits_are(a: i32, b: i32, small in 0u32..32) {
+            use crate::dsp::saturate;
+            let product = (a >> small) as i64 * b as i64;
+            proptest::prop_assert_eq!(tanh_of_product(product), tanh(saturate(product >> 22)));
+            proptest::prop_assert_eq!(stribeck_of_product(product), stribeck(saturate(product >> 21)));
         }
     }
 

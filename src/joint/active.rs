@@ -3,6 +3,7 @@
 use super::configuration::{
     BridgeConfiguration, Configuration, ConfigurationError, GearConfiguration, Limits, VelocitySource,
 };
+use super::friction_feedforward::GuardGains;
 use crate::compensation::Settings;
 use crate::friction::FrictionModel;
 use crate::motor::angle::{Direction, EncoderAlignment, STEPS, TAU};
@@ -127,6 +128,8 @@ pub struct CompensationGains {
     pub standstill: f32,
     /// Control steps a second, Hz.
     pub rate: f32,
+    /// The energy guard, per control step.
+    pub guard: GuardGains,
 }
 
 /// Everything prepared that the control step reads. It is replaced as a whole between two steps.
@@ -266,6 +269,7 @@ impl Active {
                 inverse_standstill: 1.0 / compensation.standstill_velocity,
                 standstill: compensation.standstill_velocity,
                 rate,
+                guard: GuardGains::new(rate),
             },
             bridge: *bridge,
             friction: None,

@@ -26,6 +26,25 @@ const DERIVATIVE: f32 = 0.004;
 /// Growth of the speed over that time, as a fraction, from which the joint counts as speeding up.
 const GROWTH: f32 = 0.01;
 
+/// The energy guard's time constants as parts of a control step: what would be divisions in every step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GuardGains {
+    /// Part of a step's speed that goes into its mean.
+    mean: f32,
+    /// What is taken away in a step.
+    back_off: f32,
+    /// What comes back in a step.
+    recovery: f32,
+}
+
+impl GuardGains {
+    /// For a control loop of `rate` Hz.
+    pub(super) fn new(rate: f32) -> Self {
+        let per_step = 1.0 / rate;
+        Self { mean: within(per_step / MEMORY, 0.0, 1.0), back_off: per_step / BACK_OFF, recovery: per_step / RECOVERY }
+    }
+}
+
 /// What compensation did in a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Compensated {
@@ -128,14 +147,13 @@ impl FrictionFeedforward {
     fn guard(&mut self, active: &Active, motion: &JointMotion, commanded: f32) -> f32 {
         let gains = &active.compensation;
         let speed = if motion.velocity < 0.0 { -motion.velocity } else { motion.velocity };
-        let per_step = 1.0 / gains.rate;
         let growing = speed > (1.0 + GROWTH) * self.speed && speed > gains.standstill;
-        self.speed += within(per_step / MEMORY, 0.0, 1.0) * (or_zero(speed) - self.speed);
+        self.speed += gains.guard.mean * (or_zero(speed) - self.speed);
         let pushed = if motion.velocity < 0.0 { commanded < 0.0 } else { commanded > 0.0 };
         if growing && !pushed {
-            self.withheld += per_step / BACK_OFF;
+            self.withheld += gains.guard.back_off;
         } else if pushed {
-            self.withheld -= per_step / RECOVERY;
+            self.withheld -= gains.guard.recovery;
         }
         self.withheld = within(self.withheld, 0.0, 1.0);
         greater(1.0 - self.withheld, 0.0)

@@ -14,7 +14,7 @@ use super::active::{Active, VOLTAGE_FILTER};
 use super::fault::{Fault, Faults};
 use super::signals::Measurements;
 use crate::motor::field_oriented::FieldOrientedOutput;
-use crate::motor::number::{limited, or_zero};
+use crate::motor::number::{exceeds, limited, magnitude, or_zero};
 use crate::motor::observer::Observation;
 use crate::motor::phases::Phases;
 use crate::motor::transform::Dq;
@@ -103,18 +103,10 @@ pub struct Loop {
     pub speed: f32,
 }
 
-fn magnitude(value: f32) -> f32 {
-    if value < 0.0 { -value } else { value }
-}
-
 /// Whether a value lies within bounds. What is not a number does not.
+#[inline(always)]
 fn within(value: f32, low: f32, high: f32) -> bool {
     value >= low && value <= high
-}
-
-/// Whether a magnitude is beyond a limit. What is not a number is.
-fn beyond(value: f32, limit: f32) -> bool {
-    !within(value, -limit, limit)
 }
 
 /// One step of a first-order filter; what is not a number counts as zero.
@@ -143,17 +135,17 @@ impl Monitor {
         let limits = &active.limits;
         let mut faults = Faults::NONE;
         let Phases { a, b, c } = currents;
-        faults.set(Fault::OverCurrent, [a, b, c].iter().any(|current| beyond(*current, limits.over_current)));
-        let unbalanced = beyond(a + b + c, active.current_sum_limit);
+        faults.set(Fault::OverCurrent, [a, b, c].iter().any(|current| exceeds(*current, limits.over_current)));
+        let unbalanced = exceeds(a + b + c, active.current_sum_limit);
         faults.set(Fault::CurrentSensor, self.current_sum.step(unbalanced, CURRENT_SUM_STEPS));
 
         let (lowest, highest) = limits.bus_voltage;
-        faults.set(Fault::OverVoltage, !within(measured.bus_voltage, 0.0, highest));
+        faults.set(Fault::OverVoltage, exceeds(measured.bus_voltage, highest) || measured.bus_voltage < 0.0);
         faults.set(Fault::UnderVoltage, !within(measured.bus_voltage, lowest, f32::INFINITY));
 
         let lost = self.encoder.full;
         faults.set(Fault::EncoderLost, lost);
-        faults.set(Fault::EncoderJump, !lost && beyond(observation.innovation, active.jump_limit));
+        faults.set(Fault::EncoderJump, !lost && exceeds(observation.innovation, active.jump_limit));
 
         let implausible = |sensor: bool, value: f32| sensor && !within(value, SENSOR_RANGE.0, SENSOR_RANGE.1);
         let bridge = implausible(active.bridge.has_bridge_sensor, measured.bridge_temperature);
@@ -170,7 +162,7 @@ impl Monitor {
     pub fn motion(&mut self, active: &Active, motion: &JointMotion, stale_steps: u32, derating: f32) -> Faults {
         let limits = &active.limits;
         let mut faults = Faults::NONE;
-        faults.set(Fault::OverSpeed, beyond(motion.velocity, OVER_SPEED * limits.velocity));
+        faults.set(Fault::OverSpeed, exceeds(motion.velocity, OVER_SPEED * limits.velocity));
         let (low, high) = limits.position;
         let margin = limits.position_margin;
         faults.set(Fault::PositionLimit, !within(motion.position, low - margin, high + margin));
@@ -202,8 +194,8 @@ impl Monitor {
         // A wrong resistance shows along the current only: across it the bound is close.
         let turning = INDUCED_ERROR * (magnitude(memory.induced.d) + magnitude(memory.induced.q));
         let explained = |current: f32| turning + RESISTANCE_ERROR * resistance * magnitude(current);
-        let contradicts = beyond(left.d, active.implausible_voltage.d + explained(memory.current.d))
-            || beyond(left.q, active.implausible_voltage.q + explained(memory.current.q));
+        let contradicts = exceeds(left.d, active.implausible_voltage.d + explained(memory.current.d))
+            || exceeds(left.q, active.implausible_voltage.q + explained(memory.current.q));
         let found = memory.steps.step(contradicts, UNEXPLAINED_STEPS);
 
         let permitted = MISSED_LIMIT * active.current_limit + MISSED_REFERENCE * magnitude(reference.q);

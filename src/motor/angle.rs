@@ -3,10 +3,11 @@
 //! Angles are 32-bit fractions of a turn and wrap with the integers, so a multiple of the encoder's angle is exact however often
 //! it wraps.
 //!
-//! Sine and cosine come from `idsp::cossin`, in integers: the same bits everywhere. Its documentation states about 40 instructions
-//! of a Cortex-M for both, and an error of 9e-6 at most. The CORDIC unit of the STM32G4 takes no less: 103 cycles for the pair, with
+//! Sine and cosine come from [`crate::sine`], in integers: the same bits everywhere, within 9e-6, for about 40 instructions. The CORDIC unit of the STM32G4 takes no less: 103 cycles for the pair, with
 //! the accesses to it, have been reported from a G431. It would bring registers into this arithmetic, and the host would have to
 //! imitate it bit for bit; an encoder of 14 bits is 40 times coarser than the error of either.
+
+use crate::sine::cos_sin;
 
 /// Radians in a turn.
 pub const TAU: f32 = core::f32::consts::TAU;
@@ -30,12 +31,13 @@ pub struct ElectricalAngle(
 );
 
 impl ElectricalAngle {
-    /// Sine and cosine, each within 1e-5.
-    #[inline(always)]
+    /// Sine and cosine, each within 1e-5. A call on the board: twice in a step, inlined it would take 0.1 KiB more.
+    #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     pub fn sin_cos(self) -> SinCos {
         // The routine leaves a margin below 2^31: its amplitude, in its own tests, is 2^31 - 0.85 * 2^15.
         const TO_UNIT: f32 = 1.0 / (2_147_483_648.0 - 0.85 * 32_768.0);
-        let (cos, sin) = idsp::cossin(self.0 as i32);
+        let (cos, sin) = cos_sin(self.0);
         SinCos { sin: sin as f32 * TO_UNIT, cos: cos as f32 * TO_UNIT }
     }
 

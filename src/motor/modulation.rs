@@ -9,7 +9,7 @@
 //! part of the period times V_bus, a current into it gains as much. Compensation adds that back by the sign of the current; within a
 //! band around zero in proportion, because there the sign is noise.
 
-use super::number::{greater, lesser, limited, square_root, within};
+use super::number::{greater, lesser, limited, square_root};
 use super::phases::Phases;
 use super::setting::{SettingError, check};
 use super::transform::{AlphaBeta, Dq, FRAC_1_SQRT_3};
@@ -121,7 +121,12 @@ impl Modulator {
         let leg = |wanted: f32, current: f32| {
             let compensation = limited(current * self.dead_time_per_ampere, self.dead_time);
             let ideal = middle + wanted + compensation;
-            let duty = within(ideal, self.minimum_duty, self.maximum_duty);
+            // A number: everything in it is limited.
+            let duty = match () {
+                () if ideal > self.maximum_duty => self.maximum_duty,
+                () if ideal < self.minimum_duty => self.minimum_duty,
+                () => ideal,
+            };
             (duty, duty - compensation, duty != ideal)
         };
         let (a, b, c) = (leg(wanted.a, currents.a), leg(wanted.b, currents.b), leg(wanted.c, currents.c));

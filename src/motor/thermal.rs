@@ -13,7 +13,7 @@
 //! surroundings first of all, and the model gives what the sensor is too slow for. The hotter of the two counts. It never pulls them
 //! down: a sensor that sticks while the motor is cold looks just like good cooling, and would take the protection away.
 
-use super::number::{greater, or_zero, within};
+use super::number::{greater, lesser, or_zero, within};
 use super::setting::{SettingError, check};
 use super::transform::Dq;
 
@@ -38,7 +38,7 @@ impl MeanSquareCurrent {
     /// step.
     #[inline(always)]
     pub fn add(&mut self, current: Dq) {
-        self.sum += within(or_zero(current.norm_squared()), 0.0, 1e8);
+        self.sum += lesser(or_zero(current.norm_squared()), 1e8);
         self.count = self.count.saturating_add(1);
     }
 
