@@ -257,6 +257,7 @@ extern "C" fn ADC1_2() {
         WORDS.mean_square_wanted.store(false, Ordering::Relaxed);
         WORDS.mean_square_current.store(control.joint.take_mean_square_current(), Ordering::Release);
     }
+    control.sensors.complete();
     WORDS.switching.store(bridge.state == BridgeState::Switching, Ordering::Relaxed);
     // Only this handler writes the counters, so load and store need no read-modify-write.
     let count = |counter: &AtomicU32, yes: bool| {
