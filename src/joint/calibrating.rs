@@ -16,11 +16,15 @@ use crate::motor::transform::{AlphaBeta, Dq};
 #[derive(Clone, Debug, Default)]
 pub(super) struct Calibrating {
     sequence: Option<CalibrationSequence>,
+    runs: bool,
 }
+
+const OFF: (Bridge, Dq) = (Bridge::OFF, Dq { d: 0.0, q: 0.0 });
 
 impl Calibrating {
     pub fn begin(&mut self, state: State, settings: &CalibrationSettings) -> Result<(), SettingError> {
         self.sequence = Some(CalibrationSequence::new(settings)?);
+        self.runs = true;
         if !is_off(state) {
             self.abort();
         }
@@ -31,6 +35,12 @@ impl Calibrating {
         if let Some(sequence) = &mut self.sequence {
             sequence.abort();
         }
+        self.runs = false;
+    }
+
+    /// Whether it has not ended.
+    pub const fn runs(&self) -> bool {
+        self.runs
     }
 
     pub fn progress(&self) -> Option<Progress> {
@@ -38,21 +48,28 @@ impl Calibrating {
     }
 
     /// The bridge for the next period, and the current that flows, A: a vector that stands still, and heats like one that turns.
-    #[inline(never)]
+    #[inline(always)]
     pub fn step(&mut self, state: State, active: &Active, measured: &Measurements, currents: Phases) -> (Bridge, Dq) {
-        const OFF: (Bridge, Dq) = (Bridge::OFF, Dq { d: 0.0, q: 0.0 });
-        let Some(sequence) = &mut self.sequence else { return OFF };
+        if self.runs { self.run(state, active, measured, currents) } else { OFF }
+    }
+
+    /// A function of its own, which may lie where code waits for the flash: on a board that has only one bank, nothing is written there
+    /// while this runs.
+    #[inline(never)]
+    fn run(&mut self, state: State, active: &Active, measured: &Measurements, currents: Phases) -> (Bridge, Dq) {
         if !is_off(state) {
-            sequence.abort();
-            return OFF;
+            self.abort();
         }
+        let Some(sequence) = &mut self.sequence else { return OFF };
         let input = CalibrationInput {
             phase_currents: measured.phase_currents,
             encoder: measured.encoder,
             encoder_valid: measured.encoder_valid,
             bus_voltage: measured.bus_voltage,
         };
-        let Some(voltage) = sequence.step(&input).voltage else { return OFF };
+        let step = sequence.step(&input);
+        self.runs = !matches!(step.progress, Progress::Done(_) | Progress::Failed(_));
+        let Some(voltage) = step.voltage else { return OFF };
         let modulated = active.field_oriented.modulator.modulate(voltage, measured.bus_voltage, currents);
         let AlphaBeta { alpha, beta } = AlphaBeta::from_phases(currents);
         (Bridge { state: BridgeState::Switching, duties: modulated.duties }, Dq { d: alpha, q: beta })

@@ -278,6 +278,12 @@ impl Joint {
         self.calibrating.abort();
     }
 
+    /// Whether a calibration runs.
+    #[inline(always)]
+    pub fn is_calibrating(&self) -> bool {
+        self.calibrating.runs()
+    }
+
     /// Where the calibration is that runs or ran last.
     pub fn calibration(&self) -> Option<Progress> {
         self.calibrating.progress()
