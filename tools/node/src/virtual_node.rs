@@ -442,7 +442,12 @@ impl VirtualNode {
         // It was verified a moment ago.
         let image = &self.objects.staging()[..length];
         match mode {
-            Mode::Shadow => self.shadow = model(image, SHADOW_RATE).map(Shadow::new),
+            Mode::Shadow => {
+                self.shadow = model(image, SHADOW_RATE).map(Shadow::new);
+                // A trial may have been before: the stored model acts again.
+                let stored = self.objects.program().storage.images.model(self.rate);
+                self.joint.set_friction(stored);
+            }
             Mode::Trial => {
                 let model = model(image, self.rate);
                 self.shadow = None;
