@@ -1,7 +1,7 @@
 //! Closed intervals of 64-bit integers, rounded outwards; an end that leaves the type is unbounded and stays so.
 //!
 //! Operations are functions of their own and never inlined: a proof has some hundred of them, and 64 bits that saturate take up to fifty
-//! instructions on the board.
+//! instructions on the board. What its innermost loops do has a twin that is inlined there, `..._here`.
 
 /// All values from `low` to `high`; a `low` of `i64::MIN` and a `high` of `i64::MAX` mean that there is no bound on that side.
 ///
@@ -33,6 +33,11 @@ impl Interval {
 
     #[inline(never)]
     pub(super) fn add(self, other: Self) -> Self {
+        self.add_here(other)
+    }
+
+    #[inline(always)]
+    pub(super) fn add_here(self, other: Self) -> Self {
         let lowest = self.low.min(other.low);
         let highest = self.high.max(other.high);
         Self {
@@ -58,10 +63,12 @@ impl Interval {
     /// All products of a value of each.
     #[inline(never)]
     pub(super) fn times(self, other: Self) -> Self {
-        if self == Self::ZERO || other == Self::ZERO {
-            return Self::ZERO;
-        }
-        // Ends of 32 bits, by far the most: one instruction a product on the board, where a saturating one takes fifty.
+        self.times_here(other)
+    }
+
+    /// Ends of 32 bits, by far the most, take one instruction a product on the board, where a saturating one takes fifty.
+    #[inline(always)]
+    pub(super) fn times_here(self, other: Self) -> Self {
         if let (Some((low, high)), Some((other_low, other_high))) = (self.narrow(), other.narrow()) {
             return Self::hull(
                 low as i64 * other_low as i64,
@@ -69,6 +76,14 @@ impl Interval {
                 high as i64 * other_low as i64,
                 high as i64 * other_high as i64,
             );
+        }
+        self.times_saturating(other)
+    }
+
+    #[inline(never)]
+    fn times_saturating(self, other: Self) -> Self {
+        if self == Self::ZERO || other == Self::ZERO {
+            return Self::ZERO;
         }
         if !self.bounded() || !other.bounded() {
             return Self { low: i64::MIN, high: i64::MAX };
@@ -87,13 +102,13 @@ impl Interval {
         (low as i64 == self.low && high as i64 == self.high).then_some((low, high))
     }
 
-    #[inline(never)]
+    #[inline(always)]
     fn hull(a: i64, b: i64, c: i64, d: i64) -> Self {
         Self { low: a.min(b).min(c).min(d), high: a.max(b).max(c).max(d) }
     }
 
     /// All products with a share of one: an interval within 0 to 2^14.
-    #[inline(never)]
+    #[inline(always)]
     pub(super) fn times_share(self, share: Self) -> Self {
         const SMALL: i64 = 1 << 48;
         if self.low <= -SMALL || self.high >= SMALL {
@@ -114,6 +129,11 @@ impl Interval {
     /// Division by a power of two, rounded outwards.
     #[inline(never)]
     pub(super) fn shift_right(self, bits: u32) -> Self {
+        self.shift_right_here(bits)
+    }
+
+    #[inline(always)]
+    pub(super) fn shift_right_here(self, bits: u32) -> Self {
         let bits = bits.min(63);
         let quotient = self.high >> bits;
         let rounded_up = if quotient << bits == self.high { quotient } else { quotient + 1 };

@@ -108,7 +108,8 @@ fn first_sums(cell: &Cell, parameters: &NetworkParameters) -> [Interval; NEURONS
     parameters.first.map(|weights| {
         let mut sum = Interval::point(weights[INPUTS] as i64);
         for (weight, (low, high)) in weights.iter().zip(cell.inputs) {
-            sum = sum.add(Interval::between(smmul(*weight, low) as i64, smmul(*weight, high) as i64));
+            let (a, b) = (smmul(*weight, low) as i64, smmul(*weight, high) as i64);
+            sum = sum.add_here(Interval { low: a.min(b), high: a.max(b) });
         }
         sum
     })
@@ -119,7 +120,7 @@ fn first_sums(cell: &Cell, parameters: &NetworkParameters) -> [Interval; NEURONS
 fn raw_sum(neuron: &Neuron, activations: &[Interval; NEURONS]) -> Interval {
     let mut sum = Interval::point(neuron.weights[NEURONS] as i64 * ONE);
     for (weight, activation) in neuron.weights.iter().zip(activations) {
-        sum = sum.add(activation.scaled(*weight));
+        sum = sum.add_here(activation.scaled(*weight));
     }
     sum
 }
