@@ -80,9 +80,13 @@ impl Record {
 
     /// The place as text; empty where there is none, or where its beginning was cut inside a character.
     pub fn place(&self) -> &str {
+        core::str::from_utf8(self.place_bytes()).unwrap_or("")
+    }
+
+    /// The place as it is kept.
+    pub fn place_bytes(&self) -> &[u8] {
         let length = self.place.iter().position(|byte| *byte == 0).unwrap_or(PLACE);
-        let text = self.place.split_at_checked(length).map_or(&[] as &[u8], |(text, _)| text);
-        core::str::from_utf8(text).unwrap_or("")
+        self.place.get(..length).unwrap_or_default()
     }
 
     /// The record as words.

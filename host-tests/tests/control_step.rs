@@ -207,7 +207,8 @@ fn build(board: &Board, runs: &[u8]) -> Result<PathBuf, Failed> {
     std::fs::create_dir_all(&target)?;
     let file = target.join("runs.bin");
     std::fs::write(&file, runs)?;
-    let flags = "-C linker=rust-lld -C link-arg=--nmagic -C target-cpu=cortex-m4";
+    let flags =
+        "-C linker=rust-lld -C link-arg=--nmagic -C target-cpu=cortex-m4 -C linker-plugin-lto -C codegen-units=1";
     let flags = format!("{flags} -C opt-level={} -C link-arg=-T{}", board.level, folder.join("link.x").display());
     let output = Command::new(env!("CARGO"))
         .args(["build", "--profile", "board", "--bin", "step", "--target", TARGET])

@@ -118,6 +118,7 @@ pub struct Sensors {
 }
 
 /// Sets the peripherals up; everything but the PWM counter runs afterwards. The bridge stays off.
+#[inline(never)]
 pub fn start(p: Peripherals, encoder_counts: u16) -> Result<Parts, StartError> {
     let encoder = Incremental::new(encoder_counts).ok_or(StartError::EncoderCounts(encoder_counts))?;
     set_up_bridge(p.TIM1, (p.PA8, p.PC13), (p.PA9, p.PA12), (p.PA10, p.PB15));

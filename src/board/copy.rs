@@ -2,7 +2,8 @@
 //!
 //! The compiler calls these by their names of the ARM run-time ABI (RTABI, 4.3.4) wherever it moves a struct. The library's own
 //! are made for speed at any size and take 2.6 KiB, a quarter of the smaller chip's CCM SRAM; its symbols are weak, so these
-//! take their place in the whole program. Source and destination are aligned to words, as the 4 and 8 in the names promise.
+//! take their place in the whole program. Where the name has a 4 or an 8, source and destination are aligned to words, as it promises; the others,
+//! which move bytes of frames and images in tasks, go byte by byte.
 
 use core::arch::naked_asm;
 
@@ -106,4 +107,18 @@ unsafe extern "C" fn __aeabi_memclr4(to: *mut u8, bytes: usize) {
 #[unsafe(link_section = ".ccm.copy")]
 unsafe extern "C" fn __aeabi_memclr8(to: *mut u8, bytes: usize) {
     naked_asm!("b {clear}", clear = sym __aeabi_memclr4)
+}
+
+/// Bytes, forward.
+#[unsafe(no_mangle)]
+#[unsafe(naked)]
+unsafe extern "C" fn __aeabi_memcpy(to: *mut u8, from: *const u8, bytes: usize) {
+    naked_asm!("b 2f", "1:", "ldrb r3, [r1], #1", "strb r3, [r0], #1", "2:", "subs r2, #1", "bhs 1b", "bx lr",)
+}
+
+/// Zeros, byte by byte.
+#[unsafe(no_mangle)]
+#[unsafe(naked)]
+unsafe extern "C" fn __aeabi_memclr(to: *mut u8, bytes: usize) {
+    naked_asm!("movs r3, #0", "b 2f", "1:", "strb r3, [r0], #1", "2:", "subs r1, #1", "bhs 1b", "bx lr")
 }

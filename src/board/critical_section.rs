@@ -17,6 +17,8 @@ critical_section::set_impl!(BelowControl);
 // SAFETY: between acquire and release no interrupt runs that may enter a critical section: all but the control
 // interrupt and the PWM timer's have a priority below the mask from before they are enabled (`entry`), and these two enter none. One core.
 unsafe impl critical_section::Impl for BelowControl {
+    // Functions of their own: there are some fifty sections.
+    #[inline(never)]
     unsafe fn acquire() -> RawRestoreState {
         let before: u32;
         // SAFETY: reads and raises BASEPRI; without `nomem`, so no access moves out of the section.
@@ -26,6 +28,7 @@ unsafe impl critical_section::Impl for BelowControl {
         before != 0
     }
 
+    #[inline(never)]
     unsafe fn release(was_masked: RawRestoreState) {
         if !was_masked {
             // SAFETY: lowers BASEPRI to what it was before the outermost section.

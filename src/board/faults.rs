@@ -64,18 +64,19 @@ pub fn report() {
     );
     let Some(record) = Record::decode(&words()) else { return };
     let cause = match record.cause {
-        Cause::Panic => "panic",
-        Cause::HardFault => "hard fault",
-        Cause::NonMaskable => "non-maskable interrupt",
-        Cause::Unexpected => "interrupt without a handler",
+        Cause::Panic => defmt::intern!("panic"),
+        Cause::HardFault => defmt::intern!("hard fault"),
+        Cause::NonMaskable => defmt::intern!("non-maskable interrupt"),
+        Cause::Unexpected => defmt::intern!("interrupt without a handler"),
     };
     defmt::error!(
-        "stopped by {} at {:#010x}, detail {:#x} ({}) {}; {} in a row",
+        "stopped by {} at {:#010x}, detail {:#x} ({}) {=[u8]:a}; {} in a row",
         cause,
         record.address,
         record.detail,
         record.detail,
-        record.place(),
+        // As bytes: a check that they are a text would be half a KiB of flash.
+        record.place_bytes(),
         record.repeats
     );
 }

@@ -22,6 +22,8 @@ pub mod faults;
 pub mod flash;
 pub mod memory;
 pub mod pwm;
+#[cfg(feature = "bus")]
+pub mod shadow;
 mod shared;
 pub mod watchdog;
 

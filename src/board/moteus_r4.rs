@@ -114,6 +114,7 @@ pub struct Sensors {
 /// Sets the peripherals up; everything but the PWM counter runs afterwards. The bridge stays off.
 ///
 /// `_encoder_counts` is for boards with an incremental encoder.
+#[inline(never)]
 pub fn start(p: Peripherals, _encoder_counts: u16) -> Result<Parts, StartError> {
     core::mem::forget(Output::new(p.PB7, Level::Low, Speed::Medium));
     core::mem::forget(Output::new(p.PA3, Level::High, Speed::Low));

@@ -110,11 +110,21 @@ pub struct Prepared<'a, T: 'static> {
 }
 
 impl<T> Offering<T> {
-    /// Makes a value, which may look at the one in use; none, and nothing happens, while the one before has not been taken.
-    ///
-    /// A function of its own: the stack has to bear the value once, and only while it is made.
-    #[inline(never)]
-    pub fn prepare<E>(&mut self, make: impl FnOnce(Option<&T>) -> Result<T, E>) -> Option<Result<Prepared<'_, T>, E>> {
+    /// The place for the next value, which is of no use to anybody until one is prepared; none while the one before has not been taken.
+    #[cfg(feature = "bus")]
+    pub fn spare(&mut self) -> Option<&mut MaybeUninit<T>> {
+        let place = self.preparer.place()?;
+        // SAFETY: the place is the preparer's until it is offered, and it is one of the two.
+        Some(unsafe { &mut *self.places.get().cast::<MaybeUninit<T>>().add(place) })
+    }
+
+    /// Makes a value, and has it finished in its place, looking at the one in use; none, and nothing happens, while the one before has not been
+    /// taken.
+    pub fn prepare<E>(
+        &mut self,
+        make: impl FnOnce() -> Result<T, E>,
+        finish: impl FnOnce(&mut T, Option<&T>),
+    ) -> Option<Result<Prepared<'_, T>, E>> {
         let place = self.preparer.place()?;
         // SAFETY: the place in use was written before it was offered, its user only reads it, and it changes hands no earlier than
         // another value is offered, which needs the borrow that this one is part of.
@@ -124,11 +134,20 @@ impl<T> Offering<T> {
             .map(|place| unsafe { (*self.places.get().cast::<MaybeUninit<T>>().add(place)).assume_init_ref() });
         // SAFETY: the place is the preparer's until it is offered, which needs the borrow that this one becomes; it is one of the two.
         let place = unsafe { &mut *self.places.get().cast::<MaybeUninit<T>>().add(place) };
-        Some(match make(in_use) {
-            Ok(value) => Ok(Prepared { value: place.write(value), preparer: &mut self.preparer }),
+        Some(match make_in(place, make) {
+            Ok(value) => {
+                finish(value, in_use);
+                Ok(Prepared { value, preparer: &mut self.preparer })
+            }
             Err(error) => Err(error),
         })
     }
+}
+
+/// A function of its own: the stack has to bear the value once, and no longer than until it lies in its place.
+#[inline(never)]
+fn make_in<T, E>(place: &mut MaybeUninit<T>, make: impl FnOnce() -> Result<T, E>) -> Result<&mut T, E> {
+    make().map(|value| place.write(value))
 }
 
 impl<T> Prepared<'_, T> {

@@ -152,6 +152,10 @@ pub struct Fade {
 }
 
 impl Fade {
+    /// Not prepared yet.
+    pub(super) const NONE: Self =
+        Self { edges: [Edge { range: Range { low: 0, high: 0 }, margin: 0, shift: 0, per_step: 0 }; SIGNALS] };
+
     /// Prepares the fade of `domain`.
     pub fn new(domain: &Domain) -> Self {
         Self { edges: domain.ranges.map(|range| Edge::new(range, domain.margin)) }

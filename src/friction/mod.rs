@@ -15,7 +15,7 @@ use crate::quantity::Torque;
 use domain::{Domain, Fade};
 use network::{Inputs, Layers, NetworkParameters};
 use physical::{PhysicalParameters, PreparedTerms, Scaling};
-use regime::{MAX_SETS, Memory, Selector};
+use regime::{MAX_CRITERIA, MAX_SETS, Memory, Selector};
 use state::JointState;
 
 /// One regime's parameters: the physical model and, where one helps, a network for what it leaves.
@@ -67,24 +67,56 @@ pub struct FrictionModel {
 }
 
 impl FrictionModel {
+    /// Without any friction.
+    const NONE: Self = Self {
+        fade: Fade::NONE,
+        selector: Selector { criteria: [None; MAX_CRITERIA], fade_time: 0 },
+        scaling: Scaling::NONE,
+        inputs: Inputs::NONE,
+        sets: [(PreparedTerms::NONE, None); MAX_SETS],
+        fade_decrement: 0,
+    };
+
     /// Prepares `parameters` for a control loop of `rate` Hz (at least 1).
     pub fn new(parameters: &FrictionParameters, rate: u32) -> Self {
-        let domain = parameters.domain;
+        let mut model = Self::NONE;
+        model.begin(&parameters.domain, &parameters.selector, rate);
+        for (number, set) in parameters.sets.iter().enumerate() {
+            model.prepare_set(number, set);
+        }
+        model
+    }
+
+    /// A model in its place, whose sets are still to be [prepared](Self::prepare_set).
+    #[inline(never)]
+    pub(crate) fn place<'a>(
+        place: &'a mut Option<Self>,
+        domain: &Domain,
+        selector: &Selector,
+        rate: u32,
+    ) -> &'a mut Self {
+        let model = place.insert(Self::NONE);
+        model.begin(domain, selector, rate);
+        model
+    }
+
+    fn begin(&mut self, domain: &Domain, selector: &Selector, rate: u32) {
         // 2^31 / (time * rate), with the time in Q16.16.
-        let steps = (parameters.selector.fade_time as u64 * rate as u64) >> 16;
-        let fade_decrement = match core::num::NonZeroU64::new(steps) {
+        let steps = (selector.fade_time as u64 * rate as u64) >> 16;
+        self.fade_decrement = match core::num::NonZeroU64::new(steps) {
             Some(steps) => (i32::MAX as u64 / steps).max(1) as i32,
             None => i32::MAX,
         };
-        Self {
-            fade: Fade::new(&domain),
-            selector: parameters.selector,
-            scaling: Scaling::new(&domain),
-            inputs: Inputs::new(&domain),
-            sets: parameters
-                .sets
-                .map(|set| (PreparedTerms::new(&set.physical), set.network.map(|network| Layers::new(&network)))),
-            fade_decrement,
+        self.fade = Fade::new(domain);
+        self.selector = *selector;
+        self.scaling = Scaling::new(domain);
+        self.inputs = Inputs::new(domain);
+    }
+
+    /// Prepares set `number`; nothing beyond [`MAX_SETS`].
+    pub(crate) fn prepare_set(&mut self, number: usize, set: &ParameterSet) {
+        if let Some(place) = self.sets.get_mut(number) {
+            *place = prepared(set);
         }
     }
 
@@ -109,19 +141,35 @@ impl FrictionModel {
     /// Friction in this state by parameter set `set` (taken modulo [`MAX_SETS`]).
     #[inline]
     pub fn evaluate(&self, set: usize, state: &JointState) -> Estimate {
-        let signals = state.signals();
-        let (physical, network) = self.set(set);
-        Estimate {
-            physical: physical.evaluate(&self.scaling.apply(&signals)),
-            network: match network {
-                Some(network) => network.evaluate(&self.inputs.apply(&signals)),
-                None => Torque::ZERO,
-            },
-        }
+        evaluate(&self.scaling, &self.inputs, self.set(set), state)
     }
 
     #[inline(always)]
     fn set(&self, index: usize) -> &(PreparedTerms, Option<Layers>) {
         &self.sets[index % MAX_SETS]
+    }
+}
+
+/// A parameter set ready to be evaluated.
+#[inline(never)]
+pub(crate) fn prepared(set: &ParameterSet) -> (PreparedTerms, Option<Layers>) {
+    (PreparedTerms::new(&set.physical), set.network.as_ref().map(Layers::new))
+}
+
+/// Friction in a state by one prepared set. A function of its own: the control step, the shadow and the golden vectors share one.
+#[inline(never)]
+pub(crate) fn evaluate(
+    scaling: &Scaling,
+    inputs: &Inputs,
+    (physical, network): &(PreparedTerms, Option<Layers>),
+    state: &JointState,
+) -> Estimate {
+    let signals = state.signals();
+    Estimate {
+        physical: physical.evaluate(&scaling.apply(&signals)),
+        network: match network {
+            Some(network) => network.evaluate(&inputs.apply(&signals)),
+            None => Torque::ZERO,
+        },
     }
 }

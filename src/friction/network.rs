@@ -141,10 +141,19 @@ fn activate(sums: [i32; NEURONS]) -> [u32; 3] {
 }
 
 impl Inputs {
+    /// Not prepared yet.
+    pub(super) const NONE: Self =
+        Self([InputScale { range: Range { low: 0, high: 0 }, centre: 0, factor: 0, gain: 0 }; INPUTS]);
+
     /// Prepares the scales for `domain`.
     pub fn new(domain: &Domain) -> Self {
         let [q, v, theoretical, measured, temperature, _] = domain.ranges;
         Self([q, v, theoretical, measured, temperature].map(InputScale::new))
+    }
+
+    /// How each input is scaled.
+    pub(crate) const fn scales(&self) -> &[InputScale; INPUTS] {
+        &self.0
     }
 
     /// The scaled inputs, Q31. `signals` in Q16.16, in the order of [`Signal`](super::state::Signal); each is clamped to its trained
@@ -160,11 +169,6 @@ impl Network {
     /// Prepares a network for evaluation in `domain`.
     pub fn new(parameters: &NetworkParameters, domain: &Domain) -> Self {
         Self { inputs: Inputs::new(domain), layers: Layers::new(parameters) }
-    }
-
-    /// How each input is scaled.
-    pub(crate) const fn inputs(&self) -> &[InputScale; INPUTS] {
-        &self.inputs.0
     }
 
     /// The network's torque. `signals` in Q16.16, in the order of [`Signal`](super::state::Signal).

@@ -253,6 +253,26 @@ pub(crate) struct Factors {
     pub(crate) rotor_inertia: i32,
 }
 
+impl Factors {
+    const NONE: Self = Self {
+        constant: 0,
+        position: 0,
+        temperature: 0,
+        load: 0,
+        viscous: 0,
+        viscous_temperature: 0,
+        quadratic: 0,
+        coulomb_slope: 0,
+        coulomb_temperature: 0,
+        coulomb_load: 0,
+        stribeck_slope: 0,
+        hysteresis_velocity_slope: 0,
+        hysteresis_width: 0,
+        hysteresis_acceleration_slope: 0,
+        rotor_inertia: 0,
+    };
+}
+
 /// One parameter set ready to be evaluated: coefficients of absent terms are zero, products of constants are formed.
 #[derive(Clone, Copy, Debug)]
 pub struct PreparedTerms {
@@ -300,6 +320,10 @@ pub(crate) fn times(coefficient: i32, factor: i32) -> i32 {
 }
 
 impl Scaling {
+    /// Not prepared yet.
+    pub(super) const NONE: Self =
+        Self { ranges: [Range { low: 0, high: 0 }; SIGNALS], factors: [0; SIGNALS], reference_temperature: 0 };
+
     /// Prepares the scaling of `domain`.
     pub fn new(domain: &Domain) -> Self {
         Self {
@@ -342,6 +366,18 @@ impl Physical {
 }
 
 impl PreparedTerms {
+    /// Without any term.
+    pub(super) const NONE: Self = Self {
+        terms: Terms(0),
+        coefficients: Factors::NONE,
+        coulomb: Directional { positive: 0, negative: 0 },
+        stribeck: Directional { positive: 0, negative: 0 },
+        hysteresis: 0,
+        harmonic_turns: 0,
+        harmonic_mean: [0; HARMONICS],
+        harmonic_difference: [0; HARMONICS],
+    };
+
     /// Prepares a parameter set.
     pub fn new(parameters: &PhysicalParameters) -> Self {
         let c = parameters.coefficients;

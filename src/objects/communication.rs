@@ -1,6 +1,6 @@
 //! Communication parameters of the joint: which PDOs there are at first, and each parameter as a number at its index; the task.
 
-use crate::canopen::{CommunicationParameters, MappedObject, PdoParameters};
+use crate::canopen::{CommunicationParameters, MappedObject, PDOS, PdoParameters};
 
 const CONTROLWORD: MappedObject = MappedObject::new(0x6040, 0, 16);
 const STATUSWORD: MappedObject = MappedObject::new(0x6041, 0, 16);
@@ -35,6 +35,29 @@ pub fn default_communication(node_id: u8) -> CommunicationParameters {
         slow(cob_id(0x480), &[map(0x2213, 1, 32), map(0x2200, 2, 8), map(0x2212, 2, 8), map(0x2200, 6, 16)]),
     ];
     parameters
+}
+
+/// Hands over what is stored of the communication parameters, as numbers at their indices and sub-indices, in ascending order; none as soon as one is
+/// not taken.
+pub(super) fn store(
+    parameters: &CommunicationParameters,
+    mut item: impl FnMut(u16, u8, u32) -> Option<()>,
+) -> Option<()> {
+    const RECEIVE: u16 = 0x1400;
+    const INDICES: [(u16, u16); 7] =
+        [(0x1005, 1), (0x1014, 4), (0x1029, 1), (RECEIVE, 4), (0x1600, 4), (0x1800, 4), (0x1A00, 4)];
+    const _: () = assert!(PDOS == 4);
+    for (first, count) in INDICES {
+        for index in first..first + count {
+            // Sub-indices 0 to 8 are the most that any has. RPDOs have no inhibit time.
+            for sub_index in (0..=8).filter(|sub_index| first != RECEIVE || *sub_index != 3) {
+                if let Some(value) = get(parameters, index, sub_index) {
+                    item(index, sub_index, value)?;
+                }
+            }
+        }
+    }
+    Some(())
 }
 
 /// A parameter as it is kept.

@@ -13,7 +13,7 @@
 use super::communication;
 use super::field::{Field, RANGES, Range};
 use super::shared::DEFAULT_RANGES;
-use super::table::{COMMUNICATION, OBJECTS};
+use super::table::OBJECTS;
 use crate::canopen::{CommunicationParameters, NO_NODE_ID};
 use crate::joint::configuration::Configuration;
 
@@ -121,11 +121,7 @@ impl Stored {
             }
         }
         if let Some((_, parameters)) = &self.communication {
-            for object in &COMMUNICATION {
-                if let Some(value) = communication::get(parameters, object.index, object.sub_index) {
-                    writer.item(object.index, object.sub_index, value)?;
-                }
-            }
+            communication::store(parameters, |index, sub_index, value| writer.item(index, sub_index, value))?;
         }
         Some(writer.length)
     }

@@ -3,125 +3,175 @@
 use super::certificate::Limits;
 use super::image::{CRC_LENGTH, Effort, FORMAT, GoldenVector, Image, ImageError, MAGIC, MAX_GOLDEN, Target};
 use crate::friction::domain::{Domain, Range};
-use crate::friction::network::{INPUTS, MAX_FRACTION, MIN_FRACTION, NEURONS, NetworkParameters, Neuron};
+use crate::friction::network::{INPUTS, MAX_FRACTION, MIN_FRACTION, NEURONS, NetworkParameters};
 use crate::friction::physical::{Coefficients, PhysicalParameters, Terms};
-use crate::friction::regime::{Criterion, MAX_CRITERIA, MAX_SETS, Measure, Selector};
+use crate::friction::regime::{Criterion, MAX_SETS, Measure, Selector};
 use crate::friction::state::{SIGNALS, Signal};
 use crate::friction::{Estimate, FrictionParameters, ParameterSet};
 use crate::quantity::Torque;
 
+/// What stands before the parameter sets.
+pub(super) struct Header {
+    pub(super) version: u32,
+    pub(super) target: Target,
+    pub(super) created: u64,
+    pub(super) effort: Effort,
+    pub(super) data_hash: [u8; 16],
+    pub(super) domain: Domain,
+    pub(super) selector: Selector,
+    pub(super) limits: Limits,
+    /// Parameter sets; a bit for each that has a network; golden vectors.
+    pub(super) sets: u8,
+    pub(super) networks: u8,
+    pub(super) golden: u8,
+}
+
 /// Everything between the length and the checksum.
 pub(super) fn decode_content(mut reader: Reader) -> Result<Image, ImageError> {
-    reader.skip(8)?;
-    let version = reader.u32()?;
-    let target = Target { product: reader.u32()?, serial: reader.u32()? };
-    let created = u64::from_le_bytes(reader.bytes()?);
-    let effort = match reader.checked_u8("effort unit", 0, 3)? {
-        0 => Effort::NewtonMetre,
-        1 => Effort::Newton,
-        2 => Effort::Ampere,
-        _ => Effort::Volt,
+    let Header { version, target, created, effort, data_hash, domain, selector, limits, sets, networks, golden: count } =
+        decode_header(&mut reader);
+    let mut parameters = [ParameterSet::default(); MAX_SETS];
+    for (i, set) in parameters.iter_mut().enumerate().take(sets as usize) {
+        decode_set(&mut reader, networks >> i & 1 == 1, set);
+    }
+    let mut golden = heapless::Vec::new();
+    for _ in 0..count {
+        // The count was checked against the capacity.
+        let _ = golden.push(decode_golden(&mut reader, sets));
+    }
+    decode_end(&mut reader);
+    if let Some(error) = reader.error {
+        return Err(error);
+    }
+    let friction = FrictionParameters { domain, selector, sets: parameters };
+    Ok(Image { version, target, created, effort, data_hash, friction, limits, golden })
+}
+
+#[inline(never)]
+pub(super) fn decode_header(reader: &mut Reader) -> Header {
+    reader.skip(8);
+    let mut header = Header {
+        version: reader.u32(),
+        target: Target { product: reader.u32(), serial: reader.u32() },
+        created: u64::from(reader.u32()) | u64::from(reader.u32()) << 32,
+        effort: match reader.checked_u8("effort unit", 0, 3) {
+            0 => Effort::NewtonMetre,
+            1 => Effort::Newton,
+            2 => Effort::Ampere,
+            _ => Effort::Volt,
+        },
+        data_hash: [0; 16],
+        domain: Domain { ranges: [Range::ANY; SIGNALS], margin: 0, reference_temperature: 0 },
+        selector: Selector::default(),
+        limits: Limits::default(),
+        sets: 0,
+        networks: 0,
+        golden: 0,
     };
     let sets_offset = reader.offset;
-    let sets = reader.checked_u8("number of sets", 1, MAX_SETS as u8)?;
-    let networks = reader.checked_u8("networks", 0, ((1u16 << sets) - 1) as u8)?;
-    let golden_count = reader.checked_u8("number of golden vectors", 1, MAX_GOLDEN as u8)?;
-    let data_hash = reader.bytes()?;
+    header.sets = reader.checked_u8("number of sets", 1, MAX_SETS as u8);
+    header.networks = reader.checked_u8("networks", 0, ((1u16 << header.sets) - 1) as u8);
+    header.golden = reader.checked_u8("number of golden vectors", 1, MAX_GOLDEN as u8);
+    reader.fill(&mut header.data_hash);
 
-    let mut ranges = [Range::ANY; SIGNALS];
-    for (range, signal) in ranges.iter_mut().zip(Signal::ALL) {
-        let low = reader.i32()?;
-        let high = reader.checked_i32(signal.name(), low, i32::MAX)?;
-        *range = Range { low, high };
+    let Header { domain, selector, .. } = &mut header;
+    for (range, signal) in domain.ranges.iter_mut().zip(Signal::ALL) {
+        let low = reader.i32();
+        *range = Range { low, high: reader.checked_i32(signal.name(), low, i32::MAX) };
     }
-    let domain = Domain { ranges, margin: reader.u32()?, reference_temperature: reader.i32()? };
-    let mut selector = Selector { fade_time: reader.u32()?, ..Default::default() };
-    for i in 0..MAX_CRITERIA {
-        // A second criterion without a first has no meaning: only "none" may follow "none".
-        let last = i > 0 && selector.criteria[0].is_none();
-        let measure = reader.checked_u8("criterion", 0, if last { 0 } else { 3 })?;
-        reader.reserved(3)?;
-        let enter = reader.i32()?;
-        let leave = reader.checked_i32("lower threshold", i32::MIN, enter)?;
+    domain.margin = reader.u32();
+    domain.reference_temperature = reader.i32();
+    selector.fade_time = reader.u32();
+    // A second criterion without a first has no meaning: only "none" may follow "none".
+    let mut highest = 3;
+    for criterion in &mut selector.criteria {
+        let measure = reader.checked_u8("criterion", 0, highest);
+        reader.reserved(3);
+        let offset = reader.offset;
+        let enter = reader.i32();
+        let leave = reader.checked_i32("lower threshold", i32::MIN, enter);
         let measure = match measure {
-            0 if (enter, leave) == (0, 0) => continue,
-            0 => return Err(ImageError::Reserved { offset: reader.offset - 8 }),
+            0 => {
+                highest = 0;
+                if (enter, leave) != (0, 0) {
+                    reader.refuse(ImageError::Reserved { offset });
+                }
+                continue;
+            }
             1 => Measure::Acceleration,
             2 => Measure::Speed,
             _ => Measure::Coupled,
         };
-        selector.criteria[i] = Some(Criterion { measure, enter, leave });
+        *criterion = Some(Criterion { measure, enter, leave });
     }
-    if sets as usize != selector.sets() {
-        let expected = selector.sets() as i64;
-        let (name, value) = ("number of sets", sets as i64);
-        return Err(ImageError::Field { name, offset: sets_offset, value, low: expected, high: expected });
+    let expected = selector.sets();
+    if header.sets as usize != expected {
+        let (expected, value) = (expected as i64, header.sets as i64);
+        let (name, offset) = ("number of sets", sets_offset);
+        reader.refuse(ImageError::Field { name, offset, value, low: expected, high: expected });
     }
-    let limits = Limits { output: reader.u32()?, torque_gain: reader.u32()?, velocity_slope: reader.u32()? };
+    header.limits = Limits { output: reader.u32(), torque_gain: reader.u32(), velocity_slope: reader.u32() };
+    header
+}
 
-    let mut friction = FrictionParameters { domain, selector, sets: Default::default() };
-    for (i, set) in friction.sets.iter_mut().enumerate().take(sets as usize) {
-        set.physical = decode_physical(&mut reader)?;
-        if networks >> i & 1 == 1 {
-            set.network = Some(decode_network(&mut reader)?);
-        }
+/// Overwrites the whole set.
+#[inline(never)]
+pub(super) fn decode_set(reader: &mut Reader, has_network: bool, set: &mut ParameterSet) {
+    decode_physical(reader, &mut set.physical);
+    set.network = None;
+    if has_network {
+        decode_network(reader, set.network.insert(NetworkParameters::default()));
     }
-    let mut golden = heapless::Vec::new();
-    for _ in 0..golden_count {
-        let set = reader.checked_u8("golden vector's set", 0, sets - 1)?;
-        reader.reserved(3)?;
-        let mut signals = [0; SIGNALS];
-        for signal in &mut signals {
-            *signal = reader.i32()?;
-        }
-        let expected =
-            Estimate { physical: Torque::from_bits(reader.i32()?), network: Torque::from_bits(reader.i32()?) };
-        // The count was checked against the capacity.
-        let _ = golden.push(GoldenVector { set, signals, expected });
+}
+
+#[inline(never)]
+pub(super) fn decode_golden(reader: &mut Reader, sets: u8) -> GoldenVector {
+    let set = reader.checked_u8("golden vector's set", 0, sets - 1);
+    reader.reserved(3);
+    let mut signals = [0; SIGNALS];
+    for signal in &mut signals {
+        *signal = reader.i32();
     }
+    let expected = Estimate { physical: Torque::from_bits(reader.i32()), network: Torque::from_bits(reader.i32()) };
+    GoldenVector { set, signals, expected }
+}
+
+/// Nothing may follow.
+pub(super) fn decode_end(reader: &mut Reader) {
     if !reader.bytes.is_empty() {
         let length = reader.offset + reader.bytes.len() + CRC_LENGTH;
-        return Err(ImageError::TooLong { length, limit: reader.offset + CRC_LENGTH });
+        reader.refuse(ImageError::TooLong { length, limit: reader.offset + CRC_LENGTH });
     }
-    Ok(Image { version, target, created, effort, data_hash, friction, limits, golden })
 }
 
-fn decode_physical(reader: &mut Reader) -> Result<PhysicalParameters, ImageError> {
+fn decode_physical(reader: &mut Reader, physical: &mut PhysicalParameters) {
     let offset = reader.offset;
-    let terms = reader.u16()?;
+    let terms = reader.u16();
     if terms & !Terms::ALL.0 != 0 {
         let (low, high) = (0, Terms::ALL.0 as i64);
-        return Err(ImageError::Field { name: "terms", offset, value: terms as i64, low, high });
+        reader.refuse(ImageError::Field { name: "terms", offset, value: terms as i64, low, high });
     }
-    reader.reserved(2)?;
+    reader.reserved(2);
     let mut coefficients = [0; Coefficients::COUNT];
     for coefficient in &mut coefficients {
-        *coefficient = reader.i32()?;
+        *coefficient = reader.i32();
     }
-    Ok(PhysicalParameters { terms: Terms(terms), coefficients: Coefficients::from_array(coefficients) })
+    *physical = PhysicalParameters { terms: Terms(terms), coefficients: Coefficients::from_array(coefficients) };
 }
 
-fn decode_network(reader: &mut Reader) -> Result<NetworkParameters, ImageError> {
-    let mut network = NetworkParameters::default();
+fn decode_network(reader: &mut Reader, network: &mut NetworkParameters) {
     for weight in network.first.iter_mut().flatten() {
-        *weight = reader.i32()?;
+        *weight = reader.i32();
     }
     for neuron in network.hidden.iter_mut().flatten().chain([&mut network.output]) {
-        *neuron = decode_neuron(reader)?;
+        for weight in &mut neuron.weights {
+            *weight = reader.u16() as i16;
+        }
+        neuron.fraction = reader.checked_u8("fraction bits", MIN_FRACTION, MAX_FRACTION);
+        reader.reserved(1);
     }
-    network.scale = reader.i32()?;
-    reader.reserved(2)?;
-    Ok(network)
-}
-
-fn decode_neuron(reader: &mut Reader) -> Result<Neuron, ImageError> {
-    let mut weights = [0; NEURONS + 1];
-    for weight in &mut weights {
-        *weight = i16::from_le_bytes(reader.bytes()?);
-    }
-    let fraction = reader.checked_u8("fraction bits", MIN_FRACTION, MAX_FRACTION)?;
-    reader.reserved(1)?;
-    Ok(Neuron { weights, fraction })
+    network.scale = reader.i32();
+    reader.reserved(2);
 }
 
 /// Everything before the checksum; the length stays open.
@@ -187,68 +237,98 @@ fn encode_set(set: &ParameterSet, writer: &mut Writer) {
     writer.put(&[0; 2]);
 }
 
-/// Takes numbers off the front of a byte string.
+/// Takes numbers off the front of a byte string. The first error stays; what is read behind it is of no meaning, but within the limits that were
+/// asked for. One look at the end instead of one behind every number is half the code.
+#[derive(Clone)]
 pub(super) struct Reader<'a> {
     pub(super) bytes: &'a [u8],
     pub(super) offset: usize,
+    pub(super) error: Option<ImageError>,
 }
 
-impl Reader<'_> {
-    pub(super) fn bytes<const N: usize>(&mut self) -> Result<[u8; N], ImageError> {
-        let Some((head, rest)) = self.bytes.split_first_chunk::<N>() else {
-            let (length, needed) = (self.offset + self.bytes.len(), self.offset + N);
-            return Err(ImageError::Truncated { length, needed });
+impl<'a> Reader<'a> {
+    pub(super) const fn new(bytes: &'a [u8]) -> Self {
+        Self { bytes, offset: 0, error: None }
+    }
+
+    /// Keeps an error, if it is the first.
+    #[inline(never)]
+    pub(super) fn refuse(&mut self, error: ImageError) {
+        self.error.get_or_insert(error);
+    }
+
+    /// Zeros where there are not enough bytes.
+    #[inline(never)]
+    pub(super) fn fill(&mut self, out: &mut [u8]) {
+        let Some((head, rest)) = self.bytes.split_at_checked(out.len()) else {
+            let (length, needed) = (self.offset + self.bytes.len(), self.offset + out.len());
+            out.fill(0);
+            return self.refuse(ImageError::Truncated { length, needed });
         };
         self.bytes = rest;
-        self.offset += N;
-        Ok(*head)
+        self.offset += head.len();
+        out.copy_from_slice(head);
     }
 
-    pub(super) fn u16(&mut self) -> Result<u16, ImageError> {
-        self.bytes().map(u16::from_le_bytes)
+    fn bytes<const N: usize>(&mut self) -> [u8; N] {
+        let mut bytes = [0; N];
+        self.fill(&mut bytes);
+        bytes
     }
 
-    fn u32(&mut self) -> Result<u32, ImageError> {
-        self.bytes().map(u32::from_le_bytes)
+    fn u8(&mut self) -> u8 {
+        let [byte] = self.bytes();
+        byte
     }
 
-    fn i32(&mut self) -> Result<i32, ImageError> {
-        self.bytes().map(i32::from_le_bytes)
+    #[inline(never)]
+    pub(super) fn u16(&mut self) -> u16 {
+        u16::from_le_bytes(self.bytes())
     }
 
-    fn skip(&mut self, count: usize) -> Result<(), ImageError> {
+    #[inline(never)]
+    pub(super) fn u32(&mut self) -> u32 {
+        u32::from_le_bytes(self.bytes())
+    }
+
+    fn i32(&mut self) -> i32 {
+        self.u32() as i32
+    }
+
+    fn skip(&mut self, count: usize) {
         for _ in 0..count {
-            self.bytes::<1>()?;
+            self.u8();
         }
-        Ok(())
     }
 
-    fn reserved(&mut self, count: usize) -> Result<(), ImageError> {
+    #[inline(never)]
+    fn reserved(&mut self, count: usize) {
         for _ in 0..count {
             let offset = self.offset;
-            if self.bytes::<1>()? != [0] {
-                return Err(ImageError::Reserved { offset });
+            if self.u8() != 0 {
+                self.refuse(ImageError::Reserved { offset });
             }
         }
-        Ok(())
     }
 
-    fn checked_u8(&mut self, name: &'static str, low: u8, high: u8) -> Result<u8, ImageError> {
-        let offset = self.offset;
-        let [value] = self.bytes()?;
+    #[inline(never)]
+    fn checked(&mut self, name: &'static str, offset: usize, value: i32, low: i32, high: i32) -> i32 {
         if (low..=high).contains(&value) {
-            return Ok(value);
+            return value;
         }
-        Err(ImageError::Field { name, offset, value: value as i64, low: low as i64, high: high as i64 })
+        let (value, least, high) = (value as i64, low as i64, high as i64);
+        self.refuse(ImageError::Field { name, offset, value, low: least, high });
+        low
     }
 
-    fn checked_i32(&mut self, name: &'static str, low: i32, high: i32) -> Result<i32, ImageError> {
-        let offset = self.offset;
-        let value = self.i32()?;
-        if (low..=high).contains(&value) {
-            return Ok(value);
-        }
-        Err(ImageError::Field { name, offset, value: value as i64, low: low as i64, high: high as i64 })
+    fn checked_u8(&mut self, name: &'static str, low: u8, high: u8) -> u8 {
+        let (offset, value) = (self.offset, self.u8());
+        self.checked(name, offset, value as i32, low as i32, high as i32) as u8
+    }
+
+    fn checked_i32(&mut self, name: &'static str, low: i32, high: i32) -> i32 {
+        let (offset, value) = (self.offset, self.i32());
+        self.checked(name, offset, value, low, high)
     }
 }
 

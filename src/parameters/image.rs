@@ -249,21 +249,24 @@ impl Image {
     /// Checked in this order: magic, format, length, checksum, fields. Whether the image is safe to use is the
     /// [certificate](super::certificate)'s business.
     pub fn decode(bytes: &[u8]) -> Result<Self, ImageError> {
-        decode_content(Reader { bytes: Self::content(bytes)?, offset: 0 })
+        decode_content(Reader::new(Self::content(bytes)?))
     }
 
     /// What the checksum is of, once magic, format, length and checksum are right.
+    #[inline(never)]
     pub(super) fn content(bytes: &[u8]) -> Result<&[u8], ImageError> {
-        let mut head = Reader { bytes, offset: 0 };
-        let found = head.bytes()?;
+        let truncated = |needed| ImageError::Truncated { length: bytes.len(), needed };
+        let Some((&found, rest)) = bytes.split_first_chunk::<4>() else { return Err(truncated(4)) };
         if found != MAGIC {
             return Err(ImageError::NotAnImage { found });
         }
-        let format = head.u16()?;
+        let Some((&format, rest)) = rest.split_first_chunk::<2>() else { return Err(truncated(6)) };
+        let format = u16::from_le_bytes(format);
         if format != FORMAT {
             return Err(ImageError::UnsupportedFormat { found: format });
         }
-        let stated = head.u16()? as usize;
+        let Some(&stated) = rest.first_chunk::<2>() else { return Err(truncated(8)) };
+        let stated = u16::from_le_bytes(stated) as usize;
         if stated > MAX_LENGTH {
             return Err(ImageError::TooLong { length: stated, limit: MAX_LENGTH });
         }

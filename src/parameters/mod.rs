@@ -6,6 +6,7 @@ mod codec;
 pub mod ecc;
 pub mod image;
 pub mod life_cycle;
+mod pieces;
 pub mod slots;
 mod summary;
 

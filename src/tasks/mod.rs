@@ -12,13 +12,14 @@ use standalone as connection;
 use crate::board::watchdog::{self, Watchdog};
 use crate::board::{self, Led, Peripherals, StartError, control, faults};
 use connection::Watching;
-use defmt::{Debug2Format, Display2Format};
 use embassy_executor::{SendSpawner, Spawner};
 use embassy_stm32::gpio::Input;
 use embassy_time::{Duration, Instant, Ticker};
 use joint_firmware::joint::Slow;
 use joint_firmware::joint::active::SLOW_RATE;
 use joint_firmware::joint::configuration::ConfigurationError;
+use joint_firmware::joint::fault::Fault;
+use joint_firmware::joint::state_machine::State;
 use joint_firmware::motor::setting::SettingError;
 use joint_firmware::motor::thermal::{PLAUSIBLE_SENSOR, ThermalSettings, WindingTemperature};
 use joint_firmware::parameters::slots::WriteError;
@@ -173,7 +174,7 @@ async fn log() {
             let telemetry = report.telemetry;
             defmt::info!(
                 "joint: {}, statusword {:#06x}, supply {} V, position {} rad, currents {} {} {} A",
-                Debug2Format(&telemetry.state),
+                state_name(telemetry.state),
                 telemetry.statusword(),
                 telemetry.bus_voltage,
                 telemetry.motion.position,
@@ -182,9 +183,45 @@ async fn log() {
                 report.phase_currents.c
             );
             for fault in report.latched.iter() {
-                defmt::warn!("fault: {}", Display2Format(&fault));
+                defmt::warn!("fault: {}", fault_name(fault));
             }
         }
+    }
+}
+
+/// Names for the log: the words stay on the host, and no formatting of the core library is linked for them.
+fn state_name(state: State) -> defmt::Str {
+    match state {
+        State::NotReadyToSwitchOn => defmt::intern!("not ready to switch on"),
+        State::SwitchOnDisabled => defmt::intern!("switch on disabled"),
+        State::ReadyToSwitchOn => defmt::intern!("ready to switch on"),
+        State::SwitchedOn => defmt::intern!("switched on"),
+        State::OperationEnabled => defmt::intern!("operation enabled"),
+        State::QuickStopActive => defmt::intern!("quick stop active"),
+        State::FaultReactionActive => defmt::intern!("fault reaction active"),
+        State::Fault => defmt::intern!("fault"),
+    }
+}
+
+/// As [`state_name`].
+fn fault_name(fault: Fault) -> defmt::Str {
+    match fault {
+        Fault::OverCurrent => defmt::intern!("over-current"),
+        Fault::CurrentSensor => defmt::intern!("phase currents do not add up to zero"),
+        Fault::CurrentNotFollowed => defmt::intern!("current does not follow its reference"),
+        Fault::OverVoltage => defmt::intern!("supply voltage too high"),
+        Fault::UnderVoltage => defmt::intern!("supply voltage too low"),
+        Fault::EncoderLost => defmt::intern!("encoder does not answer"),
+        Fault::EncoderJump => defmt::intern!("encoder jumped"),
+        Fault::EncoderImplausible => defmt::intern!("encoder contradicts the induced voltage"),
+        Fault::OverSpeed => defmt::intern!("joint too fast"),
+        Fault::PositionLimit => defmt::intern!("joint beyond a position limit"),
+        Fault::BridgeTemperature => defmt::intern!("bridge too hot"),
+        Fault::WindingTemperature => defmt::intern!("winding too hot"),
+        Fault::TemperatureSensor => defmt::intern!("temperature sensor open or shorted"),
+        Fault::StaleCommand => defmt::intern!("command deadline missed"),
+        Fault::Overrun => defmt::intern!("control step overran its period"),
+        Fault::BridgeDriver => defmt::intern!("gate driver fault"),
     }
 }
 

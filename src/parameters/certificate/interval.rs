@@ -1,4 +1,7 @@
 //! Closed intervals of 64-bit integers, rounded outwards; an end that leaves the type is unbounded and stays so.
+//!
+//! Operations are functions of their own and never inlined: a proof has some hundred of them, and 64 bits that saturate take up to fifty
+//! instructions on the board. What its innermost loops do has a twin that is inlined there, `..._here`.
 
 /// All values from `low` to `high`; a `low` of `i64::MIN` and a `high` of `i64::MAX` mean that there is no bound on that side.
 ///
@@ -18,6 +21,7 @@ impl Interval {
     }
 
     /// The interval between two values, in any order.
+    #[inline(never)]
     pub(super) fn between(a: i64, b: i64) -> Self {
         Self { low: a.min(b), high: a.max(b) }
     }
@@ -27,7 +31,13 @@ impl Interval {
         Self { low: -magnitude, high: magnitude }
     }
 
+    #[inline(never)]
     pub(super) fn add(self, other: Self) -> Self {
+        self.add_here(other)
+    }
+
+    #[inline(always)]
+    pub(super) fn add_here(self, other: Self) -> Self {
         let lowest = self.low.min(other.low);
         let highest = self.high.max(other.high);
         Self {
@@ -36,10 +46,12 @@ impl Interval {
         }
     }
 
+    #[inline(never)]
     pub(super) fn union(self, other: Self) -> Self {
         Self { low: self.low.min(other.low), high: self.high.max(other.high) }
     }
 
+    #[inline(never)]
     pub(super) fn contains(self, other: Self) -> bool {
         self.low <= other.low && other.high <= self.high
     }
@@ -49,11 +61,14 @@ impl Interval {
     }
 
     /// All products of a value of each.
+    #[inline(never)]
     pub(super) fn times(self, other: Self) -> Self {
-        if self == Self::ZERO || other == Self::ZERO {
-            return Self::ZERO;
-        }
-        // Ends of 32 bits, by far the most: one instruction a product on the board, where a saturating one takes fifty.
+        self.times_here(other)
+    }
+
+    /// Ends of 32 bits, by far the most, take one instruction a product on the board, where a saturating one takes fifty.
+    #[inline(always)]
+    pub(super) fn times_here(self, other: Self) -> Self {
         if let (Some((low, high)), Some((other_low, other_high))) = (self.narrow(), other.narrow()) {
             return Self::hull(
                 low as i64 * other_low as i64,
@@ -62,14 +77,22 @@ impl Interval {
                 high as i64 * other_high as i64,
             );
         }
+        self.times_saturating(other)
+    }
+
+    #[inline(never)]
+    fn times_saturating(self, other: Self) -> Self {
+        if self == Self::ZERO || other == Self::ZERO {
+            return Self::ZERO;
+        }
         if !self.bounded() || !other.bounded() {
             return Self { low: i64::MIN, high: i64::MAX };
         }
         Self::hull(
-            self.low.saturating_mul(other.low),
-            self.low.saturating_mul(other.high),
-            self.high.saturating_mul(other.low),
-            self.high.saturating_mul(other.high),
+            saturating_product(self.low, other.low),
+            saturating_product(self.low, other.high),
+            saturating_product(self.high, other.low),
+            saturating_product(self.high, other.high),
         )
     }
 
@@ -79,11 +102,13 @@ impl Interval {
         (low as i64 == self.low && high as i64 == self.high).then_some((low, high))
     }
 
+    #[inline(always)]
     fn hull(a: i64, b: i64, c: i64, d: i64) -> Self {
         Self { low: a.min(b).min(c).min(d), high: a.max(b).max(c).max(d) }
     }
 
     /// All products with a share of one: an interval within 0 to 2^14.
+    #[inline(always)]
     pub(super) fn times_share(self, share: Self) -> Self {
         const SMALL: i64 = 1 << 48;
         if self.low <= -SMALL || self.high >= SMALL {
@@ -102,7 +127,13 @@ impl Interval {
     }
 
     /// Division by a power of two, rounded outwards.
+    #[inline(never)]
     pub(super) fn shift_right(self, bits: u32) -> Self {
+        self.shift_right_here(bits)
+    }
+
+    #[inline(always)]
+    pub(super) fn shift_right_here(self, bits: u32) -> Self {
         let bits = bits.min(63);
         let quotient = self.high >> bits;
         let rounded_up = if quotient << bits == self.high { quotient } else { quotient + 1 };
@@ -114,7 +145,7 @@ impl Interval {
 
     pub(super) fn shift_left(self, bits: u32) -> Self {
         let factor = 1i64 << bits.min(62);
-        Self { low: self.low.saturating_mul(factor), high: self.high.saturating_mul(factor) }
+        Self { low: saturating_product(self.low, factor), high: saturating_product(self.high, factor) }
     }
 
     /// The image of the interval under a function that never falls or never rises.
@@ -123,6 +154,7 @@ impl Interval {
     }
 
     /// Magnitudes of the values.
+    #[inline(never)]
     pub(super) fn abs(self) -> Self {
         let (low, high) = (self.low.saturating_abs(), self.high.saturating_abs());
         let least = if self.low <= 0 && self.high >= 0 { 0 } else { low.min(high) };
@@ -133,6 +165,11 @@ impl Interval {
     pub(super) fn magnitude(self) -> u32 {
         self.low.unsigned_abs().max(self.high.unsigned_abs()).min(u32::MAX as u64) as u32
     }
+}
+
+#[inline(never)]
+fn saturating_product(a: i64, b: i64) -> i64 {
+    a.saturating_mul(b)
 }
 
 #[cfg(test)]

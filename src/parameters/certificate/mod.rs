@@ -21,10 +21,10 @@ mod network;
 mod physical;
 mod slopes;
 
-use crate::friction::FrictionParameters;
-use crate::friction::network::Network;
-use crate::friction::physical::Physical;
+use crate::friction::domain::Domain;
+use crate::friction::smooth::tanh;
 use crate::friction::state::Signal;
+use crate::friction::{FrictionParameters, ParameterSet};
 use crate::quantity::Torque;
 use interval::Interval;
 
@@ -169,54 +169,73 @@ impl core::fmt::Display for Decimal {
 
 /// Computes what can be proved of `parameters`, whatever their limits; an error where a sum could wrap.
 pub fn prove(parameters: &FrictionParameters) -> Result<Certificate, Refusal> {
-    let domain = &parameters.domain;
-    let velocity_shift = domain.shifts()[Signal::Velocity as usize];
-    let mut proved: Option<Certificate> = None;
-    let sets = parameters.selector.sets();
-    let depth = depth(sets);
-    for (index, set) in parameters.sets.iter().enumerate().take(sets) {
-        let physical = physical::bounds(&Physical::new(&set.physical, domain), depth)
-            .ok_or(Refusal::PhysicalOverflow { set: index })?;
-        let network = match &set.network {
-            Some(network) => {
-                network::bounds(&Network::new(network, domain), network, domain, depth).map_err(|sum| {
-                    Refusal::NetworkOverflow { set: index, layer: sum.layer, neuron: sum.neuron, bound: sum.bound }
-                })?
-            }
-            None => network::Bounds::default(),
-        };
-        let slope = physical.slope.per_unit(velocity_shift).add(network.velocity_slope);
-        let this = Certificate {
-            output: physical.torque.add(network.torque).magnitude(),
-            network: network.torque.magnitude(),
-            torque_gain: network.torque_gain.magnitude(),
-            velocity_slope_low: slope.low,
-            velocity_slope_high: slope.high,
-            resolution: physical.resolution.saturating_add(network.resolution),
-        };
-        proved = Some(proved.map_or(this, |before| before.worst(&this)));
+    let FrictionParameters { domain, selector, sets } = parameters;
+    let mut proved = None;
+    for (index, set) in sets.iter().enumerate().take(selector.sets()) {
+        prove_set(domain, set, index, selector.sets(), &mut proved)?;
     }
     Ok(proved.unwrap_or_default())
+}
+
+/// Adds what can be proved of the set `index` of `sets` to what has been of those before.
+#[inline(never)]
+pub(crate) fn prove_set(
+    domain: &Domain,
+    set: &ParameterSet,
+    index: usize,
+    sets: usize,
+    proved: &mut Option<Certificate>,
+) -> Result<(), Refusal> {
+    let depth = depth(sets);
+    let velocity_shift = domain.shifts()[Signal::Velocity as usize];
+    let physical = physical::bounds(&set.physical, domain, depth).ok_or(Refusal::PhysicalOverflow { set: index })?;
+    let network = match &set.network {
+        Some(network) => network::bounds(network, domain, depth).map_err(|sum| Refusal::NetworkOverflow {
+            set: index,
+            layer: sum.layer,
+            neuron: sum.neuron,
+            bound: sum.bound,
+        })?,
+        None => network::Bounds::default(),
+    };
+    let slope = physical.slope.per_unit(velocity_shift).add(network.velocity_slope);
+    let this = Certificate {
+        output: physical.torque.add(network.torque).magnitude(),
+        network: network.torque.magnitude(),
+        torque_gain: network.torque_gain.magnitude(),
+        velocity_slope_low: slope.low,
+        velocity_slope_high: slope.high,
+        resolution: physical.resolution.saturating_add(network.resolution),
+    };
+    *proved = Some(proved.map_or(this, |before| before.worst(&this)));
+    Ok(())
 }
 
 /// Computes the certificate of `parameters` and holds it against `limits`.
 pub fn certify(parameters: &FrictionParameters, limits: &Limits) -> Result<Certificate, Refusal> {
     let proved = prove(parameters)?;
-    if proved.output > limits.output {
-        return Err(Refusal::Output { bound: proved.output, limit: limits.output });
-    }
-    if proved.torque_gain > limits.torque_gain || proved.torque_gain == u32::MAX {
-        return Err(Refusal::TorqueGain { bound: proved.torque_gain, limit: limits.torque_gain });
-    }
-    for bound in [proved.velocity_slope_low, proved.velocity_slope_high] {
-        if bound.unsigned_abs() > limits.velocity_slope as u64 {
-            return Err(Refusal::VelocitySlope { bound, limit: limits.velocity_slope });
-        }
-    }
+    proved.hold(limits)?;
     Ok(proved)
 }
 
 impl Certificate {
+    /// Holds what is proved against `limits`.
+    #[inline(never)]
+    pub(crate) fn hold(&self, limits: &Limits) -> Result<(), Refusal> {
+        if self.output > limits.output {
+            return Err(Refusal::Output { bound: self.output, limit: limits.output });
+        }
+        if self.torque_gain > limits.torque_gain || self.torque_gain == u32::MAX {
+            return Err(Refusal::TorqueGain { bound: self.torque_gain, limit: limits.torque_gain });
+        }
+        for bound in [self.velocity_slope_low, self.velocity_slope_high] {
+            if bound.unsigned_abs() > limits.velocity_slope as u64 {
+                return Err(Refusal::VelocitySlope { bound, limit: limits.velocity_slope });
+            }
+        }
+        Ok(())
+    }
+
     fn worst(&self, other: &Self) -> Self {
         Self {
             output: self.output.max(other.output),
@@ -232,6 +251,12 @@ impl Certificate {
     pub const fn output_torque(&self) -> Torque {
         Torque::from_bits(if self.output > i32::MAX as u32 { i32::MAX } else { self.output as i32 })
     }
+}
+
+/// The table of the control step, whose look-up is inlined there; here it is linked once.
+#[inline(never)]
+fn tanh_at(argument: i64) -> i64 {
+    tanh(argument as i32) as i64
 }
 
 /// A bisection of a range of cells, `deepest` times (at most [`MAX_DEPTH`]): keeps splitting while a cell can still raise the largest bound found.

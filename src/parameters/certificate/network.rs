@@ -1,13 +1,12 @@
 //! Bounds of the network: torque, slopes over measured torque and velocity, for every input in the box.
 
 use super::interval::Interval;
-use super::{bisect, slopes};
+use super::{bisect, slopes, tanh_at};
 use crate::dsp::smmul;
 use crate::friction::domain::Domain;
 use crate::friction::network::{
-    INPUTS, InputScale, MIN_FRACTION, NEURONS, Network, NetworkParameters, Neuron, to_torque,
+    INPUTS, InputScale, Inputs, MIN_FRACTION, NEURONS, NetworkParameters, Neuron, to_torque,
 };
-use crate::friction::smooth::tanh;
 use crate::friction::state::Signal;
 
 /// What holds of the network in the whole box.
@@ -39,23 +38,12 @@ struct Cell {
 /// The bias' input, Q15.
 const ONE: i64 = 0x7fff;
 
-pub(super) fn bounds(
-    network: &Network,
-    parameters: &NetworkParameters,
-    domain: &Domain,
-    depth: u32,
-) -> Result<Bounds, Overflow> {
-    let root = Cell { inputs: network.input_intervals() };
+#[inline(never)]
+pub(super) fn bounds(parameters: &NetworkParameters, domain: &Domain, depth: u32) -> Result<Bounds, Overflow> {
+    let root = Cell { inputs: Inputs::new(domain).intervals() };
     check_sums(&root, parameters)?;
-    let torque = bisect(
-        root,
-        depth,
-        &|cell| Layers::of(cell, parameters).output.map(|sum| to_torque(sum as i32, parameters.scale) as i64),
-        &|a, b| a.union(b),
-        &|found, new| found.contains(*new),
-        &|cell| split(cell, parameters),
-    );
-    let tanh_slopes = Layers::of(&root, parameters).sums.map(|sums| sums.map(slopes::of_tanh));
+    let torque = torque_bounds(root, parameters, depth);
+    let tanh_slopes = tanh_slopes(&root, parameters);
     let slope = |signal: Signal, fraction_bits: u32| {
         let over_input = slopes::over_input(parameters, &tanh_slopes, signal as usize);
         per_signal(over_input, parameters.scale, domain.ranges[signal as usize].half_width(), fraction_bits)
@@ -68,7 +56,27 @@ pub(super) fn bounds(
     })
 }
 
+// Functions of their own, so that their stacks are not taken side by side.
+
+#[inline(never)]
+fn torque_bounds(root: Cell, parameters: &NetworkParameters, depth: u32) -> Interval {
+    bisect(
+        root,
+        depth,
+        &|cell| Layers::of(cell, parameters).output.map(|sum| to_torque(sum as i32, parameters.scale) as i64),
+        &|a, b| a.union(b),
+        &|found, new| found.contains(*new),
+        &|cell| split(cell, parameters),
+    )
+}
+
+#[inline(never)]
+fn tanh_slopes(root: &Cell, parameters: &NetworkParameters) -> [[Interval; NEURONS]; 3] {
+    Layers::of(root, parameters).sums.map(|sums| sums.map(slopes::of_tanh))
+}
+
 /// Slope over a scaled input (Q20) times the output's scale (Q16.16), divided by the input's half width (Q16.16).
+#[inline(never)]
 fn per_signal(slope: Interval, scale: i32, half_width: u32, fraction_bits: u32) -> Interval {
     let Some(divisor) = core::num::NonZeroU64::new(half_width as u64) else {
         return Interval::ZERO; // an input without a range has no influence
@@ -95,36 +103,42 @@ fn per_signal(slope: Interval, scale: i32, half_width: u32, fraction_bits: u32) 
 }
 
 /// Sums of a layer: monotone in every input, so the ends of the inputs bound them exactly.
+#[inline(never)]
 fn first_sums(cell: &Cell, parameters: &NetworkParameters) -> [Interval; NEURONS] {
     parameters.first.map(|weights| {
         let mut sum = Interval::point(weights[INPUTS] as i64);
         for (weight, (low, high)) in weights.iter().zip(cell.inputs) {
-            sum = sum.add(Interval::between(smmul(*weight, low) as i64, smmul(*weight, high) as i64));
+            let (a, b) = (smmul(*weight, low) as i64, smmul(*weight, high) as i64);
+            sum = sum.add_here(Interval { low: a.min(b), high: a.max(b) });
         }
         sum
     })
 }
 
 /// A neuron's 32-bit sum, before its shift to Q25.
+#[inline(never)]
 fn raw_sum(neuron: &Neuron, activations: &[Interval; NEURONS]) -> Interval {
     let mut sum = Interval::point(neuron.weights[NEURONS] as i64 * ONE);
     for (weight, activation) in neuron.weights.iter().zip(activations) {
-        sum = sum.add(activation.scaled(*weight));
+        sum = sum.add_here(activation.scaled(*weight));
     }
     sum
 }
 
 /// The sum in Q25 as the control step shifts it.
+#[inline(never)]
 fn shifted(neuron: &Neuron, raw: Interval) -> Interval {
     let shift = neuron.fraction.saturating_sub(MIN_FRACTION) as u32;
     raw.map(|sum| sum >> shift.min(31))
 }
 
 /// Activations in Q15 for sums in Q25 that fit 32 bits.
+#[inline(never)]
 fn activations(sums: [Interval; NEURONS]) -> [Interval; NEURONS] {
-    sums.map(|sum| sum.map(|end| (tanh(end as i32) >> 16) as i64))
+    sums.map(|sum| sum.map(|end| tanh_at(end) >> 16))
 }
 
+#[inline(never)]
 fn check_sums(root: &Cell, parameters: &NetworkParameters) -> Result<(), Overflow> {
     let check = |layer: usize, neuron: usize, sum: Interval| {
         let fits = Interval { low: i32::MIN as i64, high: i32::MAX as i64 };
@@ -155,6 +169,7 @@ struct Layers {
 }
 
 impl Layers {
+    #[inline(never)]
     fn of(cell: &Cell, parameters: &NetworkParameters) -> Self {
         let [second, third] = &parameters.hidden;
         let sums_0 = first_sums(cell, parameters);
@@ -165,6 +180,7 @@ impl Layers {
     }
 }
 
+#[inline(never)]
 fn hidden_sums(neurons: &[Neuron; NEURONS], activations: &[Interval; NEURONS]) -> [Interval; NEURONS] {
     neurons.each_ref().map(|neuron| shifted(neuron, raw_sum(neuron, activations)))
 }
@@ -215,9 +231,9 @@ fn resolution(parameters: &NetworkParameters) -> u32 {
     torque.saturating_add(2).min(u32::MAX as i64) as u32
 }
 
-impl Network {
+impl Inputs {
     /// The scaled inputs that the box can give, Q31.
-    fn input_intervals(&self) -> [(i32, i32); INPUTS] {
-        self.inputs().each_ref().map(InputScale::interval)
+    fn intervals(&self) -> [(i32, i32); INPUTS] {
+        self.scales().each_ref().map(InputScale::interval)
     }
 }

@@ -1,10 +1,11 @@
 //! Bounds of the physical model: torque and slope over velocity, for every state in the widened box.
 
-use super::bisect;
 use super::interval::Interval;
+use super::{bisect, tanh_at};
 use crate::dsp::{narrow, saturate};
-use crate::friction::physical::{Directional, Physical, PreparedTerms, Scaling, Terms, times};
-use crate::friction::smooth::{TANH, atan, stribeck, stribeck_slope, tanh};
+use crate::friction::domain::Domain;
+use crate::friction::physical::{Directional, PhysicalParameters, PreparedTerms, Scaling, Terms, times};
+use crate::friction::smooth::{TANH, atan, stribeck, stribeck_slope};
 use crate::friction::state::{SIGNALS, Signal};
 
 /// What holds of the physical model in the whole widened box.
@@ -29,8 +30,9 @@ struct CellBounds {
 const ONE: Interval = Interval::point(1 << 16);
 
 /// Bounds, or nothing where the sum could leave the range of a torque.
-pub(super) fn bounds(physical: &Physical, depth: u32) -> Option<Bounds> {
-    let (physical, box_) = (&physical.terms, scaled_box(&physical.scaling));
+#[inline(never)]
+pub(super) fn bounds(parameters: &PhysicalParameters, domain: &Domain, depth: u32) -> Option<Bounds> {
+    let (physical, box_) = (&PreparedTerms::new(parameters), scaled_box(&Scaling::new(domain)));
     if !harmonics_fit(physical) {
         return None;
     }
@@ -75,6 +77,7 @@ fn harmonics_fit(physical: &PreparedTerms) -> bool {
 }
 
 /// The values of a directional pair that a velocity interval can select.
+#[inline(never)]
 fn level(pair: Directional, velocity: Interval) -> Interval {
     let (positive, negative) = (Interval::point(pair.positive as i64), Interval::point(pair.negative as i64));
     match (velocity.low < 0, velocity.high >= 0) {
@@ -85,21 +88,25 @@ fn level(pair: Directional, velocity: Interval) -> Interval {
 }
 
 /// `times` over intervals: monotone in both operands, so its corners bound it.
+#[inline(never)]
 fn rounded_times(a: Interval, b: Interval) -> Interval {
     let corner = |x: i64, y: i64| times(saturate(x), saturate(y)) as i64;
     Interval::between(corner(a.low, b.low), corner(a.high, b.high))
         .union(Interval::between(corner(a.low, b.high), corner(a.high, b.low)))
 }
 
+#[inline(never)]
 fn product(coefficient: i32, signal: Interval) -> Interval {
     signal.times(Interval::point(coefficient as i64))
 }
 
 /// Part of a factor, Q16.16.
+#[inline(never)]
 fn factor_part(coefficient: i32, signal: Interval) -> Interval {
     product(coefficient, signal).map(|p| narrow(p) as i64)
 }
 
+#[inline(never)]
 fn clip(interval: Interval) -> Interval {
     interval.map(|value| saturate(value) as i64)
 }
@@ -117,11 +124,10 @@ fn cell_bounds(physical: &PreparedTerms, box_: &[Interval; SIGNALS], v: Interval
     let [q, _, load, _, th, a] = *box_;
     let c = &physical.coefficients;
 
-    let mut sum = Interval::point((c.constant as i64) << 31)
-        .add(product(c.position, q))
-        .add(product(c.temperature, th))
-        .add(product(c.load, load))
-        .add(product(c.rotor_inertia, a));
+    let mut sum = Interval::point((c.constant as i64) << 31);
+    for (coefficient, signal) in [(c.position, q), (c.temperature, th), (c.load, load), (c.rotor_inertia, a)] {
+        sum = sum.add(product(coefficient, signal));
+    }
 
     let viscous_factor = clip(ONE.add(factor_part(c.viscous_temperature, th)));
     let viscous = rounded_times(Interval::point(c.viscous as i64), viscous_factor);
@@ -134,7 +140,7 @@ fn cell_bounds(physical: &PreparedTerms, box_: &[Interval; SIGNALS], v: Interval
     slope = slope.add(product(c.quadratic, speed).shift_right(30));
 
     let argument = product(c.coulomb_slope, v).map(|p| saturate(p >> 22) as i64);
-    let direction = argument.map(|x| tanh(x as i32) as i64);
+    let direction = argument.map(tanh_at);
     let coulomb = coulomb_levels(physical, box_, v);
     sum = sum.add(coulomb.times(direction));
     // Slope of the direction over full-scale velocity, Q16: table slope Q14 times 1 / v_c in Q16.
@@ -149,11 +155,11 @@ fn cell_bounds(physical: &PreparedTerms, box_: &[Interval; SIGNALS], v: Interval
         slope = slope.add(amplitude.times(bump).shift_right(16));
     }
     if physical.terms.contains(Terms::HYSTERESIS) {
-        let at = |v: i64, a: i64| physical.hysteresis_argument(v as i32, a as i32) as i64;
+        let at = |v: i64, a: i64| hysteresis_argument(physical, v, a);
         let argument = Interval::between(at(v.low, a.low), at(v.high, a.high))
             .union(Interval::between(at(v.low, a.high), at(v.high, a.low)));
         let amplitude = Interval::point(physical.hysteresis as i64);
-        sum = sum.add(amplitude.times(argument.map(|x| atan(x as i32) as i64)));
+        sum = sum.add(amplitude.times(argument.map(atan_at)));
         let edge = atan_slopes(argument).times(Interval::point(c.hysteresis_velocity_slope as i64)).shift_right(16);
         slope = slope.add(amplitude.times(edge).shift_right(16));
     }
@@ -170,14 +176,31 @@ fn cell_bounds(physical: &PreparedTerms, box_: &[Interval; SIGNALS], v: Interval
     CellBounds { sum, slope }
 }
 
+#[inline(never)]
+fn hysteresis_argument(physical: &PreparedTerms, velocity: i64, acceleration: i64) -> i64 {
+    physical.hysteresis_argument(velocity as i32, acceleration as i32) as i64
+}
+
 /// Slopes of the tanh table over arguments in Q25, Q14. As in the network, but here the argument may span the table.
 fn tanh_slopes(argument: Interval) -> Interval {
     slopes_between(tanh_slope, argument, &[-1, 0])
 }
 
+// The tables' look-ups are inlined in the control step; here each is linked once.
+
+#[inline(never)]
+fn stribeck_at(argument: i64) -> i64 {
+    stribeck(argument as i32) as i64
+}
+
+#[inline(never)]
+fn atan_at(argument: i64) -> i64 {
+    atan(argument as i32) as i64
+}
+
 /// Values of the Stribeck bump: it turns at u = +-1 / sqrt 2, in steps 45 and -46.
 fn stribeck_values(u: Interval) -> Interval {
-    let ends = Interval::between(stribeck(u.low as i32) as i64, stribeck(u.high as i32) as i64);
+    let ends = u.map(stribeck_at);
     let peak = i32::MAX as i64;
     let ends = if spans(u, 44, 46) { ends.union(Interval::point(peak)) } else { ends };
     if spans(u, -47, -45) { ends.union(Interval::point(-peak)) } else { ends }

@@ -14,29 +14,34 @@ use crate::friction::smooth::TANH;
 pub(super) const FRACTION_BITS: u32 = 20;
 /// Combinations of the two ends of each neuron's interval in a layer.
 const COMBINATIONS: usize = 1 << NEURONS;
+/// Combinations of layer 2 that are kept at a time: all would be 2.5 KiB of stack, and what is computed again for each part is little.
+const AT_ONCE: usize = 16;
 
 /// Slope over a scaled input in units of the network's output, Q20. `tanh_slopes`: per layer and neuron, Q14.
+#[inline(never)]
 pub(super) fn over_input(
     parameters: &NetworkParameters,
     tanh_slopes: &[[Interval; NEURONS]; 3],
     input: usize,
 ) -> Interval {
     let [tanh_0, tanh_1, tanh_2] = tanh_slopes;
-    let mut behind = [[Interval::ZERO; NEURONS]; COMBINATIONS];
-    for (combination, place) in behind.iter_mut().enumerate() {
-        *place = behind_layer_1(parameters, &ends(tanh_2, combination));
-    }
     let mut steepest: Option<Interval> = None;
-    for combination in 0..COMBINATIONS {
-        let before = before_layer_1(parameters, &ends(tanh_0, combination), input);
-        for behind in &behind {
-            let mut slope = Interval::ZERO;
-            for ((before, behind), own) in before.iter().zip(behind).zip(tanh_1) {
-                let others = before.times(*behind).shift_right(FRACTION_BITS);
-                slope = slope.add(others.times_share(*own));
+    for part in 0..COMBINATIONS / AT_ONCE {
+        let mut behind = [[Interval::ZERO; NEURONS]; AT_ONCE];
+        for (combination, place) in behind.iter_mut().enumerate() {
+            *place = behind_layer_1(parameters, &ends(tanh_2, part * AT_ONCE + combination));
+        }
+        for combination in 0..COMBINATIONS {
+            let before = before_layer_1(parameters, &ends(tanh_0, combination), input);
+            for behind in &behind {
+                let mut slope = Interval::ZERO;
+                for ((before, behind), own) in before.iter().zip(behind).zip(tanh_1) {
+                    let others = before.times_here(*behind).shift_right_here(FRACTION_BITS);
+                    slope = slope.add_here(others.times_share(*own));
+                }
+                let slope = slope.shift_right(14);
+                steepest = Some(steepest.map_or(slope, |steepest| steepest.union(slope)));
             }
-            let slope = slope.shift_right(14);
-            steepest = Some(steepest.map_or(slope, |steepest| steepest.union(slope)));
         }
     }
     steepest.unwrap_or_default()
@@ -80,10 +85,11 @@ fn behind_layer_1(parameters: &NetworkParameters, tanh_2: &[i64; NEURONS]) -> [I
 }
 
 /// Weighted sum of slopes.
+#[inline(never)]
 fn weighted(neuron: &Neuron, slopes: &[Interval; NEURONS]) -> Interval {
     let mut sum = Interval::ZERO;
     for (weight, slope) in neuron.weights.iter().zip(slopes) {
-        sum = sum.add(slope.times(Interval::point(*weight as i64)));
+        sum = sum.add_here(slope.times_here(Interval::point(*weight as i64)));
     }
     sum.shift_right(neuron.fraction as u32)
 }

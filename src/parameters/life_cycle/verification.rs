@@ -5,10 +5,11 @@
 //! failure.
 
 use super::Refusal;
-use crate::friction::FrictionModel;
+use crate::friction::ParameterSet;
 use crate::parameters::authentication::{Key, split};
-use crate::parameters::certificate::{Certificate, Limits, certify};
-use crate::parameters::image::{Effort, Image, ImageError, Target};
+use crate::parameters::certificate::{self, Certificate, Limits};
+use crate::parameters::image::{Effort, Image, Target};
+use crate::parameters::pieces::Pieces;
 
 /// What this joint asks of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,52 +46,45 @@ pub(super) fn authentic(upload: &[u8], key: Option<&Key>) -> Result<bool, Refusa
     }
 }
 
-/// Checks the rest of an authentic upload.
+/// Checks the rest of an authentic upload, one parameter set at a time.
 #[inline(never)]
 pub(super) fn verify(upload: &[u8], requirements: &Requirements, floor: u32) -> Result<Verified, Refusal> {
     let (bytes, _) = split(upload);
-    // By reference: an image taken out of the result is another 2 KiB of stack.
-    let decoded = decoded(bytes);
-    let image = match &decoded {
-        Ok(image) => image,
-        Err(error) => return Err((*error).into()),
-    };
-    let Requirements { target, effort, limits, rate } = *requirements;
-    if image.version < floor {
-        return Err(Refusal::Version { version: image.version, floor });
+    let image = Pieces::of(bytes)?;
+    let Requirements { target, effort, limits, .. } = *requirements;
+    let header = &image.header;
+    if header.version < floor {
+        return Err(Refusal::Version { version: header.version, floor });
     }
-    if image.target.product != 0 && image.target.product != target.product {
-        return Err(Refusal::Product { image: image.target.product, joint: target.product });
+    if header.target.product != 0 && header.target.product != target.product {
+        return Err(Refusal::Product { image: header.target.product, joint: target.product });
     }
-    if image.target.serial != 0 && image.target.serial != target.serial {
-        return Err(Refusal::Serial { image: image.target.serial, joint: target.serial });
+    if header.target.serial != 0 && header.target.serial != target.serial {
+        return Err(Refusal::Serial { image: header.target.serial, joint: target.serial });
     }
-    if image.effort != effort {
-        return Err(Refusal::Effort { image: image.effort, joint: effort });
+    if header.effort != effort {
+        return Err(Refusal::Effort { image: header.effort, joint: effort });
     }
     let limits = Limits {
-        output: image.limits.output.min(limits.output),
-        torque_gain: image.limits.torque_gain.min(limits.torque_gain),
-        velocity_slope: image.limits.velocity_slope.min(limits.velocity_slope),
+        output: header.limits.output.min(limits.output),
+        torque_gain: header.limits.torque_gain.min(limits.torque_gain),
+        velocity_slope: header.limits.velocity_slope.min(limits.velocity_slope),
     };
-    let certificate = certified(image, &limits)?;
-    golden(image, rate)?;
-    Ok(Verified { length: bytes.len(), version: image.version, certificate })
+    let certificate = certified(&image, &limits).map_err(Refusal::Certificate)?;
+    image.verify_golden().map_err(Refusal::Golden)?;
+    Ok(Verified { length: bytes.len(), version: header.version, certificate })
 }
 
-// Functions of their own, so that the KiB of stack that each takes are not taken side by side.
-
+/// A function of its own, so that its stack and that of the golden vectors are not taken side by side.
 #[inline(never)]
-fn decoded(bytes: &[u8]) -> Result<Image, ImageError> {
-    Image::decode(bytes)
-}
-
-#[inline(never)]
-fn certified(image: &Image, limits: &Limits) -> Result<Certificate, Refusal> {
-    certify(&image.friction, limits).map_err(Refusal::Certificate)
-}
-
-#[inline(never)]
-fn golden(image: &Image, rate: u32) -> Result<(), Refusal> {
-    image.verify_golden(&FrictionModel::new(&image.friction, rate)).map_err(Refusal::Golden)
+fn certified(image: &Pieces, limits: &Limits) -> Result<Certificate, certificate::Refusal> {
+    let mut proved = None;
+    let mut set = ParameterSet::default();
+    for index in 0..image.sets() {
+        image.set(index, &mut set);
+        certificate::prove_set(&image.header.domain, &set, index, image.sets(), &mut proved)?;
+    }
+    let proved = proved.unwrap_or_default();
+    proved.hold(limits)?;
+    Ok(proved)
 }

@@ -3,18 +3,18 @@
 mod bus;
 mod node;
 mod program;
-mod shadow;
 mod store;
 
 use super::NotStarted;
 use crate::board::control::{Commands, Report};
 use crate::board::flash::Parameters;
-use crate::board::{can, control};
+use crate::board::{can, control, shadow};
 use bus::Node;
 use embassy_executor::Spawner;
 use embassy_stm32::Peri;
 use embassy_stm32::can::CanConfigurator;
 use embassy_stm32::peripherals::FLASH;
+use joint_firmware::friction::regime::Memory;
 use joint_firmware::motor::thermal::ThermalSettings;
 use joint_firmware::objects::{FrictionStatistics, Observed};
 use program::BoardProgram;
@@ -34,6 +34,7 @@ pub struct Connection {
 }
 
 /// Offers the first configuration and starts the receive interrupt. Returns what the thermal model needs, too.
+#[inline(never)]
 pub fn start(commands: Commands, parts: Parts) -> Result<(Connection, ThermalSettings), NotStarted> {
     let mut program =
         BoardProgram::new(commands.active, commands.calibration, Store::open(Parameters::new(parts.flash))?);
@@ -48,13 +49,15 @@ impl Connection {
     pub fn spawn(self, slow: Spawner) -> Watching {
         // Spawned once, so its only place is free.
         slow.spawn(defmt::unwrap!(bus::serve(self.node)));
-        Watching { statistics: FrictionStatistics::default() }
+        Watching { statistics: FrictionStatistics::default(), memory: Memory::default() }
     }
 }
 
 /// What the bus shows of the joint beside its control steps.
 pub struct Watching {
     statistics: FrictionStatistics,
+    /// Of the model in shadow.
+    memory: Memory,
 }
 
 impl Watching {
@@ -62,7 +65,7 @@ impl Watching {
     pub fn look(&mut self, bridge_temperature: f32, winding_temperature: f32) {
         let Some(Report { telemetry, latched, .. }) = control::report() else { return };
         let mut seen = telemetry;
-        if let Some(torque) = shadow::torque(&seen) {
+        if let Some(torque) = shadow::torque(&mut self.memory, &seen) {
             seen.compensated.output.shadow = torque;
         }
         self.statistics.note(&seen);

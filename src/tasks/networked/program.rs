@@ -2,10 +2,9 @@
 
 use super::store::{Guard, Store};
 use crate::board::control::Calibration;
-use crate::board::{self, BoardConfiguration, Offering, Prepared};
+use crate::board::{self, BoardConfiguration, Offering, Prepared, shadow};
 use core::cell::RefCell;
 use joint_firmware::canopen::{Event, Reset};
-use joint_firmware::friction::FrictionModel;
 use joint_firmware::joint::Active;
 use joint_firmware::joint::commissioning::calibration_settings;
 use joint_firmware::joint::configuration::{Configuration, ConfigurationError};
@@ -53,10 +52,11 @@ impl BoardProgram {
     }
 
     /// Offers the first configuration, with the friction model in flash. Returns what the thermal model needs.
+    #[inline(never)]
     pub fn begin(&mut self, configuration: &Configuration) -> Result<ThermalSettings, ConfigurationError> {
-        let model = self.store.image().and_then(|image| model(image, board::CONTROL_HZ));
+        let image = self.store.image().unwrap_or_default();
         // Nothing has been offered, so there is a place.
-        let prepared = defmt::unwrap!(prepare(&mut self.active, configuration, model))?;
+        let prepared = defmt::unwrap!(prepare(&mut self.active, configuration, image))?;
         let thermal = prepared.value().thermal;
         prepared.offer();
         Ok(thermal)
@@ -65,52 +65,53 @@ impl BoardProgram {
     /// Has the control step take the friction model of an image with the configuration in use; false while it has not taken what it was
     /// offered before.
     pub fn run(&mut self, configuration: &Configuration, image: &[u8]) -> bool {
-        self.offer(configuration, model(image, board::CONTROL_HZ))
+        offer(&mut self.active, configuration, image)
     }
 
     /// The same with the image in flash, or none where there is none.
     pub fn run_stored(&mut self, configuration: &Configuration) -> bool {
-        let model = self.store.image().and_then(|image| model(image, board::CONTROL_HZ));
-        self.offer(configuration, model)
+        let image = self.store.image().unwrap_or_default();
+        offer(&mut self.active, configuration, image)
     }
+}
 
-    fn offer(&mut self, configuration: &Configuration, model: Option<FrictionModel>) -> bool {
-        // The configuration was prepared before, when it came into use.
-        match prepare(&mut self.active, configuration, model) {
-            Some(Ok(prepared)) => {
-                prepared.offer();
-                true
-            }
-            _ => false,
+/// The configuration was prepared before, when it came into use; `image` is empty where there is none.
+fn offer(active: &mut Offering<Active>, configuration: &Configuration, image: &[u8]) -> bool {
+    match prepare(active, configuration, image) {
+        Some(Ok(prepared)) => {
+            prepared.offer();
+            true
         }
+        _ => false,
     }
 }
 
-/// The friction model of an image's bytes for `rate` evaluations a second; none where they are no image.
-///
-/// A function of its own, so that the decoded image's 2 KiB of stack are free again afterwards.
-#[inline(never)]
-pub fn model(image: &[u8], rate: u32) -> Option<FrictionModel> {
-    Some(FrictionModel::new(&Image::decode(image).ok()?.friction, rate))
-}
-
-/// A function of its own, as above.
+/// The friction model is prepared in its place, because the stack would not bear it beside the rest.
 #[inline(never)]
 fn prepare<'a>(
     active: &'a mut Offering<Active>,
     configuration: &Configuration,
-    model: Option<FrictionModel>,
+    image: &[u8],
 ) -> Option<Result<Prepared<'a, Active>, ConfigurationError>> {
-    active.prepare(|_| configuration.prepare(&board::CONFIGURATION.bridge).map(|active| active.with_friction(model)))
+    shadow::withdraw();
+    active.prepare(
+        || configuration.prepare(&board::CONFIGURATION.bridge),
+        |place, _| Image::prepare(image, board::CONTROL_HZ, &mut place.friction),
+    )
 }
 
 impl Program for BoardProgram {
     fn configure(&mut self, configuration: &Configuration) -> Result<(), NotConfigured> {
         let bridge = &board::CONFIGURATION.bridge;
-        let prepared = self.active.prepare(|in_use| {
-            let model = in_use.and_then(|active| active.friction.clone());
-            configuration.prepare(bridge).map(|active| active.with_friction(model))
-        });
+        shadow::withdraw();
+        let prepared = self.active.prepare(
+            || configuration.prepare(bridge),
+            |place, in_use| {
+                if let Some(in_use) = in_use {
+                    place.friction.clone_from(&in_use.friction);
+                }
+            },
+        );
         prepared.ok_or(NotConfigured::Busy)?.map_err(NotConfigured::Refused)?.offer();
         Ok(())
     }
