@@ -13,6 +13,18 @@ pub enum Width {
     Word,
 }
 
+impl Width {
+    /// In bytes.
+    #[inline(always)]
+    pub const fn bytes(self) -> u32 {
+        match self {
+            Self::Byte => 1,
+            Self::Half => 2,
+            Self::Word => 4,
+        }
+    }
+}
+
 /// Why an access was not answered.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Refusal {
@@ -34,6 +46,9 @@ pub struct Signals {
     pub reset: bool,
     /// Code that changed by itself (flash that was erased or written), which the core must decode anew.
     pub rewritten: Option<Range<u32>>,
+    /// Memory that does not answer before a cycle: code and data that the core wants from there wait until then. Read it also after a store to
+    /// memory that is not RAM: flash that is erased or written begins to stall with that store.
+    pub stall: Option<(Range<u32>, u64)>,
 }
 
 /// Memories and devices as a core sees them. `now` counts the core's cycles since the run began and never goes back.

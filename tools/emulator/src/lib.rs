@@ -7,3 +7,4 @@
 //! Host only.
 
 pub mod bus;
+pub mod chip;
