@@ -130,7 +130,8 @@ impl<W: Wiring> Chip<W> {
             Device::Common(group) => self.common[group].read(offset),
             Device::Debug => self.syscfg.read_debug(offset),
             Device::Spi(_) => Err(Refusal::NoAnswer),
-            Device::Fdcan | Device::MessageRam => Err(Self::nothing_at(0x4000_6400)),
+            Device::Fdcan => self.fdcan.read(offset, at, self.fdcan_clock()),
+            Device::MessageRam => Ok(self.fdcan.read_ram(offset)),
         }
     }
 
@@ -157,7 +158,7 @@ impl<W: Wiring> Chip<W> {
         }
         self.write_register(device, offset, width, value, now)?;
         match device {
-            Device::Rcc | Device::Flash | Device::Iwdg | Device::Pwr => self.refresh_slow(),
+            Device::Rcc | Device::Flash | Device::Iwdg | Device::Pwr | Device::Fdcan => self.refresh_slow(),
             _ => self.refresh(),
         }
         Ok(())
@@ -225,7 +226,12 @@ impl<W: Wiring> Chip<W> {
                 self.common[group].write(offset, value, off)?;
             }
             Device::Debug => self.syscfg.write_debug(offset, value)?,
-            Device::Fdcan | Device::MessageRam => return Err(Self::nothing_at(0x4000_6400)),
+            Device::Fdcan => {
+                let clock = self.rcc.fdcan_clock()?;
+                self.fdcan.write(offset, value, at, clock)?;
+                self.tell_line(at.instant());
+            }
+            Device::MessageRam => self.fdcan.write_ram(offset, value),
         }
         Ok(())
     }
@@ -302,6 +308,9 @@ impl<W: Wiring> Chip<W> {
             self.pwr.reset();
         } else if gate == variant::CRC_GATE {
             self.crc.reset();
+        } else if gate == variant::FDCAN_GATE {
+            self.fdcan.reset();
+            self.tell_line(self.clock.instant(now));
         }
         for port in 0..gpio::PORTS {
             if variant::gpio_gate(port) == gate {

@@ -3,6 +3,7 @@
 use super::adc::{Due, Trigger};
 use super::memory::SRAM;
 use super::rcc::Cause;
+use super::time::Instant;
 use super::variant::{self, Input, OUTPUTS};
 use super::wiring::{Gate, Pwm, TimerName, Wiring};
 use super::{Chip, syscfg::Alarm};
@@ -49,11 +50,35 @@ impl<W: Wiring> Chip<W> {
             self.power_down(cycle);
         } else {
             self.flash.advance(at);
+            self.step_line(at);
             if self.iwdg.next() <= at {
                 self.reset(cycle, Cause::IndependentWatchdog);
             }
         }
         self.refresh_slow();
+    }
+
+    /// What ended on the bus, and what the controller does next.
+    fn step_line(&mut self, at: Instant) {
+        let clock = self.fdcan_clock();
+        while let Some(event) = self.wiring.can().and_then(|line| line.take(at)) {
+            self.fdcan.happened(event, at, clock);
+            self.tell_line(at);
+        }
+        self.tell_line(at);
+    }
+
+    /// The controller's clock, Hz. 0 where RCC gives it none: then no bit ever ends.
+    pub(super) fn fdcan_clock(&self) -> u64 {
+        self.rcc.fdcan_clock().unwrap_or(0)
+    }
+
+    /// Tells the bus how the controller takes part.
+    pub(super) fn tell_line(&mut self, at: Instant) {
+        let part = self.fdcan.part(at, self.fdcan_clock());
+        if let (Some(part), Some(line)) = (part, self.wiring.can()) {
+            line.take_part(at, part);
+        }
     }
 
     fn convert(&mut self, index: usize, cycle: u64) {
@@ -135,7 +160,11 @@ impl<W: Wiring> Chip<W> {
     /// What counts time has changed, or the clock.
     pub(super) fn refresh_slow(&mut self) {
         self.next_slow = match self.powered {
-            true => self.clock.cycle(self.flash.next().min(self.iwdg.next())),
+            true => {
+                let line = self.wiring.can().map_or(Instant::NEVER, |line| line.next());
+                let controller = self.fdcan.next();
+                self.clock.cycle(self.flash.next().min(self.iwdg.next()).min(line).min(controller))
+            }
             false => u64::MAX,
         };
         self.refresh();
@@ -161,13 +190,18 @@ impl<W: Wiring> Chip<W> {
         for spi in &self.spis {
             set(spi.description().line, spi.interrupts());
         }
+        for (line, level) in variant::FDCAN_LINES.into_iter().zip(self.fdcan.interrupts()) {
+            set(line, level);
+        }
         set(variant::FLASH_LINE, self.flash.interrupts());
         self.lines = lines;
     }
 
     /// A double error was read: the interrupt, and TIM1's break where SYSCFG connects it (10.2.10).
+    /// It is an event of this cycle, so that a core that does not ask after loads from flash hears of it at once.
     pub(super) fn double_error(&mut self, cycle: u64) {
         self.alarm(cycle, Alarm::Ecc);
+        self.next = self.next.min(cycle);
     }
 
     pub(super) fn tell_signals(&mut self) -> Signals {

@@ -8,6 +8,7 @@
 
 pub mod adc;
 pub mod crc;
+pub mod fdcan;
 pub mod flash;
 pub mod gpio;
 pub mod iwdg;
@@ -32,6 +33,7 @@ mod tests;
 use crate::bus::Refusal;
 use adc::{Common, Converter};
 use crc::Crc;
+use fdcan::Fdcan;
 use flash::{Flash, Torn};
 use gpio::{Driven, Gpio, PORTS};
 use iwdg::Iwdg;
@@ -79,6 +81,7 @@ pub struct Chip<W> {
     spis: Vec<Spi>,
     iwdg: Iwdg,
     crc: Crc,
+    fdcan: Fdcan,
     deviations: Vec<Deviation>,
     /// Earliest event.
     next: u64,
@@ -110,6 +113,7 @@ impl<W: Wiring> Chip<W> {
             spis: variant.spis.iter().map(Spi::new).collect(),
             iwdg: Iwdg::new(),
             crc: Crc::new(),
+            fdcan: Fdcan::new(),
             deviations: Vec::new(),
             next: u64::MAX,
             next_slow: u64::MAX,
@@ -130,9 +134,14 @@ impl<W: Wiring> Chip<W> {
         &self.wiring
     }
 
-    /// The board.
+    /// The board. After a change that the chip has to see before its own next event, call [`wiring_changed`](Self::wiring_changed).
     pub const fn wiring_mut(&mut self) -> &mut W {
         &mut self.wiring
+    }
+
+    /// The board has something new: a frame on the bus.
+    pub fn wiring_changed(&mut self) {
+        self.refresh_slow();
     }
 
     /// SRAM1, SRAM2 and CCM SRAM, side by side from 2000_0000h on.
@@ -244,6 +253,8 @@ impl<W: Wiring> Chip<W> {
         self.spis.iter_mut().for_each(Spi::reset);
         self.iwdg.reset();
         self.crc.reset();
+        self.fdcan.reset();
+        self.tell_line(at);
         for port in 0..PORTS {
             self.tell_driven(port, cycle);
         }

@@ -4,6 +4,7 @@
 //! converter holds its sample, every end of a frame. Between two calls nothing that the chip drives has changed, so a board may integrate its
 //! plant from call to call.
 
+use super::fdcan::line::CanLine;
 use super::time::Instant;
 use std::fmt;
 
@@ -150,6 +151,11 @@ pub trait Wiring {
 
     /// A frame ended: what the board sent meanwhile.
     fn spi(&mut self, at: Instant, frame: &SpiFrame) -> u16;
+
+    /// The bus that FDCAN1's transceiver is connected to; none where it is to none, and the controller never sees it idle.
+    fn can(&mut self) -> Option<&mut dyn CanLine> {
+        None
+    }
 }
 
 /// Nothing is connected: every pin floats at 0 V, every frame comes back as ones.

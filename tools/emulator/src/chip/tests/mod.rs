@@ -2,6 +2,7 @@
 
 mod adc;
 mod crc;
+mod fdcan;
 mod flash;
 mod gpio;
 mod iwdg;
@@ -10,6 +11,7 @@ mod rcc;
 mod spi;
 mod timer;
 
+use super::fdcan::line::{CanLine, Line};
 use super::time::Instant;
 use super::variant::Variant;
 use super::wiring::{Pin, Pwm, Quadrature, SpiFrame, TimerName, Wiring};
@@ -22,7 +24,7 @@ const PWR: u32 = 0x4000_7000;
 const FLASH: u32 = 0x4002_2000;
 
 /// A board of which a test sets the inputs and sees the outputs.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 struct Board {
     volts: BTreeMap<Pin, f64>,
     levels: BTreeMap<Pin, bool>,
@@ -33,9 +35,25 @@ struct Board {
     pwm: Vec<(Instant, Pwm)>,
     frames: Vec<(Instant, SpiFrame)>,
     last: Instant,
+    can: Line,
 }
 
 impl Board {
+    fn new() -> Self {
+        Self {
+            volts: BTreeMap::new(),
+            levels: BTreeMap::new(),
+            quadrature: Quadrature::default(),
+            answers: VecDeque::new(),
+            sampled: vec![],
+            driven: vec![],
+            pwm: vec![],
+            frames: vec![],
+            last: Instant(0),
+            can: Line::new(1_000_000),
+        }
+    }
+
     /// The chip calls in the order of time.
     fn at(&mut self, at: Instant) {
         assert!(at >= self.last, "{at:?} after {:?}", self.last);
@@ -75,6 +93,10 @@ impl Wiring for Board {
         self.frames.push((at, *frame));
         self.answers.pop_front().unwrap_or(u16::MAX)
     }
+
+    fn can(&mut self) -> Option<&mut dyn CanLine> {
+        Some(&mut self.can)
+    }
 }
 
 /// A chip on that board, and the core's time.
@@ -86,7 +108,7 @@ struct Bench {
 
 impl Bench {
     fn new(variant: &'static Variant) -> Self {
-        Self { chip: Chip::new(variant, Board::default()), now: 0, signals: Signals::default() }
+        Self { chip: Chip::new(variant, Board::new()), now: 0, signals: Signals::default() }
     }
 
     /// A STM32G431CB at 170 MHz.
