@@ -8,3 +8,4 @@
 
 pub mod bus;
 pub mod chip;
+pub mod parts;
