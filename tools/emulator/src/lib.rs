@@ -6,6 +6,7 @@
 //!
 //! Host only.
 
+pub mod board;
 pub mod bus;
 pub mod chip;
 pub mod parts;
