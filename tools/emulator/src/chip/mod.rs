@@ -164,7 +164,7 @@ impl<W: Wiring> Chip<W> {
         self.memory.set_uid(uid);
     }
 
-    /// Writes flash as a programmer would, before the run. False where it does not fit, or begins within a double word.
+    /// Writes flash as a programmer would, before the run. False where it does not fit.
     pub fn program(&mut self, address: u32, bytes: &[u8]) -> bool {
         address.checked_sub(access::FLASH).is_some_and(|offset| self.flash.array.flash(offset, bytes))
     }

@@ -69,7 +69,7 @@ impl Amplifiers {
                 let gain = f64::from(2u32 << power);
                 match code >> 3 {
                     0 => Some(Amplification { input, gain, bias: None }),
-                    2 => Some(Amplification { input, gain, bias: Some(bias) }),
+                    1 => Some(Amplification { input, gain, bias: Some(bias) }),
                     _ => None,
                 }
             }

@@ -3,7 +3,7 @@
 use super::register::{Block, Register, register};
 use crate::bus::Refusal;
 
-const CFGR2: u32 = 0x18;
+const CFGR2: u32 = 0x1c;
 
 /// EXTICR1 to 4 select pins for EXTI, which is not modelled; MEMRMP maps other memories to address 0; the SRAM's write protection is not
 /// modelled either.

@@ -87,10 +87,10 @@ impl Array {
         &self.torn
     }
 
-    /// What a programmer writes beforehand: erases the pages that it touches and programs them. False where it does not fit.
+    /// What a programmer writes beforehand, over whatever is there. False where it does not fit.
     pub fn flash(&mut self, offset: u32, bytes: &[u8]) -> bool {
         let end = offset as usize + bytes.len();
-        if !offset.is_multiple_of(DOUBLE_WORD) || end > self.bytes.len() {
+        if end > self.bytes.len() {
             return false;
         }
         self.bytes[offset as usize..end].copy_from_slice(bytes);

@@ -152,7 +152,7 @@ fn a_sequence_of_what_cannot_be_measured_stops_the_run() {
 fn an_amplifier_with_bias_gives_its_gain_to_the_converter() {
     let mut bench = bench();
     // Gain 16 with VINM0, into the converter.
-    bench.set(OPAMP, 1 | 2 << 5 | 1 << 7 | 1 << 8 | 0b10011 << 14);
+    bench.set(OPAMP, 1 | 2 << 5 | 1 << 7 | 1 << 8 | 0b01011 << 14);
     enable(&mut bench, ADC1);
     arm(&mut bench, ADC1, &[13]);
     bench.board().volts.extend([(Pin::new('A', 1), 0.1), (Pin::new('A', 3), 0.01)]);
@@ -182,6 +182,7 @@ fn other_configurations_of_an_amplifier_are_refused() {
     let mut bench = bench();
     assert!(bench.refused(OPAMP, 1 | 1 << 8).starts_with("OPAMP_OPAMP1_CSR"), "standalone");
     assert!(bench.refused(OPAMP, 1 | 2 << 5).contains("running amplifier"), "output at the pin");
+    assert!(bench.refused(OPAMP, 1 | 2 << 5 | 1 << 8 | 0b10011 << 14).contains("running amplifier"), "filter");
     assert!(bench.unread(OPAMP + 0x0c).contains("OPAMP: register at 0x00c"), "OPAMP4");
 }
 

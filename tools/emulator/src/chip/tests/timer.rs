@@ -42,7 +42,7 @@ fn bridge() -> Bench {
     bench.set(TIM1 + 0x40, TOP - 1);
     bench.set(TIM1 + 0x04, 7 << 20);
     bench.set(TIM1 + 0x60, 0);
-    bench.set(SYSCFG + 0x18, 3);
+    bench.set(SYSCFG + 0x1c, 3);
     bench.set(TIM1 + 0x44, 0x84 | 1 << 10 | 1 << 11 | 1 << 13);
     bench.set(TIM1 + 0x44, 0x84 | 1 << 10 | 1 << 11 | 1 << 13 | 1 << 12);
     bench.set(TIM1 + 0x20, 0x555);
@@ -184,7 +184,7 @@ fn without_the_break_a_lock_up_changes_nothing() {
         // Break enabled but not connected in SYSCFG, and the other way round.
         bench.set(TIM1 + 0x60, 0);
         bench.set(TIM1 + 0x44, 1 << 13);
-        bench.set(SYSCFG + 0x18, if without { 3 } else { 0 });
+        bench.set(SYSCFG + 0x1c, if without { 3 } else { 0 });
         bench.set(TIM1 + 0x44, 1 << 13 | if without { 0 } else { 1 << 12 } | 1 << 15);
         bench.chip.lockup(bench.now);
         assert_ne!(bench.get(TIM1 + 0x44) & 1 << 15, 0);

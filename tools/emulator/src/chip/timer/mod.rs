@@ -268,6 +268,7 @@ impl Timer {
 
     /// A store by the core, after [`advance`](Self::advance).
     pub fn write(&mut self, offset: u32, value: u32, cycle: u64) -> Result<(), Refusal> {
+        let control = (self.counter.running, self.counter.centred);
         match offset {
             SR => self.block.set(SR, self.block.get(SR) & value),
             EGR => return self.generate(value, cycle),
@@ -284,7 +285,10 @@ impl Timer {
                 self.written(offset, cycle)?;
             }
         }
-        if matches!(offset, CR1 | CCMR1 | CCMR2 | CCER | BDTR) {
+        // Of CR1, what holds updates off changes no output: the firmware writes it twice a period.
+        if matches!(offset, CCMR1 | CCMR2 | CCER | BDTR)
+            || offset == CR1 && control != (self.counter.running, self.counter.centred)
+        {
             self.events.outputs |= self.has_outputs();
         }
         self.refresh_reference4();
