@@ -10,6 +10,7 @@ pub mod board;
 pub mod bus;
 pub mod chip;
 pub mod cpu;
+pub mod emulation;
 pub mod memory;
 pub mod parts;
 pub mod program;

@@ -6,6 +6,7 @@
 use super::drivetrain::Drivetrain;
 use super::electrics::{Ntc, divided, node};
 use super::{Inputs, Wired};
+use crate::chip::Deviation;
 use crate::chip::fdcan::line::{CanLine, Line};
 use crate::chip::time::Instant;
 use crate::chip::variant::{STM32G431CB, Variant};
@@ -70,6 +71,8 @@ impl BG431BEsc1 {
 impl Wired for BG431BEsc1 {
     const VARIANT: &'static Variant = &STM32G431CB;
     const NAME: &'static str = "b-g431b-esc1";
+    // The bridge is switched off first of all, before TIM1 has a clock: without one it drives nothing.
+    const DEVIATIONS: &'static [Deviation] = &[Deviation::WithoutClock { register: 0x4001_2c44 }];
 
     fn drivetrain(&mut self) -> &mut Drivetrain {
         &mut self.drivetrain

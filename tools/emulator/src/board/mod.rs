@@ -11,6 +11,7 @@ pub use b_g431b_esc1::BG431BEsc1;
 pub use drivetrain::Drivetrain;
 pub use moteus_r4::MoteusR4;
 
+use crate::chip::Deviation;
 use crate::chip::fdcan::line::Line;
 use crate::chip::variant::Variant;
 use crate::chip::wiring::Wiring;
@@ -30,6 +31,9 @@ pub trait Wired: Wiring {
     const VARIANT: &'static Variant;
     /// As the firmware's feature for it is called.
     const NAME: &'static str;
+
+    /// What the program does against the manual, knowingly.
+    const DEVIATIONS: &'static [Deviation];
 
     /// Bridge, motor and joint.
     fn drivetrain(&mut self) -> &mut Drivetrain;

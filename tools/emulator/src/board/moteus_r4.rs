@@ -6,6 +6,7 @@
 use super::drivetrain::Drivetrain;
 use super::electrics::{Ntc, divided};
 use super::{Inputs, Wired};
+use crate::chip::Deviation;
 use crate::chip::fdcan::line::{CanLine, Line};
 use crate::chip::time::Instant;
 use crate::chip::variant::{STM32G474CE, Variant};
@@ -65,6 +66,9 @@ impl MoteusR4 {
 impl Wired for MoteusR4 {
     const VARIANT: &'static Variant = &STM32G474CE;
     const NAME: &'static str = "moteus-r4";
+    // The bridge is switched off first of all, before the ports have clocks: without them the pins are no outputs.
+    const DEVIATIONS: &'static [Deviation] =
+        &[Deviation::WithoutClock { register: 0x4800_0418 }, Deviation::WithoutClock { register: 0x4800_0018 }];
 
     fn drivetrain(&mut self) -> &mut Drivetrain {
         &mut self.drivetrain

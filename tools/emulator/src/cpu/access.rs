@@ -7,7 +7,8 @@ use crate::bus::{Bus, Refusal, Width};
 
 /// Registers of the core itself (B3.1: the private peripheral bus).
 const PRIVATE: u32 = 0xe000_0000;
-const PRIVATE_LENGTH: u32 = 0x10_0000;
+/// Up to the instrumentation and debug devices, which are the chip's.
+const PRIVATE_LENGTH: u32 = 0x4_2000;
 
 const fn width(bytes: u32) -> Width {
     match bytes {
@@ -73,9 +74,11 @@ impl<B: Bus> Cpu<B> {
         if address.wrapping_sub(PRIVATE) < PRIVATE_LENGTH {
             return self.read_private(address, width);
         }
+        self.wait_for(address);
         let value = self.bus.read(self.now, address, width);
         self.now += u64::from(self.bus.wait_states(address));
-        if address >= SRAM.end {
+        // A device; or a word of the flash that its ECC cannot read, which is an interrupt at once.
+        if address >= SRAM.end || self.bus.next_event() <= self.now {
             self.read_signals();
         }
         value.map_err(|refusal| self.refused(address, refusal))

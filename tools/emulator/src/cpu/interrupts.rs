@@ -255,6 +255,8 @@ impl Interrupts {
             0x100..0x110 | 0x180..0x190 => self.enabled[word],
             0x200..0x210 | 0x280..0x290 => self.pending[word],
             0x300..0x310 => self.active[word],
+            // Of interrupts that the architecture has and this core has not.
+            0x480..0x600 => 0,
             0x400..0x480 => word_of(&self.priorities, (offset - 0x400) as usize),
             _ => return None,
         })

@@ -102,6 +102,8 @@ pub struct Cpu<B: Bus> {
     end: Option<End>,
     trapped_address: u32,
     code: Code<B>,
+    /// Memory that does not answer before a cycle.
+    stall: Option<(std::ops::Range<u32>, u64)>,
     interrupts: Interrupts,
     system: System,
     timer: SystemTimer,
@@ -189,13 +191,13 @@ impl<B: Bus> Cpu<B> {
             return Ok(());
         }
         self.in_it = true;
-        let next = self.pc;
+        let (next, rest, handler) = (self.pc, self.it, self.exception);
         let done = (operation.execute)(self, operation.operands);
         self.in_it = false;
         if done.is_err() {
             self.it = block;
-        } else if self.it != 0 && self.pc != next && self.exception == 0 {
-            // A branch elsewhere than at the block's end.
+        } else if rest != 0 && self.pc != next && self.exception == handler {
+            // A branch elsewhere than at the block's end. A return from a handler brings the block of what it interrupted with it.
             return self.refuse(pc, operation.length, Refused::Unpredictable);
         }
         done
@@ -223,6 +225,9 @@ impl<B: Bus> Cpu<B> {
         loop {
             if self.now >= self.due() {
                 self.catch_up();
+            }
+            if self.sleep.is_none() {
+                self.wait_for(self.pc);
             }
             if let Some(end) = self.end.take() {
                 return Some(end);
@@ -287,8 +292,19 @@ impl<B: Bus> Cpu<B> {
         if self.interrupts.set_lines(signals.lines, signals.nmi) {
             self.pended();
         }
+        self.stall = signals.stall.filter(|(_, until)| *until > self.now);
         self.code.set_wait_states(&self.bus);
         self.schedule();
+    }
+
+    /// Waits for memory that does not answer yet: flash that is erased or written.
+    #[inline]
+    fn wait_for(&mut self, address: u32) {
+        if let Some((range, until)) = &self.stall
+            && range.contains(&address)
+        {
+            self.now = self.now.max(*until);
+        }
     }
 
     /// Something has become pending: an event for WFE where SCR.SEVONPEND says so (B1.5.18).
@@ -298,7 +314,12 @@ impl<B: Bus> Cpu<B> {
 
     /// Sets when `attend` has to look again.
     fn schedule(&mut self) {
-        let at_once = self.end.is_some() || !self.thumb || self.sleep.is_some() || self.interrupts.takeable().is_some();
+        // While memory stalls, each instruction may be one that has to wait for it.
+        let at_once = self.end.is_some()
+            || self.stall.is_some()
+            || !self.thumb
+            || self.sleep.is_some()
+            || self.interrupts.takeable().is_some();
         self.attention = if at_once { 0 } else { self.due().min(self.until) };
     }
 

@@ -46,6 +46,7 @@ impl<B: Bus> Cpu<B> {
             end: None,
             trapped_address: 0,
             code,
+            stall: None,
             interrupts: Interrupts::new(),
             system: System::default(),
             timer: SystemTimer::default(),

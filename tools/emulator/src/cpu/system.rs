@@ -162,7 +162,7 @@ impl<B: Bus> Cpu<B> {
                 self.schedule();
                 read
             }
-            0xe000_e100..0xe000_e500 => self.interrupts.read(offset),
+            0xe000_e100..0xe000_e600 => self.interrupts.read(offset),
             0xe000_e000..0xe000_f000 => self.control_register(offset),
             _ => None,
         };
@@ -256,7 +256,7 @@ impl<B: Bus> Cpu<B> {
         let awake = self.now - self.slept;
         let known = match offset {
             // Priorities may be stored in parts, fault status cleared in parts.
-            0x400..0x480 => {
+            0x400..0x600 => {
                 let each = (0..bytes).zip(value.to_le_bytes());
                 each.for_each(|(i, byte)| self.interrupts.set_priority((offset - 0x400 + i) as usize, byte));
                 true
