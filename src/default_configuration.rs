@@ -35,7 +35,7 @@ pub const B_G431B_ESC1: BoardConfiguration = BoardConfiguration {
     joint: uncommissioned((8.0, 25.0), 0.0),
 };
 
-/// mjbots moteus r4.11. Supply: a bench supply of 12 to 24 V. The encoder's answer is a control period old. The motor's
+/// mjbots moteus r4.11. Supply: a bench supply of 12 to 24 V. The encoder's answer is two control periods old. The motor's
 /// thermistor is the user's to fit, so none is expected.
 pub const MOTEUS_R4: BoardConfiguration = BoardConfiguration {
     bridge: BridgeConfiguration {
@@ -48,7 +48,7 @@ pub const MOTEUS_R4: BoardConfiguration = BoardConfiguration {
         has_bridge_sensor: true,
         has_winding_sensor: false,
     },
-    joint: uncommissioned((10.0, 30.0), 1.0 / MOTEUS_R4_RATE),
+    joint: uncommissioned((10.0, 30.0), 2.0 / MOTEUS_R4_RATE),
 };
 
 /// Control steps a second, Hz.
@@ -132,6 +132,7 @@ mod tests {
                 bus_voltage: 18.0,
                 encoder: 123 << 20,
                 encoder_valid: true,
+                encoder_referenced: true,
                 winding_temperature: f32::NAN,
                 bridge_temperature: 25.0,
                 bridge_fault: false,

@@ -281,6 +281,7 @@ impl Sensors {
             bus_voltage: adc::code::<1>(pac::ADC1) * VOLTS_PER_CODE,
             encoder: self.encoder.angle(count),
             encoder_valid: self.counts_kept,
+            encoder_referenced: self.encoder.is_referenced(),
             winding_temperature: f32::NAN,
             bridge_temperature: f32::NAN,
             // A break has switched the outputs off.
@@ -288,6 +289,10 @@ impl Sensors {
             overrun: false,
         }
     }
+
+    /// At the end of a control interrupt: nothing of this board's sensors is under way.
+    #[inline(always)]
+    pub fn complete(&mut self) {}
 }
 
 /// Whether one of the chip's alarms has switched the outputs off.

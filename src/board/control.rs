@@ -16,6 +16,8 @@ use joint_firmware::joint::fault::Faults;
 use joint_firmware::joint::history::History;
 use joint_firmware::joint::state_machine::Controlword;
 use joint_firmware::joint::{Active, Bridge, BridgeState, Command, Coupled, Demand, Joint, Mode, Slow, Telemetry};
+#[cfg(feature = "bus")]
+use joint_firmware::motor::calibration::{CalibrationSettings, Progress};
 use joint_firmware::motor::phases::Phases;
 
 /// Everything that the control interrupt owns.
@@ -33,6 +35,34 @@ pub struct Commands {
     pub demand: Publisher<Demand>,
     /// Configuration and friction model, prepared: swapped between two control steps.
     pub active: Offering<Active>,
+    /// The calibration of the motor.
+    #[cfg(feature = "bus")]
+    pub calibration: Calibration,
+}
+
+/// A task's end of the calibration.
+#[cfg(feature = "bus")]
+pub struct Calibration {
+    asked: Publisher<Option<CalibrationSettings>>,
+    progress: Subscriber<Option<Progress>>,
+}
+
+#[cfg(feature = "bus")]
+impl Calibration {
+    /// Begins one, or gives up the one that runs (none), in the next control step.
+    pub fn ask(&mut self, settings: Option<&CalibrationSettings>) {
+        self.asked.publish(&settings.copied());
+        WORDS.calibration_asked.store(true, Ordering::Release);
+    }
+
+    /// Where the one is that runs or ran last.
+    pub fn progress(&mut self) -> Option<Progress> {
+        // Until the control step has taken what it was asked, it tells of the one before.
+        if WORDS.calibration_asked.load(Ordering::Acquire) {
+            return Some(Progress::Offsets);
+        }
+        *self.progress.newest()
+    }
 }
 
 /// The control interrupt's ends of the exchanges.
@@ -40,6 +70,10 @@ pub struct Ends {
     active: InUse<Active>,
     demand: Subscriber<Demand>,
     report: Publisher<Option<Report>>,
+    #[cfg(feature = "bus")]
+    asked: Subscriber<Option<CalibrationSettings>>,
+    #[cfg(feature = "bus")]
+    progress: Publisher<Option<Progress>>,
 }
 
 struct Owned(UnsafeCell<MaybeUninit<Control>>);
@@ -64,6 +98,9 @@ struct Words {
     mean_square_current: Real,
     /// The mean square current is taken anew in the next control step.
     mean_square_wanted: AtomicBool,
+    /// A calibration is to begin, or to be given up.
+    #[cfg(feature = "bus")]
+    calibration_asked: AtomicBool,
 }
 
 /// A number in an atomic word.
@@ -98,6 +135,8 @@ static WORDS: Words = Words {
     gear_temperature: Real::new(25.0),
     mean_square_current: Real::new(0.0),
     mean_square_wanted: AtomicBool::new(false),
+    #[cfg(feature = "bus")]
+    calibration_asked: AtomicBool::new(false),
 };
 
 static ACTIVE: Replaced<Active> = Replaced::new();
@@ -108,6 +147,10 @@ static DEMAND: Newest<Demand> = Newest::new(Demand {
     coupled: Coupled { velocity: 0.0, sequence: 0 },
 });
 static REPORT: Newest<Option<Report>> = Newest::new(None);
+#[cfg(feature = "bus")]
+static ASKED: Newest<Option<CalibrationSettings>> = Newest::new(None);
+#[cfg(feature = "bus")]
+static PROGRESS: Newest<Option<Progress>> = Newest::new(None);
 /// Tasks of both executors read it, one at a time.
 static READER: Mutex<RefCell<Option<Subscriber<Option<Report>>>>> = Mutex::new(RefCell::new(None));
 
@@ -197,7 +240,24 @@ pub fn exchange() -> Option<(Commands, Ends)> {
     let (publisher, demand) = DEMAND.split()?;
     let (report, reader) = REPORT.split()?;
     critical_section::with(|section| READER.replace(section, Some(reader)));
-    Some((Commands { demand: publisher, active: offering }, Ends { active, demand, report }))
+    #[cfg(feature = "bus")]
+    let ((asking, asked), (progress, told)) = (ASKED.split()?, PROGRESS.split()?);
+    let commands = Commands {
+        demand: publisher,
+        active: offering,
+        #[cfg(feature = "bus")]
+        calibration: Calibration { asked: asking, progress: told },
+    };
+    let ends = Ends {
+        active,
+        demand,
+        report,
+        #[cfg(feature = "bus")]
+        asked,
+        #[cfg(feature = "bus")]
+        progress,
+    };
+    Some((commands, ends))
 }
 
 /// Makes the joint, hands it and the sensors to the control interrupt and enables that. Until a configuration is offered to
@@ -257,6 +317,11 @@ extern "C" fn ADC1_2() {
         WORDS.mean_square_wanted.store(false, Ordering::Relaxed);
         WORDS.mean_square_current.store(control.joint.take_mean_square_current(), Ordering::Release);
     }
+    #[cfg(feature = "bus")]
+    if control.joint.is_calibrating() || WORDS.calibration_asked.load(Ordering::Acquire) {
+        calibrate(&mut control.joint, &mut control.ends);
+    }
+    control.sensors.complete();
     WORDS.switching.store(bridge.state == BridgeState::Switching, Ordering::Relaxed);
     // Only this handler writes the counters, so load and store need no read-modify-write.
     let count = |counter: &AtomicU32, yes: bool| {
@@ -268,4 +333,24 @@ extern "C" fn ADC1_2() {
     let cycles = DWT::cycle_count().wrapping_sub(begin);
     WORDS.last_cycles.store(cycles, Ordering::Relaxed);
     WORDS.longest_cycles.store(WORDS.longest_cycles.load(Ordering::Relaxed).max(cycles), Ordering::Relaxed);
+}
+
+/// Has the joint do what was asked of its calibration, and tells where it is. While the joint is off: it may lie in flash, as the calibration
+/// itself does.
+#[cfg(feature = "bus")]
+#[inline(never)]
+#[unsafe(link_section = ".text.calibrating")]
+fn calibrate(joint: &mut Joint, ends: &mut Ends) {
+    if WORDS.calibration_asked.load(Ordering::Acquire) {
+        match ends.asked.newest() {
+            // Checked by the task.
+            Some(settings) => drop(joint.calibrate(settings)),
+            None => joint.abort_calibration(),
+        }
+        ends.progress.publish(&joint.calibration());
+        // After the progress: the task takes what it reads then for that of the new one.
+        WORDS.calibration_asked.store(false, Ordering::Release);
+    } else {
+        ends.progress.publish(&joint.calibration());
+    }
 }

@@ -5,6 +5,7 @@ use defmt_rtt as _;
 use embassy_executor::{Executor, InterruptExecutor};
 use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::{InterruptExt, Priority};
+use embassy_stm32::{Peripherals, pac, rcc};
 use static_cell::StaticCell;
 
 /// Runs the tasks that must not wait for the slow ones. Its interrupt is one that the boards do not use otherwise: clock
@@ -22,12 +23,30 @@ fn main() -> ! {
     super::memory::load_control_code();
     super::bridge_off();
     lower_all_priorities();
-    let peripherals = embassy_stm32::init(super::chip_configuration());
+    let peripherals = start_chip();
     static SLOW: StaticCell<Executor> = StaticCell::new();
     SLOW.init(Executor::new()).run(|slow| {
         interrupt::CRS.set_priority(Priority::P8);
         tasks::start(slow, || MEDIUM.start(interrupt::CRS), peripherals);
     })
+}
+
+/// The regulator's range 1 in normal mode, PWR_CR5 bit 8 (RM0440, 6.4.23: R1MODE): enough for 150 MHz. Cleared, it is in boost mode.
+const R1MODE: u32 = 1 << 8;
+
+/// embassy's set-up, in two steps: at the 16 MHz that the chip starts with, then with the board's clocks.
+///
+/// Between them the regulator is switched to boost mode, which 170 MHz need (RM0440, 6.1.5). embassy's own switch has no effect:
+/// stm32-metapac 21 has R1MODE at bit 0. Before the first step it would be lost, because that resets PWR.
+fn start_chip() -> Peripherals {
+    let mut configuration = super::chip_configuration();
+    let clocks = configuration.rcc;
+    configuration.rcc = rcc::Config::default();
+    configuration.rcc.hsi48 = None;
+    let mut peripherals = embassy_stm32::init(configuration);
+    pac::PWR.cr5().modify(|w| w.0 &= !R1MODE);
+    rcc::reinit(clocks, &mut peripherals.RCC);
+    peripherals
 }
 
 /// Every interrupt starts at the highest priority, which is the control interrupt's alone: a driver that enables one before it

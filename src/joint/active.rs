@@ -159,6 +159,8 @@ pub struct Active {
     pub flux_linkage: f32,
     /// Rotor's way, rad, that an innovation of the observer may have.
     pub jump_limit: f32,
+    /// Silent steps of the encoder after which the rotor's turns are still known: in which it makes a quarter of a turn at the fastest.
+    pub bridged_steps: u32,
     /// Control steps without a new command.
     pub deadline_steps: u32,
     /// Motion.
@@ -245,6 +247,7 @@ impl Active {
             flux_linkage,
             // Half an electrical radian: with it the torque would already be a tenth less than commanded.
             jump_limit: 0.5 / pole_pairs,
+            bridged_steps: (0.25 * TAU / rotor_velocity * rate) as u32,
             deadline_steps: (limits.command_deadline * rate) as u32,
             motion: MotionGains {
                 period,

@@ -9,12 +9,16 @@
 //!  - [`state_machine`]: whether the joint may move;
 //!  - [`command`], [`motion_law`]: from a set-point to a torque within every limit;
 //!  - [`friction_feedforward`]: what friction will take of it;
+//!  - `calibrating`: measuring the motor instead of moving it, while the joint is off;
 //!  - [`history`]: the last steps before a fault.
 //!
-//! Beside it, outside the interrupt: [`configuration`] what the joint is, [`active`] the same prepared for the step.
+//! Beside it, outside the interrupt: [`configuration`] what the joint is, [`active`] the same prepared for the step, [`commissioning`] what a
+//! calibration is given and gives.
 
 pub mod active;
+mod calibrating;
 pub mod command;
+pub mod commissioning;
 pub mod configuration;
 pub mod fault;
 pub mod friction_feedforward;
@@ -32,12 +36,15 @@ pub use offsets::OFFSET_STEPS;
 pub use signals::{Bridge, BridgeState, Measurements};
 
 use crate::motor::angle::{STEPS, TAU};
+use crate::motor::calibration::{CalibrationSettings, Progress};
 use crate::motor::field_oriented::{FieldOriented, FieldOrientedInput};
 use crate::motor::number::{limited, or_zero, within};
 use crate::motor::observer::Observer;
 use crate::motor::phases::Phases;
+use crate::motor::setting::SettingError;
 use crate::motor::thermal::MeanSquareCurrent;
 use crate::motor::transform::Dq;
+use calibrating::Calibrating;
 use fault::{Fault, Faults, Reaction};
 use friction_feedforward::{Compensated, FrictionFeedforward, Surroundings};
 use history::{History, Snapshot};
@@ -115,6 +122,9 @@ pub struct Joint {
     last: Option<Loop>,
     /// The last valid reading of the encoder.
     encoder: u32,
+    /// The encoder's zero is known.
+    referenced: bool,
+    calibrating: Calibrating,
     sequence: u32,
     stale_steps: u32,
     coupled_sequence: u32,
@@ -170,7 +180,7 @@ impl Joint {
     ) -> Bridge {
         let currents = self.without_offsets(active, measured.phase_currents);
         let before = self.encoder;
-        let sample = self.encoder_sample(measured);
+        let sample = self.encoder_sample(active, measured);
         let way = self.encoder.wrapping_sub(before) as i32 as f32;
         let observation = self.observer.step(&active.observer, sample, 0.0);
         let motion = active.scales.joint(&observation.motion);
@@ -224,8 +234,9 @@ impl Joint {
             self.law.reset();
             self.monitor.loop_is_off();
             self.last = None;
-            self.mean_square.add(Dq::default());
-            (Bridge::OFF, Dq::default())
+            let (bridge, flowing) = self.calibrating.step(state, active, measured, currents);
+            self.mean_square.add(flowing);
+            (bridge, Dq::default())
         };
 
         self.telemetry = Telemetry {
@@ -254,6 +265,30 @@ impl Joint {
         self.latched
     }
 
+    /// Begins a calibration with the next control step; in a joint that is not off it is given up at once.
+    ///
+    /// # Errors
+    /// A setting out of its range; what ran goes on.
+    pub fn calibrate(&mut self, settings: &CalibrationSettings) -> Result<(), SettingError> {
+        self.calibrating.begin(self.telemetry.state, settings)
+    }
+
+    /// Gives the calibration up, where one runs: the bridge is off from the next control step on.
+    pub fn abort_calibration(&mut self) {
+        self.calibrating.abort();
+    }
+
+    /// Whether a calibration runs.
+    #[inline(always)]
+    pub fn is_calibrating(&self) -> bool {
+        self.calibrating.runs()
+    }
+
+    /// Where the calibration is that runs or ran last.
+    pub fn calibration(&self) -> Option<Progress> {
+        self.calibrating.progress()
+    }
+
     /// The steps before the last fault.
     pub fn history(&self) -> &History {
         &self.history
@@ -275,11 +310,16 @@ impl Joint {
     /// What the observer is given. A few missing samples it bridges with its prediction; a lost encoder counts as standing where it was
     /// last seen, because a prediction that nothing corrects runs away.
     #[inline(always)]
-    fn encoder_sample(&mut self, measured: &Measurements) -> Option<u32> {
+    fn encoder_sample(&mut self, active: &Active, measured: &Measurements) -> Option<u32> {
         if measured.encoder_valid {
             self.encoder = measured.encoder;
         }
-        let lost = self.monitor.encoder_is_lost(measured.encoder_valid);
+        if measured.encoder_referenced && !self.referenced {
+            // The angle has another zero from here on; the joint has been off so far.
+            self.referenced = true;
+            self.observer.reset();
+        }
+        let lost = self.monitor.encoder_is_lost(measured.encoder_valid, active.bridged_steps);
         (measured.encoder_valid || lost).then_some(self.encoder)
     }
 
@@ -346,7 +386,7 @@ impl Joint {
     #[inline(never)]
     fn decide(&mut self, active: &Active, demand: &Demand, faults: Faults, motion: &JointMotion) -> State {
         let before = self.machine.state();
-        let started = self.offsets.are_known();
+        let started = self.offsets.are_known() && self.referenced;
         let mut events =
             Events { started, fault: !faults.is_empty(), stopped: self.has_stopped(active, before, motion) };
         let mut state = self.machine.step(demand.controlword, events);
@@ -397,6 +437,39 @@ impl Joint {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn at_rest(encoder: u32, encoder_referenced: bool) -> Measurements {
+        Measurements {
+            phase_currents: Phases::uniform(0.0),
+            bus_voltage: 18.0,
+            encoder,
+            encoder_valid: true,
+            encoder_referenced,
+            winding_temperature: f32::NAN,
+            bridge_temperature: 25.0,
+            bridge_fault: false,
+            overrun: false,
+        }
+    }
+
+    #[test]
+    fn a_joint_is_not_ready_before_its_encoder_knows_its_zero_and_then_begins_there() {
+        let board = crate::default_configuration::B_G431B_ESC1;
+        let active = board.joint.prepare(&board.bridge).unwrap();
+        let mut joint = Joint::new();
+        let mut step = |encoder, referenced| {
+            joint.control_step(&active, &Demand::default(), &Slow::default(), &at_rest(encoder, referenced));
+            (joint.telemetry().state, joint.latched_faults().is_empty(), joint.telemetry().motion.position)
+        };
+        for _ in 0..2 * OFFSET_STEPS {
+            assert_eq!(step(1 << 30, false), (State::NotReadyToSwitchOn, true, TAU / 4.0));
+        }
+        // The index lies an eighth of a turn back from here: no jump, but where the joint is.
+        for _ in 0..100 {
+            let (state, healthy, position) = step(1 << 29, true);
+            assert!(state == State::SwitchOnDisabled && healthy && (position - TAU / 8.0).abs() < 1e-6, "{position}");
+        }
+    }
 
     #[test]
     fn a_coupled_joint_that_falls_silent_counts_as_standing_after_the_command_deadline() {

@@ -71,6 +71,10 @@ impl Bucket {
 pub struct Monitor {
     current_sum: Bucket,
     encoder: Bucket,
+    /// Steps since the encoder answered.
+    silent: u32,
+    /// How many turns the rotor has made is not known any more.
+    adrift: bool,
     voltage: Voltage,
 }
 
@@ -118,9 +122,18 @@ fn filter(state: &mut Dq, value: Dq) {
 
 impl Monitor {
     /// Whether the encoder is lost: it did not answer in several steps. Also at the start, when nothing else is watched.
+    ///
+    /// After more than `bridged` silent steps in a row it stays lost, whatever it says: nobody knows how many turns it made meanwhile.
     #[inline(always)]
-    pub fn encoder_is_lost(&mut self, valid: bool) -> bool {
-        self.encoder.step(!valid, ENCODER_STEPS + 1)
+    pub fn encoder_is_lost(&mut self, valid: bool, bridged: u32) -> bool {
+        let lost = self.encoder.step(!valid, ENCODER_STEPS + 1);
+        if !valid {
+            self.silent = self.silent.saturating_add(1);
+            self.adrift |= self.silent > bridged;
+        } else {
+            self.silent = 0;
+        }
+        lost | self.adrift
     }
 
     /// Faults of the measurements themselves, whether or not the bridge switches. `currents` are without offsets.
@@ -143,7 +156,7 @@ impl Monitor {
         faults.set(Fault::OverVoltage, exceeds(measured.bus_voltage, highest) || measured.bus_voltage < 0.0);
         faults.set(Fault::UnderVoltage, !within(measured.bus_voltage, lowest, f32::INFINITY));
 
-        let lost = self.encoder.full;
+        let lost = self.encoder.full | self.adrift;
         faults.set(Fault::EncoderLost, lost);
         faults.set(Fault::EncoderJump, !lost && exceeds(observation.innovation, active.jump_limit));
 
@@ -239,7 +252,7 @@ mod tests {
     #[test]
     fn a_lost_encoder_shows_at_the_step_after_those_that_are_bridged() {
         let mut monitor = Monitor::default();
-        let lost = (1..100).find(|_| monitor.encoder_is_lost(false));
+        let lost = (1..100).find(|_| monitor.encoder_is_lost(false, 1000));
         assert_eq!(lost, Some(ENCODER_STEPS + 1));
     }
 }

@@ -17,6 +17,8 @@ pub struct Measurements {
     pub encoder: u32,
     /// Whether the encoder answered, with a good parity or checksum where it has one.
     pub encoder_valid: bool,
+    /// Whether the encoder's zero is where it always is: false for an incremental encoder that has not met its index since power-on.
+    pub encoder_referenced: bool,
     /// Temperature of the winding's sensor, °C; NaN where the board has none.
     pub winding_temperature: f32,
     /// Temperature of the bridge, °C; NaN where the board has none.

@@ -1,5 +1,6 @@
 //! The joint's objects as [`canopen`](crate::canopen) asks for them; the task.
 
+use super::calibration::{self, CalibrationState};
 use super::communication::default_communication;
 use super::emergency::{Emergency, Reports, of_refusal};
 use super::field::{ConfigurationField, Field, ImageField, Range, SetPoint};
@@ -46,6 +47,7 @@ pub struct Objects<'a, P> {
     configuration: Configuration,
     staged: Configuration,
     refused: Refused,
+    calibration: CalibrationState,
     stored: Stored,
     single_bank: bool,
     now: u64,
@@ -73,6 +75,7 @@ impl<'a, P: Program> Objects<'a, P> {
             configuration,
             staged: configuration,
             refused: Refused::default(),
+            calibration: CalibrationState::default(),
             stored,
             single_bank,
             now: 0,
@@ -96,6 +99,7 @@ impl<'a, P: Program> Objects<'a, P> {
             self.shared.set_range(range, value);
         }
         self.shared.set_rated_torque(configuration.limits.torque);
+        self.calibration = CalibrationState::default();
         self.reports = Reports::default();
         self.emergencies.clear();
         self.publish();
@@ -116,6 +120,7 @@ impl<'a, P: Program> Objects<'a, P> {
         self.now = now;
         self.observed = *observed;
         self.images.tick(now, self.heartbeat_lost);
+        self.take_calibration();
         while !self.emergencies.is_full()
             && let Some(emergency) = self.reports.next(observed, now)
         {
@@ -177,7 +182,8 @@ impl<'a, P: Program> Objects<'a, P> {
     /// Under current, or one command away from it.
     fn armed(&self) -> bool {
         let state = self.observed.telemetry.state;
-        !matches!(state, State::NotReadyToSwitchOn | State::SwitchOnDisabled | State::Fault)
+        let off = matches!(state, State::NotReadyToSwitchOn | State::SwitchOnDisabled | State::Fault);
+        !off || calibration::runs(self.program.calibration())
     }
 
     fn circumstances(&self) -> Circumstances {
@@ -218,6 +224,7 @@ impl<'a, P: Program> Objects<'a, P> {
             Field::Compensation(setting) => setting.get(&self.configuration).into(),
             Field::Configuration(ConfigurationField::Changed) => (self.staged != self.configuration).into(),
             Field::Configuration(part) => self.refused.get(part).into(),
+            Field::Calibration(part) => self.calibration.get(part, self.program.calibration()),
             Field::Image(part) => self.images.get(part, self.now).into(),
             Field::Server | Field::History => 0,
         }
@@ -278,6 +285,40 @@ impl<'a, P: Program> Objects<'a, P> {
                 Ok(())
             }
             _ => Err(Abort::VALUE),
+        }
+    }
+
+    /// Begins a calibration, or gives it up.
+    fn calibrate(&mut self, current: f32) -> Result<(), Abort> {
+        if current == 0.0 {
+            self.program.abort_calibration();
+            return Ok(());
+        }
+        if self.armed() || self.observed.telemetry.state == State::Fault {
+            return Err(Abort::DEVICE_STATE);
+        }
+        match self.program.calibrate(&self.configuration, current) {
+            Ok(()) => {
+                self.calibration.begin(current);
+                Ok(())
+            }
+            Err(error) => {
+                self.refused = Refused::by(&error.into());
+                Err(Abort::VALUE)
+            }
+        }
+    }
+
+    /// Has the control step take what a calibration found, once there is something. With settings that do not go with it, it is staged only,
+    /// and 2100h says which one is refused.
+    fn take_calibration(&mut self) {
+        let Some(found) = self.calibration.result(self.program.calibration()) else { return };
+        let temperature = self.observed.winding_temperature;
+        self.staged = self.staged.calibrated(&found, temperature);
+        let configuration = self.configuration.calibrated(&found, temperature);
+        // Where the control step has not taken the one before, in the next millisecond again.
+        if self.configure(&configuration) != Err(Abort::DEVICE_STATE) {
+            self.calibration.taken();
         }
     }
 
@@ -382,6 +423,7 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
             }
             Field::Compensation(setting) => self.write_compensation(setting, word),
             Field::Configuration(ConfigurationField::Command) => self.command_configuration(word),
+            Field::Calibration(_) => self.calibrate(f32::from_bits(word)),
             Field::Image(field) => self.write_image(field, word),
             _ => Err(Abort::READ_ONLY),
         }
@@ -452,8 +494,14 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
 
     fn event(&mut self, event: Event) {
         match event {
-            Event::State(state) => self.state = state,
-            Event::HeartbeatLost { .. } => self.heartbeat_lost = true,
+            Event::State(state) => {
+                self.state = state;
+                self.program.abort_calibration();
+            }
+            Event::HeartbeatLost { .. } => {
+                self.heartbeat_lost = true;
+                self.program.abort_calibration();
+            }
             Event::HeartbeatBack { .. } => self.heartbeat_lost = false,
             _ => {}
         }

@@ -23,6 +23,8 @@ pub enum Field {
     Compensation(Setting),
     /// Taking the configuration, and why it was refused.
     Configuration(ConfigurationField),
+    /// The calibration of the motor.
+    Calibration(CalibrationField),
     /// The life of a parameter image.
     Image(ImageField),
     /// The control steps before a fault.
@@ -155,6 +157,25 @@ pub enum ConfigurationField {
     Highest,
     /// Whether what is staged differs from what is in use.
     Changed,
+}
+
+/// The calibration of the motor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CalibrationField {
+    /// Current, A, that begins it; 0 gives it up.
+    Current,
+    /// Where it is.
+    Progress,
+    /// Why it was given up.
+    Failure,
+    /// What was measured then.
+    Value,
+    /// What that was held against.
+    Limit,
+    /// How far the rotor lagged behind the field, electrical turns.
+    Lag,
+    /// Voltage that a leg loses, V.
+    LostVoltage,
 }
 
 /// The life of a parameter image.

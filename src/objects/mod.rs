@@ -24,6 +24,7 @@
 //! A demand that nobody refreshes becomes stale by its deadline. The task has the interrupt run on every
 //! [`Event::State`](crate::canopen::Event::State), so that a transition of its own reaches the joint without a frame.
 
+mod calibration;
 mod communication;
 mod dictionary;
 pub mod emergency;

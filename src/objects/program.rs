@@ -3,6 +3,8 @@
 use crate::canopen::Event;
 use crate::joint::configuration::{Configuration, ConfigurationError};
 use crate::joint::history::History;
+use crate::motor::calibration::Progress;
+use crate::motor::setting::SettingError;
 use crate::parameters::authentication::Key;
 use crate::parameters::slots::SlotError;
 
@@ -19,6 +21,15 @@ pub enum NotConfigured {
 pub trait Program {
     /// Prepares a configuration, with the friction model in use, and has the control step swap it in.
     fn configure(&mut self, configuration: &Configuration) -> Result<(), NotConfigured>;
+
+    /// Begins a calibration of the motor by a current, A, in the control step, which gives it up unless the joint is off.
+    fn calibrate(&mut self, configuration: &Configuration, current: f32) -> Result<(), SettingError>;
+
+    /// Gives up the calibration that runs, if one does.
+    fn abort_calibration(&mut self);
+
+    /// Where the calibration is that runs or ran last: from [`Program::calibrate`] on, never where the one before had ended.
+    fn calibration(&self) -> Option<Progress>;
 
     /// Makes a record outlast a loss of power. At start it goes to [`Stored::decode`](super::Stored::decode).
     fn store(&mut self, record: &[u8]) -> Result<(), SlotError>;

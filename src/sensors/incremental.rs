@@ -10,6 +10,8 @@ pub struct Incremental {
     counts_per_turn: u16,
     scale: u32,
     index: Option<u16>,
+    /// Angle of the index before it is subtracted.
+    zero: u32,
 }
 
 impl Incremental {
@@ -21,7 +23,7 @@ impl Incremental {
         // Rounded: at the end of the turn the angle is off by at most half a count in 2^16.
         let turn = 1u64 << 32;
         let scale = ((turn + counts_per_turn as u64 / 2) / counts_per_turn as u64) as u32;
-        Some(Self { counts_per_turn, scale, index: None })
+        Some(Self { counts_per_turn, scale, index: None, zero: 0 })
     }
 
     /// Counts a turn: the timer counts from 0 to one less.
@@ -29,24 +31,35 @@ impl Incremental {
         self.counts_per_turn
     }
 
-    /// Angle of a count, 2^32 a turn; zero is where the counter was zero, which is where the rotor stood at power-on.
+    /// Angle of a count, 2^32 a turn; zero is where the last index pulse was, and before the first one where the counter was zero.
     #[inline(always)]
     pub const fn angle(&self, count: u16) -> u32 {
-        (count as u32).wrapping_mul(self.scale)
+        (count as u32).wrapping_mul(self.scale).wrapping_sub(self.zero)
     }
 
-    /// Takes the count at an index pulse; whether it is where the first index pulse was, within four counts.
+    /// Whether the angle's zero is the index: without it a rotor that was switched on elsewhere has another electrical zero.
+    #[inline(always)]
+    pub const fn is_referenced(&self) -> bool {
+        self.index.is_some()
+    }
+
+    /// Takes the count at an index pulse, where the angle's zero is from now on unless it was there already; whether it is where the
+    /// pulse before was, within four counts.
     ///
     /// False means that counts were lost or invented since. The first pulse is always true.
     #[inline(always)]
     pub const fn index(&mut self, count: u16) -> bool {
-        let Some(first) = self.index else {
-            self.index = Some(count);
-            return true;
-        };
-        let apart = count.abs_diff(first);
-        let other_way = self.counts_per_turn.saturating_sub(apart);
-        apart <= INDEX_TOLERANCE || other_way <= INDEX_TOLERANCE
+        if let Some(last) = self.index {
+            let apart = count.abs_diff(last);
+            let other_way = self.counts_per_turn.saturating_sub(apart);
+            if apart <= INDEX_TOLERANCE || other_way <= INDEX_TOLERANCE {
+                return true;
+            }
+        }
+        let is_first = self.index.is_none();
+        self.index = Some(count);
+        self.zero = (count as u32).wrapping_mul(self.scale);
+        is_first
     }
 }
 
@@ -73,6 +86,20 @@ mod tests {
             prop_assert!(encoder.index(first));
             let later = ((u32::from(first) + u32::from(lost)) % u32::from(counts)) as u16;
             prop_assert!(!encoder.index(later));
+            // From there on the angle is right again.
+            prop_assert!(encoder.index(later));
+            prop_assert_eq!(encoder.angle(later), 0);
+        }
+
+        #[test]
+        fn from_the_index_on_the_angle_does_not_know_where_the_power_came(counts in 64u16.., at in any::<u16>(), way in any::<u16>()) {
+            let (at, way) = (at % counts, way % counts);
+            let mut encoder = Incremental::new(counts).unwrap();
+            prop_assert!(!encoder.is_referenced() && encoder.index(at) && encoder.is_referenced());
+            let count = ((u32::from(at) + u32::from(way)) % u32::from(counts)) as u16;
+            let exact = f64::from(way) / f64::from(counts) * 2f64.powi(32);
+            let off = (encoder.angle(count) as i32).wrapping_sub(exact as u64 as u32 as i32);
+            prop_assert!(off.abs() <= 2 * 65_536, "{off}");
         }
     }
 

@@ -126,6 +126,7 @@ pub fn measured(words: &[u32; WORDS]) -> (Measurements, Slow) {
         bus_voltage,
         encoder,
         encoder_valid: flags & 1 != 0,
+        encoder_referenced: true,
         winding_temperature: f32::from_bits(winding),
         bridge_temperature: f32::from_bits(bridge),
         bridge_fault: flags & 2 != 0,

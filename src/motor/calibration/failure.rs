@@ -149,6 +149,58 @@ pub enum Failure {
     },
 }
 
+impl Failure {
+    /// What it is called over a bus, in object 2107h:3: 1 to 19.
+    pub const fn number(&self) -> u8 {
+        match self {
+            Self::Aborted => 1,
+            Self::TooLong { .. } => 2,
+            Self::SupplyTooLow { .. } => 3,
+            Self::OverCurrent { .. } => 4,
+            Self::EncoderLost { .. } => 5,
+            Self::RotorMoves { .. } => 6,
+            Self::OffsetTooLarge { .. } => 7,
+            Self::PhaseOpen { .. } => 8,
+            Self::CurrentNotReached { .. } => 9,
+            Self::CurrentsDoNotAddUp { .. } => 10,
+            Self::ResistanceImplausible { .. } => 11,
+            Self::RippleTooSmall { .. } => 12,
+            Self::NotInductive { .. } => 13,
+            Self::RotorDidNotMove { .. } => 14,
+            Self::RotorSlipped { .. } => 15,
+            Self::PolePairsUnclear { .. } => 16,
+            Self::PolePairs { .. } => 17,
+            Self::LagTooLarge { .. } => 18,
+            Self::RotorBesideField { .. } => 19,
+        }
+    }
+
+    /// What was measured, and what it was held against, in the failure's unit; 0 where there is no such number.
+    pub const fn numbers(&self) -> (f32, f32) {
+        match *self {
+            Self::Aborted => (0.0, 0.0),
+            Self::TooLong { limit } => (0.0, limit),
+            Self::SupplyTooLow { voltage, least } => (voltage, least),
+            Self::OverCurrent { current, limit, .. } => (current, limit),
+            Self::EncoderLost { steps } => (steps as f32, super::TOLERATED_ENCODER_LOSS as f32),
+            Self::RotorMoves { turns, limit } => (turns, limit),
+            Self::OffsetTooLarge { offset, limit, .. } => (offset, limit),
+            Self::PhaseOpen { current, expected, .. } => (current, expected),
+            Self::CurrentNotReached { current, wanted, .. } => (current, wanted),
+            Self::CurrentsDoNotAddUp { sum, limit } => (sum, limit),
+            Self::ResistanceImplausible { resistance, greatest, .. } => (resistance, greatest),
+            Self::RippleTooSmall { amplitude, least } => (amplitude, least),
+            Self::NotInductive { ratio, least } => (ratio, least),
+            Self::RotorDidNotMove { turns, least } => (turns, least),
+            Self::RotorSlipped { forward, backward } => (forward, backward),
+            Self::PolePairsUnclear { ratio } => (ratio, 0.0),
+            Self::PolePairs { counted, expected } => (counted as f32, expected as f32),
+            Self::LagTooLarge { lag, limit } => (lag, limit),
+            Self::RotorBesideField { turns, limit } => (turns, limit),
+        }
+    }
+}
+
 impl core::fmt::Display for Failure {
     fn fmt(&self, f: &mut core::fmt::Formatter) -> core::fmt::Result {
         match *self {

@@ -1,7 +1,10 @@
 //! 2100h to 21FFh: the configuration. Limits that depend on other settings are the widest possible.
 
 use super::*;
-use crate::objects::field::{ConfigurationField as C, Field::Configuration as Control, Field::Setting as S};
+use crate::objects::field::{
+    CalibrationField, ConfigurationField as C, Field::Calibration as K, Field::Configuration as Control,
+    Field::Setting as S,
+};
 use crate::objects::settings::Setting;
 
 room! {
@@ -100,5 +103,24 @@ room! {
             "Thermal resistance from housing to surroundings"
         5, "ambient temperature", F32, RW, UNMAPPED, S(Setting::Ambient); "°C", 1.0, within(-40.0, 85.0);
             "Temperature of the surroundings"
+    }
+    0x2107 "calibration" {
+        1, "calibration current", F32, RW, UNMAPPED, K(CalibrationField::Current); "A", 1.0, within(0.0, 100.0);
+            "Writing a current, 0.1 A or more, measures the motor with it: the joint, which must be switched off, turns by itself there and back. 0 gives it up, and so does any command. \
+             What was found goes into 2101h:1, 2, 3, 6, 7 and 8, in use and staged; 1010h stores it"
+        2, "calibration progress", U8, RO, UNMAPPED, K(CalibrationField::Progress); "", 1.0, ANY;
+            "0 none yet, 1 offsets, 2 resistance, 3 inductance, 4 alignment, 5 ending, 6 done, 7 given up"
+        3, "calibration failure", U8, RO, UNMAPPED, K(CalibrationField::Failure); "", 1.0, ANY;
+            "Why it was given up: 0 it was not, 1 asked to, 2 too long, 3 supply too low, 4 over-current, 5 encoder lost, 6 rotor moves, 7 offset too large, 8 phase open, \
+             9 current not reached, 10 currents do not add up, 11 resistance implausible, 12 ripple too small, 13 not inductive, 14 rotor did not move, 15 rotor slipped, \
+             16 and 17 pole pairs unclear or others, 18 lag too large, 19 rotor beside the field"
+        4, "calibration failure's value", F32, RO, UNMAPPED, K(CalibrationField::Value); "", 1.0, ANY;
+            "What was measured when it was given up, in the failure's unit"
+        5, "calibration failure's limit", F32, RO, UNMAPPED, K(CalibrationField::Limit); "", 1.0, ANY;
+            "What that was held against"
+        6, "lag of the rotor", F32, RO, UNMAPPED, K(CalibrationField::Lag); "turns", 1.0, ANY;
+            "How far the rotor lagged behind the field, electrical turns: friction against the current"
+        7, "lost voltage", F32, RO, UNMAPPED, K(CalibrationField::LostVoltage); "V", 1.0, ANY;
+            "Voltage that a leg loses beyond what dead-time compensation makes up for"
     }
 }

@@ -22,7 +22,7 @@ room! {
         4, "staged length", U32, RO, UNMAPPED, I(ImageField::Length); "B", 1.0, ANY;
             "Bytes staged"
         5, "staged CRC-32", U32, RO, UNMAPPED, I(ImageField::Checksum); "", 1.0, ANY;
-            "CRC-32 (ISO-HDLC) of the bytes staged"
+            "CRC-32 (ISO-HDLC) of the bytes staged; the same for every sound image without a tag, because an image ends with its own CRC-32"
         6, "trial time left", U32, RO, UNMAPPED, I(ImageField::TrialLeft); "s", 1e-3, ANY;
             "What is left of a trial or shadow; 0 outside"
         7, "trial time", U32, RW, UNMAPPED, I(ImageField::TrialTime); "s", 1e-3, within(0.001, 3_600.0);

@@ -1,5 +1,6 @@
 //! The objects behind the real server: a client by SDO, a master by PDO, a hostile bus; the host.
 
+mod calibration;
 mod client;
 mod documentation;
 mod hostile;
@@ -11,8 +12,11 @@ mod table;
 use super::*;
 use crate::canopen::{self, Event, Frame, Identity, NmtState, Receiver, Route, SdoSettings, Server};
 use crate::default_configuration::{B_G431B_ESC1, BoardConfiguration};
+use crate::joint::commissioning::calibration_settings;
 use crate::joint::configuration::Configuration;
 use crate::joint::history::History;
+use crate::motor::calibration::{Failure, Progress};
+use crate::motor::setting::SettingError;
 use crate::parameters::authentication::{Key, STAGING};
 use crate::parameters::certificate::Limits;
 use crate::parameters::image::{Effort, Target};
@@ -43,6 +47,8 @@ pub struct Memory {
     pub key: Option<[u8; 32]>,
     pub image: Vec<u8>,
     pub history: Option<History>,
+    pub calibrations: Vec<f32>,
+    pub calibration: Option<Progress>,
     pub fails: Option<SlotError>,
 }
 
@@ -54,6 +60,23 @@ impl Program for Memory {
         configuration.prepare(&BOARD.bridge).map_err(NotConfigured::Refused)?;
         self.configured.push(*configuration);
         Ok(())
+    }
+
+    fn calibrate(&mut self, configuration: &Configuration, current: f32) -> Result<(), SettingError> {
+        calibration_settings(configuration, &BOARD.bridge, current)?;
+        self.calibrations.push(current);
+        self.calibration = Some(Progress::Offsets);
+        Ok(())
+    }
+
+    fn abort_calibration(&mut self) {
+        if !matches!(self.calibration, None | Some(Progress::Done(_))) {
+            self.calibration = Some(Progress::Failed(Failure::Aborted));
+        }
+    }
+
+    fn calibration(&self) -> Option<Progress> {
+        self.calibration
     }
 
     fn store(&mut self, record: &[u8]) -> Result<(), SlotError> {

@@ -124,6 +124,10 @@ impl Node {
         let outcome = match action {
             Action::Nothing => return None,
             Action::Run { mode: Mode::Shadow, length } => {
+                // A trial may have been before: the stored model acts again.
+                if !program.run_stored(&configuration) {
+                    return None;
+                }
                 shadow::replace(model(staging.get(..length)?, shadow::RATE));
                 return Some(Ok(()));
             }

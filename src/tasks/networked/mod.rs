@@ -35,7 +35,8 @@ pub struct Connection {
 
 /// Offers the first configuration and starts the receive interrupt. Returns what the thermal model needs, too.
 pub fn start(commands: Commands, parts: Parts) -> Result<(Connection, ThermalSettings), NotStarted> {
-    let mut program = BoardProgram::new(commands.active, Store::open(Parameters::new(parts.flash))?);
+    let mut program =
+        BoardProgram::new(commands.active, commands.calibration, Store::open(Parameters::new(parts.flash))?);
     let (stored, configuration) = program.stored();
     let thermal = program.begin(&configuration)?;
     let node = node::start(program, &stored, &configuration, commands.demand, parts.can);

@@ -1,12 +1,17 @@
 //! What the board does for the objects: configurations and friction models to the control step, records to flash. Thread mode.
 
 use super::store::{Guard, Store};
+use crate::board::control::Calibration;
 use crate::board::{self, BoardConfiguration, Offering, Prepared};
+use core::cell::RefCell;
 use joint_firmware::canopen::{Event, Reset};
 use joint_firmware::friction::FrictionModel;
 use joint_firmware::joint::Active;
+use joint_firmware::joint::commissioning::calibration_settings;
 use joint_firmware::joint::configuration::{Configuration, ConfigurationError};
 use joint_firmware::joint::history::History;
+use joint_firmware::motor::calibration::Progress;
+use joint_firmware::motor::setting::SettingError;
 use joint_firmware::motor::thermal::ThermalSettings;
 use joint_firmware::objects::{NotConfigured, Program, Stored};
 use joint_firmware::parameters::authentication::Key;
@@ -17,6 +22,7 @@ use joint_firmware::parameters::slots::SlotError;
 pub struct BoardProgram {
     /// To the control step.
     pub active: Offering<Active>,
+    calibration: RefCell<Calibration>,
     /// The flash.
     pub store: Store,
     /// As kept in flash.
@@ -27,9 +33,9 @@ pub struct BoardProgram {
 
 impl BoardProgram {
     /// With what the flash holds.
-    pub fn new(active: Offering<Active>, mut store: Store) -> Self {
+    pub fn new(active: Offering<Active>, calibration: Calibration, mut store: Store) -> Self {
         let guard = store.guard();
-        Self { active, store, guard, restart: false }
+        Self { active, calibration: RefCell::new(calibration), store, guard, restart: false }
     }
 
     /// The stored record, or none, and the configuration to start with: the board's own where none is stored, or where the stored one
@@ -107,6 +113,21 @@ impl Program for BoardProgram {
         });
         prepared.ok_or(NotConfigured::Busy)?.map_err(NotConfigured::Refused)?.offer();
         Ok(())
+    }
+
+    fn calibrate(&mut self, configuration: &Configuration, current: f32) -> Result<(), SettingError> {
+        let settings = calibration_settings(configuration, &board::CONFIGURATION.bridge, current)?;
+        self.calibration.get_mut().ask(Some(&settings));
+        Ok(())
+    }
+
+    fn abort_calibration(&mut self) {
+        self.calibration.get_mut().ask(None);
+    }
+
+    fn calibration(&self) -> Option<Progress> {
+        // Borrowed for the length of this call only.
+        self.calibration.try_borrow_mut().ok().and_then(|mut calibration| calibration.progress())
     }
 
     fn store(&mut self, record: &[u8]) -> Result<(), SlotError> {

@@ -236,21 +236,37 @@ fn a_virtual_joint_on_a_bus_is_found_and_a_bus_without_one_is_an_error() {
     // The system chooses a port that is free; nobody else takes it within a moment.
     let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
     let (listening, calling) = (format!("slcan:listen://127.0.0.1:{port}"), format!("slcan:tcp://127.0.0.1:{port}"));
-    let mut joint = Command::new(env!("CARGO_BIN_EXE_jointctl"))
-        .current_dir(folder.path())
-        .args(["sim", "--bus", &listening, "--node", "7", "--duration", "60"])
-        .stderr(std::process::Stdio::piped())
-        .spawn()
-        .unwrap();
-    let mut line = String::new();
-    let mut log = std::io::BufReader::new(joint.stderr.take().unwrap());
-    std::io::BufRead::read_line(&mut log, &mut line).unwrap();
-    assert!(line.starts_with("node 7 on slcan:listen"), "{line}");
+    let start = || {
+        let mut joint = Command::new(env!("CARGO_BIN_EXE_jointctl"))
+            .current_dir(folder.path())
+            .args(["sim", "--bus", &listening, "--node", "7", "--duration", "60", "--storage", "kept"])
+            .stderr(std::process::Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut line = String::new();
+        let mut log = std::io::BufReader::new(joint.stderr.take().unwrap());
+        std::io::BufRead::read_line(&mut log, &mut line).unwrap();
+        assert!(line.starts_with("node 7 on slcan:listen"), "{line}");
+        joint
+    };
+    let mut joint = start();
 
     let found = jointctl(folder.path(), &["scan", "--bus", &calling]);
     let text = String::from_utf8_lossy(&found.stdout).into_owned();
     assert!(found.status.success() && text.lines().count() == 1, "{text} {}", stderr(&found));
     assert!(text.starts_with("node 7: virtual joint") && text.contains("serial 7"), "{text}");
+    let on = |arguments: &[&str]| {
+        let output = jointctl(folder.path(), &[arguments, &["--bus", &calling, "--node", "7"]].concat());
+        assert!(output.status.success(), "{arguments:?}: {}", stderr(&output));
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    };
+    on(&["set", "command-deadline", "0.25"]);
+    on(&["store"]);
+    joint.kill().unwrap();
+    joint.wait().unwrap();
+    let mut joint = start();
+    let kept = on(&["get", "command-deadline"]);
+    assert!(kept.contains("0.25 s"), "{kept}");
     joint.kill().unwrap();
     joint.wait().unwrap();
 

@@ -3,8 +3,11 @@
 use crate::storage::Storage;
 use joint_firmware::canopen::{Event, Reset};
 use joint_firmware::joint::Active;
+use joint_firmware::joint::commissioning::calibration_settings;
 use joint_firmware::joint::configuration::{BridgeConfiguration, Configuration};
 use joint_firmware::joint::history::History;
+use joint_firmware::motor::calibration::{CalibrationSettings, Progress};
+use joint_firmware::motor::setting::SettingError;
 use joint_firmware::objects::{NotConfigured, Program, Stored};
 use joint_firmware::parameters::authentication::Key;
 use joint_firmware::parameters::slots::SlotError;
@@ -16,6 +19,10 @@ pub struct VirtualProgram {
     /// Prepared, for the next control step.
     pub next: Option<Active>,
     pub storage: Storage,
+    /// What is asked of the joint's calibration, for the next control step.
+    pub asked: Option<Option<CalibrationSettings>>,
+    /// Where the joint's calibration is.
+    pub calibration: Option<Progress>,
     /// The steps before the latched fault.
     pub history: Option<History>,
     /// The network asked for a reset of the node.
@@ -24,7 +31,7 @@ pub struct VirtualProgram {
 
 impl VirtualProgram {
     pub fn new(bridge: BridgeConfiguration, storage: Storage) -> Self {
-        Self { bridge, next: None, storage, history: None, reset: false }
+        Self { bridge, next: None, asked: None, calibration: None, storage, history: None, reset: false }
     }
 
     /// What is stored, and the configuration that a joint starts with: the board's where the stored one is refused.
@@ -47,6 +54,20 @@ impl Program for VirtualProgram {
         }
         self.next = Some(configuration.prepare(&self.bridge).map_err(NotConfigured::Refused)?);
         Ok(())
+    }
+
+    fn calibrate(&mut self, configuration: &Configuration, current: f32) -> Result<(), SettingError> {
+        self.asked = Some(Some(calibration_settings(configuration, &self.bridge, current)?));
+        self.calibration = Some(Progress::Offsets);
+        Ok(())
+    }
+
+    fn abort_calibration(&mut self) {
+        self.asked = Some(None);
+    }
+
+    fn calibration(&self) -> Option<Progress> {
+        self.calibration
     }
 
     fn store(&mut self, record: &[u8]) -> Result<(), SlotError> {

@@ -102,6 +102,14 @@ impl Storage {
         })
     }
 
+    /// Makes an image the stored one, unless it is already; the one before can be rolled back to.
+    ///
+    /// # Errors
+    /// An image that fits into no slot.
+    pub fn store_image(&mut self, image: &[u8]) -> Result<(), SlotError> {
+        if self.images.active().as_deref() == Some(image) { Ok(()) } else { self.images.store(image) }
+    }
+
     /// The record of object 1010h.
     pub(crate) fn configuration(&mut self) -> Option<Vec<u8>> {
         self.configuration.load()

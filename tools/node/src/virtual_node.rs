@@ -346,8 +346,12 @@ impl VirtualNode {
         self.statistics = FrictionStatistics::default();
     }
 
-    /// Swaps a prepared configuration in: here is always between two control steps.
+    /// Swaps a prepared configuration in, and begins or ends a calibration: here is always between two control steps.
     fn swap(&mut self) {
+        if let Some(asked) = self.objects.program().asked.take() {
+            // Checked when it was asked for.
+            let _ = self.joint.calibrate(asked.as_ref());
+        }
         if let Some(active) = self.objects.program().next.take() {
             self.joint.set_active(active);
         }
@@ -400,7 +404,12 @@ impl VirtualNode {
             friction: self.statistics,
         };
         let history = if latched.is_empty() { None } else { Some(*joint.history()) };
-        self.objects.program().history = history;
+        let calibration = joint.calibration();
+        let program = self.objects.program();
+        program.history = history;
+        if program.asked.is_none() {
+            program.calibration = calibration;
+        }
     }
 
     /// Does what the life cycle asks for, until it asks for nothing.
@@ -433,7 +442,12 @@ impl VirtualNode {
         // It was verified a moment ago.
         let image = &self.objects.staging()[..length];
         match mode {
-            Mode::Shadow => self.shadow = model(image, SHADOW_RATE).map(Shadow::new),
+            Mode::Shadow => {
+                self.shadow = model(image, SHADOW_RATE).map(Shadow::new);
+                // A trial may have been before: the stored model acts again.
+                let stored = self.objects.program().storage.images.model(self.rate);
+                self.joint.set_friction(stored);
+            }
             Mode::Trial => {
                 let model = model(image, self.rate);
                 self.shadow = None;

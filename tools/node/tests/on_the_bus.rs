@@ -246,6 +246,17 @@ fn a_shadow_is_computed_and_has_no_effect() {
     assert_eq!(master.node.joint().joint().telemetry().compensated.torque, 0.0);
     let rms = f32::from_bits(master.number(0x2200, 7) as u32);
     assert!((0.4..=0.5).contains(&rms), "{rms} Nm");
+    // From a trial back to the shadow: what is stored acts again, here nothing.
+    let acts = |master: &mut Master| {
+        master.drive(15, 300, 1_000);
+        master.node.joint().joint().telemetry().compensated.torque
+    };
+    master.download(0x2200, 1, &[2]).unwrap();
+    master.download(0x2200, 3, &1f32.to_le_bytes()).unwrap();
+    master.image(2).unwrap();
+    assert!((0.4..=0.5).contains(&acts(&mut master)));
+    master.image(6).unwrap();
+    assert_eq!(acts(&mut master), 0.0);
     master.image(5).unwrap();
     assert_eq!(master.number(0x2212, 2), 0);
 }

@@ -6,10 +6,11 @@ use bus::client::{ClientError, Network, Node, cob_id};
 use clap::Args;
 use joint_firmware::canopen::NO_NODE_ID;
 use joint_firmware::parameters::image::Image;
-use node::{NodeError, Options, SlotImages, VirtualNode, serve};
+use node::{Options, Storage, VirtualNode, serve};
 use plant::ActuatorParameters;
 use plant::virtual_joint::Setup;
 use std::collections::BTreeSet;
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -33,6 +34,9 @@ pub struct OnBus {
     /// Serial number of the first joint, the others count up [default: the node id; without one, 1000 and up]
     #[arg(long, value_name = "N", requires = "bus")]
     serial: Option<u32>,
+    /// Keep what the joints store in this folder, one below it for each serial number; without it they forget everything when they leave
+    #[arg(long, value_name = "DIR", requires = "bus")]
+    storage: Option<PathBuf>,
     /// Leave the bus after this time, s
     #[arg(long, value_name = "S", requires = "bus")]
     duration: Option<f64>,
@@ -71,7 +75,7 @@ impl OnBus {
                     None => id.into(),
                 };
                 let options = Options { node_id: id, serial, seed: serial.into() };
-                let mut joint = joint(plant, setup, &options, image).map_err(|error| failed(&error))?;
+                let mut joint = self.joint(plant, setup, &options, image)?;
                 match id {
                     NO_NODE_ID => eprintln!("{name}: virtual joint without a node id, serial {serial}"),
                     id => eprintln!("node {id} on {name}: virtual joint, serial {serial}"),
@@ -103,20 +107,31 @@ impl OnBus {
     }
 }
 
-fn joint(
-    plant: &ActuatorParameters,
-    setup: &Setup,
-    options: &Options,
-    image: Option<&Image>,
-) -> Result<VirtualNode, NodeError> {
-    let mut images = SlotImages::empty().map_err(NodeError::Slots)?;
-    if let Some(image) = image {
-        let mut buffer = [0; joint_firmware::parameters::image::MAX_LENGTH];
-        // It has been verified, which encodes it.
-        let length = image.encode(&mut buffer).unwrap_or(0);
-        images.store(&buffer[..length]).map_err(NodeError::Slots)?;
+impl OnBus {
+    /// A joint with what it has stored before. An image that is given comes first, as if it had been committed.
+    fn joint(
+        &self,
+        plant: &ActuatorParameters,
+        setup: &Setup,
+        options: &Options,
+        image: Option<&Image>,
+    ) -> Result<VirtualNode, CommandError> {
+        let failed = |error: &dyn std::fmt::Display| CommandError::Bus(error.to_string());
+        let mut storage = match &self.storage {
+            Some(folder) => {
+                let folder = folder.join(format!("serial-{}", options.serial));
+                Storage::open(&folder).map_err(|error| failed(&format_args!("{}: {error}", folder.display())))?
+            }
+            None => Storage::empty().map_err(|error| failed(&error))?,
+        };
+        if let Some(image) = image {
+            let mut buffer = [0; joint_firmware::parameters::image::MAX_LENGTH];
+            // It has been verified, which encodes it.
+            let length = image.encode(&mut buffer).unwrap_or(0);
+            storage.store_image(&buffer[..length]).map_err(|error| failed(&error))?;
+        }
+        VirtualNode::with_storage(*plant, setup, options, storage).map_err(|error| failed(&error))
     }
-    VirtualNode::new(*plant, setup, options, images)
 }
 
 /// Arguments of `scan`.

@@ -1,6 +1,7 @@
 //! The commands of `jointctl`, one file each: arguments in, files and a few lines of text out; host.
 
 pub mod bus;
+mod calibrate;
 pub mod demo;
 pub mod describe;
 pub mod drive;
@@ -66,6 +67,8 @@ pub enum Command {
     Disable(drive::Disable),
     /// Enable a joint, move it for a time, disable it
     Move(drive::Move),
+    /// Have a joint measure its motor and align its encoder; it turns by itself
+    Calibrate(calibrate::Calibrate),
     /// Watch a joint in the terminal: curves, state, faults
     Monitor(monitor::Monitor),
     /// Record what a joint does, as a data set for `fit`
@@ -193,6 +196,7 @@ pub fn run(arguments: Arguments) -> Result<(), CommandError> {
         Command::Enable(enable) => enable.run(),
         Command::Disable(disable) => disable.run(),
         Command::Move(motion) => motion.run(),
+        Command::Calibrate(calibrate) => calibrate.run(),
         Command::Monitor(monitor) => monitor.run(),
         Command::Record(record) => record.run(),
         Command::Retrain(retrain) => retrain.run(),

@@ -62,7 +62,7 @@ fn stage<'a>(joint: &RemoteJoint, settings: impl Iterator<Item = &'a (Entry, Val
 }
 
 /// The setting that was refused, and what would be possible; where the joint does not say, the error itself.
-fn explained(joint: &RemoteJoint, error: RemoteError) -> RemoteError {
+pub(super) fn explained(joint: &RemoteJoint, error: RemoteError) -> RemoteError {
     if !matches!(error, RemoteError::Client(ClientError::Aborted { abort: Abort::VALUE, .. })) {
         return error;
     }

@@ -2,8 +2,11 @@
 
 use crate::storage::Storage;
 use joint_firmware::canopen::Event;
+use joint_firmware::joint::commissioning::calibration_settings;
 use joint_firmware::joint::configuration::{BridgeConfiguration, Configuration};
 use joint_firmware::joint::history::History;
+use joint_firmware::motor::calibration::Progress;
+use joint_firmware::motor::setting::SettingError;
 use joint_firmware::objects::{NotConfigured, Program};
 use joint_firmware::parameters::authentication::Key;
 use joint_firmware::parameters::slots::SlotError;
@@ -35,6 +38,20 @@ impl Program for Watched {
         configuration.prepare(&self.bridge).map_err(NotConfigured::Refused)?;
         self.configured += 1;
         Ok(())
+    }
+
+    fn calibrate(&mut self, configuration: &Configuration, current: f32) -> Result<(), SettingError> {
+        calibration_settings(configuration, &self.bridge, current)?;
+        if self.armed {
+            self.problem = Some("a calibration is begun under current");
+        }
+        Ok(())
+    }
+
+    fn abort_calibration(&mut self) {}
+
+    fn calibration(&self) -> Option<Progress> {
+        None
     }
 
     fn store(&mut self, record: &[u8]) -> Result<(), SlotError> {

@@ -12,6 +12,7 @@ pub(super) fn measurements(sample: &DriveSample, overrun: bool) -> Measurements 
         bus_voltage: sample.bus_voltage as f32,
         encoder: sample.encoder,
         encoder_valid: sample.encoder_valid,
+        encoder_referenced: true,
         winding_temperature: sample.winding_temperature as f32,
         bridge_temperature: sample.bridge_temperature as f32,
         bridge_fault: sample.bridge_fault,

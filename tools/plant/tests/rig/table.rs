@@ -9,6 +9,8 @@ const DOCUMENT: &str = include_str!("../../../../docs/faults.md");
 pub enum Reset {
     /// Once its cause is gone.
     OnceGone,
+    /// Once its cause is gone, where that is soon; later only by a restart of the joint.
+    Restart,
     /// At any time: with the bridge off the cause does not show.
     AnyTime,
 }
@@ -55,6 +57,7 @@ pub fn documented(fault: Fault) -> FaultRow {
         },
         reset: match reset {
             "once gone" => Reset::OnceGone,
+            "once gone, or restart" => Reset::Restart,
             "any time" => Reset::AnyTime,
             other => panic!("{name}: {other:?}"),
         },
