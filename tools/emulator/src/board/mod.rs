@@ -1,0 +1,46 @@
+//! The boards: what lies between the chip's pins, the plant and the bus.
+//!
+//! Each board's parts are those of its schematics, not the firmware's constants: where both agree, a run says something.
+
+pub mod b_g431b_esc1;
+pub mod drivetrain;
+pub mod electrics;
+pub mod moteus_r4;
+
+pub use b_g431b_esc1::BG431BEsc1;
+pub use drivetrain::Drivetrain;
+pub use moteus_r4::MoteusR4;
+
+use crate::chip::Deviation;
+use crate::chip::fdcan::line::Line;
+use crate::chip::variant::Variant;
+use crate::chip::wiring::Wiring;
+
+/// What a person or a broken part does to a board.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Inputs {
+    /// The button is pressed.
+    pub button: bool,
+    /// Something pulls the gate driver's fault line low.
+    pub driver_fault: bool,
+}
+
+/// A board as the chip's surroundings, and as who tests it sees it.
+pub trait Wired: Wiring {
+    /// The chip on it.
+    const VARIANT: &'static Variant;
+    /// As the firmware's feature for it is called.
+    const NAME: &'static str;
+
+    /// What the program does against the manual, knowingly.
+    const DEVIATIONS: &'static [Deviation];
+
+    /// Bridge, motor and joint.
+    fn drivetrain(&mut self) -> &mut Drivetrain;
+    /// Button and lines.
+    fn inputs(&mut self) -> &mut Inputs;
+    /// The CAN bus.
+    fn line(&mut self) -> &mut Line;
+    /// Whether the LED is lit.
+    fn led(&self) -> bool;
+}

@@ -1,0 +1,156 @@
+//! mjbots moteus r4.11: pins to plant.
+//!
+//! Parts by docs/boards.md: shunts of 0.5 mOhm, amplified in the gate driver around half the reference; supply divided by 100 and 4.7 kOhm; the bridge's
+//! thermistor of 47 kOhm, beta 4050 K, with 10 kOhm to ground; no thermistor in the motor.
+
+use super::drivetrain::Drivetrain;
+use super::electrics::{Ntc, divided};
+use super::{Inputs, Wired};
+use crate::chip::Deviation;
+use crate::chip::fdcan::line::{CanLine, Line};
+use crate::chip::time::Instant;
+use crate::chip::variant::{STM32G474CE, Variant};
+use crate::chip::wiring::{Pin, Pwm, Quadrature, SpiFrame, TimerName, Wiring};
+use crate::parts::as5047p::{As5047p, Field};
+use crate::parts::drv8353::Drv8353;
+
+/// Shunt, Ohm.
+const SHUNT: f64 = 0.5e-3;
+const VDD: f64 = 3.3;
+const BRIDGE_NTC: Ntc = Ntc { nominal: 47_000.0, beta: 4_050.0 };
+const CURRENTS: [Pin; 3] = [Pin::new('B', 0), Pin::new('B', 1), Pin::new('B', 2)];
+const SUPPLY: Pin = Pin::new('B', 12);
+const BRIDGE: Pin = Pin::new('A', 9);
+const ENABLE: Pin = Pin::new('A', 3);
+const HIZ: Pin = Pin::new('B', 7);
+const FAULT: Pin = Pin::new('B', 6);
+const DRIVER_SELECT: Pin = Pin::new('C', 4);
+const ENCODER_SELECT: Pin = Pin::new('B', 11);
+const LED: Pin = Pin::new('F', 0);
+/// Amplifier control of the gate driver: gain 5, 10, 20, 40 by its bits 7 and 6.
+const AMPLIFIERS: usize = 6;
+
+/// The board.
+#[derive(Clone, Debug)]
+pub struct MoteusR4 {
+    drivetrain: Drivetrain,
+    inputs: Inputs,
+    line: Line,
+    driver: Drv8353,
+    encoder: As5047p,
+    /// INLA to INLC.
+    switched_on: bool,
+    led: bool,
+}
+
+impl MoteusR4 {
+    /// With a plant behind it.
+    pub fn new(drivetrain: Drivetrain) -> Self {
+        Self {
+            drivetrain,
+            inputs: Inputs::default(),
+            line: Line::new(1_000_000),
+            driver: Drv8353::new(),
+            encoder: As5047p::new(),
+            switched_on: false,
+            led: false,
+        }
+    }
+
+    fn enable(&mut self, at: Instant) {
+        let enabled = self.switched_on && self.driver.drives(at);
+        self.drivetrain.enable(at, enabled);
+    }
+}
+
+impl Wired for MoteusR4 {
+    const VARIANT: &'static Variant = &STM32G474CE;
+    const NAME: &'static str = "moteus-r4";
+    // The bridge is switched off first of all, before the ports have clocks: without them the pins are no outputs.
+    const DEVIATIONS: &'static [Deviation] =
+        &[Deviation::WithoutClock { register: 0x4800_0418 }, Deviation::WithoutClock { register: 0x4800_0018 }];
+
+    fn drivetrain(&mut self) -> &mut Drivetrain {
+        &mut self.drivetrain
+    }
+
+    fn inputs(&mut self) -> &mut Inputs {
+        &mut self.inputs
+    }
+
+    fn line(&mut self) -> &mut Line {
+        &mut self.line
+    }
+
+    fn led(&self) -> bool {
+        self.led
+    }
+}
+
+impl Wiring for MoteusR4 {
+    fn volts(&mut self, at: Instant, pin: Pin) -> f64 {
+        let sample = *self.drivetrain.sample(at);
+        if let Some(phase) = CURRENTS.iter().position(|current| *current == pin) {
+            if !self.driver.is_awake(at) {
+                return 0.0;
+            }
+            let gain = 5.0 * f64::from(1u32 << (self.driver.register(AMPLIFIERS).unwrap_or(0) >> 6 & 3));
+            return 0.5 * VDD + gain * SHUNT * sample.phase_currents[phase];
+        }
+        match pin {
+            SUPPLY => divided(sample.bus_voltage, 100_000.0, 4_700.0),
+            BRIDGE => BRIDGE_NTC.voltage(sample.bridge_temperature, VDD, 10_000.0),
+            _ => 0.0,
+        }
+    }
+
+    fn level(&mut self, _: Instant, pin: Pin) -> Option<bool> {
+        // Open drain: pulled low, or left to the pull-up.
+        (pin == FAULT && (self.driver.has_fault() || self.inputs.driver_fault)).then_some(false)
+    }
+
+    fn driven(&mut self, at: Instant, pin: Pin, level: Option<bool>) {
+        match pin {
+            ENABLE => self.driver.enable(at, level == Some(true)),
+            HIZ => self.switched_on = level == Some(true),
+            DRIVER_SELECT => self.driver.select(level == Some(false)),
+            ENCODER_SELECT => self.encoder.select(level == Some(false)),
+            // Between the supply and the pin.
+            LED => self.led = level == Some(false),
+            _ => return,
+        }
+        self.enable(at);
+    }
+
+    fn quadrature(&mut self, _: Instant, _: TimerName) -> Quadrature {
+        Quadrature::default()
+    }
+
+    fn pwm(&mut self, at: Instant, pwm: &Pwm) {
+        if pwm.timer == TimerName::Tim2 {
+            self.enable(at);
+            self.drivetrain.pwm(at, pwm);
+        }
+    }
+
+    fn spi(&mut self, at: Instant, frame: &SpiFrame) -> u16 {
+        let answer = match frame.bus {
+            1 => {
+                let answer = self.driver.exchange(at, frame);
+                self.enable(at);
+                answer
+            }
+            2 => {
+                let angle = (self.drivetrain.sample(at).encoder >> 18) as u16;
+                self.encoder.exchange(frame, &Field::at(angle))
+            }
+            _ => None,
+        };
+        // Pulled up where nobody drives the line.
+        answer.unwrap_or(u16::MAX)
+    }
+
+    fn can(&mut self) -> Option<&mut dyn CanLine> {
+        Some(&mut self.line)
+    }
+}

@@ -1,0 +1,72 @@
+//! What an emulated core is connected to: addresses that answer, time that makes things happen, and lines that interrupt.
+
+use std::ops::Range;
+
+/// How much of a word an access takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Width {
+    /// 8 bits.
+    Byte,
+    /// 16 bits.
+    Half,
+    /// 32 bits.
+    Word,
+}
+
+impl Width {
+    /// In bytes.
+    #[inline(always)]
+    pub const fn bytes(self) -> u32 {
+        match self {
+            Self::Byte => 1,
+            Self::Half => 2,
+            Self::Word => 4,
+        }
+    }
+}
+
+/// Why an access was not answered.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Refusal {
+    /// Nothing on the chip answers there: the core takes a precise bus fault.
+    NoAnswer,
+    /// The chip would answer, but that part of it is not modelled: the run ends, so that no result rests on it. In words, with the section of
+    /// the reference manual.
+    Unmodelled(String),
+}
+
+/// What the bus tells the core besides data. Read after every write to a device, every read of one, and every [`Bus::advance`].
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Signals {
+    /// Level of interrupt line n in bit n % 32 of word n / 32.
+    pub lines: [u32; 4],
+    /// Level of the non-maskable interrupt.
+    pub nmi: bool,
+    /// The chip resets the core (watchdog, power).
+    pub reset: bool,
+    /// Code that changed by itself (flash that was erased or written), which the core must decode anew.
+    pub rewritten: Option<Range<u32>>,
+    /// Memory that does not answer before a cycle: code and data that the core wants from there wait until then. Read it also after a store to
+    /// memory that is not RAM: flash that is erased or written begins to stall with that store.
+    pub stall: Option<(Range<u32>, u64)>,
+}
+
+/// Memories and devices as a core sees them. `now` counts the core's cycles since the run began and never goes back.
+pub trait Bus {
+    /// A load. `address` is a multiple of the width, or lies in memory that allows any.
+    fn read(&mut self, now: u64, address: u32, width: Width) -> Result<u32, Refusal>;
+    /// A store.
+    fn write(&mut self, now: u64, address: u32, width: Width, value: u32) -> Result<(), Refusal>;
+    /// Half a word of code.
+    fn fetch(&mut self, now: u64, address: u32) -> Result<u16, Refusal>;
+    /// Where code may lie; what the core keeps decoded.
+    fn code(&self) -> Vec<Range<u32>>;
+    /// Cycles that an access there takes more than the core's own.
+    fn wait_states(&self, address: u32) -> u32;
+    /// When something next happens by itself; `u64::MAX` for never.
+    fn next_event(&self) -> u64;
+    /// Does what is due up to `now`.
+    fn advance(&mut self, now: u64);
+    /// What the core has to know; forgets `rewritten` and `reset`, which are told once.
+    fn signals(&mut self) -> Signals;
+}

@@ -1,0 +1,117 @@
+//! A timer's outputs: RM0440, 28.3.11 to 28.3.18 "PWM edge-aligned and centre-aligned", "Complementary outputs and dead-time insertion",
+//! "Using the break function", "Output control bits" (table of 28.6.11).
+
+use super::super::wiring::{Gate, Leg, Pwm};
+use super::registers::*;
+use super::{Refusal, Timer, TimerKind};
+
+impl Timer {
+    /// Whether a channel from 1 to 3 is enabled as an output.
+    pub(super) fn has_outputs(&self) -> bool {
+        self.description.kind != TimerKind::TwoChannels && self.encoder.is_none() && self.block.get(CCER) & 0x555 != 0
+    }
+
+    fn mode(&self, channel: usize) -> u32 {
+        let register = if channel < 2 { CCMR1 } else { CCMR2 };
+        self.block.get_or_zero(register) >> (8 * (channel & 1)) & 0xff
+    }
+
+    /// Level of a channel's reference, OCxREF: in PWM mode 1 active below the compare value counting up, and up to it counting down; in mode 2
+    /// the other way round (28.6.7, OC1M).
+    pub(super) fn reference(&self, channel: usize) -> bool {
+        let (count, compare) = (self.counter.count, self.compare[channel]);
+        let below = if self.counter.up { count < compare } else { count <= compare };
+        match self.mode(channel) >> 4 & 7 {
+            6 => below,
+            7 => !below,
+            _ => false,
+        }
+    }
+
+    /// What the outputs do from now on.
+    pub fn pwm(&self) -> Pwm {
+        let leg = |channel: usize| Leg {
+            compare: self.compare[channel],
+            active_below: self.mode(channel) >> 4 & 7 == 6,
+            high: self.gate(channel, false),
+            low: self.gate(channel, true),
+        };
+        Pwm {
+            timer: self.description.name,
+            running: self.counter.running,
+            count: self.counter.count,
+            up: self.counter.up,
+            top: self.counter.top,
+            tick: self.counter.tick,
+            dead_time: self.dead_time(),
+            legs: [leg(0), leg(1), leg(2)],
+        }
+    }
+
+    /// A channel's pin, or its complementary one.
+    fn gate(&self, channel: usize, complementary: bool) -> Gate {
+        let enables = self.block.get(CCER) >> (4 * channel);
+        let (own, other, inverted) = match complementary {
+            false => (enables & 1, enables >> 2 & 1, enables >> 1 & 1),
+            true => (enables >> 2 & 1, enables & 1, enables >> 3 & 1),
+        };
+        let (own, other, inverted) = (own != 0, other != 0, inverted != 0);
+        if self.mode(channel) & 3 != 0 {
+            return Gate::Released;
+        }
+        if self.description.kind != TimerKind::Advanced {
+            return match own && !complementary {
+                true => Gate::Switching { inverted },
+                false => Gate::Released,
+            };
+        }
+        let control = self.block.get(BDTR);
+        if control & MOE == 0 {
+            // Off-state of idle mode: the idle level, or the pin is released.
+            let idle = self.block.get(CR2) >> (8 + 2 * channel + usize::from(complementary)) & 1 != 0;
+            return if control & OSSI != 0 && (own || other) { Gate::Held(idle != inverted) } else { Gate::Released };
+        }
+        match (own, complementary) {
+            (true, false) => Gate::Switching { inverted },
+            (true, true) if other => Gate::Complement { inverted },
+            // Alone, the complementary output follows the reference itself.
+            (true, true) => Gate::Switching { inverted },
+            (false, _) if other && control & OSSR != 0 => Gate::Held(inverted),
+            (false, _) => Gate::Released,
+        }
+    }
+
+    /// Dead time in cycles: BDTR.DTG in periods of the clock that CR1.CKD divides (28.6.20).
+    fn dead_time(&self) -> u64 {
+        if self.description.kind != TimerKind::Advanced {
+            return 0;
+        }
+        let code = u64::from(self.block.get(BDTR) & 0xff);
+        let periods = match code >> 5 {
+            0..=3 => code,
+            4 | 5 => (64 + (code & 0x3f)) * 2,
+            6 => (32 + (code & 0x1f)) * 8,
+            _ => (32 + (code & 0x1f)) * 16,
+        };
+        periods << (self.block.get(CR1) >> 8 & 3)
+    }
+
+    /// BDTR. While a break is active the outputs cannot be switched on (28.3.17).
+    ///
+    /// The BKIN input is on after reset; no pin carries it here, so it reads low, which the polarity after reset takes for a break.
+    pub(super) fn write_break(&mut self, value: u32) -> Result<(), Refusal> {
+        self.block.write(BDTR, value)?;
+        self.judge_break();
+        Ok(())
+    }
+
+    pub(super) fn judge_break(&mut self) {
+        let control = self.block.get(BDTR);
+        // AF1.BKINP turns the level round where the input is enabled.
+        let level = self.block.get(AF1) & (BKINE | 1 << 9) == BKINE | 1 << 9;
+        if control & BKE != 0 && level == (control & BKP != 0) {
+            self.block.set(SR, self.block.get(SR) | BIF);
+            self.switch_off();
+        }
+    }
+}

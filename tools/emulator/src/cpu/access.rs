@@ -1,0 +1,153 @@
+//! Loads and stores: memory at once, devices with what they have to say, the core's own registers.
+
+use super::code::SRAM;
+use super::operation::Trap;
+use super::{Cpu, End};
+use crate::bus::{Bus, Refusal, Width};
+
+/// Registers of the core itself (B3.1: the private peripheral bus).
+const PRIVATE: u32 = 0xe000_0000;
+/// Up to the instrumentation and debug devices, which are the chip's.
+const PRIVATE_LENGTH: u32 = 0x4_2000;
+
+const fn width(bytes: u32) -> Width {
+    match bytes {
+        1 => Width::Byte,
+        2 => Width::Half,
+        _ => Width::Word,
+    }
+}
+
+impl<B: Bus> Cpu<B> {
+    /// A load of 1, 2 or 4 bytes from any address (MemU).
+    #[inline(always)]
+    pub(super) fn load<const BYTES: u32>(&mut self, address: u32) -> Result<u32, Trap> {
+        if address & (BYTES - 1) != 0 {
+            return self.load_unaligned::<BYTES>(address);
+        }
+        if address.wrapping_sub(SRAM.start) < SRAM.end - SRAM.start {
+            match self.bus.read(self.now, address, width(BYTES)) {
+                Ok(value) => Ok(value),
+                Err(refusal) => Err(self.refused(address, refusal)),
+            }
+        } else {
+            self.load_elsewhere(address, width(BYTES))
+        }
+    }
+
+    /// A load whose address has to be a multiple of the width (MemA).
+    #[inline(always)]
+    pub(super) fn load_aligned<const BYTES: u32>(&mut self, address: u32) -> Result<u32, Trap> {
+        if address & (BYTES - 1) != 0 {
+            return Err(Trap::Unaligned);
+        }
+        self.load::<BYTES>(address)
+    }
+
+    /// A store of 1, 2 or 4 bytes to any address (MemU).
+    #[inline(always)]
+    pub(super) fn store<const BYTES: u32>(&mut self, address: u32, value: u32) -> Result<(), Trap> {
+        if address & (BYTES - 1) != 0 {
+            return self.store_unaligned::<BYTES>(address, value);
+        }
+        if address.wrapping_sub(SRAM.start) < SRAM.end - SRAM.start && !self.code.in_sram {
+            match self.bus.write(self.now, address, width(BYTES), value) {
+                Ok(()) => Ok(()),
+                Err(refusal) => Err(self.refused(address, refusal)),
+            }
+        } else {
+            self.store_elsewhere(address, width(BYTES), value)
+        }
+    }
+
+    /// A store whose address has to be a multiple of the width (MemA).
+    #[inline(always)]
+    pub(super) fn store_aligned<const BYTES: u32>(&mut self, address: u32, value: u32) -> Result<(), Trap> {
+        if address & (BYTES - 1) != 0 {
+            return Err(Trap::Unaligned);
+        }
+        self.store::<BYTES>(address, value)
+    }
+
+    #[inline(never)]
+    fn load_elsewhere(&mut self, address: u32, width: Width) -> Result<u32, Trap> {
+        if address.wrapping_sub(PRIVATE) < PRIVATE_LENGTH {
+            return self.read_private(address, width);
+        }
+        self.wait_for(address);
+        let value = self.bus.read(self.now, address, width);
+        self.now += u64::from(self.bus.wait_states(address));
+        // A device; or a word of the flash that its ECC cannot read, which is an interrupt at once.
+        if address >= SRAM.end || self.bus.next_event() <= self.now {
+            self.read_signals();
+        }
+        value.map_err(|refusal| self.refused(address, refusal))
+    }
+
+    #[inline(never)]
+    fn store_elsewhere(&mut self, address: u32, width: Width, value: u32) -> Result<(), Trap> {
+        if address.wrapping_sub(PRIVATE) < PRIVATE_LENGTH {
+            return self.write_private(address, width, value);
+        }
+        let done = self.bus.write(self.now, address, width, value);
+        self.now += u64::from(self.bus.wait_states(address));
+        if address < SRAM.end {
+            self.code.forget(address..address.saturating_add(4));
+        }
+        if !SRAM.contains(&address) {
+            self.read_signals();
+        }
+        done.map_err(|refusal| self.refused(address, refusal))
+    }
+
+    /// Byte by byte, in one cycle more; faults where the program asked for that, and for devices (A3.2.1).
+    #[cold]
+    fn load_unaligned<const BYTES: u32>(&mut self, address: u32) -> Result<u32, Trap> {
+        self.check_unaligned(address)?;
+        let mut value = 0;
+        for i in 0..BYTES {
+            value |= self.load::<1>(address.wrapping_add(i))? << (8 * i);
+        }
+        Ok(value)
+    }
+
+    #[cold]
+    fn store_unaligned<const BYTES: u32>(&mut self, address: u32, value: u32) -> Result<(), Trap> {
+        self.check_unaligned(address)?;
+        for i in 0..BYTES {
+            self.store::<1>(address.wrapping_add(i), value >> (8 * i) & 0xff)?;
+        }
+        Ok(())
+    }
+
+    fn check_unaligned(&mut self, address: u32) -> Result<(), Trap> {
+        // Devices, and what lies where the map has devices (B3.1).
+        let device = matches!(address >> 28, 4 | 5 | 0xa..=0xf);
+        self.now += 1;
+        match device || self.system.traps_unaligned() {
+            true => Err(Trap::Unaligned),
+            false => Ok(()),
+        }
+    }
+
+    #[cold]
+    fn refused(&mut self, address: u32, refusal: Refusal) -> Trap {
+        match refusal {
+            Refusal::NoAnswer => {
+                self.trapped_address = address;
+                Trap::Data
+            }
+            Refusal::Unmodelled(what) => {
+                // The instruction's address is filled in by `trapped`.
+                self.end = Some(End::Unmodelled { address: 0, what });
+                Trap::End
+            }
+        }
+    }
+
+    /// Ends the run because a register of the core is not modelled.
+    pub(super) fn unmodelled(&mut self, what: String) -> Trap {
+        self.end = Some(End::Unmodelled { address: 0, what });
+        Trap::End
+    }
+}

@@ -1,0 +1,240 @@
+//! Loads and stores of one register, of two, of several, and exclusive ones.
+
+use crate::bus::Bus;
+use crate::cpu::Cpu;
+use crate::cpu::operation::{Execute, Operands, Trap};
+
+/// What is moved: the numbers of the narrow encodings with a register offset.
+pub(in crate::cpu) const STR: u8 = 0;
+pub(in crate::cpu) const STRH: u8 = 1;
+pub(in crate::cpu) const STRB: u8 = 2;
+pub(in crate::cpu) const LDRSB: u8 = 3;
+pub(in crate::cpu) const LDR: u8 = 4;
+pub(in crate::cpu) const LDRH: u8 = 5;
+pub(in crate::cpu) const LDRB: u8 = 6;
+pub(in crate::cpu) const LDRSH: u8 = 7;
+
+pub(in crate::cpu) const fn loads(what: u8) -> bool {
+    what >= LDRSB
+}
+
+/// How the address is formed: register n and constant; n and register m shifted left; a constant alone; n changed before or after.
+pub(in crate::cpu) const OFFSET: u8 = 0;
+pub(in crate::cpu) const INDEXED: u8 = 1;
+pub(in crate::cpu) const ABSOLUTE: u8 = 2;
+pub(in crate::cpu) const BEFORE: u8 = 3;
+pub(in crate::cpu) const AFTER: u8 = 4;
+
+/// Loads d, or stores it.
+#[inline(always)]
+fn access<B: Bus, const WHAT: u8, const ADDRESS: u8>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+    let (address, changed) = match ADDRESS {
+        OFFSET => (cpu.get(o.n).wrapping_add(o.immediate), 0),
+        INDEXED => (cpu.get(o.n).wrapping_add(cpu.get(o.m) << (o.immediate & 3)), 0),
+        ABSOLUTE => (o.immediate, 0),
+        BEFORE => {
+            let address = cpu.get(o.n).wrapping_add(o.immediate);
+            (address, address)
+        }
+        _ => (cpu.get(o.n), cpu.get(o.n).wrapping_add(o.immediate)),
+    };
+    let value = match WHAT {
+        STR => return cpu.store::<4>(address, cpu.get(o.d)).map(|()| write_back::<B, ADDRESS>(cpu, o.n, changed)),
+        STRH => {
+            let value = cpu.get(o.d) & 0xffff;
+            return cpu.store::<2>(address, value).map(|()| write_back::<B, ADDRESS>(cpu, o.n, changed));
+        }
+        STRB => {
+            let value = cpu.get(o.d) & 0xff;
+            return cpu.store::<1>(address, value).map(|()| write_back::<B, ADDRESS>(cpu, o.n, changed));
+        }
+        LDR => cpu.load::<4>(address)?,
+        LDRH => cpu.load::<2>(address)?,
+        LDRB => cpu.load::<1>(address)?,
+        LDRSH => cpu.load::<2>(address)? as u16 as i16 as u32,
+        _ => cpu.load::<1>(address)? as u8 as i8 as u32,
+    };
+    write_back::<B, ADDRESS>(cpu, o.n, changed);
+    if WHAT == LDR {
+        cpu.set_any(o.d, value);
+    } else {
+        cpu.set(o.d, value);
+    }
+    Ok(())
+}
+
+#[inline(always)]
+fn write_back<B: Bus, const ADDRESS: u8>(cpu: &mut Cpu<B>, base: u8, value: u32) {
+    if ADDRESS == BEFORE || ADDRESS == AFTER {
+        cpu.set_any(base, value);
+    }
+}
+
+/// Loads the program counter.
+pub(in crate::cpu) fn load_branch<B: Bus, const ADDRESS: u8>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+    let base = if ADDRESS == ABSOLUTE { 0 } else { cpu.get(o.n) };
+    let offset = if ADDRESS == INDEXED { cpu.get(o.m) << (o.immediate & 3) } else { o.immediate };
+    let changed = base.wrapping_add(offset);
+    let target = cpu.load_aligned::<4>(if ADDRESS == AFTER { base } else { changed })?;
+    write_back::<B, ADDRESS>(cpu, o.n, changed);
+    cpu.branch_exchange(target)
+}
+
+pub(in crate::cpu) fn load_branch_of<B: Bus>(address: u8) -> Execute<B> {
+    match address {
+        OFFSET => load_branch::<B, OFFSET>,
+        INDEXED => load_branch::<B, INDEXED>,
+        ABSOLUTE => load_branch::<B, ABSOLUTE>,
+        BEFORE => load_branch::<B, BEFORE>,
+        _ => load_branch::<B, AFTER>,
+    }
+}
+
+/// The function of an access that only decoding knows.
+pub(in crate::cpu) fn access_of<B: Bus>(what: u8, address: u8) -> Execute<B> {
+    macro_rules! address {
+        ($what:ident) => {
+            match address {
+                OFFSET => access::<B, $what, OFFSET>,
+                INDEXED => access::<B, $what, INDEXED>,
+                ABSOLUTE => access::<B, $what, ABSOLUTE>,
+                BEFORE => access::<B, $what, BEFORE>,
+                _ => access::<B, $what, AFTER>,
+            }
+        };
+    }
+    match what {
+        STR => address!(STR),
+        STRH => address!(STRH),
+        STRB => address!(STRB),
+        LDRSB => address!(LDRSB),
+        LDR => address!(LDR),
+        LDRH => address!(LDRH),
+        LDRB => address!(LDRB),
+        _ => address!(LDRSH),
+    }
+}
+
+/// x of the functions for several registers: the base changes; the block lies below it.
+pub(in crate::cpu) const CHANGES: u32 = 1;
+pub(in crate::cpu) const BELOW: u32 = 2;
+
+/// Lowest address of a block of `bytes`, and what the base becomes.
+#[inline(always)]
+pub(super) fn block(base: u32, bytes: u32, below: bool) -> (u32, u32) {
+    let end = base.wrapping_sub(bytes);
+    if below { (end, end) } else { (base, base.wrapping_add(bytes)) }
+}
+
+/// LDM, POP. Registers are loaded as they come; the base keeps its value where a load faults.
+pub(in crate::cpu) fn load_several<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+    let base = cpu.get(o.n);
+    let (mut address, changed) = block(base, 4 * o.immediate.count_ones(), u32::from(o.x) & BELOW != 0);
+    let mut list = o.immediate & 0x7fff;
+    let mut of_base = None;
+    while list != 0 {
+        let register = list.trailing_zeros() as u8;
+        list &= list - 1;
+        let value = cpu.load_aligned::<4>(address)?;
+        address = address.wrapping_add(4);
+        if register == o.n {
+            of_base = Some(value);
+        } else {
+            cpu.set(register, value);
+        }
+    }
+    let target = if o.immediate >> 15 != 0 { Some(cpu.load_aligned::<4>(address)?) } else { None };
+    if let Some(value) = of_base {
+        cpu.set_any(o.n, value);
+    } else if u32::from(o.x) & CHANGES != 0 {
+        cpu.set_any(o.n, changed);
+    }
+    target.map_or(Ok(()), |target| cpu.branch_exchange(target))
+}
+
+/// STM, PUSH.
+pub(in crate::cpu) fn store_several<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+    let (mut address, changed) = block(cpu.get(o.n), 4 * o.immediate.count_ones(), u32::from(o.x) & BELOW != 0);
+    let mut list = o.immediate;
+    while list != 0 {
+        let register = list.trailing_zeros() as u8;
+        list &= list - 1;
+        cpu.store_aligned::<4>(address, cpu.get(register))?;
+        address = address.wrapping_add(4);
+    }
+    if u32::from(o.x) & CHANGES != 0 {
+        cpu.set_any(o.n, changed);
+    }
+    Ok(())
+}
+
+/// x of the functions for two registers: the base changes; the offset counts before.
+pub(in crate::cpu) const PRE: u32 = 2;
+
+fn pair_address<B: Bus>(cpu: &Cpu<B>, o: Operands) -> (u32, u32) {
+    let base = cpu.get(o.n);
+    let changed = base.wrapping_add(o.immediate);
+    (if u32::from(o.x) & PRE != 0 { changed } else { base }, changed)
+}
+
+/// LDRD to d and m.
+pub(in crate::cpu) fn ldrd<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+    let (address, changed) = pair_address(cpu, o);
+    let first = cpu.load_aligned::<4>(address)?;
+    let second = cpu.load_aligned::<4>(address.wrapping_add(4))?;
+    if u32::from(o.x) & CHANGES != 0 {
+        cpu.set_any(o.n, changed);
+    }
+    cpu.set(o.d, first);
+    cpu.set(o.m, second);
+    Ok(())
+}
+
+/// LDRD from an address that decoding knows.
+pub(in crate::cpu) fn ldrd_absolute<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+    let first = cpu.load_aligned::<4>(o.immediate)?;
+    let second = cpu.load_aligned::<4>(o.immediate.wrapping_add(4))?;
+    cpu.set(o.d, first);
+    cpu.set(o.m, second);
+    Ok(())
+}
+
+/// STRD from d and m.
+pub(in crate::cpu) fn strd<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+    let (address, changed) = pair_address(cpu, o);
+    cpu.store_aligned::<4>(address, cpu.get(o.d))?;
+    cpu.store_aligned::<4>(address.wrapping_add(4), cpu.get(o.m))?;
+    if u32::from(o.x) & CHANGES != 0 {
+        cpu.set_any(o.n, changed);
+    }
+    Ok(())
+}
+
+/// LDREX: loads, and marks the address as its own. With a single core the monitor has no address (B.3.4.5 leaves its size open).
+pub(in crate::cpu) fn load_exclusive<B: Bus, const BYTES: u32>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+    let address = cpu.get(o.n).wrapping_add(o.immediate);
+    let value = cpu.load_aligned::<BYTES>(address)?;
+    cpu.exclusive = true;
+    cpu.set(o.d, value);
+    Ok(())
+}
+
+/// STREX: stores m if the mark is still there; d becomes 0 then, 1 otherwise.
+pub(in crate::cpu) fn store_exclusive<B: Bus, const BYTES: u32>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+    let address = cpu.get(o.n).wrapping_add(o.immediate);
+    if address & (BYTES - 1) != 0 {
+        return Err(Trap::Unaligned);
+    }
+    let own = std::mem::take(&mut cpu.exclusive);
+    if own {
+        let value = cpu.get(o.m) & (u32::MAX >> (32 - 8 * BYTES));
+        cpu.store_aligned::<BYTES>(address, value)?;
+    }
+    cpu.set(o.d, u32::from(!own));
+    Ok(())
+}
+
+pub(in crate::cpu) fn clear_exclusive<B: Bus>(cpu: &mut Cpu<B>, _: Operands) -> Result<(), Trap> {
+    cpu.exclusive = false;
+    Ok(())
+}

@@ -1,0 +1,37 @@
+//! What instructions do, by group. Operands were checked by `decode`; the names are the architecture's (ARM DDI 0403, A7.7).
+
+pub(super) mod branch;
+pub(super) mod data_processing;
+pub(super) mod floating_point;
+pub(super) mod load_store;
+pub(super) mod multiply;
+pub(super) mod simd;
+pub(super) mod system;
+
+use super::Cpu;
+use crate::bus::Bus;
+
+impl<B: Bus> Cpu<B> {
+    /// Value of a general register; never asked for the program counter.
+    #[inline(always)]
+    pub(super) fn get(&self, register: u8) -> u32 {
+        self.r[usize::from(register & 15)]
+    }
+
+    /// Sets a general register that is not the stack pointer.
+    #[inline(always)]
+    pub(super) fn set(&mut self, register: u8, value: u32) {
+        self.r[usize::from(register & 15)] = value;
+    }
+
+    /// Sets a general register that may be the stack pointer, whose lowest two bits are always 0.
+    #[inline(always)]
+    pub(super) fn set_any(&mut self, register: u8, value: u32) {
+        self.r[usize::from(register & 15)] = if register == 13 { value & !3 } else { value };
+    }
+
+    #[inline(always)]
+    pub(super) fn set_negative_zero(&mut self, value: u32) {
+        (self.negative, self.zero) = ((value as i32) < 0, value == 0);
+    }
+}

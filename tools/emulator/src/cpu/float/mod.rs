@@ -1,0 +1,159 @@
+//! Single-precision arithmetic as the floating-point unit does it, to the bit: rounding modes, NaNs, flush to zero, exception flags.
+//!
+//! ARM DDI 0403, A2.5 and its pseudo-code. The host's arithmetic is the same where the mode is the usual one, the result is
+//! a normal number and nothing is left to flag: that is nearly always, because the inexact flag is sticky. Everything else takes the
+//! way of `exact`, which computes with integers.
+
+mod convert;
+mod exact;
+
+pub use convert::{from_fixed, from_half, to_fixed, to_half};
+
+/// Modes: alternative half precision, default NaN, flush to zero, rounding.
+pub(super) const MODES: u32 = 0x07c0_0000;
+const ALTERNATIVE_HALF: u32 = 1 << 26;
+const DEFAULT_NAN_MODE: u32 = 1 << 25;
+const FLUSH_TO_ZERO: u32 = 1 << 24;
+/// Exception flags.
+const INVALID: u32 = 1;
+const DIVISION_BY_ZERO: u32 = 1 << 1;
+const OVERFLOW: u32 = 1 << 2;
+const UNDERFLOW: u32 = 1 << 3;
+const INEXACT: u32 = 1 << 4;
+const INPUT_DENORMAL: u32 = 1 << 7;
+/// What the register has.
+const IMPLEMENTED: u32 = 0xf000_0000 | MODES | 0x9f;
+
+/// The NaN that operations without a NaN among their operands give.
+const DEFAULT_NAN: u32 = 0x7fc0_0000;
+
+/// Where a result between two numbers goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rounding {
+    /// To the nearer, to the even one from the middle.
+    Nearest,
+    /// Upwards.
+    Up,
+    /// Downwards.
+    Down,
+    /// Towards zero.
+    Zero,
+}
+
+/// FPSCR: flags of the last comparison, modes, sticky exception flags.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Status(u32);
+
+impl Status {
+    /// From the register's bits; those that it does not have are ignored.
+    pub fn from_bits(bits: u32) -> Self {
+        Self(bits & IMPLEMENTED)
+    }
+
+    /// The register's bits.
+    pub fn bits(self) -> u32 {
+        self.0
+    }
+
+    /// Takes over the modes of a new context.
+    pub(super) fn set_modes(&mut self, modes: u32) {
+        self.0 = self.0 & !MODES | modes & MODES;
+    }
+
+    fn rounding(self) -> Rounding {
+        match self.0 >> 22 & 3 {
+            0 => Rounding::Nearest,
+            1 => Rounding::Up,
+            2 => Rounding::Down,
+            _ => Rounding::Zero,
+        }
+    }
+
+    fn flushes(self) -> bool {
+        self.0 & FLUSH_TO_ZERO != 0
+    }
+
+    fn flag(&mut self, flags: u32) {
+        self.0 |= flags;
+    }
+
+    /// Whether the host's result is the unit's: nothing could be flagged that is not, and nothing be rounded otherwise. A result of the
+    /// smallest exponent may have been rounded up to it, which is an underflow.
+    #[inline(always)]
+    fn trusts(self, result: u32) -> bool {
+        self.0 & (MODES | INEXACT) == INEXACT && (result & 0x7f80_0000).wrapping_sub(0x0100_0000) < 0x7e80_0000
+    }
+}
+
+/// The host's result if it can be trusted, the exact way otherwise.
+macro_rules! operation {
+    ($(#[$doc:meta])* $name:ident($($operand:ident),+) = $host:expr) => {
+        $(#[$doc])*
+        #[inline(always)]
+        pub fn $name($($operand: u32,)+ status: &mut Status) -> u32 {
+            let result = {
+                $(let $operand = f32::from_bits($operand);)+
+                $host.to_bits()
+            };
+            if status.trusts(result) { result } else { exact::$name($($operand,)+ status) }
+        }
+    };
+}
+
+operation! {
+    /// FPAdd.
+    add(a, b) = (a + b)
+}
+operation! {
+    /// FPSub.
+    subtract(a, b) = (a - b)
+}
+operation! {
+    /// FPMul.
+    multiply(a, b) = (a * b)
+}
+operation! {
+    /// FPDiv.
+    divide(a, b) = (a / b)
+}
+operation! {
+    /// FPSqrt.
+    square_root(a) = a.sqrt()
+}
+operation! {
+    /// FPMulAdd: `addend` + `a` `b`, rounded once.
+    multiply_add(addend, a, b) = a.mul_add(b, addend)
+}
+
+/// FPNeg: also of a NaN.
+pub fn negate(a: u32) -> u32 {
+    a ^ 0x8000_0000
+}
+
+/// FPCompare: the four flags as the register has them. A quiet NaN is invalid only if `signals`.
+#[inline]
+pub fn compare(a: u32, b: u32, signals: bool, status: &mut Status) {
+    let nan = |bits: u32| bits & 0x7fff_ffff > 0x7f80_0000;
+    let signalling = |bits: u32| nan(bits) && bits & 0x40_0000 == 0;
+    if status.flushes() {
+        // Denormal operands count as zero.
+        let (a, b) = (exact::flushed(a, status), exact::flushed(b, status));
+        status.0 = status.0 & 0x0fff_ffff | order(a, b);
+    } else {
+        status.0 = status.0 & 0x0fff_ffff | order(a, b);
+    }
+    if signalling(a) || signalling(b) || signals && (nan(a) || nan(b)) {
+        status.flag(INVALID);
+    }
+}
+
+fn order(a: u32, b: u32) -> u32 {
+    use std::cmp::Ordering;
+    let flags: u32 = match f32::from_bits(a).partial_cmp(&f32::from_bits(b)) {
+        Some(Ordering::Equal) => 0b0110,
+        Some(Ordering::Less) => 0b1000,
+        Some(Ordering::Greater) => 0b0010,
+        None => 0b0011,
+    };
+    flags << 28
+}

@@ -1,0 +1,359 @@
+//! A Cortex-M4F: predecoded, deterministic, one instruction at a time.
+//!
+//! From ARM DDI 0403 (ARMv7-M Architecture Reference Manual) with the DSP extension and the single-precision floating-point unit; what the
+//! core itself chooses is from its Technical Reference Manual (Arm 100166). An encoding that is not implemented, or whose outcome the
+//! architecture leaves open, ends the run and says where.
+//!
+//! - `registers`, `reset`: what a debugger sees; special registers; how it all begins
+//! - `code`, `decode`, `operation`: half-words of code become calls, once
+//! - `execute`, `arithmetic`, `float`: what the calls do
+//! - `access`: loads and stores, the core's own registers among them
+//! - `exceptions`, `interrupts`, `faults`: from a request to its handler and back
+//! - `system`, `system_timer`, `cycle_counter`: the core's own devices
+//! - `timing`: how long things take, and what is assumed
+//! - `watch`: what test equipment wants to know of functions and stack
+//!
+//! Host only.
+
+mod access;
+mod arithmetic;
+mod code;
+mod cycle_counter;
+mod decode;
+mod end;
+mod exceptions;
+mod execute;
+mod faults;
+pub mod float;
+mod interrupts;
+mod operation;
+mod registers;
+mod reset;
+mod system;
+mod system_timer;
+mod timing;
+mod watch;
+
+#[cfg(test)]
+mod tests;
+
+pub use decode::Refused;
+pub use end::{End, Lockup, Origin};
+pub use exceptions::ExceptionTimes;
+pub use watch::{Call, Watch};
+
+use crate::bus::Bus;
+use code::Code;
+use cycle_counter::CycleCounter;
+use exceptions::Activation;
+use interrupts::Interrupts;
+use operation::{Operation, Trap};
+use std::collections::BTreeMap;
+use system::System;
+use system_timer::SystemTimer;
+
+/// A core and what it is connected to.
+pub struct Cpu<B: Bus> {
+    /// Memories and devices.
+    pub bus: B,
+    /// r0 to r12, the stack pointer in use, the link register; the last is never read.
+    r: [u32; 16],
+    /// Where the next instruction lies.
+    pc: u32,
+    /// The stack pointer that is not in use.
+    other_stack: u32,
+    /// s0 to s31.
+    s: [u32; 32],
+    /// FPSCR.
+    floating: float::Status,
+    negative: bool,
+    zero: bool,
+    carry: bool,
+    overflow: bool,
+    saturated: bool,
+    /// The four greater-or-equal flags.
+    greater: u8,
+    /// ITSTATE, and whether the instruction that runs is in an IT block.
+    it: u8,
+    in_it: bool,
+    /// Cleared by a branch to an even address: the next instruction faults.
+    thumb: bool,
+    /// Number of the exception whose handler runs, 0 in thread mode.
+    exception: u16,
+    /// CONTROL: thread mode is unprivileged; it uses the process stack; floating-point registers have been used.
+    unprivileged: bool,
+    process_stack: bool,
+    floating_used: bool,
+    /// Whether a floating-point instruction may go ahead without further preparation.
+    floating_ready: bool,
+    /// The event register of WFE, and the exclusive monitor.
+    event: bool,
+    exclusive: bool,
+    sleep: Option<Sleep>,
+    /// Cycles since the run began; those of them asleep; instructions.
+    now: u64,
+    slept: u64,
+    instructions: u64,
+    /// Whether the last instruction loaded or stored one register.
+    single: bool,
+    /// The cycle at which `attend` has to look, and the one at which the run is to end.
+    attention: u64,
+    until: u64,
+    end: Option<End>,
+    trapped_address: u32,
+    code: Code<B>,
+    /// Memory that does not answer before a cycle.
+    stall: Option<(std::ops::Range<u32>, u64)>,
+    interrupts: Interrupts,
+    system: System,
+    timer: SystemTimer,
+    counter: CycleCounter,
+    activations: Vec<Activation>,
+    times: BTreeMap<u16, ExceptionTimes>,
+    watch: Option<Box<Watch>>,
+}
+
+/// What the core waits for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Sleep {
+    Interrupt,
+    Event,
+}
+
+impl<B: Bus> Cpu<B> {
+    /// Runs until the cycle `until` is reached or something else ends the run. The instruction that reaches it completes.
+    pub fn run(&mut self, until: u64) -> End {
+        self.until = until;
+        self.attention = 0;
+        match self.watch.is_some() {
+            true => self.run_watched::<true>(),
+            false => self.run_watched::<false>(),
+        }
+    }
+
+    /// Runs one instruction, and before it the entry of an exception that is due. Sleep is passed over. Says what ended the run, if
+    /// anything did.
+    pub fn step(&mut self) -> Option<End> {
+        self.until = u64::MAX;
+        if let Some(end) = self.attend() {
+            return Some(end);
+        }
+        match self.watch.is_some() {
+            true => self.instruct::<true>(),
+            false => self.instruct::<false>(),
+        }
+        // What was not decoded yet took a turn by itself.
+        self.attention = 0;
+        self.end.take()
+    }
+
+    fn run_watched<const WATCHED: bool>(&mut self) -> End {
+        loop {
+            if self.now >= self.attention
+                && let Some(end) = self.attend()
+            {
+                return end;
+            }
+            self.instruct::<WATCHED>();
+        }
+    }
+
+    #[inline(always)]
+    fn instruct<const WATCHED: bool>(&mut self) {
+        let pc = self.pc;
+        let Some(operation) = self.code.at(pc) else { return self.elsewhere(pc) };
+        if WATCHED && self.watched(pc) {
+            return;
+        }
+        self.pc = pc.wrapping_add(u32::from(operation.length));
+        self.instructions += 1;
+        self.now += u64::from(operation.cycles - (operation.overlaps & u8::from(self.single)));
+        self.single = operation.single;
+        let done = match self.it {
+            0 => (operation.execute)(self, operation.operands),
+            _ => self.in_block(operation, pc),
+        };
+        if let Err(trap) = done {
+            self.trapped(trap, pc);
+        }
+        if WATCHED {
+            self.watch_stack();
+        }
+    }
+
+    /// An instruction of an IT block: runs if its condition holds (A7.3.2).
+    fn in_block(&mut self, operation: Operation<B>, pc: u32) -> Result<(), Trap> {
+        let block = self.it;
+        self.it = if block & 7 == 0 { 0 } else { block & 0xe0 | block << 1 & 0x1f };
+        if !self.holds(block >> 4) {
+            self.now -= u64::from(operation.cycles) - 1;
+            self.single = false;
+            return Ok(());
+        }
+        self.in_it = true;
+        let (next, rest, handler) = (self.pc, self.it, self.exception);
+        let done = (operation.execute)(self, operation.operands);
+        self.in_it = false;
+        if done.is_err() {
+            self.it = block;
+        } else if rest != 0 && self.pc != next && self.exception == handler {
+            // A branch elsewhere than at the block's end. A return from a handler brings the block of what it interrupted with it.
+            return self.refuse(pc, operation.length, Refused::Unpredictable);
+        }
+        done
+    }
+
+    /// Whether a condition holds (ConditionPassed).
+    #[inline(always)]
+    fn holds(&self, condition: u8) -> bool {
+        let plain = match condition >> 1 {
+            0 => self.zero,
+            1 => self.carry,
+            2 => self.negative,
+            3 => self.overflow,
+            4 => self.carry && !self.zero,
+            5 => self.negative == self.overflow,
+            6 => !self.zero && self.negative == self.overflow,
+            _ => return true,
+        };
+        plain ^ (condition & 1 != 0)
+    }
+
+    /// Everything that is not the next instruction: time that makes things happen, sleep, exceptions, the run's end.
+    #[cold]
+    fn attend(&mut self) -> Option<End> {
+        loop {
+            if self.now >= self.due() {
+                self.catch_up();
+            }
+            if self.sleep.is_none() {
+                self.wait_for(self.pc);
+            }
+            if let Some(end) = self.end.take() {
+                return Some(end);
+            }
+            if self.now >= self.until {
+                return Some(End::Time);
+            }
+            let Some(sleep) = self.sleep else { break };
+            if self.wakes(sleep) {
+                self.sleep = None;
+                continue;
+            }
+            let next = self.due().min(self.until);
+            if next == u64::MAX {
+                return Some(End::Asleep);
+            }
+            let passed = next.saturating_sub(self.now);
+            self.slept += passed;
+            self.now += passed;
+        }
+        if let Some(number) = self.interrupts.takeable() {
+            self.enter(number, self.pc);
+        }
+        if !self.thumb && self.end.is_none() {
+            self.trapped(Trap::NotThumb, self.pc);
+        }
+        self.schedule();
+        None
+    }
+
+    fn wakes(&mut self, sleep: Sleep) -> bool {
+        match sleep {
+            Sleep::Interrupt => self.interrupts.would_wake(),
+            Sleep::Event => std::mem::take(&mut self.event) || self.interrupts.takeable().is_some(),
+        }
+    }
+
+    /// When something next happens by itself.
+    fn due(&self) -> u64 {
+        self.bus.next_event().min(self.timer.next())
+    }
+
+    /// Does what time has made due.
+    fn catch_up(&mut self) {
+        if self.timer.expire(self.now) {
+            self.interrupts.pend(interrupts::SYSTICK);
+            self.pended();
+        }
+        self.bus.advance(self.now);
+        self.read_signals();
+    }
+
+    /// Takes over what the bus has to say.
+    fn read_signals(&mut self) {
+        let signals = self.bus.signals();
+        if let Some(range) = signals.rewritten {
+            self.code.forget(range);
+        }
+        if signals.reset {
+            self.end = Some(End::Reset(Origin::Chip));
+        }
+        if self.interrupts.set_lines(signals.lines, signals.nmi) {
+            self.pended();
+        }
+        self.stall = signals.stall.filter(|(_, until)| *until > self.now);
+        self.code.set_wait_states(&self.bus);
+        self.schedule();
+    }
+
+    /// Waits for memory that does not answer yet: flash that is erased or written.
+    #[inline]
+    fn wait_for(&mut self, address: u32) {
+        if let Some((range, until)) = &self.stall
+            && range.contains(&address)
+        {
+            self.now = self.now.max(*until);
+        }
+    }
+
+    /// Something has become pending: an event for WFE where SCR.SEVONPEND says so (B1.5.18).
+    fn pended(&mut self) {
+        self.event |= self.system.event_on_pending();
+    }
+
+    /// Sets when `attend` has to look again.
+    fn schedule(&mut self) {
+        // While memory stalls, each instruction may be one that has to wait for it.
+        let at_once = self.end.is_some()
+            || self.stall.is_some()
+            || !self.thumb
+            || self.sleep.is_some()
+            || self.interrupts.takeable().is_some();
+        self.attention = if at_once { 0 } else { self.due().min(self.until) };
+    }
+
+    /// Goes on at `target`, which is even.
+    #[inline(always)]
+    fn branch(&mut self, target: u32) {
+        self.pc = target;
+        if !self.code.holds(target) {
+            self.code.enter(target);
+        }
+        self.now += timing::REFILL + self.code.wait_states();
+    }
+
+    /// Goes on at `target`, whose lowest bit says Thumb (BXWritePC, LoadWritePC), or returns from an exception.
+    #[inline(always)]
+    fn branch_exchange(&mut self, target: u32) -> Result<(), Trap> {
+        if target >= 0xf000_0000 && self.exception != 0 {
+            return self.exception_return(target);
+        }
+        if target & 1 == 0 {
+            self.thumb = false;
+            self.attention = 0;
+        }
+        self.branch(target & !1);
+        Ok(())
+    }
+
+    /// Ends the run at an instruction.
+    #[cold]
+    fn refuse(&mut self, address: u32, length: u8, why: Refused) -> Result<(), Trap> {
+        let now = self.now;
+        let mut half = |at: u32| self.bus.fetch(now, at).map_or(0, u32::from);
+        let encoding = if length == 4 { half(address) << 16 | half(address.wrapping_add(2)) } else { half(address) };
+        self.end = Some(End::Refused { address, encoding, why });
+        Err(Trap::End)
+    }
+}

@@ -1,0 +1,115 @@
+//! A decoded instruction: what to call, with which operands, how long it is and how long it takes.
+
+use super::Cpu;
+use crate::bus::Bus;
+
+/// Why an instruction did not complete.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Trap {
+    /// The instruction is undefined by definition.
+    Undefined,
+    /// Thumb state was left.
+    NotThumb,
+    /// A return from an exception that does not hold together.
+    Return,
+    /// The floating-point unit is switched off.
+    NoCoprocessor,
+    /// An address that is not a multiple of the width, where it has to be.
+    Unaligned,
+    /// A division by zero, with the trap switched on.
+    DivisionByZero,
+    /// Nothing answered a load or a store; the address is in `Cpu::trapped_address`.
+    Data,
+    /// Nothing answered the fetch.
+    Fetch,
+    /// Code must not lie there.
+    ExecuteNever,
+    /// A supervisor call or a breakpoint that nothing can take.
+    Escalated,
+    /// The run ends; why is in `Cpu::end`.
+    End,
+}
+
+/// Fields of an encoding, or what decoding made of them.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Operands {
+    /// Constant, offset, list of registers, absolute address.
+    pub immediate: u32,
+    /// Destination.
+    pub d: u8,
+    /// First operand, or base address.
+    pub n: u8,
+    /// Second operand.
+    pub m: u8,
+    /// What else there is: a fourth register, a condition, a position.
+    pub x: u8,
+}
+
+/// Executes an instruction.
+pub(super) type Execute<B> = fn(&mut Cpu<B>, Operands) -> Result<(), Trap>;
+
+/// A decoded instruction. Each half-word of code has one, so it is kept small.
+pub(super) struct Operation<B: Bus> {
+    pub execute: Execute<B>,
+    pub operands: Operands,
+    /// Bytes; 0 for what is not decoded yet.
+    pub length: u8,
+    /// Cycles without wait states, branch and pipelining.
+    pub cycles: u8,
+    /// Whether it loads or stores one register, and the cycles that it saves behind another that does (see `timing`).
+    pub single: bool,
+    pub overlaps: u8,
+}
+
+// Not derived: that would ask the same of the bus.
+impl<B: Bus> Clone for Operation<B> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<B: Bus> Copy for Operation<B> {}
+
+impl<B: Bus> Operation<B> {
+    /// One cycle, no operands; the length is filled in by `decode`.
+    pub fn new(execute: Execute<B>) -> Self {
+        Self { execute, operands: Operands::default(), length: 0, cycles: 1, single: false, overlaps: 0 }
+    }
+
+    pub fn d(mut self, register: u32) -> Self {
+        self.operands.d = register as u8;
+        self
+    }
+
+    pub fn n(mut self, register: u32) -> Self {
+        self.operands.n = register as u8;
+        self
+    }
+
+    pub fn m(mut self, register: u32) -> Self {
+        self.operands.m = register as u8;
+        self
+    }
+
+    pub fn x(mut self, value: u32) -> Self {
+        self.operands.x = value as u8;
+        self
+    }
+
+    pub fn immediate(mut self, value: u32) -> Self {
+        self.operands.immediate = value;
+        self
+    }
+
+    pub fn cycles(mut self, cycles: u32) -> Self {
+        self.cycles = cycles as u8;
+        self
+    }
+
+    /// Takes the cycles of a load or a store of one register.
+    pub fn single(mut self, load: bool) -> Self {
+        self.single = true;
+        self.overlaps = u8::from(load);
+        self.cycles(if load { 2 } else { 1 })
+    }
+}

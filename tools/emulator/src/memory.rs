@@ -1,0 +1,122 @@
+//! A bus with nothing but memory, for tests of the core and programs that need no chip.
+
+use crate::bus::{Bus, Refusal, Signals, Width};
+use std::ops::Range;
+
+/// Blocks of memory, each of which can be loaded, stored and executed, and a line of which the test decides.
+#[derive(Default)]
+pub struct Memory {
+    blocks: Vec<Block>,
+    /// What the core is told; `rewritten` and `reset` are told once.
+    pub signals: Signals,
+    /// Cycles that every access outside of SRAM takes more.
+    pub wait_states: u32,
+}
+
+struct Block {
+    start: u32,
+    bytes: Vec<u8>,
+    executable: bool,
+}
+
+impl Memory {
+    /// No memory at all.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds zeros, of which `executable` ones are what the core keeps decoded.
+    pub fn with(mut self, range: Range<u32>, executable: bool) -> Self {
+        let length = range.end.saturating_sub(range.start) as usize;
+        self.blocks.push(Block { start: range.start, bytes: vec![0; length], executable });
+        self
+    }
+
+    /// 2 MiB at 0, 1 MiB where an STM32's flash begins, 256 KiB of SRAM that is not executable.
+    pub fn usual() -> Self {
+        let flash = 0x0800_0000..0x0810_0000;
+        Self::new().with(0x2000_0000..0x2004_0000, false).with(flash, true).with(0..0x20_0000, true)
+    }
+
+    /// The bytes at `address`; None where they do not all lie in one block.
+    pub fn bytes(&self, address: u32, length: usize) -> Option<&[u8]> {
+        let block = self.blocks.iter().find(|block| address.wrapping_sub(block.start) < block.bytes.len() as u32)?;
+        let at = (address - block.start) as usize;
+        block.bytes.get(at..at.checked_add(length)?)
+    }
+
+    /// Sets the bytes at `address`, and lets the core know; false where they do not all lie in one block.
+    pub fn set(&mut self, address: u32, bytes: &[u8]) -> bool {
+        let Some(block) =
+            self.blocks.iter_mut().find(|block| address.wrapping_sub(block.start) < block.bytes.len() as u32)
+        else {
+            return false;
+        };
+        let at = (address - block.start) as usize;
+        let Some(place) = block.bytes.get_mut(at..at + bytes.len()) else { return false };
+        place.copy_from_slice(bytes);
+        let end = address + bytes.len() as u32;
+        let changed = self.signals.rewritten.take().unwrap_or(address..end);
+        self.signals.rewritten = Some(changed.start.min(address)..changed.end.max(end));
+        true
+    }
+
+    #[inline(always)]
+    fn place(&self, address: u32) -> Option<(usize, usize)> {
+        self.blocks.iter().enumerate().find_map(|(i, block)| {
+            let at = address.wrapping_sub(block.start) as usize;
+            (at < block.bytes.len()).then_some((i, at))
+        })
+    }
+}
+
+impl Bus for Memory {
+    #[inline(always)]
+    fn read(&mut self, _: u64, address: u32, width: Width) -> Result<u32, Refusal> {
+        let (block, at) = self.place(address).ok_or(Refusal::NoAnswer)?;
+        let bytes = self.blocks[block].bytes.get(at..).unwrap_or_default();
+        let value = match width {
+            Width::Byte => bytes.first().map(|byte| u32::from(*byte)),
+            Width::Half => bytes.first_chunk().map(|bytes| u32::from(u16::from_le_bytes(*bytes))),
+            Width::Word => bytes.first_chunk().map(|bytes| u32::from_le_bytes(*bytes)),
+        };
+        value.ok_or(Refusal::NoAnswer)
+    }
+
+    #[inline(always)]
+    fn write(&mut self, _: u64, address: u32, width: Width, value: u32) -> Result<(), Refusal> {
+        let (block, at) = self.place(address).ok_or(Refusal::NoAnswer)?;
+        let bytes = self.blocks[block].bytes.get_mut(at..).unwrap_or_default();
+        let done = match width {
+            Width::Byte => bytes.first_mut().map(|byte| *byte = value as u8),
+            Width::Half => bytes.first_chunk_mut().map(|bytes| *bytes = (value as u16).to_le_bytes()),
+            Width::Word => bytes.first_chunk_mut().map(|bytes| *bytes = value.to_le_bytes()),
+        };
+        done.ok_or(Refusal::NoAnswer)
+    }
+
+    fn fetch(&mut self, now: u64, address: u32) -> Result<u16, Refusal> {
+        self.read(now, address, Width::Half).map(|half| half as u16)
+    }
+
+    fn code(&self) -> Vec<Range<u32>> {
+        let executable = self.blocks.iter().filter(|block| block.executable);
+        executable.map(|block| block.start..block.start + block.bytes.len() as u32).collect()
+    }
+
+    fn wait_states(&self, _: u32) -> u32 {
+        self.wait_states
+    }
+
+    fn next_event(&self) -> u64 {
+        u64::MAX
+    }
+
+    fn advance(&mut self, _: u64) {}
+
+    fn signals(&mut self) -> Signals {
+        let told = self.signals.clone();
+        (self.signals.rewritten, self.signals.reset) = (None, false);
+        told
+    }
+}

@@ -1,0 +1,194 @@
+//! DRV8353S, a gate driver for three half bridges: its registers, its enable and its fault output.
+//!
+//! Source: TI SLVSDY6, "SPI" and "Register maps": frames of 16 bits, mode 1: bit 15 reads, bits 14 to 11 are the register, bits 10 to 0 the data; the
+//! register's content comes back in the same frame. Values after reset are from memory of that document: unconfirmed; the firmware
+//! writes every register.
+
+use crate::chip::time::Instant;
+use crate::chip::wiring::SpiFrame;
+
+/// From the enable to the first frame, ns.
+pub const WAKE_NS: u64 = 1_000_000;
+
+const REGISTERS: usize = 8;
+const RESET: [u16; REGISTERS] = [0, 0, 0x000, 0x3ff, 0x7ff, 0x159, 0x283, 0x000];
+const DATA: u16 = 0x7ff;
+
+/// Driver control: clear faults, coast.
+const CLEAR: u16 = 1 << 0;
+const COAST: u16 = 1 << 2;
+/// High-side gates: the lock.
+const LOCK: u16 = 0b111 << 8;
+const LOCKED: u16 = 0b110 << 8;
+/// Fault status 1: any fault.
+const FAULT: u16 = 1 << 10;
+
+/// The driver.
+#[derive(Clone, Debug)]
+pub struct Drv8353 {
+    registers: [u16; REGISTERS],
+    selected: bool,
+    /// Since when it is enabled; none while it sleeps.
+    enabled: Option<Instant>,
+}
+
+impl Drv8353 {
+    /// Asleep.
+    pub const fn new() -> Self {
+        Self { registers: RESET, selected: false, enabled: None }
+    }
+
+    /// The enable pin. Without it the registers are lost.
+    pub fn enable(&mut self, at: Instant, enabled: bool) {
+        match (enabled, self.enabled) {
+            (true, None) => self.enabled = Some(at),
+            (false, _) => *self = Self { selected: self.selected, ..Self::new() },
+            _ => {}
+        }
+    }
+
+    /// Whether it has woken up.
+    pub fn is_awake(&self, at: Instant) -> bool {
+        self.enabled.is_some_and(|since| at >= since.after_ns(WAKE_NS))
+    }
+
+    /// The select line, low or not.
+    pub fn select(&mut self, selected: bool) {
+        self.selected = selected;
+    }
+
+    /// A register's content.
+    pub fn register(&self, number: usize) -> Option<u16> {
+        self.registers.get(number).copied()
+    }
+
+    /// Whether its outputs follow its inputs: awake, no fault, not told to coast.
+    pub fn drives(&self, at: Instant) -> bool {
+        self.is_awake(at) && !self.has_fault() && self.registers[2] & COAST == 0
+    }
+
+    /// Something went wrong in the bridge: bits of fault status 1. They stay until they are cleared, and pull nFAULT low.
+    pub fn fail(&mut self, status: u16) {
+        self.registers[0] |= status & DATA | FAULT;
+    }
+
+    /// Whether nFAULT is pulled low.
+    pub const fn has_fault(&self) -> bool {
+        self.registers[0] & FAULT != 0
+    }
+
+    /// A frame that ended. None where it is asleep or not selected: it leaves the line alone.
+    pub fn exchange(&mut self, at: Instant, frame: &SpiFrame) -> Option<u16> {
+        if !self.selected || !self.is_awake(at) {
+            return None;
+        }
+        let number = usize::from(frame.sent >> 11 & 0xf);
+        // A wrong mode or size is no command; what is read then is nothing.
+        let valid = frame.bits == 16 && frame.mode == 1;
+        let Some(before) = self.registers.get(number).copied().filter(|_| valid) else { return Some(0) };
+        if frame.sent >> 15 == 0 {
+            self.write(number, frame.sent & DATA);
+        }
+        Some(before)
+    }
+
+    fn write(&mut self, number: usize, data: u16) {
+        let locked = self.registers[3] & LOCK == LOCKED;
+        match number {
+            // Status cannot be written.
+            0 | 1 => {}
+            2 => {
+                // Locked, the control of the outputs alone can be written: bits 0 to 2.
+                let writable = if locked { 0b111 } else { DATA };
+                self.registers[2] = self.registers[2] & !writable | data & writable & !CLEAR;
+                if data & CLEAR != 0 {
+                    (self.registers[0], self.registers[1]) = (0, 0);
+                }
+            }
+            3 => {
+                let lock = data & LOCK;
+                // 110b locks, 011b unlocks, anything else leaves the lock as it is.
+                let lock = if lock == LOCKED || lock == 0b011 << 8 { lock } else { self.registers[3] & LOCK };
+                let rest = if locked { self.registers[3] } else { data } & !LOCK;
+                self.registers[3] = lock | rest;
+            }
+            _ if locked => {}
+            _ => self.registers[number] = data,
+        }
+    }
+}
+
+impl Default for Drv8353 {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LATER: Instant = Instant(2_000_000_000);
+
+    fn frame(sent: u16) -> SpiFrame {
+        SpiFrame { bus: 1, mode: 1, bits: 16, sent, frequency: 664_062, began: Instant(0) }
+    }
+
+    fn awake() -> Drv8353 {
+        let mut driver = Drv8353::new();
+        driver.enable(Instant(0), true);
+        driver.select(true);
+        driver
+    }
+
+    #[test]
+    fn it_wakes_up_a_millisecond_after_its_enable() {
+        let mut driver = awake();
+        assert_eq!(driver.exchange(Instant(999_999_999), &frame(1 << 15)), None);
+        assert_eq!(driver.exchange(Instant(1_000_000_000), &frame(1 << 15)), Some(0));
+        driver.select(false);
+        assert_eq!(driver.exchange(LATER, &frame(1 << 15)), None);
+    }
+
+    #[test]
+    fn a_register_reads_what_was_written_and_a_write_answers_what_was_there() {
+        let mut driver = awake();
+        assert_eq!(driver.exchange(LATER, &frame(6 << 11 | 0x281)), Some(0x283));
+        assert_eq!(driver.exchange(LATER, &frame(1 << 15 | 6 << 11)), Some(0x281));
+        driver.enable(LATER, false);
+        driver.enable(LATER, true);
+        assert_eq!(driver.register(6), Some(0x283), "the enable loses it");
+    }
+
+    #[test]
+    fn a_locked_driver_takes_nothing_but_the_control_of_the_outputs() {
+        let mut driver = awake();
+        driver.exchange(LATER, &frame(3 << 11 | LOCKED));
+        driver.exchange(LATER, &frame(6 << 11));
+        assert_eq!(driver.register(6), Some(0x283));
+        driver.exchange(LATER, &frame(2 << 11 | 0x7fe));
+        assert_eq!(driver.register(2), Some(0b110));
+        driver.exchange(LATER, &frame(3 << 11 | 0b011 << 8));
+        driver.exchange(LATER, &frame(6 << 11 | 5));
+        assert_eq!(driver.register(6), Some(5));
+    }
+
+    #[test]
+    fn a_fault_switches_off_until_it_is_cleared() {
+        let mut driver = awake();
+        assert!(driver.drives(LATER));
+        driver.fail(1 << 9);
+        assert!(driver.has_fault() && !driver.drives(LATER));
+        assert_eq!(driver.exchange(LATER, &frame(1 << 15)), Some(1 << 10 | 1 << 9));
+        driver.exchange(LATER, &frame(2 << 11 | 1));
+        assert!(!driver.has_fault() && driver.drives(LATER));
+        assert_eq!(driver.register(2), Some(0), "the request clears itself");
+    }
+
+    #[test]
+    fn another_mode_is_no_command() {
+        let mut driver = awake();
+        driver.exchange(LATER, &SpiFrame { mode: 0, ..frame(6 << 11) });
+        assert_eq!(driver.register(6), Some(0x283));
+    }
+}

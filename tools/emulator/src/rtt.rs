@@ -1,0 +1,145 @@
+//! What the program logs: SEGGER's real-time transfer read out of its memory, and the defmt messages in it.
+//!
+//! Host only. The control block is that of `defmt-rtt`: a name of 16 bytes, the number of channels in each direction, then for each channel
+//! name, buffer, size, write offset, read offset, flags, a word each. A debug probe does the same over its wire.
+
+use crate::bus::{Bus, Refusal, Width};
+use crate::program::Program;
+use defmt_decoder::{DecodeError, StreamDecoder, Table};
+use std::fmt;
+
+/// Symbol of the control block.
+const CONTROL_BLOCK: &str = "_SEGGER_RTT";
+/// Offset of the first channel to the host, and in it of what is needed.
+const CHANNEL: u32 = 24;
+const BUFFER: u32 = 4;
+const SIZE: u32 = 8;
+const WRITE: u32 = 12;
+const READ: u32 = 16;
+
+/// The first channel from program to host.
+#[derive(Clone, Copy, Debug)]
+pub struct Rtt {
+    channel: u32,
+}
+
+/// Why nothing could be read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum RttError {
+    /// Its memory does not answer.
+    Memory(Refusal),
+    /// The offsets lie outside of the buffer: it is not set up, or overwritten.
+    Damaged {
+        /// Bytes of the buffer.
+        size: u32,
+        /// Where the program writes next.
+        write: u32,
+        /// Where the host reads next.
+        read: u32,
+    },
+}
+
+impl fmt::Display for RttError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Memory(refusal) => write!(f, "the log's memory does not answer: {refusal:?}"),
+            Self::Damaged { size, write, read } => {
+                write!(f, "the log's offsets {write} and {read} lie outside of its {size} bytes")
+            }
+        }
+    }
+}
+
+impl std::error::Error for RttError {}
+
+impl From<Refusal> for RttError {
+    fn from(refusal: Refusal) -> Self {
+        Self::Memory(refusal)
+    }
+}
+
+impl Rtt {
+    /// The channel of a program; None where it has no log.
+    pub fn of(program: &Program) -> Option<Self> {
+        let block = program.symbol(CONTROL_BLOCK)?;
+        Some(Self { channel: block.address + CHANNEL })
+    }
+
+    /// Takes what has been written since it was last read. Nothing before the program has initialised its memory.
+    pub fn read<B: Bus>(&self, bus: &mut B, now: u64) -> Result<Vec<u8>, RttError> {
+        let mut word = |offset: u32| bus.read(now, self.channel + offset, Width::Word);
+        let (buffer, size, write, start) = (word(BUFFER)?, word(SIZE)?, word(WRITE)?, word(READ)?);
+        if size == 0 || write == start {
+            return Ok(Vec::new());
+        }
+        if write >= size || start >= size {
+            return Err(RttError::Damaged { size, write, read: start });
+        }
+        let length = if write > start { write - start } else { size - start + write };
+        let bytes = (0..length).map(|i| {
+            let at = buffer + (start + i) % size;
+            bus.read(now, at, Width::Byte).map(|byte| byte as u8)
+        });
+        let bytes = bytes.collect::<Result<Vec<u8>, Refusal>>()?;
+        bus.write(now, self.channel + READ, Width::Word, write)?;
+        Ok(bytes)
+    }
+}
+
+/// The messages that a program can log.
+pub struct Messages(Table);
+
+impl Messages {
+    /// From the table in a program; None where it logs without defmt, an error where it is of another version.
+    pub fn of(program: &Program) -> Result<Option<Self>, String> {
+        Table::parse(program.elf()).map(|table| table.map(Self)).map_err(|error| format!("{error:#}"))
+    }
+
+    /// Decodes a stream from its beginning.
+    pub fn decoder(&self) -> Decoder<'_> {
+        Decoder { stream: self.0.new_stream_decoder(), recovers: self.0.encoding().can_recover() }
+    }
+}
+
+/// Bytes become messages, as they come.
+pub struct Decoder<'t> {
+    stream: Box<dyn StreamDecoder + Send + Sync + 't>,
+    /// Whether the encoding shows where the next message begins.
+    recovers: bool,
+}
+
+/// A message.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Message {
+    /// Its timestamp as the program formats it; empty where it has none.
+    pub timestamp: String,
+    /// "error", "warn", "info", "debug", "trace"; None for what is printed without a level.
+    pub level: Option<&'static str>,
+    /// What it says.
+    pub text: String,
+}
+
+impl Decoder<'_> {
+    /// The messages that are complete with these bytes. A damaged one is told as what it is.
+    pub fn decode(&mut self, bytes: &[u8]) -> Vec<Message> {
+        self.stream.received(bytes);
+        let mut messages = Vec::new();
+        loop {
+            match self.stream.decode() {
+                Ok(frame) => messages.push(Message {
+                    timestamp: frame.display_timestamp().map(|time| time.to_string()).unwrap_or_default(),
+                    level: frame.level().map(|level| level.as_str()),
+                    text: frame.display_message().to_string(),
+                }),
+                Err(DecodeError::UnexpectedEof) => return messages,
+                Err(DecodeError::Malformed) => {
+                    let text = "a message that the table does not explain".to_owned();
+                    messages.push(Message { timestamp: String::new(), level: Some("error"), text });
+                    if !self.recovers {
+                        return messages;
+                    }
+                }
+            }
+        }
+    }
+}
