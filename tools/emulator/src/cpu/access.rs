@@ -9,6 +9,7 @@ use crate::bus::{Bus, Refusal, Width};
 const PRIVATE: u32 = 0xe000_0000;
 const PRIVATE_LENGTH: u32 = 0x10_0000;
 
+#[inline(always)]
 const fn width(bytes: u32) -> Width {
     match bytes {
         1 => Width::Byte,
