@@ -13,6 +13,8 @@ use std::fmt;
 pub enum ProgramError {
     /// Not a 32-bit ELF file, or a damaged one.
     Elf(object::Error),
+    /// A segment whose bytes the file does not have, by its physical address.
+    Segment(u32),
     /// Nothing in it would be flashed.
     Empty,
 }
@@ -21,6 +23,7 @@ impl fmt::Display for ProgramError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Elf(error) => write!(f, "not a 32-bit ELF program: {error}"),
+            Self::Segment(address) => write!(f, "the ELF file ends before the segment for {address:#010x} does"),
             Self::Empty => write!(f, "the ELF file has nothing to flash"),
         }
     }
@@ -61,8 +64,7 @@ impl Program {
             if header.p_type(endian) != PT_LOAD || header.p_filesz(endian) == 0 {
                 continue;
             }
-            let damaged = ProgramError::Empty;
-            let data = header.data(endian, &*elf).map_err(|()| damaged)?;
+            let data = header.data(endian, &*elf).map_err(|()| ProgramError::Segment(header.p_paddr(endian)))?;
             segments.push((header.p_paddr(endian), data.to_vec()));
         }
         if segments.is_empty() {
@@ -114,5 +116,66 @@ impl Program {
     /// The file itself.
     pub fn elf(&self) -> &[u8] {
         &self.elf
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An ELF file of one segment whose bytes lie in flash and run in CCM SRAM, and of two symbols.
+    fn elf() -> Vec<u8> {
+        let names = b"\0_ZN5joint4step17h0123456789abcdefE\0_SEGGER_RTT\0";
+        let words = |words: &[u32]| words.iter().flat_map(|word| word.to_le_bytes()).collect::<Vec<u8>>();
+        let (data, symbols, strings, sections) = (84u32, 88u32, 88 + 48, 88 + 48 + names.len() as u32);
+        let mut file = b"\x7fELF\x01\x01\x01".to_vec();
+        file.resize(16, 0);
+        // Executable for Arm; entry, program headers, section headers, flags; sizes and counts of headers.
+        file.extend(words(&[2 | 40 << 16, 1, 0, 52, sections, 0x0500_0200]));
+        file.extend(words(&[52 | 32 << 16, 1 | 40 << 16, 3 | 2 << 16]));
+        // One segment to load: virtual address in CCM SRAM, physical in flash, room for eight bytes of which four are in the file.
+        file.extend(words(&[1, data, 0x1000_0000, 0x0800_1000, 4, 8, 5, 4]));
+        file.extend([1, 2, 3, 4]);
+        file.extend(words(&[0; 4]));
+        // A global function in Thumb code and a global object.
+        file.extend(words(&[1, 0x1000_0001, 4, 0x12 | 1 << 16]));
+        file.extend(words(&[36, 0x2000_0100, 48, 0x11 | 1 << 16]));
+        file.extend(names);
+        file.extend(words(&[0; 10]));
+        file.extend(words(&[0, 2, 0, 0, symbols, 48, 2, 1, 4, 16]));
+        file.extend(words(&[0, 3, 0, 0, strings, names.len() as u32, 0, 0, 1, 0]));
+        file
+    }
+
+    #[test]
+    fn bytes_go_to_their_physical_address() {
+        let program = Program::parse(elf()).expect("a program");
+        assert_eq!(program.segments().collect::<Vec<_>>(), [(0x0800_1000, &[1, 2, 3, 4][..])]);
+    }
+
+    #[test]
+    fn symbols_are_found_by_either_name_and_by_address() {
+        let program = Program::parse(elf()).expect("a program");
+        let step = Some(Symbol { address: 0x1000_0000, size: 4 });
+        assert_eq!(program.symbol("joint::step"), step);
+        assert_eq!(program.symbol("_ZN5joint4step17h0123456789abcdefE"), step);
+        assert_eq!(program.symbol("_SEGGER_RTT").map(|symbol| symbol.address), Some(0x2000_0100));
+        assert_eq!(program.symbol("step"), None);
+        assert_eq!(program.functions_ending("::step").collect::<Vec<_>>(), [(0x1000_0000, "joint::step")]);
+        let at = [0x1000_0000, 0x1000_0003, 0x1000_0004].map(|address| program.function_at(address));
+        assert_eq!(at, [Some("joint::step"), Some("joint::step"), None]);
+    }
+
+    #[test]
+    fn what_is_no_program_is_refused() {
+        assert!(matches!(Program::parse(b"hello".to_vec()), Err(ProgramError::Elf(_))));
+        let mut empty = elf();
+        // The type of the segment: none.
+        empty[52] = 0;
+        assert!(matches!(Program::parse(empty), Err(ProgramError::Empty)));
+        let mut short = elf();
+        // More bytes in the file than there are.
+        short[52 + 18] = 1;
+        assert!(matches!(Program::parse(short), Err(ProgramError::Segment(0x0800_1000))));
     }
 }

@@ -143,3 +143,42 @@ impl Decoder<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::memory::Memory;
+
+    const BLOCK: u32 = 0x2000_0000;
+    const TEXT: u32 = 0x2000_0100;
+
+    /// A channel of 8 bytes that hold "ABCDEFGH".
+    fn channel(write: u32, read: u32) -> (Memory, Rtt) {
+        let mut memory = Memory::new().with(BLOCK..BLOCK + 0x200, false);
+        let words = [0, TEXT, 8, write, read, 0].map(u32::to_le_bytes).concat();
+        assert!(memory.set(BLOCK + CHANNEL, &words) && memory.set(TEXT, b"ABCDEFGH"));
+        (memory, Rtt { channel: BLOCK + CHANNEL })
+    }
+
+    #[test]
+    fn what_was_written_is_read_once() {
+        let (mut memory, rtt) = channel(5, 2);
+        assert_eq!(rtt.read(&mut memory, 0), Ok(b"CDE".to_vec()));
+        assert_eq!(rtt.read(&mut memory, 0), Ok(Vec::new()));
+    }
+
+    #[test]
+    fn the_buffer_is_a_ring() {
+        let (mut memory, rtt) = channel(1, 6);
+        assert_eq!(rtt.read(&mut memory, 0), Ok(b"GHA".to_vec()));
+    }
+
+    #[test]
+    fn offsets_that_cannot_be_are_told() {
+        let (mut memory, rtt) = channel(9, 0);
+        assert_eq!(rtt.read(&mut memory, 0), Err(RttError::Damaged { size: 8, write: 9, read: 0 }));
+        let (_, rtt) = channel(1, 0);
+        let mut nothing = Memory::new();
+        assert_eq!(rtt.read(&mut nothing, 0), Err(RttError::Memory(Refusal::NoAnswer)));
+    }
+}

@@ -10,6 +10,7 @@ const PRIVATE: u32 = 0xe000_0000;
 /// Up to the instrumentation and debug devices, which are the chip's.
 const PRIVATE_LENGTH: u32 = 0x4_2000;
 
+#[inline(always)]
 const fn width(bytes: u32) -> Width {
     match bytes {
         1 => Width::Byte,

@@ -55,7 +55,7 @@ impl<B: Bus> Code<B> {
         if offset >= self.current.length {
             return None;
         }
-        let operation = *self.operations.get(self.current.offset + (offset / 2) as usize)?;
+        let operation = *self.operations.get(self.current.offset.wrapping_add((offset / 2) as usize))?;
         (operation.length != 0).then_some(operation)
     }
 

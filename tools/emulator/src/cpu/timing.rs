@@ -1,7 +1,8 @@
 //! How long things take, in cycles of the core: the published timings, and what this model assumes beyond them.
 //!
 //! Sources: Cortex-M4 Technical Reference Manual (Arm 100166), 3.3.1 (instructions), 3.3.2 (loads and stores), 7.2.3 (floating point) and 5
-//! (exceptions). They are the timings of `host-tests/tests/thumb`, which counts over traces. Assumed:
+//! (exceptions). They are the timings of `host-tests/tests/thumb`, which counts over traces, but where that takes a group for its commonest
+//! member: table branches and exclusive accesses take 2 here as published and not 3, VLDR and VSTR of two words 3. Assumed:
 //! - Data-processing and multiply instructions take 1 cycle, integer multiply-accumulates included.
 //! - A load takes 2 cycles, 1 right behind another single load or store, whatever the registers; a store takes 1: the write buffer
 //!   hides the rest. Loads and stores of several registers take one cycle more than there are registers.
@@ -12,7 +13,9 @@
 //!   load costs those of its address each time: the accelerator's caches (RM0440, 3.3.5) are taken to miss always.
 //!   Where code lies in CCM SRAM, which has none, none of this matters.
 //! - SRAM from 0x2000_0000 to 0x3fff_ffff has no wait states and no contention with DMA; devices have those that the bus states.
-//! - A barrier, MRS and MSR take what TRM 3.3.1 gives as least: nothing outstanding is modelled that they could wait for.
+//! - A barrier, CPS, MRS and MSR take what TRM 3.3.1 gives as least: nothing outstanding is modelled that they could wait for.
+//! - Instructions are never interrupted half-way: a load of several registers or a division completes first. A store that nothing
+//!   answers faults at its own instruction; the write buffer of the hardware may report it later.
 //! - Waking from sleep takes no time by itself.
 
 /// A taken branch beyond its own cycle: refilling the pipeline.

@@ -146,7 +146,7 @@ fn miscellaneous<B: Bus>(word: u32, pc: u32) -> Decoded<B> {
             let cycles = several(list.count_ones());
             unless(list == 0, op(store_several).n(13).immediate(list).x(CHANGES | BELOW).cycles(cycles))
         }
-        6 if word & 0xffec == 0xb660 => unless(word & 3 == 0, op(system::change_state).x(word & 0x13).cycles(2)),
+        6 if word & 0xffec == 0xb660 => unless(word & 3 == 0, op(system::change_state).x(word & 0x13)),
         10 => {
             let execute = match bits(word, 7, 6) {
                 0 => reverse::<B, 0>,
