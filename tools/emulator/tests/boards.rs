@@ -147,11 +147,11 @@ fn starts<W: Wired>(bench: &mut Bench<W>, rate: u32, idle: &str) -> Result<(), F
 }
 
 fn esc1_starts() -> Result<(), Failed> {
-    starts(&mut Bench::new(BG431BEsc1::new)?, 20_000, "NotReadyToSwitchOn")
+    starts(&mut Bench::new(BG431BEsc1::new)?, 20_000, "not ready to switch on")
 }
 
 fn moteus_starts() -> Result<(), Failed> {
-    starts(&mut Bench::new(MoteusR4::new)?, 40_000, "SwitchOnDisabled")
+    starts(&mut Bench::new(MoteusR4::new)?, 40_000, "switch on disabled")
 }
 
 /// Somebody turns the link by hand: the rotor passes the index.
@@ -163,7 +163,7 @@ fn esc1_index() -> Result<(), Failed> {
     bench.board().drivetrain().external_torque = 0.0;
     bench.run(SETTLED - 0.6)?;
     match bench.state().as_str() {
-        "SwitchOnDisabled" => Ok(()),
+        "switch on disabled" => Ok(()),
         state => Err(format!("{state}:\n{}", bench.log()).into()),
     }
 }
@@ -185,7 +185,7 @@ fn supply() -> Result<(), Failed> {
         bench.board().drivetrain().actuator_mut().inject(Fault::SourceVoltage(40.0))?;
         bench.run(SETTLED - 0.2)?;
         bench.expect("fault: supply voltage too high")?;
-        if bench.state() == "Fault" { Ok(()) } else { Err(bench.log().into()) }
+        if bench.state() == "fault" { Ok(()) } else { Err(bench.log().into()) }
     }
     over(Bench::new(BG431BEsc1::new)?)?;
     over(Bench::new(MoteusR4::new)?)
