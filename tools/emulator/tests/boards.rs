@@ -154,14 +154,22 @@ fn moteus_starts() -> Result<(), Failed> {
     starts(&mut Bench::new(MoteusR4::new)?, 40_000, "switch on disabled")
 }
 
-/// Somebody turns the link by hand: the rotor passes the index.
+/// Somebody turns the link by hand, slowly: the rotor passes the index.
 fn esc1_index() -> Result<(), Failed> {
     let mut bench = Bench::new(BG431BEsc1::new)?;
     bench.run(0.2)?;
-    bench.board().drivetrain().external_torque = 30.0;
-    bench.run(0.4)?;
+    for _ in 0..700 {
+        let drivetrain = bench.board().drivetrain();
+        let velocity = drivetrain.actuator().state().joint.velocity;
+        drivetrain.external_torque = (200.0 * (0.25 - velocity)).clamp(-10.0, 10.0);
+        bench.run(0.001)?;
+    }
+    let turned = bench.board().drivetrain().actuator().state().rotor_angle;
+    if turned < std::f64::consts::TAU {
+        return Err(format!("the rotor turned by {turned} rad only").into());
+    }
     bench.board().drivetrain().external_torque = 0.0;
-    bench.run(SETTLED - 0.6)?;
+    bench.run(SETTLED - 0.9)?;
     match bench.state().as_str() {
         "switch on disabled" => Ok(()),
         state => Err(format!("{state}:\n{}", bench.log()).into()),
