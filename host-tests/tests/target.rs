@@ -6,6 +6,9 @@
 #[path = "../probe/src/sequence.rs"]
 mod sequence;
 
+use emulator::cpu::{Cpu, End};
+use emulator::memory::Memory;
+use emulator::program::Program;
 use host_tests::image_bytes::encoded;
 use host_tests::parameters::{image, tame};
 use joint_firmware::parameters::certificate::{Limits, prove};
@@ -32,6 +35,8 @@ fn main() {
         Trial::test("friction_compensation_and_parameters_link_no_panic_and_no_float_library", links_little)
             .with_ignored_flag(!target),
         Trial::test("the_emulated_core_gives_the_same_bits_as_the_host", same_bits).with_ignored_flag(!emulator),
+        Trial::test("the_project_s_own_core_gives_the_same_bits_as_the_host", own_core_same_bits)
+            .with_ignored_flag(!target),
         Trial::test("an_image_is_verified_within_its_instruction_budget_on_the_emulated_core", verification_cost)
             .with_ignored_flag(!emulator),
     ];
@@ -143,6 +148,37 @@ fn same_bits() -> Result<(), Failed> {
     let emulated: Vec<u32> = printed()?.into_iter().map(|(hash, _)| hash).collect();
     let host: Vec<u32> = images().iter().map(|image| sequence::run(image).unwrap_or(0)).collect();
     println!("{} images x {} states", host.len(), sequence::STATES);
+    match emulated == host && host.iter().all(|sum| *sum != 0) {
+        true => Ok(()),
+        false => Err(format!("core {emulated:08x?}, host {host:08x?}").into()),
+    }
+}
+
+/// The same program on the core of `tools/emulator`.
+fn own_core_same_bits() -> Result<(), Failed> {
+    let program = Program::parse(std::fs::read(build()?)?)?;
+    let mut memory = Memory::usual();
+    if !program.segments().all(|(address, bytes)| memory.set(address, bytes)) {
+        return Err("the program does not fit into the memory".into());
+    }
+    let mut cpu = Cpu::new(memory);
+    cpu.reset(0).map_err(|refusal| format!("{refusal:?}"))?;
+    let mut hashes = Vec::new();
+    loop {
+        match cpu.run(u64::MAX) {
+            // Semihosting: a line of eight digits to print, first a hash, then ticks; anything else ends the program.
+            End::Breakpoint { number: 0xab, .. } if cpu.register(0) == 0x04 => {
+                let digits = cpu.bus.bytes(cpu.register(1), 8).unwrap_or_default();
+                hashes.push(u32::from_str_radix(std::str::from_utf8(digits)?, 16)?);
+                cpu.skip();
+            }
+            End::Breakpoint { number: 0xab, .. } => break,
+            end => return Err(format!("{end}").into()),
+        }
+    }
+    let emulated: Vec<u32> = hashes.chunks(2).map(|pair| pair[0]).collect();
+    let host: Vec<u32> = images().iter().map(|image| sequence::run(image).unwrap_or(0)).collect();
+    println!("{} instructions, {} modelled cycles", cpu.instructions(), cpu.now());
     match emulated == host && host.iter().all(|sum| *sum != 0) {
         true => Ok(()),
         false => Err(format!("core {emulated:08x?}, host {host:08x?}").into()),
