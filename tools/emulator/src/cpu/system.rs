@@ -272,7 +272,7 @@ impl<B: Bus> Cpu<B> {
             }
             _ if width != Width::Word => false,
             0x010..0x020 => self.timer.write(self.now, offset & 0xf, value),
-            0x100..0x500 => self.interrupts.write(offset, value),
+            0x100..0x400 => self.interrupts.write(offset, value),
             _ if address & !0xfff == 0xe000_1000 => self.counter.write(awake, address & 0xfff, value),
             _ => self.set_control_register(offset, value)?,
         };
