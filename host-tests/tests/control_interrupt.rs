@@ -63,19 +63,23 @@ fn build(board: &str) -> Result<PathBuf, Failed> {
 /// What is wrong with everything that runs from `entry` on.
 fn faults(path: &Path, entry: &str) -> Result<Vec<String>, Failed> {
     let program = thumb::Program::parse(&std::fs::read(path)?)?;
-    let reached = program.reachable(program.address(entry).ok_or(format!("{entry} is not linked"))?);
+    let entry_address = program.address(entry).ok_or(format!("{entry} is not linked"))?;
+    let reached = program.reachable(entry_address, |_| false);
     let bytes: u32 = reached.functions.iter().map(|(_, size, _)| size).sum();
     println!("{}: {entry} reaches {} functions, {bytes} B", path.display(), reached.functions.len());
     let mut faults = reached.unclear;
-    for (address, _, name) in reached.functions {
+    for (_, _, name) in reached.functions {
         if name.contains("panic") || name.contains("unwrap_failed") || name.contains("expect_failed") {
             faults.push(format!("reaches {name}"));
         }
+    }
+    let steady = program.reachable(entry_address, calibrates);
+    for (address, _, name) in steady.functions {
         if FLASH.contains(&address) && !calibrates(&name) {
             faults.push(format!("{name} lies in flash, at {address:#010x}"));
         }
     }
-    let constants = reached.constants.into_iter().filter(|(word, name)| FLASH.contains(word) && !calibrates(name));
+    let constants = steady.constants.into_iter().filter(|(word, name)| FLASH.contains(word) && !calibrates(name));
     faults.extend(constants.map(|(word, name)| format!("{name} may read flash, at {word:#010x}")));
     Ok(faults)
 }

@@ -95,8 +95,8 @@ impl Program {
         self.mapping.range(..=address).next_back().is_none_or(|(_, code)| *code)
     }
 
-    /// Everything that can run once `entry` runs.
-    pub fn reachable(&self, entry: u32) -> Reached {
+    /// Everything that can run once `entry` runs. Functions of which `leaf` is true are in it, but nothing that only they can reach.
+    pub fn reachable(&self, entry: u32, leaf: impl Fn(&str) -> bool) -> Reached {
         let mut reached = Reached::default();
         let (mut waiting, mut seen) = (vec![entry], BTreeSet::new());
         while let Some(target) = waiting.pop() {
@@ -112,6 +112,9 @@ impl Program {
                 continue;
             }
             reached.functions.push((start, *size, name.clone()));
+            if leaf(name) {
+                continue;
+            }
             let mut at = start;
             // Lower halves that movw has put into each register.
             let mut halves = [0; 16];
