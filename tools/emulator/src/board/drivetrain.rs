@@ -36,8 +36,8 @@ pub struct Drivetrain {
 }
 
 impl Drivetrain {
-    /// An actuator at rest, with the bridge off. `frequency` of the timers is told by their ticks; delays, steps of duty and resolutions
-    /// of the plant's own sensors and timer are taken away, because chip and board have theirs.
+    /// An actuator at rest, with the bridge off. Delays, steps of duty and resolutions of the plant's own sensors and timer are taken
+    /// away, because chip and board have theirs.
     ///
     /// # Errors
     /// What the plant refuses.
