@@ -10,11 +10,10 @@
 #[allow(dead_code, reason = "each test uses its part")]
 mod thumb;
 
+use host_tests::bare_metal::{self, target_installed};
 use libtest_mimic::{Arguments, Failed, Trial};
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
-const TARGET: &str = "thumbv7em-none-eabihf";
 /// Each board with its handlers of the highest priority.
 const BOARDS: [(&str, [&str; 2]); 2] =
     [("b-g431b-esc1", ["ADC1_2", "TIM1_UP_TIM16"]), ("moteus-r4", ["ADC1_2", "TIM2"])];
@@ -33,31 +32,9 @@ fn main() {
     libtest_mimic::run(&arguments, trials).exit();
 }
 
-fn target_installed() -> bool {
-    let output = Command::new("rustc").args(["--print", "target-libdir", "--target", TARGET]).output();
-    output.is_ok_and(|output| {
-        let folder = String::from_utf8_lossy(&output.stdout).trim().to_owned();
-        Path::new(&folder).read_dir().is_ok_and(|mut files| files.next().is_some())
-    })
-}
-
-/// Builds the board's program as it is flashed; its path.
+/// The board's program; its path.
 fn build(board: &str) -> Result<PathBuf, Failed> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let target = Path::new(env!("CARGO_TARGET_TMPDIR")).join("boards").join(board);
-    let own = format!(".cargo/{board}.toml");
-    let own = root.join(&own).exists().then_some(["--config".to_owned(), own]);
-    let output = Command::new(env!("CARGO"))
-        .args(own.into_iter().flatten())
-        .args(["build", "--release", "-p", "joint-firmware", "--target", TARGET])
-        .args(["--no-default-features", "--features", board])
-        .current_dir(root)
-        .env("CARGO_TARGET_DIR", &target)
-        .output()?;
-    if !output.status.success() {
-        return Err(String::from_utf8_lossy(&output.stderr).into_owned().into());
-    }
-    Ok(target.join(TARGET).join("release/joint-firmware"))
+    Ok(bare_metal::build(board, env!("CARGO_TARGET_TMPDIR"))?)
 }
 
 /// What is wrong with everything that runs from `entry` on.

@@ -15,6 +15,7 @@ mod replay;
 #[allow(dead_code, reason = "each test uses its part")]
 mod thumb;
 
+use host_tests::bare_metal::{TARGET, target_installed};
 use host_tests::image_bytes::encoded;
 use host_tests::parameters::{coefficients, image, q16, range, tame_network};
 use joint_firmware::friction::domain::Domain;
@@ -35,8 +36,6 @@ use std::collections::HashMap;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-
-const TARGET: &str = "thumbv7em-none-eabihf";
 
 /// A board's way of being compiled, and what a control step may cost with it.
 struct Board {
@@ -83,14 +82,6 @@ fn main() {
         Trial::test(name, move || replayed(board)).with_ignored_flag(!emulator)
     };
     libtest_mimic::run(&arguments, BOARDS.iter().map(trial).collect()).exit();
-}
-
-fn target_installed() -> bool {
-    let output = Command::new("rustc").args(["--print", "target-libdir", "--target", TARGET]).output();
-    output.is_ok_and(|output| {
-        let folder = String::from_utf8_lossy(&output.stdout).trim().to_owned();
-        Path::new(&folder).read_dir().is_ok_and(|mut files| files.next().is_some())
-    })
 }
 
 /// Every term, a network in every set, and two criteria that the runs cross; friction like the reference joint's.

@@ -9,6 +9,7 @@ mod sequence;
 use emulator::cpu::{Cpu, End};
 use emulator::memory::Memory;
 use emulator::program::Program;
+use host_tests::bare_metal::{TARGET, target_installed};
 use host_tests::image_bytes::encoded;
 use host_tests::parameters::{image, tame};
 use joint_firmware::parameters::certificate::{Limits, prove};
@@ -20,7 +21,6 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-const TARGET: &str = "thumbv7em-none-eabihf";
 /// Images that the probe evaluates.
 const IMAGES: usize = 12;
 /// Flash that friction, compensation, parameters and their tables may take, bytes.
@@ -41,14 +41,6 @@ fn main() {
             .with_ignored_flag(!emulator),
     ];
     libtest_mimic::run(&arguments, trials).exit();
-}
-
-fn target_installed() -> bool {
-    let output = Command::new("rustc").args(["--print", "target-libdir", "--target", TARGET]).output();
-    output.is_ok_and(|output| {
-        let folder = String::from_utf8_lossy(&output.stdout).trim().to_owned();
-        Path::new(&folder).read_dir().is_ok_and(|mut files| files.next().is_some())
-    })
 }
 
 /// Images like trained ones, that certify within their own limits.

@@ -133,7 +133,6 @@ impl Node {
             target: Target { product: 2, serial: 4 },
             effort: Effort::NewtonMetre,
             limits: Limits { output: u32::MAX, torque_gain: u32::MAX, velocity_slope: u32::MAX },
-            rate: 20_000,
         };
         let staging = Box::leak(Box::new([0; STAGING]));
         let images = Images::new(staging, LifeCycle::new(requirements, 0, 0, 0), None, StoredImages::default());

@@ -13,12 +13,8 @@ use crate::friction::{FrictionModel, FrictionParameters, ParameterSet};
 
 const RATE: u32 = 20_000;
 const GENEROUS: Limits = Limits { output: u32::MAX, torque_gain: u32::MAX - 1, velocity_slope: u32::MAX };
-const REQUIREMENTS: Requirements = Requirements {
-    target: Target { product: 7, serial: 1234 },
-    effort: Effort::NewtonMetre,
-    limits: GENEROUS,
-    rate: RATE,
-};
+const REQUIREMENTS: Requirements =
+    Requirements { target: Target { product: 7, serial: 1234 }, effort: Effort::NewtonMetre, limits: GENEROUS };
 
 /// An image with a constant friction of half a newton metre.
 fn image(version: u32) -> Image {

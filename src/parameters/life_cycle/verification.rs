@@ -20,8 +20,6 @@ pub struct Requirements {
     pub effort: Effort,
     /// What its own certificate must stay within, whatever the image permits itself.
     pub limits: Limits,
-    /// Rate of the control loop, Hz.
-    pub rate: u32,
 }
 
 /// An upload that everything holds of.
@@ -51,7 +49,7 @@ pub(super) fn authentic(upload: &[u8], key: Option<&Key>) -> Result<bool, Refusa
 pub(super) fn verify(upload: &[u8], requirements: &Requirements, floor: u32) -> Result<Verified, Refusal> {
     let (bytes, _) = split(upload);
     let image = Pieces::of(bytes)?;
-    let Requirements { target, effort, limits, .. } = *requirements;
+    let Requirements { target, effort, limits } = *requirements;
     let header = &image.header;
     if header.version < floor {
         return Err(Refusal::Version { version: header.version, floor });

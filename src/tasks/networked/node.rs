@@ -59,7 +59,6 @@ pub fn start(
             torque_gain: 1 << 16,
             velocity_slope: u32::MAX,
         },
-        rate: board::CONTROL_HZ,
     };
     let life = LifeCycle::new(requirements, floor, program.guard.failures, 0);
     let key = program.guard.key.clone();

@@ -152,7 +152,6 @@ impl VirtualNode {
                 torque_gain: 1 << 16,
                 velocity_slope: u32::MAX,
             },
-            rate,
         };
         let (life, stored_images) = life(requirements, &mut program.storage, 0);
         let key = program.storage.key();

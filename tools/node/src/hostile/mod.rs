@@ -154,7 +154,6 @@ impl<'a> HostileNode<'a> {
             target: Target { product: IDENTITY.product, serial: IDENTITY.serial },
             effort: Effort::NewtonMetre,
             limits: Limits { output: u32::MAX, torque_gain: u32::MAX, velocity_slope: u32::MAX },
-            rate: 20_000,
         };
         let Statics { bus, shared, staging } = statics;
         let (bus, shared) = (&*bus, &*shared);

@@ -8,13 +8,11 @@ use emulator::chip::fdcan::line::CanFrame;
 use emulator::emulation::Emulation;
 use emulator::program::Program;
 use emulator::rtt::Messages;
+use host_tests::bare_metal::{build, target_installed};
 use libtest_mimic::{Arguments, Failed, Trial};
 use plant::ActuatorParameters;
 use plant::actuator::Fault;
-use std::path::{Path, PathBuf};
-use std::process::Command;
 
-const TARGET: &str = "thumbv7em-none-eabihf";
 /// Exception of the control interrupt, ADC1_2: interrupt 18 of both chips.
 const CONTROL: u16 = 16 + 18;
 /// Time after power-up by which the second line of the log has come, s.
@@ -35,33 +33,6 @@ fn main() {
     libtest_mimic::run(&arguments, trials).exit();
 }
 
-fn target_installed() -> bool {
-    let output = Command::new("rustc").args(["--print", "target-libdir", "--target", TARGET]).output();
-    output.is_ok_and(|output| {
-        let folder = String::from_utf8_lossy(&output.stdout).trim().to_owned();
-        Path::new(&folder).read_dir().is_ok_and(|mut files| files.next().is_some())
-    })
-}
-
-/// Builds the board's program as it is flashed; where others of this project's tests build it, too.
-fn build(board: &str) -> Result<PathBuf, Failed> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let target = Path::new(env!("CARGO_TARGET_TMPDIR")).join("boards").join(board);
-    let own = format!(".cargo/{board}.toml");
-    let own = root.join(&own).exists().then_some(["--config".to_owned(), own]);
-    let output = Command::new(env!("CARGO"))
-        .args(own.into_iter().flatten())
-        .args(["build", "--release", "-p", "joint-firmware", "--target", TARGET])
-        .args(["--no-default-features", "--features", board])
-        .current_dir(root)
-        .env("CARGO_TARGET_DIR", &target)
-        .output()?;
-    if !output.status.success() {
-        return Err(String::from_utf8_lossy(&output.stderr).into_owned().into());
-    }
-    Ok(target.join(TARGET).join("release/joint-firmware"))
-}
-
 /// A board with its program, on a bench supply.
 struct Bench<W: Wired> {
     emulation: Emulation<W>,
@@ -73,7 +44,8 @@ impl<W: Wired> Bench<W> {
     fn new(board: impl FnOnce(Drivetrain) -> W) -> Result<Self, Failed> {
         let mut parameters = ActuatorParameters::reference().aligned().without_payload();
         parameters.bus.source_voltage = 18.0;
-        let program = Program::parse(std::fs::read(build(W::NAME)?)?).map_err(|error| format!("{error:?}"))?;
+        let program = Program::parse(std::fs::read(build(W::NAME, env!("CARGO_TARGET_TMPDIR"))?)?)
+            .map_err(|error| format!("{error:?}"))?;
         let emulation = Emulation::new(board(Drivetrain::new(parameters, 25.0, 1)?), &program)?;
         let messages = Messages::of(&program)?.ok_or("the program logs without defmt")?;
         Ok(Self { emulation, messages, bytes: Vec::new() })
