@@ -1,9 +1,10 @@
 //! What several scenarios share: friction parameters and joint states drawn from a seed, the friction model once more in
-//! arithmetic too wide to overflow, images as bytes, and joints in the loop: commissioned, driven, left alone.
+//! arithmetic too wide to overflow, images as bytes, joints in the loop: commissioned, driven, left alone; and the boards' programs on emulated boards.
 
 pub mod bare_metal;
 pub mod commission;
 pub mod driving;
+pub mod emulated;
 pub mod image_bytes;
 pub mod in_the_loop;
 pub mod informed;

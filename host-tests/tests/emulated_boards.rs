@@ -4,13 +4,10 @@
 //! Needs the target; where it is missing the tests are reported as ignored, by name; with `CI` set they run and fail.
 
 use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired};
-use emulator::chip::fdcan::line::CanFrame;
-use emulator::emulation::Emulation;
-use emulator::program::Program;
-use emulator::rtt::Messages;
-use host_tests::bare_metal::{build, target_installed};
+use host_tests::bare_metal::target_installed;
+use host_tests::emulated::Bench;
+use host_tests::emulated::bench::program;
 use libtest_mimic::{Arguments, Failed, Trial};
-use plant::ActuatorParameters;
 use plant::actuator::Fault;
 
 /// Exception of the control interrupt, ADC1_2: interrupt 18 of both chips.
@@ -34,61 +31,8 @@ fn main() {
 }
 
 /// A board with its program, on a bench supply.
-struct Bench<W: Wired> {
-    emulation: Emulation<W>,
-    messages: Messages,
-    bytes: Vec<u8>,
-}
-
-impl<W: Wired> Bench<W> {
-    fn new(board: impl FnOnce(Drivetrain) -> W) -> Result<Self, Failed> {
-        let mut parameters = ActuatorParameters::reference().aligned().without_payload();
-        parameters.bus.source_voltage = 18.0;
-        let program = Program::parse(std::fs::read(build(W::NAME, env!("CARGO_TARGET_TMPDIR"))?)?)
-            .map_err(|error| format!("{error:?}"))?;
-        let emulation = Emulation::new(board(Drivetrain::new(parameters, 25.0, 1)?), &program)?;
-        let messages = Messages::of(&program)?.ok_or("the program logs without defmt")?;
-        Ok(Self { emulation, messages, bytes: Vec::new() })
-    }
-
-    /// Runs on; whatever ends the run before is an error.
-    fn run(&mut self, seconds: f64) -> Result<(), Failed> {
-        let parts = (seconds / 0.02).ceil();
-        for _ in 0..parts as u32 {
-            let end = self.emulation.run(seconds / parts);
-            // The buffer of the log is small.
-            self.bytes.extend(self.emulation.log());
-            if let Some(end) = end {
-                return Err(format!("after {:.6} s: {end}", self.emulation.now().seconds()).into());
-            }
-        }
-        Ok(())
-    }
-
-    /// The log so far.
-    fn log(&self) -> String {
-        let messages = self.messages.decoder().decode(&self.bytes);
-        messages.iter().map(|message| format!("{}\n", message.text)).collect()
-    }
-
-    /// What the log says of the joint, last of all.
-    fn state(&self) -> String {
-        let log = self.log();
-        let line = log.lines().rfind(|line| line.starts_with("joint: ")).unwrap_or_default();
-        line.trim_start_matches("joint: ").split(',').next().unwrap_or_default().to_owned()
-    }
-
-    fn expect(&self, what: &str) -> Result<(), Failed> {
-        match self.log().contains(what) {
-            true => Ok(()),
-            false => Err(format!("the log does not say \"{what}\":\n{}", self.log()).into()),
-        }
-    }
-
-    /// The board's own part of the plant and of the bus.
-    fn board(&mut self) -> &mut W {
-        self.emulation.cpu.bus.wiring_mut()
-    }
+fn bench<W: Wired>(board: impl FnOnce(Drivetrain) -> W) -> Result<Bench<W>, Failed> {
+    Bench::new(board, &program(W::NAME, env!("CARGO_TARGET_TMPDIR"))?)
 }
 
 /// It starts once, controls once a period and within it, and reports neither faults nor overruns.
@@ -119,16 +63,16 @@ fn starts<W: Wired>(bench: &mut Bench<W>, rate: u32, idle: &str) -> Result<(), F
 }
 
 fn esc1_starts() -> Result<(), Failed> {
-    starts(&mut Bench::new(BG431BEsc1::new)?, 20_000, "not ready to switch on")
+    starts(&mut bench(BG431BEsc1::new)?, 20_000, "not ready to switch on")
 }
 
 fn moteus_starts() -> Result<(), Failed> {
-    starts(&mut Bench::new(MoteusR4::new)?, 40_000, "switch on disabled")
+    starts(&mut bench(MoteusR4::new)?, 31_250, "switch on disabled")
 }
 
 /// Somebody turns the link by hand, slowly: the rotor passes the index.
 fn esc1_index() -> Result<(), Failed> {
-    let mut bench = Bench::new(BG431BEsc1::new)?;
+    let mut bench = bench(BG431BEsc1::new)?;
     bench.run(0.2)?;
     for _ in 0..700 {
         let drivetrain = bench.board().drivetrain();
@@ -149,7 +93,7 @@ fn esc1_index() -> Result<(), Failed> {
 }
 
 fn esc1_button() -> Result<(), Failed> {
-    let mut bench = Bench::new(BG431BEsc1::new)?;
+    let mut bench = bench(BG431BEsc1::new)?;
     bench.run(0.2)?;
     bench.board().inputs().button = true;
     bench.run(0.1)?;
@@ -167,42 +111,26 @@ fn supply() -> Result<(), Failed> {
         bench.expect("fault: supply voltage too high")?;
         if bench.state() == "fault" { Ok(()) } else { Err(bench.log().into()) }
     }
-    over(Bench::new(BG431BEsc1::new)?)?;
-    over(Bench::new(MoteusR4::new)?)
+    over(bench(BG431BEsc1::new)?)?;
+    over(bench(MoteusR4::new)?)
 }
 
 /// CiA 305: a new node is silent until LSS gives it a node id. Then it boots and answers.
 fn moteus_bus() -> Result<(), Failed> {
-    let mut bench = Bench::new(MoteusR4::new)?;
+    let mut bench = bench(MoteusR4::new)?;
     bench.run(0.2)?;
-    let mut exchange = |id: u32, data: [u8; 8]| -> Result<Vec<(u32, [u8; 8])>, Failed> {
-        let frame = CanFrame::standard(id, &data).ok_or("no such frame")?;
-        let now = bench.emulation.now();
-        bench.board().line().send(now, frame);
-        bench.emulation.cpu.bus.wiring_changed();
-        bench.run(0.02)?;
-        let line = bench.board().line();
-        Ok(std::iter::from_fn(|| line.receive()).map(|(_, frame)| (frame.id, frame.data)).collect())
-    };
-    const LSS: u32 = 0x7E5;
-    let silent = exchange(0x605, [0x40, 0, 0x10, 0, 0, 0, 0, 0])?;
+    let request = [0x40, 0, 0x10, 0, 0, 0, 0, 0];
+    let silent = bench.exchange(0x605, &request, 0.02)?;
     if !silent.is_empty() {
         return Err(format!("a node without a node id sends {silent:x?}").into());
     }
-    // All nodes to configuration; node id 5; back to waiting.
-    exchange(LSS, [0x04, 1, 0, 0, 0, 0, 0, 0])?;
-    let taken = exchange(LSS, [0x11, 5, 0, 0, 0, 0, 0, 0])?;
-    if taken != [(0x7E4, [0x11, 0, 0, 0, 0, 0, 0, 0])] {
-        return Err(format!("answer to the node id: {taken:x?}").into());
-    }
-    let booted = exchange(LSS, [0x04, 0, 0, 0, 0, 0, 0, 0])?;
-    if !booted.contains(&(0x705, [0; 8])) {
+    let booted = bench.give_node_id(5)?;
+    if !booted.contains(&(0x705, vec![0])) {
         return Err(format!("no boot-up message: {booted:x?}").into());
     }
-    // Device type of a servo drive, by SDO.
-    let answer = exchange(0x605, [0x40, 0, 0x10, 0, 0, 0, 0, 0])?;
-    match answer.contains(&(0x585, [0x43, 0, 0x10, 0, 0x92, 0x01, 0x02, 0])) {
-        true => Ok(()),
-        false => Err(format!("answer to 1000h: {answer:x?}").into()),
+    // Device type of a servo drive.
+    match bench.upload(5, 0x1000, 0)?.as_slice() {
+        [0x92, 0x01, 0x02, 0] => Ok(()),
+        answer => Err(format!("1000h is {answer:x?}").into()),
     }
 }

@@ -41,7 +41,7 @@ impl BoardProgram {
     /// is refused.
     #[inline(never)]
     pub fn stored(&mut self) -> (Stored, Configuration) {
-        let BoardConfiguration { bridge, joint } = &board::CONFIGURATION;
+        let BoardConfiguration { bridge, joint, .. } = &board::CONFIGURATION;
         let stored = self.store.record().and_then(|record| Stored::decode(record, joint)).unwrap_or(Stored::NOTHING);
         let configuration = stored.configuration(joint);
         if configuration.prepare(bridge).is_ok() {
