@@ -136,7 +136,7 @@ fn drive(joint: u64, program: &Program, variables: &Variables) -> Result<(Seen, 
 
     let mut bench = Bench::with(|drivetrain: Drivetrain| MoteusR4::new(drivetrain), &actuator, program)?;
     Kept { configuration: &configuration, image: &image }.write(&mut bench.emulation, program)?;
-    let mut twin = Twin::new(variables, [active])?;
+    let mut twin = Twin::new(variables, active)?;
     watch(&mut bench.emulation.cpu, program)?;
 
     let periods = (STEPS / JOINTS) as f64 / f64::from(MoteusR4::CONFIGURATION.bridge.rate) / SET_POINT;

@@ -6,7 +6,7 @@ use emulator::emulation::Emulation;
 use emulator::program::Program;
 use joint_firmware::joint::configuration::Configuration;
 use joint_firmware::objects::{RECORD, Stored};
-use joint_firmware::parameters::slots::{Layout, PAGE_WORDS, SlotFlash, Slots};
+use joint_firmware::parameters::slots::{BLANK, Layout, PAGE_WORDS, SlotFlash, Slots};
 use libtest_mimic::Failed;
 use node::flash::Flash;
 
@@ -47,7 +47,7 @@ impl Kept<'_> {
         let start = program.symbol("__parameters_start").ok_or("the program names no parameters")?.address;
         for word in 0..PAGES * PAGE_WORDS {
             let bytes = flash.read(word).map_err(|error| format!("{error:?}"))?;
-            let written = bytes != joint_firmware::parameters::slots::BLANK;
+            let written = bytes != BLANK;
             if written && !emulation.cpu.bus.program(start + 8 * word as u32, &bytes) {
                 return Err("the parameters lie outside of the flash".into());
             }

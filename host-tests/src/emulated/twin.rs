@@ -21,7 +21,7 @@ use joint_firmware::joint::{
 use joint_firmware::motor::modulation::compare_value;
 use joint_firmware::sensors::as5047p;
 use libtest_mimic::Failed;
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 
 /// What the twin reads on a board.
 pub trait Observed: Wired {
@@ -56,8 +56,6 @@ struct Given {
 pub struct Seen {
     /// Steps that were compared.
     pub steps: u64,
-    /// Parameters that a step took over.
-    pub offered: u64,
     /// Those in which the bridge switched.
     pub switching: u64,
     /// Those with a fault.
@@ -70,8 +68,8 @@ pub struct Seen {
 pub struct Twin<'v> {
     variables: Fields<'v>,
     joint: Joint,
-    /// What the board is going to be offered, in this order.
-    coming: VecDeque<Active>,
+    /// What the board is going to be offered, until it is taken.
+    coming: Option<Active>,
     active: Option<Active>,
     /// The encoder's last good angle.
     angle: u32,
@@ -80,25 +78,20 @@ pub struct Twin<'v> {
 }
 
 impl<'v> Twin<'v> {
-    /// A twin of a joint that has not started; `coming` are the parameters that it will be offered, in their order.
+    /// A twin of a joint that has not started; `coming` is what it will be offered.
     ///
     /// # Errors
     /// A variable that the program does not have.
-    pub fn new(variables: &'v Variables, coming: impl IntoIterator<Item = Active>) -> Result<Self, Failed> {
+    pub fn new(variables: &'v Variables, coming: Active) -> Result<Self, Failed> {
         Ok(Self {
             variables: Fields::of(variables)?,
             joint: Joint::new(),
-            coming: coming.into_iter().collect(),
+            coming: Some(coming),
             active: None,
             angle: 0,
             given: None,
             seen: Seen::default(),
         })
-    }
-
-    /// The board is going to be offered these as well.
-    pub fn expect(&mut self, active: Active) {
-        self.coming.push_back(active);
     }
 
     /// What was compared.
@@ -177,10 +170,7 @@ impl<'v> Twin<'v> {
         }
         given.measured.encoder = self.angle;
         if self.variables.place(memory)? != given.place {
-            // The same once more, where nothing else was announced.
-            let next = self.coming.pop_front().or_else(|| self.active.take());
-            self.active = Some(next.ok_or("parameters that were not expected")?);
-            self.seen.offered += 1;
+            self.active = Some(self.coming.take().ok_or("parameters that were not expected")?);
         }
         let wanted = match &self.active {
             Some(active) => self.joint.control_step(active, &given.demand, &given.slow, &given.measured),
