@@ -71,11 +71,9 @@ fn same_every_time<W: Wired>(board: fn(Drivetrain) -> W) -> Result<(), Failed> {
         .map_err(|error| format!("{error:?}"))?;
     let once = How { pieces: 1, watched: false, seed: 1 };
     let first = run(board, &program, once)?;
-    for (what, how) in [
-        ("again", once),
-        ("in many pieces", How { pieces: 97, ..once }),
-        ("watched", How { watched: true, ..once }),
-    ] {
+    for (what, how) in
+        [("again", once), ("in many pieces", How { pieces: 97, ..once }), ("watched", How { watched: true, ..once })]
+    {
         if run(board, &program, how)? != first {
             return Err(format!("{what}, the run is another one").into());
         }

@@ -74,7 +74,7 @@ pub struct Places([Option<Place>; 64]);
 
 impl Places {
     /// None yet.
-    pub const fn new() -> Self {
+    pub(super) const fn new() -> Self {
         Self([None; 64])
     }
 
