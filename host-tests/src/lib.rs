@@ -1,7 +1,9 @@
 //! What several scenarios share: friction parameters and joint states drawn from a seed, the friction model once more in
 //! arithmetic too wide to overflow, images as bytes, and joints in the loop: commissioned, driven, left alone.
 
+pub mod bare_core;
 pub mod bare_metal;
+pub mod certified;
 pub mod commission;
 pub mod driving;
 pub mod image_bytes;
