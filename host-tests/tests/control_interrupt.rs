@@ -7,7 +7,6 @@
 //! runs while the joint is off, and nothing is written to flash meanwhile.
 //! Needs the target; where it is missing the tests are reported as ignored, by name; with `CI` set they run and fail.
 
-#[allow(dead_code, reason = "each test uses its part")]
 mod thumb;
 
 use host_tests::bare_metal::{self, target_installed};
