@@ -14,7 +14,7 @@ use super::active::{Active, VOLTAGE_FILTER};
 use super::fault::{Fault, Faults};
 use super::signals::Measurements;
 use crate::motor::field_oriented::FieldOrientedOutput;
-use crate::motor::number::{exceeds, limited, magnitude, or_zero};
+use crate::motor::number::{exceeds, magnitude, or_zero};
 use crate::motor::observer::Observation;
 use crate::motor::phases::Phases;
 use crate::motor::transform::Dq;
@@ -113,10 +113,10 @@ fn within(value: f32, low: f32, high: f32) -> bool {
     value >= low && value <= high
 }
 
-/// One step of a first-order filter; what is not a number counts as zero.
+/// One step of a first-order filter. What is not a number stays, and is a fault: nothing explains it.
 #[inline(always)]
 fn filter(state: &mut Dq, value: Dq) {
-    let step = |state: f32, value: f32| state + VOLTAGE_FILTER * (limited(value, 1e4) - state);
+    let step = |state: f32, value: f32| state + VOLTAGE_FILTER * (value - state);
     *state = Dq { d: step(state.d, value.d), q: step(state.q, value.q) };
 }
 

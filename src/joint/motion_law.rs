@@ -107,7 +107,7 @@ impl MotionLaw {
         let distance = if way < 0.0 { -way } else { way };
         // Of the way that the next step needs anyway, nothing is left to brake on.
         let speed = square_root(2.0 * gains.acceleration * distance);
-        let arrival = distance / gains.period;
+        let arrival = distance * active.bridge.rate;
         let speed = lesser(lesser(speed, arrival), active.limits.velocity);
         let wanted = if way < 0.0 { -speed } else { speed };
         self.ramp(wanted, gains.velocity_step);

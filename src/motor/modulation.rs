@@ -101,6 +101,9 @@ impl Modulator {
     #[inline(always)]
     pub fn limit(&self, voltage: Dq, bus_voltage: f32) -> Dq {
         let reach = self.reach(bus_voltage);
+        if voltage.norm_squared() <= reach * reach {
+            return voltage;
+        }
         let d = limited(voltage.d, reach);
         let q = limited(voltage.q, square_root(reach * reach - d * d));
         Dq { d, q }
