@@ -5,8 +5,9 @@
 //! or without a model, the torque is exactly zero: the loop computes the same bits as one without compensation.
 
 use crate::friction::FrictionModel;
+use crate::friction::domain::Weights;
 use crate::friction::regime::Memory;
-use crate::friction::state::{JointState, Signal};
+use crate::friction::state::{JointState, SIGNALS, Signal};
 use crate::quantity::Torque;
 
 /// What the operator asks for.
@@ -143,7 +144,7 @@ impl Settings {
 }
 
 /// The outcome of one control step.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Output {
     /// Torque to add to the command.
     pub torque: Torque,
@@ -157,11 +158,40 @@ pub struct Output {
     pub limited: bool,
 }
 
+impl Output {
+    /// Nothing, because it is off.
+    pub const NOTHING: Self = Self {
+        torque: Torque::ZERO,
+        shadow: Torque::ZERO,
+        acting: Acting::Nothing,
+        reason: Reason::Off,
+        limited: false,
+    };
+}
+
+impl Default for Output {
+    fn default() -> Self {
+        Self::NOTHING
+    }
+}
+
 /// Compensation of one joint, from one control step to the next.
+///
+/// A step has two halves, about as long as each other: [`begin`](Self::begin) with a state, [`finish`](Self::finish) with what it gives. A loop that has no
+/// time for both in one period does them in two.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Compensation {
     memory: Memory,
     last: Torque,
+    begun: Option<Begun>,
+}
+
+/// What the first half of a step leaves for the second.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Begun {
+    signals: [i32; SIGNALS],
+    weights: Weights,
+    physical: Torque,
 }
 
 /// Weights come in Q31 and a torque in Q16.16: `i32::MAX` counts as one, so that a full weight changes no bit. Never larger in
@@ -172,17 +202,40 @@ fn weigh(torque: i32, weight: i32) -> i32 {
 }
 
 impl Compensation {
-    /// One control step. Without a model, or switched off, the torque goes to zero at the slew rate, stays there exactly, and the past
-    /// is forgotten.
-    #[inline]
+    /// Forgets the past. Field by field: the compiler would copy even what an absent value has no use for.
+    #[inline(always)]
+    pub fn reset(&mut self) {
+        self.memory = Memory::default();
+        self.last = Torque::ZERO;
+        self.begun = None;
+    }
+
+    /// Both halves at once.
     pub fn step(&mut self, model: Option<&FrictionModel>, settings: &Settings, state: &JointState) -> Output {
-        let model = match (settings.request, model) {
-            (Request::Off, _) => return self.fade_out(settings, Reason::Off),
-            (_, None) => return self.fade_out(settings, Reason::NoModel),
-            (_, Some(model)) => model,
+        self.begin(model, settings, state);
+        self.finish(model, settings)
+    }
+
+    /// First half of a step in a state: regime, physical model, and how much of it counts.
+    #[inline]
+    pub fn begin(&mut self, model: Option<&FrictionModel>, settings: &Settings, state: &JointState) {
+        self.begun = match (settings.request, model) {
+            (Request::Off, _) | (_, None) => None,
+            (_, Some(model)) => {
+                let signals = state.signals();
+                let physical = model.begin(state, &mut self.memory);
+                Some(Begun { signals, weights: model.fade().weights(&signals), physical })
+            }
         };
-        let estimate = model.step(state, &mut self.memory);
-        let weights = model.fade().weights(&state.signals());
+    }
+
+    /// Second half of a step: the network, and the torque. Without a model, or switched off, it goes to zero at the slew rate, stays there
+    /// exactly, and the past is forgotten. A model that came after the first half finishes what another one has begun, within clamp and slew limit.
+    #[inline]
+    pub fn finish(&mut self, model: Option<&FrictionModel>, settings: &Settings) -> Output {
+        let (Some(begun), Some(model)) = (&self.begun, model) else { return self.fade_out(settings) };
+        let weights = begun.weights;
+        let estimate = model.finish(begun.physical, &begun.signals, &mut self.memory);
         let physical = weigh(estimate.physical.to_bits(), weights.physical);
         let network = weigh(estimate.network.to_bits(), weights.network);
         let full = self.permitted(physical.saturating_add(network), settings);
@@ -220,10 +273,12 @@ impl Compensation {
 
     /// Brings what is left of the torque to zero at the slew rate; from then on the past is forgotten.
     #[inline(never)]
-    fn fade_out(&mut self, settings: &Settings, reason: Reason) -> Output {
+    fn fade_out(&mut self, settings: &Settings) -> Output {
+        let reason = if settings.request == Request::Off { Reason::Off } else { Reason::NoModel };
         let last = self.last.to_bits();
         let torque = last.saturating_sub(last.max(settings.slew.saturating_neg()).min(settings.slew));
-        *self = Self { last: Torque::from_bits(torque), ..Self::default() };
+        self.reset();
+        self.last = Torque::from_bits(torque);
         Output { torque: self.last, reason, limited: torque != 0, ..Output::default() }
     }
 }

@@ -28,6 +28,7 @@ pub struct BoardConfiguration {
 pub const B_G431B_ESC1: BoardConfiguration = BoardConfiguration {
     bridge: BridgeConfiguration {
         rate: 20_000.0,
+        spreads_friction: false,
         // The low sides conduct at least 2.5 µs around the top: dead time, settling of the amplifiers, two conversions.
         duty: (0.0, 0.95),
         dead_time: 800e-9,
@@ -52,6 +53,8 @@ pub const B_G431B_ESC1: BoardConfiguration = BoardConfiguration {
 pub const MOTEUS_R4: BoardConfiguration = BoardConfiguration {
     bridge: BridgeConfiguration {
         rate: MOTEUS_R4_RATE,
+        // A period has 4,250 cycles: too few for all of it in each.
+        spreads_friction: true,
         // The low sides conduct at least 2.5 µs around the top: dead time, settling of the amplifiers, one conversion.
         duty: (0.0, 0.9),
         // As the gate driver is configured.
@@ -73,7 +76,7 @@ pub const MOTEUS_R4: BoardConfiguration = BoardConfiguration {
 };
 
 /// Control steps a second, Hz.
-const MOTEUS_R4_RATE: f32 = 31_250.0;
+const MOTEUS_R4_RATE: f32 = 40_000.0;
 
 /// A joint that nobody has described, at a lowest and highest supply, V, with an encoder whose samples are so old, s.
 const fn uncommissioned(bus_voltage: (f32, f32), encoder_latency: f32) -> Configuration {

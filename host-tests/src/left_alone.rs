@@ -57,7 +57,7 @@ pub fn run(seed: u64, alone: Alone, variant: Option<&Variant>, steps: u32) -> Re
     let request = if variant.is_some() { Request::Physical } else { Request::Off };
     let mut setup = Setup::of(&parameters).compensating(request);
     measured(&mut setup.configuration);
-    let model = FrictionModel::new(&informed(&parameters, &wrong), setup.bridge.rate as u32);
+    let model = FrictionModel::new(&informed(&parameters, &wrong), setup.bridge.friction_rate());
     let variant = variant.unwrap_or(&DEFAULT);
     let mut joint = variant.enabled(&parameters, &setup, Some(model), 0.0, seed).map_err(|error| error.to_string())?;
 

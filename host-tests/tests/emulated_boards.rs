@@ -74,7 +74,7 @@ fn esc1_starts() -> Result<(), Failed> {
 }
 
 fn moteus_starts() -> Result<(), Failed> {
-    starts(&mut bench(MoteusR4::new)?, 31_250, "switch on disabled")
+    starts(&mut bench(MoteusR4::new)?, 40_000, "switch on disabled")
 }
 
 /// Somebody turns the link by hand, slowly: the rotor passes the index.

@@ -153,8 +153,8 @@ fn drive(joint: u64, program: &Program, variables: &Variables) -> Result<(Seen, 
         let velocity = amplitude * (TAU * (0.8 + 0.4 * time) * time).sin();
         match period {
             20 => send(&mut bench.emulation, 0x000, &[0x01, NODE])?,
-            400 if joint % 3 == 1 => bench.board().drivetrain().actuator_mut().inject(Fault::SourceVoltage(40.0))?,
-            400 if joint % 3 == 2 => bench.board().drivetrain().external_torque = 8.0,
+            300 if joint % 3 == 1 => bench.board().drivetrain().actuator_mut().inject(Fault::SourceVoltage(40.0))?,
+            300 if joint % 3 == 2 => bench.board().drivetrain().external_torque = 8.0,
             _ => {}
         }
         let mut frame = controlword.to_le_bytes().to_vec();
@@ -185,7 +185,7 @@ fn configuration(request: Request) -> Configuration {
 fn prepared<W: Observed>(configuration: &Configuration, image: &[u8]) -> Result<Active, Failed> {
     let bridge = W::CONFIGURATION.bridge;
     let mut active = configuration.prepare(&bridge).map_err(|error| error.to_string())?;
-    Image::prepare(image, bridge.rate as u32, &mut active.friction);
+    Image::prepare(image, bridge.friction_rate(), &mut active.friction);
     if active.friction.is_none() {
         return Err("the image is none".into());
     }

@@ -12,22 +12,35 @@ use plant::virtual_joint::Setup;
 
 #[test]
 fn the_torque_moves_by_no_more_than_the_slew_limit_when_models_are_swapped_in_motion() {
+    swapped_in_motion(false);
+}
+
+#[test]
+fn nor_where_friction_is_spread_over_two_steps() {
+    swapped_in_motion(true);
+}
+
+fn swapped_in_motion(spreads_friction: bool) {
     let parameters = ActuatorParameters::reference().aligned();
-    let setup = Setup::of(&parameters).compensating(Request::Physical);
+    let mut setup = Setup::of(&parameters).compensating(Request::Physical);
+    setup.bridge.spreads_friction = spreads_friction;
+    let rate = setup.bridge.friction_rate();
     let model = |factor: f64| {
         let friction = parameters.joint.friction.scaled(&FrictionFactors::uniform(factor)).unwrap();
-        FrictionModel::new(&informed(&parameters, &friction), 20_000)
+        FrictionModel::new(&informed(&parameters, &friction), rate)
     };
     // Weak, strong, none at all: what an upload, a roll back and a refusal do.
     let models = [Some(model(0.5)), Some(model(1.3)), None];
     let mut joint = enabled(&parameters, &setup, 0.0, 1).unwrap();
     let trajectory = Trajectory::new(vec![Segment::Move { to: 1.2, speed: 1.0, acceleration: 20.0 }]).unwrap();
-    let slew = f64::from(setup.configuration.compensation.slew) * joint.period();
+    // The torque moves once an evaluation of friction.
+    let slew = f64::from(setup.configuration.compensation.slew) / f64::from(rate);
     let steps = (trajectory.duration() / joint.period()) as u64;
     let (mut before, mut largest, mut swaps) = (0.0, 0.0f64, 0);
     let mut at_swap = 0.0f64;
     for n in 0..steps {
-        if n % 4_000 == 2_000 {
+        // Also between the two halves of an evaluation.
+        if n % 4_001 == 2_000 {
             joint.set_friction(models[swaps % 3].clone());
             swaps += 1;
         }
@@ -36,12 +49,12 @@ fn the_torque_moves_by_no_more_than_the_slew_limit_when_models_are_swapped_in_mo
         assert_eq!(telemetry.state, State::OperationEnabled);
         let torque = f64::from(telemetry.compensated.torque);
         largest = largest.max((torque - before).abs());
-        if n % 4_000 == 2_500 {
+        if n % 4_001 == 2_500 {
             at_swap = at_swap.max(torque.abs());
         }
         before = torque;
     }
     assert!(swaps >= 6 && at_swap > 2.0, "{swaps} swaps, compensation up to {at_swap} Nm");
-    println!("{swaps} swaps, largest step {largest:.4} Nm, slew limit {slew:.4} Nm a step");
+    println!("{swaps} swaps, largest step {largest:.4} Nm, slew limit {slew:.4} Nm an evaluation");
     assert!(largest <= slew * 1.001, "{largest} Nm in a step, slew limit {slew} Nm");
 }

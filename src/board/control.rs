@@ -69,7 +69,7 @@ impl Calibration {
 pub struct Ends {
     active: InUse<Active>,
     demand: Subscriber<Demand>,
-    report: Publisher<Option<Report>>,
+    report: Publisher<Report>,
     #[cfg(feature = "bus")]
     asked: Subscriber<Option<CalibrationSettings>>,
     #[cfg(feature = "bus")]
@@ -146,13 +146,13 @@ static DEMAND: Newest<Demand> = Newest::new(Demand {
     sequence: 0,
     coupled: Coupled { velocity: 0.0, sequence: 0 },
 });
-static REPORT: Newest<Option<Report>> = Newest::new(None);
+static REPORT: Newest<Report> = Newest::new(Report::NOTHING);
 #[cfg(feature = "bus")]
 static ASKED: Newest<Option<CalibrationSettings>> = Newest::new(None);
 #[cfg(feature = "bus")]
 static PROGRESS: Newest<Option<Progress>> = Newest::new(None);
 /// Tasks of both executors read it, one at a time.
-static READER: Mutex<RefCell<Option<Subscriber<Option<Report>>>>> = Mutex::new(RefCell::new(None));
+static READER: Mutex<RefCell<Option<Subscriber<Report>>>> = Mutex::new(RefCell::new(None));
 
 /// What the joint found and did in a control step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -163,6 +163,12 @@ pub struct Report {
     pub latched: Faults,
     /// Phase currents as measured, A, offsets included: what a person looks at when a board is new.
     pub phase_currents: Phases,
+}
+
+impl Report {
+    /// Before the first step.
+    const NOTHING: Self =
+        Self { telemetry: Telemetry::NOTHING, latched: Faults::NONE, phase_currents: Phases::uniform(0.0) };
 }
 
 /// What is known of the control steps since the start; a copy.
@@ -220,7 +226,11 @@ pub fn mean_square_current() -> f32 {
 
 /// The newest control step's report; none before the first.
 pub fn report() -> Option<Report> {
-    critical_section::with(|section| *READER.borrow_ref_mut(section).as_mut()?.newest())
+    // A step takes some cycles.
+    if WORDS.longest_cycles.load(Ordering::Acquire) == 0 {
+        return None;
+    }
+    critical_section::with(|section| Some(*READER.borrow_ref_mut(section).as_mut()?.newest()))
 }
 
 /// Reads the steps before a fault; none while no fault is latched. A control step that is due meanwhile waits: the bridge is off then.
@@ -308,11 +318,11 @@ extern "C" fn ADC1_2() {
     let bridge = if stopped { Bridge::OFF } else { wanted };
     super::apply(&bridge);
 
-    control.ends.report.publish(&Some(Report {
-        telemetry: *control.joint.telemetry(),
-        latched: control.joint.latched_faults(),
-        phase_currents: measurements.phase_currents,
-    }));
+    control.ends.report.publish_in_place(|report| {
+        report.telemetry = *control.joint.telemetry();
+        report.latched = control.joint.latched_faults();
+        report.phase_currents = measurements.phase_currents;
+    });
     if WORDS.mean_square_wanted.load(Ordering::Acquire) {
         WORDS.mean_square_wanted.store(false, Ordering::Relaxed);
         WORDS.mean_square_current.store(control.joint.take_mean_square_current(), Ordering::Release);

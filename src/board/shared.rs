@@ -47,8 +47,14 @@ impl<T: Copy> Publisher<T> {
     /// Publishes a value.
     #[inline(always)]
     pub fn publish(&mut self, value: &T) {
-        // SAFETY: the place is the giver's, and one of the three.
-        unsafe { self.places.get().cast::<T>().add(self.giver.place()).write(*value) };
+        self.publish_in_place(|place| *place = *value);
+    }
+
+    /// Publishes what `write` leaves in a place, where it finds an older value: a large one is copied once only.
+    #[inline(always)]
+    pub fn publish_in_place(&mut self, write: impl FnOnce(&mut T)) {
+        // SAFETY: the place is the giver's until it gives it, and one of the three.
+        write(unsafe { &mut *self.places.get().cast::<T>().add(self.giver.place()) });
         self.giver.give();
     }
 }

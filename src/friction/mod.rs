@@ -16,7 +16,7 @@ use domain::{Domain, Fade};
 use network::{Inputs, Layers, NetworkParameters};
 use physical::{PhysicalParameters, PreparedTerms, Scaling};
 use regime::{MAX_CRITERIA, MAX_SETS, Memory, Selector};
-use state::JointState;
+use state::{JointState, SIGNALS};
 
 /// One regime's parameters: the physical model and, where one helps, a network for what it leaves.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -80,7 +80,7 @@ impl FrictionModel {
     /// Prepares `parameters` for a control loop of `rate` Hz (at least 1).
     pub fn new(parameters: &FrictionParameters, rate: u32) -> Self {
         let mut model = Self::NONE;
-        model.begin(&parameters.domain, &parameters.selector, rate);
+        model.set_up(&parameters.domain, &parameters.selector, rate);
         for (number, set) in parameters.sets.iter().enumerate() {
             model.prepare_set(number, set);
         }
@@ -96,11 +96,11 @@ impl FrictionModel {
         rate: u32,
     ) -> &'a mut Self {
         let model = place.insert(Self::NONE);
-        model.begin(domain, selector, rate);
+        model.set_up(domain, selector, rate);
         model
     }
 
-    fn begin(&mut self, domain: &Domain, selector: &Selector, rate: u32) {
+    fn set_up(&mut self, domain: &Domain, selector: &Selector, rate: u32) {
         // 2^31 / (time * rate), with the time in Q16.16.
         let steps = (selector.fade_time as u64 * rate as u64) >> 16;
         self.fade_decrement = match core::num::NonZeroU64::new(steps) {
@@ -133,9 +133,23 @@ impl FrictionModel {
     /// Friction in this state, with regime selection and cross-fade.
     #[inline]
     pub fn step(&self, state: &JointState, memory: &mut Memory) -> Estimate {
+        let physical = self.begin(state, memory);
+        self.finish(physical, &state.signals(), memory)
+    }
+
+    /// First half of a step: chooses the regime's parameter set; friction by its physical model.
+    #[inline]
+    pub fn begin(&self, state: &JointState, memory: &mut Memory) -> Torque {
         let set = self.selector.select(state, memory.set.unwrap_or(0));
         memory.enter(set);
-        memory.fade(self.evaluate(set, state), self.fade_decrement)
+        by_physical_model(&self.scaling, &self.set(set).0, &state.signals())
+    }
+
+    /// Second half of a step: adds the network for the same signals to what [`begin`](Self::begin) gave, and cross-fades from the regime before.
+    #[inline]
+    pub fn finish(&self, physical: Torque, signals: &[i32; SIGNALS], memory: &mut Memory) -> Estimate {
+        let network = by_network(&self.inputs, &self.set(memory.set.unwrap_or(0)).1, signals);
+        memory.fade(Estimate { physical, network }, self.fade_decrement)
     }
 
     /// Friction in this state by parameter set `set` (taken modulo [`MAX_SETS`]).
@@ -156,8 +170,8 @@ pub(crate) fn prepared(set: &ParameterSet) -> (PreparedTerms, Option<Layers>) {
     (PreparedTerms::new(&set.physical), set.network.as_ref().map(Layers::new))
 }
 
-/// Friction in a state by one prepared set. A function of its own: the control step, the shadow and the golden vectors share one.
-#[inline(never)]
+/// Friction in a state by one prepared set.
+#[inline]
 pub(crate) fn evaluate(
     scaling: &Scaling,
     inputs: &Inputs,
@@ -166,10 +180,22 @@ pub(crate) fn evaluate(
 ) -> Estimate {
     let signals = state.signals();
     Estimate {
-        physical: physical.evaluate(&scaling.apply(&signals)),
-        network: match network {
-            Some(network) => network.evaluate(inputs, &signals),
-            None => Torque::ZERO,
-        },
+        physical: by_physical_model(scaling, physical, &signals),
+        network: by_network(inputs, network, &signals),
+    }
+}
+
+/// A function of its own: the control step, the shadow and the golden vectors share one.
+#[inline(never)]
+fn by_physical_model(scaling: &Scaling, terms: &PreparedTerms, signals: &[i32; SIGNALS]) -> Torque {
+    terms.evaluate(&scaling.apply(signals))
+}
+
+/// As above; nothing without a network.
+#[inline(never)]
+fn by_network(inputs: &Inputs, network: &Option<Layers>, signals: &[i32; SIGNALS]) -> Torque {
+    match network {
+        Some(network) => network.evaluate(inputs, signals),
+        None => Torque::ZERO,
     }
 }

@@ -126,8 +126,8 @@ pub struct CompensationGains {
     pub inverse_standstill: f32,
     /// rad/s.
     pub standstill: f32,
-    /// Control steps a second, Hz.
-    pub rate: f32,
+    /// Time from one control step to the next, s.
+    pub period: f32,
     /// The energy guard, per control step.
     pub guard: GuardGains,
 }
@@ -266,12 +266,12 @@ impl Active {
                     (compensation.gain * 65536.0) as u32,
                     torque(compensation.clamp),
                     torque(compensation.slew),
-                    rate as u32,
+                    bridge.friction_rate(),
                 )?,
                 source: compensation.velocity_source,
                 inverse_standstill: 1.0 / compensation.standstill_velocity,
                 standstill: compensation.standstill_velocity,
-                rate,
+                period,
                 guard: GuardGains::new(rate),
             },
             bridge: *bridge,

@@ -112,6 +112,9 @@ pub struct CompensationConfiguration {
 pub struct BridgeConfiguration {
     /// Control steps a second, Hz; 1 kHz to 100 kHz.
     pub rate: f32,
+    /// Friction is evaluated over two control steps, half of it in each, and its torque held meanwhile: for a control loop that has no time
+    /// for all of it in every step. Its state is then up to two steps old.
+    pub spreads_friction: bool,
     /// Least and greatest duty of a high side that leaves room to sample the shunts; 0 to 0.4, 0.6 to 1.
     pub duty: (f32, f32),
     /// Dead time, s; 0 to 5 µs.
@@ -122,6 +125,13 @@ pub struct BridgeConfiguration {
     pub has_bridge_sensor: bool,
     /// The motor has a temperature sensor: a reading out of range is a fault.
     pub has_winding_sensor: bool,
+}
+
+impl BridgeConfiguration {
+    /// Evaluations of friction a second, Hz: the rate that a friction model and its settings are prepared for.
+    pub const fn friction_rate(&self) -> u32 {
+        self.rate as u32 / if self.spreads_friction { 2 } else { 1 }
+    }
 }
 
 /// Heat paths of the motor.

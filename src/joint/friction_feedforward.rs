@@ -46,7 +46,7 @@ impl GuardGains {
 }
 
 /// What compensation did in a step.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Compensated {
     /// Torque to add, Nm.
     pub torque: f32,
@@ -54,6 +54,11 @@ pub struct Compensated {
     pub output: Output,
     /// Part that standstill and guard let through, 0 to 1.
     pub permitted: f32,
+}
+
+impl Compensated {
+    /// No compensation.
+    pub const NOTHING: Self = Self { torque: 0.0, output: Output::NOTHING, permitted: 0.0 };
 }
 
 /// What friction depends on besides this joint's motion and torque.
@@ -75,6 +80,10 @@ pub struct FrictionFeedforward {
     speed: f32,
     /// Reference velocity, rad/s, as a first-order lag follows it; what it lacks is its acceleration.
     reference: Option<f32>,
+    /// The second half of an evaluation is due.
+    half: bool,
+    /// What the last evaluation came to.
+    output: Output,
 }
 
 /// To Q16.16; held at the ends of the range, zero for what is not a number.
@@ -84,8 +93,11 @@ fn q16(value: f32) -> i32 {
 
 impl FrictionFeedforward {
     /// Forgets the past.
+    #[inline(never)]
     pub fn reset(&mut self) {
-        *self = Self::default();
+        self.compensation.reset();
+        (self.withheld, self.speed, self.reference) = (0.0, 0.0, None);
+        (self.half, self.output) = (false, Output::NOTHING);
     }
 
     /// One control step. `measured_torque` is the torque of the measured current, Nm.
@@ -104,17 +116,26 @@ impl FrictionFeedforward {
             VelocitySource::Measured => None,
         };
         let velocity = reference.unwrap_or(motion.velocity);
-        let acceleration = self.acceleration(gains.rate, reference, motion);
-        let state = JointState {
-            position: Position::from_bits(q16(motion.position)),
-            velocity: Velocity::from_bits(q16(velocity)),
-            acceleration: Acceleration::from_bits(q16(acceleration)),
-            theoretical_torque: Torque::from_bits(q16(wanted.torque)),
-            measured_torque: Torque::from_bits(q16(measured_torque)),
-            temperature: Temperature::from_bits(q16(surroundings.temperature)),
-            coupled_velocity: Velocity::from_bits(q16(surroundings.coupled_velocity)),
-        };
-        let output = self.compensation.step(active.friction.as_ref(), &gains.settings, &state);
+        let acceleration = self.acceleration(gains.period, reference, motion);
+        let model = active.friction.as_ref();
+        let spread = active.bridge.spreads_friction;
+        if !(spread && self.half) {
+            let state = JointState {
+                position: Position::from_bits(q16(motion.position)),
+                velocity: Velocity::from_bits(q16(velocity)),
+                acceleration: Acceleration::from_bits(q16(acceleration)),
+                theoretical_torque: Torque::from_bits(q16(wanted.torque)),
+                measured_torque: Torque::from_bits(q16(measured_torque)),
+                temperature: Temperature::from_bits(q16(surroundings.temperature)),
+                coupled_velocity: Velocity::from_bits(q16(surroundings.coupled_velocity)),
+            };
+            self.compensation.begin(model, &gains.settings, &state);
+        }
+        if !spread || self.half {
+            self.output = self.compensation.finish(model, &gains.settings);
+        }
+        self.half = !self.half;
+        let output = self.output;
         let speed = if velocity < 0.0 { -velocity } else { velocity };
         let standstill = within(speed * gains.inverse_standstill, 0.0, 1.0);
         let guarded = match reference {
@@ -129,14 +150,14 @@ impl FrictionFeedforward {
 
     /// Acceleration for the model, rad/s²: the reference's, where there is one. The measured one is mostly noise, and a sign of noise
     /// switches the friction of a hysteresis back and forth.
-    fn acceleration(&mut self, rate: f32, reference: Option<f32>, motion: &JointMotion) -> f32 {
+    fn acceleration(&mut self, period: f32, reference: Option<f32>, motion: &JointMotion) -> f32 {
         let Some(velocity) = reference else {
             self.reference = None;
             return motion.acceleration;
         };
         let lagging = self.reference.unwrap_or(velocity);
         let acceleration = (velocity - lagging) * (1.0 / DERIVATIVE);
-        self.reference = Some(or_zero(lagging + acceleration / rate));
+        self.reference = Some(or_zero(lagging + acceleration * period));
         acceleration
     }
 

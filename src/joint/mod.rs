@@ -74,7 +74,7 @@ impl Default for Slow {
 }
 
 /// What a control step found and did, for tasks that report it.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Telemetry {
     /// State after the step.
     pub state: State,
@@ -98,7 +98,27 @@ pub struct Telemetry {
     pub bus_voltage: f32,
 }
 
+impl Default for Telemetry {
+    fn default() -> Self {
+        Self::NOTHING
+    }
+}
+
 impl Telemetry {
+    /// Before the first step.
+    pub const NOTHING: Self = Self {
+        state: State::NotReadyToSwitchOn,
+        faults: Faults::NONE,
+        motion: JointMotion { position: 0.0, velocity: 0.0, acceleration: 0.0 },
+        wanted: Wanted { torque: 0.0, velocity: None },
+        compensated: Compensated::NOTHING,
+        measured_torque: 0.0,
+        gear_temperature: 0.0,
+        reference: Dq { d: 0.0, q: 0.0 },
+        current: Dq { d: 0.0, q: 0.0 },
+        bus_voltage: 0.0,
+    };
+
     /// The statusword, object 6041h: state, voltage present, and that the joint follows its commands.
     pub fn statusword(&self) -> u16 {
         // Before the start is complete nobody has looked at the supply.
@@ -201,7 +221,7 @@ impl Joint {
             self.friction.step(active, &motion, &wanted, measured_torque, &surroundings)
         } else {
             self.friction.reset();
-            Compensated::default()
+            Compensated::NOTHING
         };
         let torque = match compensated.torque {
             0.0 => wanted.torque,

@@ -96,7 +96,7 @@ fn prepare<'a>(
     shadow::withdraw();
     active.prepare(
         || configuration.prepare(&board::CONFIGURATION.bridge),
-        |place, _| Image::prepare(image, board::CONTROL_HZ, &mut place.friction),
+        |place, _| Image::prepare(image, board::CONFIGURATION.bridge.friction_rate(), &mut place.friction),
     )
 }
 

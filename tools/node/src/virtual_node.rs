@@ -72,6 +72,8 @@ pub struct VirtualNode {
     setup: Setup,
     requirements: Requirements,
     rate: u32,
+    /// Evaluations of friction a second, Hz.
+    friction_rate: u32,
     bus: &'static canopen::Shared,
     receiver: Receiver<'static>,
     server: Server<'static>,
@@ -123,12 +125,12 @@ impl VirtualNode {
         if !matches!(options.node_id, 1..=127 | NO_NODE_ID) {
             return Err(NodeError::NodeId(options.node_id));
         }
-        let rate = setup.bridge.rate as u32;
+        let (rate, friction_rate) = (setup.bridge.rate as u32, setup.bridge.friction_rate());
         let mut program = VirtualProgram::new(setup.bridge, storage);
         let (stored, configuration) = program.power_on(&setup.configuration);
         let started = Setup { configuration, ..*setup };
         let mut joint = VirtualJoint::new(parameters, &started, parameters.joint.thermal.ambient, options.seed)?;
-        joint.set_friction(program.storage.images.model(rate));
+        joint.set_friction(program.storage.images.model(friction_rate));
 
         // The firmware keeps these in statics.
         let bus: &canopen::Shared = Box::leak(Box::new(canopen::Shared::new()));
@@ -163,6 +165,7 @@ impl VirtualNode {
             setup: *setup,
             requirements,
             rate,
+            friction_rate,
             bus,
             receiver: Receiver::new(bus),
             server: Server::new(bus, identity, SdoSettings::default(), node_id),
@@ -336,7 +339,7 @@ impl VirtualNode {
         let program = self.objects.program();
         let (stored, configuration) = program.power_on(&defaults);
         let (life, stored_images) = life(self.requirements, &mut program.storage, now);
-        let model = program.storage.images.model(self.rate);
+        let model = program.storage.images.model(self.friction_rate);
         // Refused only where even the defaults are, with which the joint began.
         program.next = configuration.prepare(&self.setup.bridge).ok();
         self.objects.restart(life, stored_images, &Start { configuration, stored, single_bank: true });
@@ -419,7 +422,7 @@ impl VirtualNode {
                 Action::Run { mode, length } => self.run(mode, length),
                 Action::Revert | Action::Activate => {
                     self.shadow = None;
-                    let model = self.objects.program().storage.images.model(self.rate);
+                    let model = self.objects.program().storage.images.model(self.friction_rate);
                     self.joint.set_friction(model);
                     Ok(())
                 }
@@ -444,11 +447,11 @@ impl VirtualNode {
             Mode::Shadow => {
                 self.shadow = model(image, SHADOW_RATE).map(Shadow::new);
                 // A trial may have been before: the stored model acts again.
-                let stored = self.objects.program().storage.images.model(self.rate);
+                let stored = self.objects.program().storage.images.model(self.friction_rate);
                 self.joint.set_friction(stored);
             }
             Mode::Trial => {
-                let model = model(image, self.rate);
+                let model = model(image, self.friction_rate);
                 self.shadow = None;
                 self.joint.set_friction(model);
             }
