@@ -5,8 +5,9 @@
 
 use bus::{Frame, Transport, open};
 use libtest_mimic::{Arguments, Failed, Trial};
+use python::Packages;
 use std::io::{BufRead, BufReader, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -20,7 +21,7 @@ fn main() {
     let must_run = std::env::var_os("CI").is_some();
     let multicast = must_run || works();
     // Looked for only where it is going to be used.
-    let python = if multicast && !arguments.list { python() } else { None };
+    let python = if multicast && !arguments.list { PACKAGES.python(env!("CARGO_TARGET_TMPDIR")) } else { None };
     let without_python = !must_run && python.is_none();
     let trials = vec![
         Trial::test("members_of_a_group_hear_each_other_and_not_themselves", members).with_ignored_flag(!multicast),
@@ -79,25 +80,9 @@ fn groups() -> Result<(), Failed> {
     Ok(())
 }
 
-/// A Python with python-can and msgpack, made once in the build directory.
-fn python() -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("python-can");
-    let python = folder.join("bin/python3");
-    let works = || {
-        Command::new(&python).args(["-c", "import can, msgpack"]).output().is_ok_and(|output| output.status.success())
-    };
-    if !works() {
-        Command::new("python3")
-            .args(["-m", "venv"])
-            .arg(&folder)
-            .output()
-            .ok()
-            .filter(|output| output.status.success())?;
-        let install = ["-m", "pip", "install", "--quiet", "--timeout", "10", "python-can==4.6.1", "msgpack==1.2.4"];
-        Command::new(&python).args(install).output().ok()?;
-    }
-    works().then_some(python)
-}
+/// python-can, and what its multicast format needs.
+const PACKAGES: Packages =
+    Packages { folder: "python-can", install: &["python-can==4.6.1", "msgpack==1.2.4"], import: "can, msgpack" };
 
 /// Says what it hears, and answers with the data reversed and the identifier plus one; then sends what has to be passed over.
 const PROGRAM: &str = r#"
@@ -117,7 +102,7 @@ with can.Bus(interface="udp_multicast", channel=sys.argv[1], port=int(sys.argv[2
 "#;
 
 fn python_can(python: Option<&Path>) -> Result<(), Failed> {
-    let python = python.ok_or("there is no python3 with venv, or python-can could not be installed")?;
+    let python = PACKAGES.required(python)?;
     let port = port();
     let bus = member(port);
     let mut program = Command::new(python)

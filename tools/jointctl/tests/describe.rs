@@ -7,7 +7,8 @@ use libtest_mimic::{Arguments, Failed, Trial};
 use node::{Options, SlotImages, VirtualNode, serve};
 use plant::ActuatorParameters;
 use plant::virtual_joint::Setup;
-use std::path::{Path, PathBuf};
+use python::Packages;
+use std::path::Path;
 use std::process::Command;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -17,38 +18,22 @@ const NODE: u8 = 7;
 fn main() {
     let arguments = Arguments::from_args();
     let must_run = std::env::var_os("CI").is_some();
-    let python = if arguments.list { None } else { python() };
+    let python = if arguments.list { None } else { PACKAGES.python(env!("CARGO_TARGET_TMPDIR")) };
     let ignored = !must_run && python.is_none();
     let name = "python_canopen_loads_the_eds_and_cantools_the_dbc_and_both_agree_with_a_joint";
     let trial = Trial::test(name, move || compare(python.as_deref()));
     libtest_mimic::run(&arguments, vec![trial.with_ignored_flag(ignored)]).exit();
 }
 
-/// A Python with python-canopen and cantools, made once in the build directory.
-fn python() -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("python-describe");
-    let python = folder.join("bin/python3");
-    let works = || {
-        let imports = Command::new(&python).args(["-c", "import canopen, can, msgpack, cantools"]).output();
-        imports.is_ok_and(|output| output.status.success())
-    };
-    if !works() {
-        let made = Command::new("python3").args(["-m", "venv"]).arg(&folder).output().ok()?;
-        if !made.status.success() {
-            return None;
-        }
-        let packages = ["canopen==2.4.1", "python-can==4.6.1", "msgpack==1.2.4", "cantools==41.0.0"];
-        Command::new(&python)
-            .args(["-m", "pip", "install", "--quiet", "--timeout", "10"])
-            .args(packages)
-            .output()
-            .ok()?;
-    }
-    works().then_some(python)
-}
+/// python-canopen with its bus, and cantools.
+const PACKAGES: Packages = Packages {
+    folder: "python-describe",
+    install: &["canopen==2.4.1", "python-can==4.6.1", "msgpack==1.2.4", "cantools==41.0.0"],
+    import: "canopen, can, msgpack, cantools",
+};
 
 fn compare(python: Option<&Path>) -> Result<(), Failed> {
-    let python = python.ok_or("there is no python3 with venv, or python-canopen or cantools could not be installed")?;
+    let python = PACKAGES.required(python)?;
     let folder = tempfile::tempdir()?;
     for arguments in [vec!["eds", "joint.eds"], vec!["dbc", "joint.dbc", "--node", "7", "--node", "8"]] {
         let written = Command::new(env!("CARGO_BIN_EXE_jointctl")).current_dir(&folder).args(&arguments).output()?;

@@ -8,7 +8,8 @@ mod client;
 use client::Joint;
 use libtest_mimic::{Arguments, Failed, Trial};
 use node::SampleImage;
-use std::path::{Path, PathBuf};
+use python::Packages;
+use std::path::Path;
 use std::process::Command;
 
 const GROUP: &str = "239.74.163.2";
@@ -16,7 +17,7 @@ const GROUP: &str = "239.74.163.2";
 fn main() {
     let arguments = Arguments::from_args();
     let must_run = std::env::var_os("CI").is_some();
-    let python = if arguments.list { None } else { python() };
+    let python = if arguments.list { None } else { PACKAGES.python(env!("CARGO_TARGET_TMPDIR")) };
     let ignored = !must_run && python.is_none();
     let (one, two) = (python.clone(), python);
     let trials = vec![
@@ -27,32 +28,16 @@ fn main() {
     libtest_mimic::run(&arguments, trials).exit();
 }
 
-/// A Python with python-canopen, made once in the build directory.
-fn python() -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("python-canopen");
-    let python = folder.join("bin/python3");
-    let works = || {
-        let imports = Command::new(&python).args(["-c", "import canopen, can, msgpack"]).output();
-        imports.is_ok_and(|output| output.status.success())
-    };
-    if !works() {
-        let made = Command::new("python3").args(["-m", "venv"]).arg(&folder).output().ok()?;
-        if !made.status.success() {
-            return None;
-        }
-        let packages = ["canopen==2.4.1", "python-can==4.6.1", "msgpack==1.2.4"];
-        Command::new(&python)
-            .args(["-m", "pip", "install", "--quiet", "--timeout", "10"])
-            .args(packages)
-            .output()
-            .ok()?;
-    }
-    works().then_some(python)
-}
+/// python-canopen with its bus.
+const PACKAGES: Packages = Packages {
+    folder: "python-canopen",
+    install: &["canopen==2.4.1", "python-can==4.6.1", "msgpack==1.2.4"],
+    import: "canopen, can, msgpack",
+};
 
 /// A script on a bus of its own with a joint; what it printed.
 fn run(python: Option<&Path>, script: &str, images: &[Vec<u8>], more: &[&str]) -> Result<String, Failed> {
-    let python = python.ok_or("there is no python3 with venv, or python-canopen could not be installed")?;
+    let python = PACKAGES.required(python)?;
     let port = std::net::UdpSocket::bind("0.0.0.0:0")?.local_addr()?.port();
     let mut joint = Joint::new(&format!("udp:{GROUP}:{port}"))?;
     let mut command = Command::new(python);

@@ -1,0 +1,44 @@
+//! Python with packages of others, for the tests that drive this project's programs from it.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Packages of PyPI, as pip installs and Python imports them.
+#[derive(Clone, Copy, Debug)]
+pub struct Packages {
+    /// Folder of their environment.
+    pub folder: &'static str,
+    /// What pip installs, with versions.
+    pub install: &'static [&'static str],
+    /// What must then be found, separated by commas.
+    pub import: &'static str,
+}
+
+impl Packages {
+    /// A Python that finds them, in a virtual environment below a test's temporary folder that is made once. None without Python, without its module
+    /// `venv`, or where the packages cannot be installed.
+    pub fn python(&self, temporary: &str) -> Option<PathBuf> {
+        let folder = Path::new(temporary).join(self.folder);
+        let python = folder.join("bin/python3");
+        let works = || succeeds(Command::new(&python).args(["-c", &format!("import {}", self.import)]));
+        if !works() && succeeds(Command::new("python3").args(["-m", "venv"]).arg(&folder)) {
+            let pip = ["-m", "pip", "install", "--quiet", "--timeout", "10"];
+            succeeds(Command::new(&python).args(pip).args(self.install));
+        }
+        works().then_some(python)
+    }
+
+    /// The same, or why there is none.
+    ///
+    /// # Errors
+    /// There is none.
+    pub fn required<'a>(&self, python: Option<&'a Path>) -> Result<&'a Path, String> {
+        python.ok_or_else(|| {
+            format!("there is no python3 with venv, or {} could not be installed", self.install.join(", "))
+        })
+    }
+}
+
+fn succeeds(command: &mut Command) -> bool {
+    command.output().is_ok_and(|output| output.status.success())
+}
