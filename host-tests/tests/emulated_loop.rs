@@ -12,7 +12,7 @@ use emulator::cpu::{Cpu, Watch};
 use emulator::program::Program;
 use emulator::variables::Variables;
 use host_tests::bare_metal::target_installed;
-use host_tests::emulated::bench::{actuator, program};
+use host_tests::emulated::bench::{actuator, commissioned, program};
 use host_tests::emulated::kept::Kept;
 use host_tests::emulated::master::send;
 use host_tests::emulated::twin::{Observed, Seen};
@@ -125,7 +125,7 @@ fn drive(joint: u64, program: &Program, variables: &Variables) -> Result<(Seen, 
         4 => Request::Off,
         _ => Request::PhysicalAndNetwork,
     };
-    let configuration = configuration(request);
+    let configuration = commissioned::<MoteusR4>(&actuator, NODE, request);
     let mut friction = parameters::tame(&mut random);
     // The bench is at room temperature, and so is the box of every second joint.
     if joint.is_multiple_of(2) {
@@ -137,7 +137,7 @@ fn drive(joint: u64, program: &Program, variables: &Variables) -> Result<(Seen, 
     let mut bench = Bench::with(|drivetrain: Drivetrain| MoteusR4::new(drivetrain), &actuator, program)?;
     Kept { configuration: &configuration, image: &image }.write(&mut bench.emulation, program)?;
     let mut twin = Twin::new(variables, active)?;
-    watch(&mut bench.emulation.cpu, program)?;
+    bench.stop_at_control_steps(program)?;
 
     let periods = (STEPS / JOINTS) as f64 / f64::from(MoteusR4::CONFIGURATION.bridge.rate) / SET_POINT;
     let amplitude = 0.4 + 0.35 * joint as f64;
@@ -172,15 +172,6 @@ fn drive(joint: u64, program: &Program, variables: &Variables) -> Result<(Seen, 
     Ok((twin.seen().clone(), times.most))
 }
 
-/// The actuator's configuration, on the board.
-fn configuration(request: Request) -> Configuration {
-    let board = MoteusR4::CONFIGURATION;
-    let mut configuration = Setup::of(&actuator()).compensating(request).configuration;
-    configuration.node_id = NODE;
-    configuration.motor.encoder_latency = board.joint.motor.encoder_latency;
-    configuration
-}
-
 /// What the board will prepare of it.
 fn prepared<W: Observed>(configuration: &Configuration, image: &[u8]) -> Result<Active, Failed> {
     let bridge = W::CONFIGURATION.bridge;
@@ -190,11 +181,4 @@ fn prepared<W: Observed>(configuration: &Configuration, image: &[u8]) -> Result<
         return Err("the image is none".into());
     }
     Ok(active)
-}
-
-/// Stops before every control interrupt.
-fn watch<W: Wired>(cpu: &mut Cpu<Chip<W>>, program: &Program) -> Result<(), Failed> {
-    let handler = program.symbol("ADC1_2").ok_or("the program has no control interrupt")?;
-    cpu.set_watch(Some(Watch::new().stop_at(handler.address)));
-    Ok(())
 }

@@ -1,14 +1,18 @@
 //! A board with its program, on a bench supply.
 
+use super::twin::Observed;
 use crate::bare_metal::build;
 use emulator::board::{Drivetrain, Wired};
 use emulator::chip::time::Instant;
-use emulator::cpu::End;
+use emulator::cpu::{End, Watch};
 use emulator::emulation::Emulation;
 use emulator::program::Program;
 use emulator::rtt::Messages;
+use joint_firmware::compensation::Request;
+use joint_firmware::joint::configuration::Configuration;
 use libtest_mimic::Failed;
 use plant::ActuatorParameters;
+use plant::virtual_joint::Setup;
 
 /// Voltage of the supply, V.
 pub const SUPPLY: f64 = 18.0;
@@ -20,6 +24,14 @@ pub fn actuator() -> ActuatorParameters {
     let mut parameters = ActuatorParameters::reference().aligned().without_payload();
     parameters.bus.source_voltage = SUPPLY;
     parameters
+}
+
+/// Its configuration on a board, as a node on the bus.
+pub fn commissioned<W: Observed>(actuator: &ActuatorParameters, node_id: u8, request: Request) -> Configuration {
+    let mut configuration = Setup::of(actuator).compensating(request).configuration;
+    configuration.node_id = node_id;
+    configuration.motor.encoder_latency = W::CONFIGURATION.joint.motor.encoder_latency;
+    configuration
 }
 
 /// A board's program as it is flashed, below a test's temporary folder.
@@ -62,6 +74,16 @@ impl<W: Wired> Bench<W> {
         Ok(Self { emulation, messages, bytes: Vec::new() })
     }
 
+    /// Has the run stop before every control interrupt, for what [`run_with`](Self::run_with) calls then.
+    ///
+    /// # Errors
+    /// The program has none.
+    pub fn stop_at_control_steps(&mut self, program: &Program) -> Result<(), Failed> {
+        let handler = program.symbol("ADC1_2").ok_or("the program has no control interrupt")?;
+        self.emulation.cpu.set_watch(Some(Watch::new().stop_at(handler.address)));
+        Ok(())
+    }
+
     /// Runs on; whatever ends the run before is an error.
     ///
     /// # Errors
@@ -79,7 +101,18 @@ impl<W: Wired> Bench<W> {
         seconds: f64,
         mut reached: impl FnMut(&mut Emulation<W>) -> Result<(), Failed>,
     ) -> Result<(), Failed> {
-        let end = Instant(self.emulation.now().0 + (seconds * 1e12) as u64);
+        self.run_until(Instant(self.emulation.now().0 + (seconds * 1e12) as u64), &mut reached)
+    }
+
+    /// The same up to an instant.
+    ///
+    /// # Errors
+    /// As above.
+    pub fn run_until(
+        &mut self,
+        end: Instant,
+        reached: &mut impl FnMut(&mut Emulation<W>) -> Result<(), Failed>,
+    ) -> Result<(), Failed> {
         loop {
             let part = Instant(self.emulation.now().0 + PART);
             let ended = self.emulation.run_until(end.min(part));

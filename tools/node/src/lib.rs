@@ -11,6 +11,7 @@
 //!
 //! - [`VirtualNode`]: the whole node; frames and time passed in, so that tests run it faster than real time
 //! - [`serve`]: the node on a bus, in real time
+//! - [`EmulatedNode`]: a board's own program, as it is flashed, in its place
 //! - [`PacedNodes`]: several nodes on one modelled wire, in simulated time
 //! - [`Storage`]: what outlasts a loss of power, in memory or in files
 //! - [`flash`]: a flash with the rules of the STM32G4's
@@ -18,6 +19,7 @@
 
 #![forbid(unsafe_code)]
 
+mod emulated;
 pub mod flash;
 pub mod hostile;
 mod images;
@@ -28,9 +30,10 @@ mod serve;
 mod storage;
 mod virtual_node;
 
+pub use emulated::EmulatedNode;
 pub use images::SlotImages;
 pub use paced::{PacedEvent, PacedNodes, REACTION, TASK};
 pub use sample_image::SampleImage;
-pub use serve::{ServeError, serve};
+pub use serve::{ServeError, Served, serve};
 pub use storage::{Storage, StorageError};
 pub use virtual_node::{NodeError, Options, VirtualNode};

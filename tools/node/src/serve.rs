@@ -1,14 +1,55 @@
 //! A node on a bus, in real time.
 
 use crate::virtual_node::VirtualNode;
-use bus::{BusError, Transport};
+use bus::{BusError, Frame, Transport};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// Time that is waited for a frame, and simulated at once.
 const TICK: Duration = Duration::from_millis(1);
+/// Time that is simulated at most before the bus is looked at again: a machine that is behind still answers.
+const LONGEST: Duration = Duration::from_millis(5);
 /// A machine that is so much behind gives the time up.
 const LOST: Duration = Duration::from_millis(100);
+
+/// What can be on a bus: simulated, with a time of its own.
+pub trait Served {
+    /// Its time.
+    fn now(&self) -> Duration;
+
+    /// Lives up to an instant of its time.
+    ///
+    /// # Errors
+    /// What ended its life.
+    fn live_until(&mut self, instant: Duration) -> Result<(), String>;
+
+    /// A frame of somebody else's has come.
+    fn receive(&mut self, frame: &Frame);
+
+    /// The next frame that it sends.
+    fn take_frame(&mut self) -> Option<Frame>;
+}
+
+impl Served for VirtualNode {
+    fn now(&self) -> Duration {
+        Duration::from_secs_f64(self.steps() as f64 / f64::from(self.rate()))
+    }
+
+    fn live_until(&mut self, instant: Duration) -> Result<(), String> {
+        let steps = (instant.as_secs_f64() * f64::from(self.rate())) as u64;
+        self.advance(steps.saturating_sub(self.steps()));
+        Ok(())
+    }
+
+    fn receive(&mut self, frame: &Frame) {
+        Self::receive(self, frame);
+        self.work();
+    }
+
+    fn take_frame(&mut self) -> Option<Frame> {
+        Self::take_frame(self)
+    }
+}
 
 /// Why a node left the bus.
 #[derive(Debug, thiserror::Error)]
@@ -16,47 +57,42 @@ pub enum ServeError {
     /// The bus.
     #[error(transparent)]
     Bus(#[from] BusError),
+    /// Its simulation.
+    #[error("{0}")]
+    Ended(String),
 }
 
 /// Runs the node until `stop`; simulated time that the machine was too slow for, s.
 ///
 /// # Errors
-/// A bus that is gone.
-pub fn serve(node: &mut VirtualNode, bus: &dyn Transport, stop: &AtomicBool) -> Result<f64, ServeError> {
-    let rate = f64::from(node.rate());
-    let mut start = Instant::now();
-    let (mut done, mut lost) = (0u64, Duration::ZERO);
+/// A bus that is gone, a node that ended.
+pub fn serve(node: &mut impl Served, bus: &dyn Transport, stop: &AtomicBool) -> Result<f64, ServeError> {
+    let origin = node.now();
+    let (mut start, mut lost) = (Instant::now(), Duration::ZERO);
     while !stop.load(Ordering::Relaxed) {
         let mut wait = TICK;
         while let Some(frame) = bus.receive(wait)? {
             node.receive(&frame);
-            node.work();
             send(node, bus)?;
             wait = Duration::ZERO;
-            if elapsed(start, rate) > done + (rate * TICK.as_secs_f64()) as u64 {
+            if origin + start.elapsed() > node.now() + TICK {
                 break;
             }
         }
-        let target = elapsed(start, rate);
-        let behind = Duration::from_secs_f64(target.saturating_sub(done) as f64 / rate);
+        let target = origin + start.elapsed();
+        let behind = target.saturating_sub(node.now());
         if behind > LOST {
             start += behind;
             lost += behind;
         } else {
-            node.advance(target.saturating_sub(done));
-            done = done.max(target);
+            node.live_until(target.min(node.now() + LONGEST)).map_err(ServeError::Ended)?;
             send(node, bus)?;
         }
     }
     Ok(lost.as_secs_f64())
 }
 
-/// Control steps since the start.
-fn elapsed(start: Instant, rate: f64) -> u64 {
-    (Instant::now().saturating_duration_since(start).as_secs_f64() * rate) as u64
-}
-
-fn send(node: &mut VirtualNode, bus: &dyn Transport) -> Result<(), BusError> {
+fn send(node: &mut impl Served, bus: &dyn Transport) -> Result<(), BusError> {
     while let Some(frame) = node.take_frame() {
         bus.send(&frame)?;
     }

@@ -220,12 +220,6 @@ impl VirtualNode {
         &self.joint
     }
 
-    /// Control steps so far.
-    #[must_use]
-    pub fn steps(&self) -> u64 {
-        self.steps
-    }
-
     /// Frames that found no room on the way to the task.
     #[must_use]
     pub fn dropped(&self) -> u64 {
@@ -254,6 +248,12 @@ impl VirtualNode {
     #[must_use]
     pub fn rate(&self) -> u32 {
         self.rate
+    }
+
+    /// Control steps so far.
+    #[must_use]
+    pub fn steps(&self) -> u64 {
+        self.steps
     }
 
     /// A frame from the bus: what acts in the receive interrupt acts now.

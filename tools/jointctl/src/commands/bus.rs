@@ -48,6 +48,36 @@ impl OnBus {
         self.bus.as_deref()
     }
 
+    fn duration(&self) -> Result<Option<Duration>, CommandError> {
+        match self.duration {
+            Some(seconds) if !(seconds > 0.0 && seconds < 1e6) => {
+                Err(CommandError::Arguments(format!("--duration is {seconds} s, must lie in 0 to 1000000 s")))
+            }
+            seconds => Ok(seconds.map(Duration::from_secs_f64)),
+        }
+    }
+
+    /// Does something on the bus until its time is over; `work` says what time the machine was too slow for, s.
+    pub fn until_the_end(
+        &self,
+        work: impl FnOnce(&AtomicBool) -> Result<f64, CommandError> + Send,
+    ) -> Result<(), CommandError> {
+        let (duration, stop) = (self.duration()?, AtomicBool::new(false));
+        let lost = std::thread::scope(|scope| {
+            let working = scope.spawn(|| {
+                let outcome = work(&stop);
+                stop.store(true, Ordering::Relaxed);
+                outcome
+            });
+            wait(duration, &stop);
+            working.join().unwrap_or_else(|_| Err(CommandError::Bus("the node panicked".into())))
+        })?;
+        if lost > 0.0 {
+            eprintln!("{lost:.1} s were lost, this machine is too slow for real time");
+        }
+        Ok(())
+    }
+
     /// Runs a joint for every node id in real time.
     pub fn run(
         &self,
@@ -56,12 +86,7 @@ impl OnBus {
         setup: &Setup,
         image: Option<&Image>,
     ) -> Result<(), CommandError> {
-        let duration = match self.duration {
-            Some(seconds) if !(seconds > 0.0 && seconds < 1e6) => {
-                return Err(CommandError::Arguments(format!("--duration is {seconds} s, must lie in 0 to 1000000 s")));
-            }
-            seconds => seconds.map(Duration::from_secs_f64),
-        };
+        let duration = self.duration()?;
         let stop = AtomicBool::new(false);
         let failed = |error: &dyn std::fmt::Display| CommandError::Bus(error.to_string());
         std::thread::scope(|scope| {
@@ -87,11 +112,7 @@ impl OnBus {
                     left
                 }));
             }
-            let start = Instant::now();
-            while !stop.load(Ordering::Relaxed) && duration.is_none_or(|duration| start.elapsed() < duration) {
-                std::thread::sleep(Duration::from_millis(20));
-            }
-            stop.store(true, Ordering::Relaxed);
+            wait(duration, &stop);
             for (joint, id) in joints.into_iter().zip(&self.node) {
                 match joint.join() {
                     Ok(Ok(lost)) if lost > 0.0 => {
@@ -132,6 +153,15 @@ impl OnBus {
         }
         VirtualNode::with_storage(*plant, setup, options, storage).map_err(|error| failed(&error))
     }
+}
+
+/// Waits until somebody stops, or a time is over, and stops then.
+fn wait(duration: Option<Duration>, stop: &AtomicBool) {
+    let start = Instant::now();
+    while !stop.load(Ordering::Relaxed) && duration.is_none_or(|duration| start.elapsed() < duration) {
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    stop.store(true, Ordering::Relaxed);
 }
 
 /// Arguments of `scan`.

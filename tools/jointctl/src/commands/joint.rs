@@ -22,6 +22,11 @@ pub struct JointChoice {
 }
 
 impl JointChoice {
+    /// Whether an actuator is named.
+    pub const fn names_plant(&self) -> bool {
+        self.plant.is_some() || self.joint.is_some()
+    }
+
     /// Reads what is named. Without a configuration, the encoder is taken as aligned; with one, what it says of the
     /// encoder counts.
     pub fn read(&self) -> Result<(ActuatorParameters, Setup), CommandError> {

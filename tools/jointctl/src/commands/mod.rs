@@ -5,6 +5,7 @@ mod calibrate;
 pub mod demo;
 pub mod describe;
 pub mod drive;
+mod elf;
 pub mod evaluate;
 pub mod excite;
 pub mod fit;

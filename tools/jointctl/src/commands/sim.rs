@@ -2,6 +2,7 @@
 
 use super::CommandError;
 use super::bus::OnBus;
+use super::elf::OnBoard;
 use super::image::{read, verify};
 use super::joint::JointChoice;
 use crate::excite::file as excitation;
@@ -44,6 +45,9 @@ pub struct Sim {
     /// The bus.
     #[command(flatten)]
     on_bus: OnBus,
+    /// The program of a board.
+    #[command(flatten)]
+    on_board: OnBoard,
     /// Folder for logs, page, and the files that describe joint and actuator
     #[arg(long, value_name = "DIR", default_value = "sim")]
     out: PathBuf,
@@ -71,6 +75,10 @@ impl Sim {
             return Err(CommandError::Arguments(text));
         }
         let (plant, setup) = self.joint.read()?;
+        if let (Some(bus), true) = (self.on_bus.bus(), self.on_board.is_named()) {
+            let plant = Some(&plant).filter(|_| self.joint.names_plant());
+            return self.on_bus.until_the_end(|stop| self.on_board.run(bus, plant, stop));
+        }
         if let Some(bus) = self.on_bus.bus() {
             let image = self.image.as_deref().map(read).transpose()?;
             if let (Some(image), Some(path)) = (&image, &self.image) {
