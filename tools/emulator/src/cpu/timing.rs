@@ -1,8 +1,7 @@
 //! How long things take, in cycles of the core: the published timings, and what this model assumes beyond them.
 //!
 //! Sources: Cortex-M4 Technical Reference Manual (Arm 100166), 3.3.1 (instructions), 3.3.2 (loads and stores), 7.2.3 (floating point) and 5
-//! (exceptions). They are the timings of `host-tests/tests/thumb`, which counts over traces, but where that takes a group for its commonest
-//! member: table branches and exclusive accesses take 2 here as published and not 3, VLDR and VSTR of two words 3. Assumed:
+//! (exceptions). Assumed:
 //! - Data-processing and multiply instructions take 1 cycle, integer multiply-accumulates included.
 //! - A load takes 2 cycles, 1 right behind another single load or store, whatever the registers; a store takes 1: the write buffer
 //!   hides the rest. Loads and stores of several registers take one cycle more than there are registers.
