@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 /// Time that is waited for a frame, and simulated at once.
 const TICK: Duration = Duration::from_millis(1);
 /// Time that is simulated at most before the bus is looked at again: a machine that is behind still answers.
-const LONGEST: Duration = Duration::from_millis(5);
+const LONGEST: Duration = Duration::from_millis(20);
 /// A machine that is so much behind gives the time up.
 const LOST: Duration = Duration::from_millis(100);
 
