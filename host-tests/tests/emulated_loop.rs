@@ -13,7 +13,7 @@ use emulator::program::Program;
 use emulator::variables::Variables;
 use host_tests::bare_metal::target_installed;
 use host_tests::emulated::bench::{actuator, program};
-use host_tests::emulated::kept::Kept;
+use host_tests::emulated::kept::{Kept, configuration};
 use host_tests::emulated::master::send;
 use host_tests::emulated::twin::{Observed, Seen};
 use host_tests::emulated::{Bench, Twin};
@@ -26,7 +26,6 @@ use joint_firmware::joint::configuration::Configuration;
 use joint_firmware::parameters::image::Image;
 use libtest_mimic::{Arguments, Failed, Trial};
 use plant::actuator::Fault;
-use plant::virtual_joint::Setup;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeMap;
@@ -125,7 +124,7 @@ fn drive(joint: u64, program: &Program, variables: &Variables) -> Result<(Seen, 
         4 => Request::Off,
         _ => Request::PhysicalAndNetwork,
     };
-    let configuration = configuration(request);
+    let configuration = configuration::<MoteusR4>(&actuator, NODE, request);
     let mut friction = parameters::tame(&mut random);
     // The bench is at room temperature, and so is the box of every second joint.
     if joint.is_multiple_of(2) {
@@ -170,15 +169,6 @@ fn drive(joint: u64, program: &Program, variables: &Variables) -> Result<(Seen, 
     }
     let times = bench.emulation.cpu.exception_times().get(&CONTROL).ok_or("no control interrupt")?;
     Ok((twin.seen().clone(), times.most))
-}
-
-/// The actuator's configuration, on the board.
-fn configuration(request: Request) -> Configuration {
-    let board = MoteusR4::CONFIGURATION;
-    let mut configuration = Setup::of(&actuator()).compensating(request).configuration;
-    configuration.node_id = NODE;
-    configuration.motor.encoder_latency = board.joint.motor.encoder_latency;
-    configuration
 }
 
 /// What the board will prepare of it.

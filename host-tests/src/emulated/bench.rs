@@ -9,6 +9,7 @@ use emulator::program::Program;
 use emulator::rtt::Messages;
 use libtest_mimic::Failed;
 use plant::ActuatorParameters;
+use std::sync::Arc;
 
 /// Voltage of the supply, V.
 pub const SUPPLY: f64 = 18.0;
@@ -31,11 +32,12 @@ pub fn program(board: &str, temporary: &str) -> Result<Program, Failed> {
     Ok(Program::parse(elf)?)
 }
 
-/// A board with its program.
+/// A board with its program. A clone is a snapshot.
+#[derive(Clone)]
 pub struct Bench<W: Wired> {
     /// Core, chip and board.
     pub emulation: Emulation<W>,
-    messages: Messages,
+    messages: Arc<Messages>,
     bytes: Vec<u8>,
 }
 
@@ -59,6 +61,7 @@ impl<W: Wired> Bench<W> {
     ) -> Result<Self, Failed> {
         let emulation = Emulation::new(board(Drivetrain::new(*actuator, 25.0, 1)?), program)?;
         let messages = Messages::of(program)?.ok_or("the program logs without defmt")?;
+        let messages = Arc::new(messages);
         Ok(Self { emulation, messages, bytes: Vec::new() })
     }
 
