@@ -4,6 +4,7 @@
 pub mod bench;
 pub mod kept;
 pub mod master;
+pub mod motion;
 pub mod power;
 pub mod twin;
 
