@@ -228,7 +228,7 @@ fn moteus() -> Result<(), Failed> {
         let (least, most) = times.iter().fold((f64::MAX, 0.0f64), |(least, most), t| (least.min(*t), most.max(*t)));
         let within = 1e3 * limits.within;
         println!(
-            "| {} | {} | {within} | {least:.3} to {most:.3} | {} |",
+            "| {} | {} | {within:.2} | {least:.3} to {most:.3} | {} |",
             MoteusR4::NAME,
             broken.name,
             reasons.join("; ")
@@ -243,7 +243,7 @@ impl Broken {
         let said = moving.bench.log().len();
         let from = (self.bring)(&mut moving, program)?;
         let time = moving.until_off(from, limits.within + 0.1)?.ok_or("the bridge is still on")?;
-        let (resets, emergencies) = (moving.bench.emulation.resets().len(), moving.emergencies().len());
+        let resets = moving.bench.emulation.resets().len();
         let rest = self.afterwards - (moving.now().0 - from.0) as f64 * 1e-12;
         moving.run(rest.max(0.05))?;
         if moving.bench.board().drivetrain().is_switching() {
@@ -253,11 +253,9 @@ impl Broken {
         let code = u16::from_le_bytes(*moving.bench.upload(NODE, 0x603F, 0)?.first_chunk().ok_or("603Fh is short")?);
         let mut reason = String::new();
         if !limits.codes.is_empty() {
-            let newest = moving.bench.upload(NODE, 0x1003, 1)?;
-            let history: Vec<u16> = newest.first_chunk().map(|code| u16::from_le_bytes(*code)).into_iter().collect();
+            let history = error_history(&mut moving.bench)?;
             let sent = moving.emergencies();
-            let sent = sent.get(emergencies.min(sent.len())..).unwrap_or_default();
-            if !limits.codes.contains(&code) || !moving.emergencies().contains(&code) {
+            if !limits.codes.contains(&code) || !sent.contains(&code) || !history.contains(&code) {
                 return Err(format!("603Fh is {code:04X}h, 1003h {history:04X?}, EMCYs {sent:04X?}").into());
             }
             reason = format!("{code:04X}h");
@@ -273,6 +271,16 @@ impl Broken {
         }
         Ok((time, reason))
     }
+}
+
+/// Codes in object 1003h, newest first.
+fn error_history(bench: &mut Bench<MoteusR4>) -> Result<Vec<u16>, Failed> {
+    let length = bench.upload(NODE, 0x1003, 0)?.first().copied().unwrap_or(0);
+    let code = |number| {
+        let entry = bench.upload(NODE, 0x1003, number)?;
+        Ok(u16::from_le_bytes(*entry.first_chunk().ok_or("an entry of 1003h is short")?))
+    };
+    (1..=length).map(code).collect()
 }
 
 /// What breaks on the other board, which has no bus: nobody enables its bridge.

@@ -42,7 +42,7 @@ struct How {
 }
 
 /// Number of a run in which somebody shakes the joint and asks for a node, and the log.
-fn run<W: Wired>(board: fn(Drivetrain) -> W, program: &Program, how: How) -> Result<(u64, Vec<u8>), Failed> {
+fn run<W: Wired + Clone>(board: fn(Drivetrain) -> W, program: &Program, how: How) -> Result<(u64, Vec<u8>), Failed> {
     let drivetrain = Drivetrain::new(ActuatorParameters::reference().aligned(), 25.0, how.seed)?;
     let mut emulation = Emulation::new(Witnessed::new(board(drivetrain)), program)?;
     if how.watched {
@@ -72,7 +72,7 @@ fn run<W: Wired>(board: fn(Drivetrain) -> W, program: &Program, how: How) -> Res
     Ok((emulation.fingerprint(), log))
 }
 
-fn same_every_time<W: Wired>(board: fn(Drivetrain) -> W) -> Result<(), Failed> {
+fn same_every_time<W: Wired + Clone>(board: fn(Drivetrain) -> W) -> Result<(), Failed> {
     let program = program(W::NAME, env!("CARGO_TARGET_TMPDIR"))?;
     let once = How { pieces: 1, watched: false, cloned: false, seed: 1 };
     let first = run(board, &program, once)?;
