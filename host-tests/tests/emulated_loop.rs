@@ -157,7 +157,7 @@ fn drive(joint: u64, program: &Program, variables: &Variables) -> Result<(Seen, 
             _ => {}
         }
         let mut frame = controlword.to_le_bytes().to_vec();
-        frame.extend([3, period as u8]);
+        frame.extend([9, period as u8]);
         frame.extend(((1e3 * velocity) as i32).to_le_bytes());
         send(&mut bench.emulation, 0x300 + u16::from(NODE), &frame)?;
         bench
