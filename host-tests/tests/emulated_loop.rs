@@ -7,13 +7,11 @@
 //! Needs the target; where it is missing the tests are reported as ignored, by name; with `CI` set they run and fail.
 
 use emulator::board::{Drivetrain, MoteusR4, Wired};
-use emulator::chip::Chip;
-use emulator::cpu::{Cpu, Watch};
 use emulator::program::Program;
 use emulator::variables::Variables;
 use host_tests::bare_metal::target_installed;
-use host_tests::emulated::bench::{actuator, commissioned, program};
-use host_tests::emulated::kept::Kept;
+use host_tests::emulated::bench::{actuator, program};
+use host_tests::emulated::kept::{Kept, configuration};
 use host_tests::emulated::master::send;
 use host_tests::emulated::twin::{Observed, Seen};
 use host_tests::emulated::{Bench, Twin};
@@ -26,7 +24,6 @@ use joint_firmware::joint::configuration::Configuration;
 use joint_firmware::parameters::image::Image;
 use libtest_mimic::{Arguments, Failed, Trial};
 use plant::actuator::Fault;
-use plant::virtual_joint::Setup;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeMap;
@@ -125,7 +122,7 @@ fn drive(joint: u64, program: &Program, variables: &Variables) -> Result<(Seen, 
         4 => Request::Off,
         _ => Request::PhysicalAndNetwork,
     };
-    let configuration = commissioned::<MoteusR4>(&actuator, NODE, request);
+    let configuration = configuration::<MoteusR4>(&actuator, NODE, request);
     let mut friction = parameters::tame(&mut random);
     // The bench is at room temperature, and so is the box of every second joint.
     if joint.is_multiple_of(2) {
@@ -158,7 +155,7 @@ fn drive(joint: u64, program: &Program, variables: &Variables) -> Result<(Seen, 
             _ => {}
         }
         let mut frame = controlword.to_le_bytes().to_vec();
-        frame.extend([3, period as u8]);
+        frame.extend([9, period as u8]);
         frame.extend(((1e3 * velocity) as i32).to_le_bytes());
         send(&mut bench.emulation, 0x300 + u16::from(NODE), &frame)?;
         bench

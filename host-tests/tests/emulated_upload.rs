@@ -10,8 +10,8 @@ use emulator::emulation::Emulation;
 use host_tests::bare_metal::target_installed;
 use host_tests::control_steps::friction;
 use host_tests::emulated::Bench;
-use host_tests::emulated::bench::{actuator, commissioned, program};
-use host_tests::emulated::kept::Kept;
+use host_tests::emulated::bench::{actuator, program};
+use host_tests::emulated::kept::{Kept, configuration};
 use host_tests::emulated::master::{Heard, heard, send};
 use host_tests::emulated::twin::Observed;
 use host_tests::image_bytes::encoded;
@@ -128,7 +128,7 @@ impl Served for Watched<'_> {
 fn upload(python: Option<&Path>) -> Result<(), Failed> {
     let python = PACKAGES.required(python)?;
     let program = program(MoteusR4::NAME, env!("CARGO_TARGET_TMPDIR"))?;
-    let configuration = commissioned::<MoteusR4>(&actuator(), NODE, Request::PhysicalAndNetwork);
+    let configuration = configuration::<MoteusR4>(&actuator(), NODE, Request::PhysicalAndNetwork);
     let mut bench = Bench::with(|drivetrain: Drivetrain| MoteusR4::new(drivetrain), &actuator(), &program)?;
     Kept { configuration: &configuration, image: &encoded(&image(1, 1.0)) }.write(&mut bench.emulation, &program)?;
     bench.stop_at_control_steps(&program)?;

@@ -1,5 +1,5 @@
 //! The emulated boards are deterministic: a program's run is the same to the picosecond and the bit whenever it is repeated, however its time is cut
-//! into pieces, and whether or not somebody watches.
+//! into pieces, whether or not somebody watches, and by whichever clone it is gone on with.
 //!
 //! Needs the target; where it is missing the tests are reported as ignored, by name; with `CI` set they run and fail.
 
@@ -35,12 +35,14 @@ struct How {
     /// Calls for a step.
     pieces: u64,
     watched: bool,
+    /// At each step a clone goes on instead.
+    cloned: bool,
     /// Seed of the sensors' noise.
     seed: u64,
 }
 
 /// Number of a run in which somebody shakes the joint and asks for a node, and the log.
-fn run<W: Wired>(board: fn(Drivetrain) -> W, program: &Program, how: How) -> Result<(u64, Vec<u8>), Failed> {
+fn run<W: Wired + Clone>(board: fn(Drivetrain) -> W, program: &Program, how: How) -> Result<(u64, Vec<u8>), Failed> {
     let drivetrain = Drivetrain::new(ActuatorParameters::reference().aligned(), 25.0, how.seed)?;
     let mut emulation = Emulation::new(Witnessed::new(board(drivetrain)), program)?;
     if how.watched {
@@ -56,6 +58,9 @@ fn run<W: Wired>(board: fn(Drivetrain) -> W, program: &Program, how: How) -> Res
             emulation.cpu.bus.wiring_mut().line().send(now, frame);
             emulation.cpu.bus.wiring_changed();
         }
+        if how.cloned {
+            emulation = emulation.clone();
+        }
         for piece in 1..=how.pieces {
             match emulation.cpu.run(STEP * step + STEP * piece / how.pieces) {
                 End::Time => {}
@@ -67,13 +72,16 @@ fn run<W: Wired>(board: fn(Drivetrain) -> W, program: &Program, how: How) -> Res
     Ok((emulation.fingerprint(), log))
 }
 
-fn same_every_time<W: Wired>(board: fn(Drivetrain) -> W) -> Result<(), Failed> {
+fn same_every_time<W: Wired + Clone>(board: fn(Drivetrain) -> W) -> Result<(), Failed> {
     let program = program(W::NAME, env!("CARGO_TARGET_TMPDIR"))?;
-    let once = How { pieces: 1, watched: false, seed: 1 };
+    let once = How { pieces: 1, watched: false, cloned: false, seed: 1 };
     let first = run(board, &program, once)?;
-    for (what, how) in
-        [("again", once), ("in many pieces", How { pieces: 97, ..once }), ("watched", How { watched: true, ..once })]
-    {
+    for (what, how) in [
+        ("again", once),
+        ("in many pieces", How { pieces: 97, ..once }),
+        ("watched", How { watched: true, ..once }),
+        ("by clones", How { cloned: true, ..once }),
+    ] {
         if run(board, &program, how)? != first {
             return Err(format!("{what}, the run is another one").into());
         }

@@ -338,3 +338,9 @@ pub fn bridge_off() {
     // Without its clock the timer ignores this, but then its outputs have never been on.
     pac::TIM1.bdtr().modify(|w| w.set_moe(false));
 }
+
+/// Switches all transistors off, now, until [`apply`] says otherwise: here there is nothing that more would switch off.
+#[inline(always)]
+pub fn let_go() {
+    bridge_off();
+}

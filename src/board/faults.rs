@@ -144,11 +144,12 @@ extern "C" fn hard_fault(frame: *const u32) -> ! {
 /// Flash ECC, clock security or SRAM parity.
 ///
 /// Reading a parameter word that a loss of power tore gives a double ECC error and so this interrupt. That is no reason to
-/// stop: the bridge goes off (parameters are read with the bridge off anyway), the flag is cleared, and the reader of the double
-/// word finds [`torn_words`] risen. What is that and what is fatal: [`ecc`].
+/// stop: the bridge goes off until the next control step, the flag is cleared, and the reader of the double word finds [`torn_words`]
+/// risen. What is that and what is fatal: [`ecc`]. The gate driver stays enabled: the slots are read after it was configured, and
+/// disabled it would be of no use until the next start, which reads the same torn word.
 #[unsafe(no_mangle)]
 extern "C" fn NonMaskableInt() {
-    super::bridge_off();
+    super::let_go();
     let status = pac::FLASH.eccr().read().0;
     let storage = Storage {
         flash: super::FLASH_START,
@@ -163,6 +164,7 @@ extern "C" fn NonMaskableInt() {
         }
         Decision::Fatal { address } => address,
     };
+    super::bridge_off();
     cortex_m::interrupt::disable();
     reset_with(Record::new(Cause::NonMaskable, address, status))
 }

@@ -293,8 +293,7 @@ pub fn temperatures() -> (f32, f32) {
 pub fn apply(bridge: &Bridge) {
     pwm::hold(bridge.duties, TOP, LARGEST_DUTY);
     match bridge.state {
-        // HIZ only: a disabled driver would forget its configuration.
-        BridgeState::Off => pac::GPIOB.bsrr().write(|w| w.set_br(7, true)),
+        BridgeState::Off => let_go(),
         BridgeState::Switching => pac::GPIOB.bsrr().write(|w| w.set_bs(7, true)),
     }
 }
@@ -320,11 +319,18 @@ extern "C" fn TIM2() {
     tim.cr1().modify(|w| w.set_udis(false));
 }
 
+/// Switches all transistors off, now, until [`apply`] says otherwise.
+#[inline(always)]
+pub fn let_go() {
+    // HIZ only: a disabled driver would forget its configuration.
+    pac::GPIOB.bsrr().write(|w| w.set_br(7, true));
+}
+
 /// Switches all transistors off, now, and disables the gate driver. For fault handlers: needs nothing initialised, takes no
 /// lock, cannot fail. The driver has lost its configuration afterwards.
 #[inline(always)]
 pub fn bridge_off() {
     // Without their clocks the ports ignore this, but then these pins have never been outputs.
-    pac::GPIOB.bsrr().write(|w| w.set_br(7, true));
+    let_go();
     pac::GPIOA.bsrr().write(|w| w.set_br(3, true));
 }

@@ -1,6 +1,5 @@
 //! A board with its program, on a bench supply.
 
-use super::twin::Observed;
 use crate::bare_metal::build;
 use emulator::board::{Drivetrain, Wired};
 use emulator::chip::time::Instant;
@@ -8,11 +7,9 @@ use emulator::cpu::{End, Watch};
 use emulator::emulation::Emulation;
 use emulator::program::Program;
 use emulator::rtt::Messages;
-use joint_firmware::compensation::Request;
-use joint_firmware::joint::configuration::Configuration;
 use libtest_mimic::Failed;
 use plant::ActuatorParameters;
-use plant::virtual_joint::Setup;
+use std::sync::Arc;
 
 /// Voltage of the supply, V.
 pub const SUPPLY: f64 = 18.0;
@@ -26,14 +23,6 @@ pub fn actuator() -> ActuatorParameters {
     parameters
 }
 
-/// Its configuration on a board, as a node on the bus.
-pub fn commissioned<W: Observed>(actuator: &ActuatorParameters, node_id: u8, request: Request) -> Configuration {
-    let mut configuration = Setup::of(actuator).compensating(request).configuration;
-    configuration.node_id = node_id;
-    configuration.motor.encoder_latency = W::CONFIGURATION.joint.motor.encoder_latency;
-    configuration
-}
-
 /// A board's program as it is flashed, below a test's temporary folder.
 ///
 /// # Errors
@@ -43,11 +32,12 @@ pub fn program(board: &str, temporary: &str) -> Result<Program, Failed> {
     Ok(Program::parse(elf)?)
 }
 
-/// A board with its program.
+/// A board with its program. A clone is a snapshot.
+#[derive(Clone)]
 pub struct Bench<W: Wired> {
     /// Core, chip and board.
     pub emulation: Emulation<W>,
-    messages: Messages,
+    messages: Arc<Messages>,
     bytes: Vec<u8>,
 }
 
@@ -71,6 +61,7 @@ impl<W: Wired> Bench<W> {
     ) -> Result<Self, Failed> {
         let emulation = Emulation::new(board(Drivetrain::new(*actuator, 25.0, 1)?), program)?;
         let messages = Messages::of(program)?.ok_or("the program logs without defmt")?;
+        let messages = Arc::new(messages);
         Ok(Self { emulation, messages, bytes: Vec::new() })
     }
 

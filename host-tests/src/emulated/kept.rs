@@ -1,14 +1,27 @@
 //! What a board's flash holds when it is switched on: the stored configuration and a friction image, in the slots that the program reads
 //! (`src/tasks/networked/store.rs`).
 
+use super::twin::Observed;
 use emulator::board::Wired;
 use emulator::emulation::Emulation;
 use emulator::program::Program;
+use joint_firmware::compensation::Request;
 use joint_firmware::joint::configuration::Configuration;
 use joint_firmware::objects::{RECORD, Stored};
 use joint_firmware::parameters::slots::{BLANK, Layout, PAGE_WORDS, SlotFlash, Slots};
 use libtest_mimic::Failed;
 use node::flash::Flash;
+use plant::ActuatorParameters;
+use plant::virtual_joint::Setup;
+
+/// The configuration of the actuator on a board, with a node id and with compensation as requested.
+pub fn configuration<W: Observed>(actuator: &ActuatorParameters, node: u8, request: Request) -> Configuration {
+    let board = W::CONFIGURATION;
+    let mut configuration = Setup::of(actuator).compensating(request).configuration;
+    configuration.node_id = node;
+    configuration.motor.encoder_latency = board.joint.motor.encoder_latency;
+    configuration
+}
 
 /// Pages of the program's parameters.
 const PAGES: usize = 6;

@@ -11,7 +11,7 @@ use libtest_mimic::Failed;
 use std::time::Duration;
 
 /// Time that a master lets pass between two looks at the bus, s.
-const TICK: f64 = 0.000_5;
+const TICK: f64 = 0.000_25;
 const LSS_MASTER: u16 = 0x7E5;
 
 /// A data frame with an 11-bit identifier.
@@ -68,6 +68,15 @@ impl<W: Wired> Bench<W> {
     pub fn upload(&mut self, node: u8, index: u16, sub_index: u8) -> Result<Vec<u8>, Failed> {
         let object = Object { node, index, sub_index };
         self.transfer(Transfer::upload(object, Method::Automatic, Settings::default()))
+    }
+
+    /// Reads an object in blocks.
+    ///
+    /// # Errors
+    /// The joint refuses or is silent.
+    pub fn upload_in_blocks(&mut self, node: u8, index: u16, sub_index: u8) -> Result<Vec<u8>, Failed> {
+        let object = Object { node, index, sub_index };
+        self.transfer(Transfer::upload(object, Method::Block, Settings::default()))
     }
 
     /// Writes an object.

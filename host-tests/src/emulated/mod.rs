@@ -4,6 +4,8 @@
 pub mod bench;
 pub mod kept;
 pub mod master;
+pub mod motion;
+pub mod power;
 pub mod twin;
 
 pub use bench::Bench;

@@ -38,7 +38,8 @@ impl std::fmt::Display for EmulationError {
 
 impl std::error::Error for EmulationError {}
 
-/// A board that runs its program.
+/// A board that runs its program. A clone is a snapshot: it goes on as the original would, on its own.
+#[derive(Clone)]
 pub struct Emulation<W: Wired> {
     /// Core, chip and board.
     pub cpu: Cpu<Chip<W>>,
@@ -71,7 +72,8 @@ impl<W: Wired> Emulation<W> {
         self.cpu.bus.instant(self.cpu.now())
     }
 
-    /// Runs for so many seconds, through resets. What else ended the run, if anything did.
+    /// Runs for so many seconds, through resets. What else ended the run, if anything did; a loss of power shows as a reset by the chip, and
+    /// nothing runs before [`power_up`](Self::power_up).
     pub fn run(&mut self, seconds: f64) -> Option<End> {
         self.run_until(Instant(self.now().0 + (seconds * 1e12) as u64))
     }
@@ -83,12 +85,15 @@ impl<W: Wired> Emulation<W> {
             if left == 0 {
                 return None;
             }
+            if !self.is_powered() {
+                return Some(End::Reset(Origin::Chip));
+            }
             // The core's frequency may change on the way: never too far at once.
             let cycles = (left.min(10_000_000_000) as f64 * 1e-12 * self.cpu.bus.frequency() as f64) as u64;
             let end = self.cpu.run(self.cpu.now() + cycles.max(1));
             match end {
                 End::Time => {}
-                End::Reset(origin) => self.reset(origin),
+                End::Reset(origin) if self.is_powered() => self.reset(origin),
                 end => return Some(end),
             }
         }
@@ -97,6 +102,25 @@ impl<W: Wired> Emulation<W> {
     /// When and by whom the chip was reset since power-up.
     pub fn resets(&self) -> &[(Instant, Origin)] {
         &self.resets
+    }
+
+    /// Whether the chip has power.
+    pub fn is_powered(&self) -> bool {
+        self.cpu.bus.is_powered()
+    }
+
+    /// The power goes, in the middle of whatever is done: what SRAM and registers hold is lost.
+    pub fn power_down(&mut self) {
+        let now = self.cpu.now();
+        self.cpu.bus.power_down(now);
+    }
+
+    /// The power comes back, and the program starts. What was read of the log before is not read again.
+    pub fn power_up(&mut self) {
+        let now = self.cpu.now();
+        self.cpu.bus.power_up(now);
+        // The vectors are where they were.
+        let _ = self.cpu.reset(VECTORS);
     }
 
     fn reset(&mut self, origin: Origin) {

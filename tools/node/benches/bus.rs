@@ -54,7 +54,7 @@ impl Round {
             let options = Options { node_id: number + 1, serial: 1, seed: number.into() };
             let images = SlotImages::empty().expect("an erased flash can be written");
             let node = VirtualNode::new(parameters, &Setup::of(&parameters), &options, images).expect("a joint");
-            nodes.add(node, STEP * number.into() / joints.into());
+            nodes.add(node, STEP * u32::from(number) / u32::from(joints));
         }
         let mut round = Self { nodes, master, joints, noise: 1 };
         round.nodes.wait(200 * MILLISECOND);

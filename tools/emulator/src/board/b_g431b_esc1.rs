@@ -82,6 +82,7 @@ impl Wiring for BG431BEsc1 {
         }
         match pin {
             SUPPLY => divided(sample.bus_voltage, 169_000.0, 18_000.0),
+            BRIDGE if self.inputs.thermistor_open => 0.0,
             BRIDGE => BRIDGE_NTC.voltage(sample.bridge_temperature, VDD, 4_700.0),
             _ => 0.0,
         }

@@ -31,6 +31,8 @@ pub struct Drivetrain {
     enabled: bool,
     /// It switched since `moved`, if only for a part of it.
     switched: bool,
+    /// When it last ceased to switch.
+    off_since: Option<Instant>,
     /// Torque on the link from outside, Nm.
     pub external_torque: f64,
 }
@@ -60,6 +62,7 @@ impl Drivetrain {
             on: [0.0; 3],
             enabled: false,
             switched: false,
+            off_since: None,
             external_torque: 0.0,
         })
     }
@@ -74,16 +77,33 @@ impl Drivetrain {
         &mut self.actuator
     }
 
+    /// Whether the bridge switches: the timer drives the gates of all legs, and they reach the transistors.
+    pub fn is_switching(&self) -> bool {
+        self.enabled && self.pwm.is_some_and(|(_, pwm)| pwm.running && is_switching(&pwm))
+    }
+
+    /// When the bridge last ceased to switch; none where it does, or never did.
+    pub fn off_since(&self) -> Option<Instant> {
+        self.off_since.filter(|_| !self.is_switching())
+    }
+
+    fn change(&mut self, at: Instant, change: impl FnOnce(&mut Self)) {
+        self.pass(at);
+        let before = self.is_switching();
+        change(self);
+        if before && !self.is_switching() {
+            self.off_since = Some(at);
+        }
+    }
+
     /// Whether the bridge follows its inputs from now on: an enable line, a gate driver.
     pub fn enable(&mut self, at: Instant, enabled: bool) {
-        self.pass(at);
-        self.enabled = enabled;
+        self.change(at, |drivetrain| drivetrain.enabled = enabled);
     }
 
     /// The timer's outputs from now on.
     pub fn pwm(&mut self, at: Instant, pwm: &Pwm) {
-        self.pass(at);
-        self.pwm = Some((at, *pwm));
+        self.change(at, |drivetrain| drivetrain.pwm = Some((at, *pwm)));
         if pwm.running && pwm.count >= pwm.top {
             self.period(at);
         }

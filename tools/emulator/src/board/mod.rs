@@ -25,6 +25,11 @@ pub struct Inputs {
     pub button: bool,
     /// Something pulls the gate driver's fault line low.
     pub driver_fault: bool,
+    /// The bridge's thermistor is not connected any more.
+    pub thermistor_open: bool,
+    /// The level that the data line of an encoder with a serial interface stays at, whatever the encoder says. Of one that is silent it is
+    /// high: the line is pulled up.
+    pub encoder_line: Option<bool>,
 }
 
 /// A board as the chip's surroundings, and as who tests it sees it.

@@ -99,6 +99,7 @@ impl Wiring for MoteusR4 {
         }
         match pin {
             SUPPLY => divided(sample.bus_voltage, 100_000.0, 4_700.0),
+            BRIDGE if self.inputs.thermistor_open => 0.0,
             BRIDGE => BRIDGE_NTC.voltage(sample.bridge_temperature, VDD, 10_000.0),
             _ => 0.0,
         }
@@ -142,7 +143,8 @@ impl Wiring for MoteusR4 {
             }
             2 => {
                 let angle = (self.drivetrain.sample(at).encoder >> 18) as u16;
-                self.encoder.exchange(frame, &Field::at(angle))
+                let answer = self.encoder.exchange(frame, &Field::at(angle));
+                self.inputs.encoder_line.map(|high| if high { u16::MAX } else { 0 }).or(answer)
             }
             _ => None,
         };

@@ -5,6 +5,7 @@ use super::{Cpu, End, decode};
 use crate::bus::{Bus, Refusal};
 use std::ops::Range;
 
+#[derive(Clone)]
 pub(super) struct Code<B: Bus> {
     operations: Vec<Operation<B>>,
     regions: Vec<Region>,

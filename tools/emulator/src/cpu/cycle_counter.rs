@@ -2,7 +2,7 @@
 //!
 //! It stands still while the core sleeps, as the core's clock does (RM0440, 6.3.8: sleep stops the CPU clock; no debugger is attached).
 
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct CycleCounter {
     /// DEMCR.TRCENA, which switches the whole unit on.
     tracing: bool,

@@ -34,6 +34,7 @@ pub struct ExceptionTimes {
 }
 
 /// A handler that has begun.
+#[derive(Clone)]
 pub(super) struct Activation {
     number: u16,
     cycles: u64,

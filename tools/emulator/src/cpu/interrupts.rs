@@ -18,6 +18,7 @@ const THREAD: i16 = 256;
 /// The bits of a priority that exist.
 const IMPLEMENTED: u8 = 0xf0;
 
+#[derive(Clone)]
 pub(super) struct Interrupts {
     pub enabled: [u32; 4],
     pending: [u32; 4],

@@ -54,7 +54,8 @@ use std::collections::BTreeMap;
 use system::System;
 use system_timer::SystemTimer;
 
-/// A core and what it is connected to.
+/// A core and what it is connected to. A clone goes on as the original would, on its own.
+#[derive(Clone)]
 pub struct Cpu<B: Bus> {
     /// Memories and devices.
     pub bus: B,

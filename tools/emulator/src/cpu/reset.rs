@@ -70,7 +70,6 @@ impl<B: Bus> Cpu<B> {
         (self.greater, self.it, self.thumb, self.exception) = (0, 0, start & 1 != 0, 0);
         (self.unprivileged, self.process_stack, self.floating_used) = (false, false, false);
         (self.event, self.exclusive, self.sleep, self.single) = (false, false, None, false);
-        (self.end, self.attention) = (None, 0);
         self.interrupts = Interrupts::new();
         self.system = System::default();
         self.system.vectors = vectors;
@@ -80,6 +79,8 @@ impl<B: Bus> Cpu<B> {
         self.prepare_floating_point();
         self.code.enter(self.pc);
         self.read_signals();
+        // A reset that the bus has told of is this one.
+        (self.end, self.attention) = (None, 0);
         Ok(())
     }
 }

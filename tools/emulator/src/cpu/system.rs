@@ -19,6 +19,7 @@ const AUTOMATIC: u32 = 1 << 31;
 const LAZY: u32 = 1 << 30;
 const DEFERRED: u32 = 1;
 
+#[derive(Clone)]
 pub(super) struct System {
     /// VTOR.
     pub vectors: u32,

@@ -1,6 +1,6 @@
 //! SysTick: counts down and pends its exception whenever it reaches zero (ARM DDI 0403, B3.3). Computed from the time, not counted.
 
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct SystemTimer {
     enabled: bool,
     interrupts: bool,

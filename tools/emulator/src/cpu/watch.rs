@@ -47,7 +47,7 @@ impl Open {
 }
 
 /// Functions that are watched, addresses to stop at, and what has been seen.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub struct Watch {
     functions: BTreeSet<u32>,
     stops: BTreeSet<u32>,

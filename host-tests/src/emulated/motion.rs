@@ -1,0 +1,127 @@
+//! A joint in motion: the moteus r4's program, enabled over the bus and given a set-point every few milliseconds, until something goes wrong.
+
+use super::Bench;
+use super::kept::{Kept, configuration};
+use super::master::{Heard, heard, send};
+use emulator::board::{MoteusR4, Wired};
+use emulator::chip::time::Instant;
+use emulator::program::Program;
+use joint_firmware::compensation::Request;
+use joint_firmware::joint::configuration::Configuration;
+use libtest_mimic::Failed;
+use plant::ActuatorParameters;
+use std::f64::consts::TAU;
+
+/// Its node id.
+pub const NODE: u8 = 5;
+/// Between two set-points, s.
+pub const SET_POINT: f64 = 0.005;
+/// Between two heartbeats of the joint, ms.
+const HEARTBEAT: u16 = 10;
+/// Cyclic synchronous velocity, of object 6060h.
+const VELOCITY: u8 = 9;
+/// Controlwords of CiA 402: shutdown, switch on, enable operation.
+const ENABLING: [u16; 3] = [0x06, 0x07, 0x0F];
+
+/// A joint that somebody moves. A clone is a snapshot.
+#[derive(Clone)]
+pub struct Moving {
+    /// The board.
+    pub bench: Bench<MoteusR4>,
+    /// Set-points so far.
+    period: u32,
+    /// Amplitude of the velocity at the link, rad/s.
+    pub amplitude: f64,
+    /// Nobody sends set-points.
+    pub silent: bool,
+    /// What it is configured for.
+    pub configuration: Configuration,
+    /// Frames of the joint.
+    heard: Vec<Heard>,
+}
+
+impl Moving {
+    /// From power-up until it moves.
+    ///
+    /// # Errors
+    /// It is not enabled.
+    pub fn start(actuator: &ActuatorParameters, program: &Program, image: &[u8]) -> Result<Self, Failed> {
+        let configuration = configuration::<MoteusR4>(actuator, NODE, Request::PhysicalAndNetwork);
+        let mut bench = Bench::with(MoteusR4::new, actuator, program)?;
+        Kept { configuration: &configuration, image }.write(&mut bench.emulation, program)?;
+        bench.booted(NODE)?;
+        let mut moving = Self { bench, period: 0, amplitude: 2.0, silent: false, configuration, heard: Vec::new() };
+        // Operational.
+        send(&mut moving.bench.emulation, 0x000, &[0x01, NODE])?;
+        // A heartbeat, so that it always has something to send.
+        moving.bench.download(NODE, 0x1017, 0, &HEARTBEAT.to_le_bytes())?;
+        moving.run(0.3)?;
+        match moving.bench.board().drivetrain().is_switching() {
+            true => Ok(moving),
+            false => Err(format!("the bridge does not switch:\n{}", moving.bench.log()).into()),
+        }
+    }
+
+    /// Moves on.
+    ///
+    /// # Errors
+    /// The run ended.
+    pub fn run(&mut self, seconds: f64) -> Result<(), Failed> {
+        for _ in 0..(seconds / SET_POINT).round() as u32 {
+            self.set_point()?;
+        }
+        Ok(())
+    }
+
+    /// A set-point, and the time up to the next.
+    fn set_point(&mut self) -> Result<(), Failed> {
+        // The joint measures its currents' zeros first.
+        let [shutdown, switch_on, enable] = ENABLING;
+        let controlword = match self.period {
+            0..24 => shutdown,
+            24..28 => switch_on,
+            _ => enable,
+        };
+        let time = f64::from(self.period) * SET_POINT;
+        let velocity = self.amplitude * (TAU * time).sin();
+        let mut frame = controlword.to_le_bytes().to_vec();
+        frame.extend([VELOCITY, self.period as u8]);
+        frame.extend(((1e3 * velocity) as i32).to_le_bytes());
+        self.period += 1;
+        if !self.silent {
+            send(&mut self.bench.emulation, 0x300 + u16::from(NODE), &frame)?;
+        }
+        self.bench.run(SET_POINT)?;
+        self.heard.extend(heard(&mut self.bench.emulation));
+        Ok(())
+    }
+
+    /// Now.
+    pub fn now(&self) -> Instant {
+        self.bench.emulation.now()
+    }
+
+    /// Moves on until the bridge is off; for how long it has been on since `from`, s. None where it still is after so many seconds.
+    ///
+    /// # Errors
+    /// The run ended.
+    pub fn until_off(&mut self, from: Instant, seconds: f64) -> Result<Option<f64>, Failed> {
+        let end = from.0 + (seconds * 1e12) as u64;
+        loop {
+            if let Some(off) = self.bench.board().drivetrain().off_since().filter(|off| *off >= from) {
+                return Ok(Some((off.0 - from.0) as f64 * 1e-12));
+            }
+            if self.now().0 >= end {
+                return Ok(None);
+            }
+            self.set_point()?;
+        }
+    }
+
+    /// Codes of the EMCYs so far.
+    pub fn emergencies(&self) -> Vec<u16> {
+        let own = 0x80 + u16::from(NODE);
+        let codes = self.heard.iter().filter(|(id, _)| *id == own);
+        codes.filter_map(|(_, data)| Some(u16::from_le_bytes(*data.first_chunk()?))).collect()
+    }
+}

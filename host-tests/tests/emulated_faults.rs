@@ -1,0 +1,337 @@
+//! Something breaks while the flashed program moves the joint on the emulated board: the bridge is off in time, and the reason can be read.
+//!
+//! Times run from the instant at which the part breaks to the one at which the plant sees the last gate off. How long that may take and what is to be
+//! read stands in the table of docs/emulated-board.md, which the tests read. Each fault is brought in at several instants, anywhere in a
+//! control period, drawn by a fixed seed; the worst counts.
+//!
+//! Needs the target; where it is missing the tests are reported as ignored, by name; with `CI` set they run and fail.
+
+use emulator::board::{BG431BEsc1, MoteusR4, Wired};
+use emulator::chip::time::Instant;
+use emulator::cpu::{End, Watch};
+use emulator::program::Program;
+use host_tests::bare_metal::target_installed;
+use host_tests::emulated::Bench;
+use host_tests::emulated::bench::{SUPPLY, actuator, program};
+use host_tests::emulated::motion::{Moving, NODE, SET_POINT};
+use libtest_mimic::{Arguments, Failed, Trial};
+use node::SampleImage;
+use plant::actuator::{Channel, Failure, Fault, Phase};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// Where the limits stand.
+const DOCUMENT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/emulated-board.md");
+/// Instants at which a fault is brought in.
+const INSTANTS: usize = 6;
+/// The joint is at least so fast then, rad/s: what stands still shows little of what is broken.
+const MOVING: f64 = 0.8;
+/// How long the bus is disturbed, s.
+const DISTURBED: f64 = 0.4;
+/// Of the supply: what it rises to, what it falls to, and what is left of it where it is lost; the chip's regulators need more.
+const SURGE: f64 = 2.2;
+const SAG: f64 = 0.3;
+const LOST: f64 = 0.1;
+
+fn main() {
+    let arguments = Arguments::from_args();
+    let ignored = std::env::var_os("CI").is_none() && !target_installed();
+    let trials = vec![
+        Trial::test("moteus_r4_switches_off_in_time_and_says_why", moteus),
+        Trial::test("b_g431b_esc1_keeps_its_bridge_off_and_says_why", esc1),
+    ];
+    let trials = trials.into_iter().map(|trial| trial.with_ignored_flag(ignored)).collect();
+    libtest_mimic::run(&arguments, trials).exit();
+}
+
+/// A row of the document's table.
+struct Documented {
+    /// From the fault until the bridge is off, s.
+    within: f64,
+    /// Error codes, of which one is to be read over the bus.
+    codes: Vec<u16>,
+    /// What the log is to say.
+    log: Vec<String>,
+}
+
+/// The row of a fault.
+fn documented(board: &str, fault: &str) -> Result<Documented, Failed> {
+    let document = std::fs::read_to_string(DOCUMENT)?;
+    let mut row = document.lines().filter_map(|line| {
+        let cells: Vec<&str> = line.strip_prefix("| ")?.strip_suffix(" |")?.split(" | ").collect();
+        let [of, what, within, _, reason] = cells.as_slice() else { return None };
+        (*of == board && *what == fault).then_some((within.trim(), reason.trim()))
+    });
+    let (within, reason) =
+        row.next_back().ok_or_else(|| format!("docs/emulated-board.md has no row for {board}, {fault}"))?;
+    let words = reason.split([' ', ',']);
+    Ok(Documented {
+        within: within.parse::<f64>().map_or(0.0, |milliseconds| 1e-3 * milliseconds),
+        codes: words.filter_map(|word| u16::from_str_radix(word.strip_suffix('h')?, 16).ok()).collect(),
+        log: reason.split('`').skip(1).step_by(2).map(str::to_owned).collect(),
+    })
+}
+
+/// A fault, and how it is brought in: the instant from which on it is there.
+struct Broken {
+    name: &'static str,
+    bring: fn(&mut Moving, &Program) -> Result<Instant, Failed>,
+    /// How often it is brought in.
+    instants: usize,
+    /// From the fault to the last of what the joint has to say of it, s.
+    afterwards: f64,
+}
+
+/// Brought in at every instant; what there is to say is said at once.
+const fn broken(name: &'static str, bring: fn(&mut Moving, &Program) -> Result<Instant, Failed>) -> Broken {
+    Broken { name, bring, instants: INSTANTS, afterwards: 0.05 }
+}
+
+fn inject(moving: &mut Moving, fault: Fault) -> Result<Instant, Failed> {
+    moving.bench.board().drivetrain().actuator_mut().inject(fault)?;
+    Ok(moving.now())
+}
+
+/// Something on the board: no sensor, no lead, no supply.
+fn on_the_board(moving: &mut Moving, breaks: fn(&mut MoteusR4)) -> Instant {
+    breaks(moving.bench.board());
+    moving.now()
+}
+
+/// The source takes another voltage; from the instant on at which the supply is beyond the configuration's limits.
+fn supply(moving: &mut Moving, part: f64) -> Result<Instant, Failed> {
+    inject(moving, Fault::SourceVoltage(part * SUPPLY))?;
+    let (lowest, highest) = moving.configuration.limits.bus_voltage;
+    for _ in 0..100_000 {
+        let voltage = moving.bench.board().drivetrain().actuator().state().bus_voltage as f32;
+        if voltage < lowest || voltage > highest {
+            return Ok(moving.now());
+        }
+        moving.bench.run(2e-6)?;
+    }
+    Err("the supply stays within its limits".into())
+}
+
+/// The supply is gone, and with it the chip's, at once; it comes back later.
+fn lose_supply(moving: &mut Moving) -> Result<Instant, Failed> {
+    let lost = inject(moving, Fault::SourceVoltage(LOST * SUPPLY))?;
+    moving.bench.emulation.power_down();
+    moving.bench.board().drivetrain().actuator_mut().clear_faults();
+    moving.bench.emulation.power_up();
+    Ok(lost)
+}
+
+/// Nobody's frame comes through.
+fn disturb(moving: &mut Moving) -> Instant {
+    let now = moving.now();
+    moving.bench.board().line().disturb(Instant(now.0 + (DISTURBED * 1e12) as u64));
+    now
+}
+
+/// An instruction that branches to itself, where the program has none: the flash before its parameters is empty.
+fn trap<W: Wired>(bench: &mut Bench<W>, program: &Program) -> Result<u32, Failed> {
+    let place = program.symbol("__parameters_start").ok_or("the program names no parameters")?.address - 8;
+    match bench.emulation.cpu.bus.program(place, &[0xfe, 0xe7]) {
+        true => Ok(place),
+        false => Err("the flash ends before the parameters".into()),
+    }
+}
+
+/// The executor of the interrupt never comes back, and with it none that is less urgent.
+fn stall_interrupt_executor<W: Wired>(bench: &mut Bench<W>, program: &Program) -> Result<Instant, Failed> {
+    let place = trap(bench, program)?;
+    let executor = program.symbol("CRS").ok_or("the program has no executor in an interrupt")?;
+    let end = Instant(bench.emulation.now().0 + 50_000_000_000);
+    bench.emulation.cpu.set_watch(Some(Watch::new().stop_at(executor.address)));
+    match bench.emulation.run_until(end) {
+        Some(End::Reached { .. }) => {}
+        other => return Err(format!("the executor does not run: {other:?}").into()),
+    }
+    bench.emulation.cpu.set_watch(None);
+    bench.emulation.cpu.set_register(15, place);
+    Ok(bench.emulation.now())
+}
+
+/// The main loop never comes back.
+fn stall_main_loop<W: Wired>(bench: &mut Bench<W>, program: &Program) -> Result<Instant, Failed> {
+    let place = trap(bench, program)?;
+    let core = &mut bench.emulation.cpu;
+    while core.exception() != 0 {
+        if let Some(end) = core.step() {
+            return Err(end.to_string().into());
+        }
+    }
+    core.set_register(15, place);
+    Ok(bench.emulation.now())
+}
+
+const MOTEUS: [Broken; 15] = [
+    broken("motor lead open", |m, _| inject(m, Fault::PhaseOpen(Phase::B))),
+    broken("low side shorted", |m, _| inject(m, Fault::PhaseShorted(Phase::B))),
+    broken("current sensor off by 10 A", |m, _| inject(m, Fault::Sensor(Channel::CurrentA, Failure::Offset(10.0)))),
+    broken("encoder's line stuck low", |m, _| Ok(on_the_board(m, |board| board.inputs().encoder_line = Some(false)))),
+    broken("encoder silent", |m, _| Ok(on_the_board(m, |board| board.inputs().encoder_line = Some(true)))),
+    broken("encoder stuck", |m, _| inject(m, Fault::Sensor(Channel::Encoder, Failure::Stuck))),
+    broken("bridge's thermistor open", |m, _| Ok(on_the_board(m, |board| board.inputs().thermistor_open = true))),
+    broken("gate driver's fault line", |m, _| Ok(on_the_board(m, |board| board.inputs().driver_fault = true))),
+    broken("supply too high", |m, _| supply(m, SURGE)),
+    broken("supply sags", |m, _| supply(m, SAG)),
+    broken("supply lost", |m, _| lose_supply(m)),
+    Broken { afterwards: DISTURBED + 0.25, instants: 2, ..broken("bus disturbed", |m, _| Ok(disturb(m))) },
+    broken("set-points end", |m, _| {
+        m.silent = true;
+        Ok(m.now())
+    }),
+    broken("interrupt executor stands still", |m, program| stall_interrupt_executor(&mut m.bench, program)),
+    Broken { instants: 1, ..broken("main loop stands still", |m, program| stall_main_loop(&mut m.bench, program)) },
+];
+
+fn moteus() -> Result<(), Failed> {
+    let program = program(MoteusR4::NAME, env!("CARGO_TARGET_TMPDIR"))?;
+    let image = SampleImage::constant(1, 0.1);
+    let mut moving = Moving::start(&actuator(), &program, &image)?;
+    let mut random = ChaCha8Rng::seed_from_u64(1);
+    let mut moments = Vec::new();
+    for _ in 0..20 * INSTANTS {
+        if moments.len() == INSTANTS {
+            break;
+        }
+        moving.run(f64::from(random.random_range(2..12)) * SET_POINT)?;
+        let mut moment = moving.clone();
+        moment.bench.run(random.random_range(0.0..SET_POINT))?;
+        if moment.bench.board().drivetrain().actuator().state().joint.velocity.abs() > MOVING {
+            moments.push(moment);
+        }
+    }
+    if moments.len() < INSTANTS {
+        return Err(format!("the joint hardly moves:\n{}", moving.bench.log()).into());
+    }
+    let mut bad = Vec::new();
+    for broken in &MOTEUS {
+        let limits = documented(MoteusR4::NAME, broken.name)?;
+        let (mut times, mut reasons) = (Vec::new(), Vec::new());
+        for moment in moments.iter().take(broken.instants) {
+            match broken.happens(moment.clone(), &program, &limits) {
+                Ok((time, reason)) => {
+                    times.push(1e3 * time);
+                    if !reasons.contains(&reason) {
+                        reasons.push(reason);
+                    }
+                }
+                Err(error) => {
+                    let error = format!("{}: {}", broken.name, error.message().unwrap_or_default());
+                    println!("bad: {error}");
+                    bad.push(error);
+                }
+            }
+        }
+        let (least, most) = times.iter().fold((f64::MAX, 0.0f64), |(least, most), t| (least.min(*t), most.max(*t)));
+        let within = 1e3 * limits.within;
+        println!(
+            "| {} | {} | {within:.2} | {least:.3} to {most:.3} | {} |",
+            MoteusR4::NAME,
+            broken.name,
+            reasons.join("; ")
+        );
+    }
+    if bad.is_empty() { Ok(()) } else { Err(bad.join("\n").into()) }
+}
+
+impl Broken {
+    /// After how long the bridge was off, and what is to be read of it.
+    fn happens(&self, mut moving: Moving, program: &Program, limits: &Documented) -> Result<(f64, String), Failed> {
+        let said = moving.bench.log().len();
+        let from = (self.bring)(&mut moving, program)?;
+        let time = moving.until_off(from, limits.within + 0.1)?.ok_or("the bridge is still on")?;
+        let resets = moving.bench.emulation.resets().len();
+        let rest = self.afterwards - (moving.now().0 - from.0) as f64 * 1e-12;
+        moving.run(rest.max(0.05))?;
+        if moving.bench.board().drivetrain().is_switching() {
+            return Err("the bridge is on again".into());
+        }
+        let log = moving.bench.log().split_off(said);
+        let code = u16::from_le_bytes(*moving.bench.upload(NODE, 0x603F, 0)?.first_chunk().ok_or("603Fh is short")?);
+        let mut reason = String::new();
+        if !limits.codes.is_empty() {
+            let history = error_history(&mut moving.bench)?;
+            let sent = moving.emergencies();
+            if !limits.codes.contains(&code) || !sent.contains(&code) || !history.contains(&code) {
+                return Err(format!("603Fh is {code:04X}h, 1003h {history:04X?}, EMCYs {sent:04X?}").into());
+            }
+            reason = format!("{code:04X}h");
+        }
+        for text in &limits.log {
+            if !log.contains(text) {
+                return Err(format!("the log does not say \"{text}\", but:\n{log}").into());
+            }
+            reason = format!("{reason}`{text}`");
+        }
+        if resets > 1 || time > limits.within {
+            return Err(format!("off after {:.3} ms, {resets} resets, {reason}", 1e3 * time).into());
+        }
+        Ok((time, reason))
+    }
+}
+
+/// Codes in object 1003h, newest first.
+fn error_history(bench: &mut Bench<MoteusR4>) -> Result<Vec<u16>, Failed> {
+    let length = bench.upload(NODE, 0x1003, 0)?.first().copied().unwrap_or(0);
+    let code = |number| {
+        let entry = bench.upload(NODE, 0x1003, number)?;
+        Ok(u16::from_le_bytes(*entry.first_chunk().ok_or("an entry of 1003h is short")?))
+    };
+    (1..=length).map(code).collect()
+}
+
+/// What breaks on the other board, which has no bus: nobody enables its bridge.
+type OnEsc1 = (&'static str, fn(&mut Bench<BG431BEsc1>, &Program) -> Result<(), Failed>);
+
+fn inject_on_esc1(bench: &mut Bench<BG431BEsc1>, fault: Fault) -> Result<(), Failed> {
+    Ok(bench.board().drivetrain().actuator_mut().inject(fault)?)
+}
+
+const ESC1: [OnEsc1; 6] = [
+    ("current sensor off by 10 A", |b, _| inject_on_esc1(b, Fault::Sensor(Channel::CurrentA, Failure::Offset(10.0)))),
+    ("bridge's thermistor open", |bench, _| {
+        bench.board().inputs().thermistor_open = true;
+        Ok(())
+    }),
+    ("supply too high", |bench, _| inject_on_esc1(bench, Fault::SourceVoltage(SURGE * SUPPLY))),
+    ("supply sags", |bench, _| inject_on_esc1(bench, Fault::SourceVoltage(SAG * SUPPLY))),
+    ("supply lost", |bench, _| {
+        bench.emulation.power_down();
+        bench.emulation.power_up();
+        Ok(())
+    }),
+    ("interrupt executor stands still", |bench, program| stall_interrupt_executor(bench, program).map(drop)),
+];
+
+fn esc1() -> Result<(), Failed> {
+    let program = program(BG431BEsc1::NAME, env!("CARGO_TARGET_TMPDIR"))?;
+    let mut actuator = actuator();
+    // Without the index's noise around its zero.
+    actuator.sensors.encoder.zero = 0.5;
+    let mut started = Bench::with(BG431BEsc1::new, &actuator, &program)?;
+    started.run(0.3)?;
+    let mut bad = Vec::new();
+    for (name, breaks) in ESC1 {
+        let mut bench = started.clone();
+        let said = bench.log().len();
+        breaks(&mut bench, &program)?;
+        // A line of the log a second.
+        bench.run(1.3)?;
+        let log = bench.log().split_off(said);
+        let drivetrain = bench.board().drivetrain();
+        if drivetrain.is_switching() || drivetrain.off_since().is_some() {
+            bad.push(format!("{name}: the bridge was on"));
+        }
+        let documented = documented(BG431BEsc1::NAME, name)?;
+        for text in documented.log {
+            match log.contains(&text) {
+                true => println!("| {} | {name} | off | off | `{text}` |", BG431BEsc1::NAME),
+                false => bad.push(format!("{name}: the log does not say \"{text}\":\n{log}")),
+            }
+        }
+    }
+    if bad.is_empty() { Ok(()) } else { Err(bad.join("\n").into()) }
+}
