@@ -1,16 +1,15 @@
-//! Both boards' programs, as they are flashed, on the emulated boards: they start, control at their rate and within their period, see the
-//! supply, the rotor and the button, and answer on the bus.
+//! The boards' programs, as they are flashed, on the emulated boards: they start, control at their rate and within their period, see the
+//! supply, the rotor and the button.
 //!
 //! Needs the target; where it is missing the tests are reported as ignored, by name; with `CI` set they run and fail.
 
-use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired};
-use emulator::chip::fdcan::line::CanFrame;
-use emulator::emulation::Emulation;
-use emulator::program::Program;
-use emulator::rtt::Messages;
-use host_tests::bare_metal::{build, target_installed};
+#[allow(dead_code, reason = "each test uses its part")]
+mod bench;
+
+use bench::Bench;
+use emulator::board::{BG431BEsc1, MoteusR4, Wired};
+use host_tests::bare_metal::target_installed;
 use libtest_mimic::{Arguments, Failed, Trial};
-use plant::ActuatorParameters;
 use plant::actuator::Fault;
 
 /// Exception of the control interrupt, ADC1_2: interrupt 18 of both chips.
@@ -26,69 +25,11 @@ fn main() {
         Trial::test("b_g431b_esc1_is_ready_once_its_encoder_has_met_the_index", esc1_index),
         Trial::test("b_g431b_esc1_keeps_the_bridge_off_after_the_button", esc1_button),
         Trial::test("moteus_r4_starts_and_controls", moteus_starts),
-        Trial::test("moteus_r4_takes_a_node_id_and_answers", moteus_bus),
+        Trial::test("b_g431b_esc1_with_the_bus_starts_and_controls", esc1_bus_starts),
         Trial::test("a_supply_out_of_range_is_a_fault_on_both", supply),
     ];
     let trials = trials.into_iter().map(|trial| trial.with_ignored_flag(ignored)).collect();
     libtest_mimic::run(&arguments, trials).exit();
-}
-
-/// A board with its program, on a bench supply.
-struct Bench<W: Wired> {
-    emulation: Emulation<W>,
-    messages: Messages,
-    bytes: Vec<u8>,
-}
-
-impl<W: Wired> Bench<W> {
-    fn new(board: impl FnOnce(Drivetrain) -> W) -> Result<Self, Failed> {
-        let mut parameters = ActuatorParameters::reference().aligned().without_payload();
-        parameters.bus.source_voltage = 18.0;
-        let program = Program::parse(std::fs::read(build(W::NAME, env!("CARGO_TARGET_TMPDIR"))?)?)
-            .map_err(|error| format!("{error:?}"))?;
-        let emulation = Emulation::new(board(Drivetrain::new(parameters, 25.0, 1)?), &program)?;
-        let messages = Messages::of(&program)?.ok_or("the program logs without defmt")?;
-        Ok(Self { emulation, messages, bytes: Vec::new() })
-    }
-
-    /// Runs on; whatever ends the run before is an error.
-    fn run(&mut self, seconds: f64) -> Result<(), Failed> {
-        let parts = (seconds / 0.02).ceil();
-        for _ in 0..parts as u32 {
-            let end = self.emulation.run(seconds / parts);
-            // The buffer of the log is small.
-            self.bytes.extend(self.emulation.log());
-            if let Some(end) = end {
-                return Err(format!("after {:.6} s: {end}", self.emulation.now().seconds()).into());
-            }
-        }
-        Ok(())
-    }
-
-    /// The log so far.
-    fn log(&self) -> String {
-        let messages = self.messages.decoder().decode(&self.bytes);
-        messages.iter().map(|message| format!("{}\n", message.text)).collect()
-    }
-
-    /// What the log says of the joint, last of all.
-    fn state(&self) -> String {
-        let log = self.log();
-        let line = log.lines().rfind(|line| line.starts_with("joint: ")).unwrap_or_default();
-        line.trim_start_matches("joint: ").split(',').next().unwrap_or_default().to_owned()
-    }
-
-    fn expect(&self, what: &str) -> Result<(), Failed> {
-        match self.log().contains(what) {
-            true => Ok(()),
-            false => Err(format!("the log does not say \"{what}\":\n{}", self.log()).into()),
-        }
-    }
-
-    /// The board's own part of the plant and of the bus.
-    fn board(&mut self) -> &mut W {
-        self.emulation.cpu.bus.wiring_mut()
-    }
 }
 
 /// It starts once, controls once a period and within it, and reports neither faults nor overruns.
@@ -120,6 +61,10 @@ fn starts<W: Wired>(bench: &mut Bench<W>, rate: u32, idle: &str) -> Result<(), F
 
 fn esc1_starts() -> Result<(), Failed> {
     starts(&mut Bench::new(BG431BEsc1::new)?, 20_000, "not ready to switch on")
+}
+
+fn esc1_bus_starts() -> Result<(), Failed> {
+    starts(&mut Bench::of("b-g431b-esc1-bus", BG431BEsc1::new)?, 20_000, "not ready to switch on")
 }
 
 fn moteus_starts() -> Result<(), Failed> {
@@ -169,40 +114,4 @@ fn supply() -> Result<(), Failed> {
     }
     over(Bench::new(BG431BEsc1::new)?)?;
     over(Bench::new(MoteusR4::new)?)
-}
-
-/// CiA 305: a new node is silent until LSS gives it a node id. Then it boots and answers.
-fn moteus_bus() -> Result<(), Failed> {
-    let mut bench = Bench::new(MoteusR4::new)?;
-    bench.run(0.2)?;
-    let mut exchange = |id: u32, data: [u8; 8]| -> Result<Vec<(u32, [u8; 8])>, Failed> {
-        let frame = CanFrame::standard(id, &data).ok_or("no such frame")?;
-        let now = bench.emulation.now();
-        bench.board().line().send(now, frame);
-        bench.emulation.cpu.bus.wiring_changed();
-        bench.run(0.02)?;
-        let line = bench.board().line();
-        Ok(std::iter::from_fn(|| line.receive()).map(|(_, frame)| (frame.id, frame.data)).collect())
-    };
-    const LSS: u32 = 0x7E5;
-    let silent = exchange(0x605, [0x40, 0, 0x10, 0, 0, 0, 0, 0])?;
-    if !silent.is_empty() {
-        return Err(format!("a node without a node id sends {silent:x?}").into());
-    }
-    // All nodes to configuration; node id 5; back to waiting.
-    exchange(LSS, [0x04, 1, 0, 0, 0, 0, 0, 0])?;
-    let taken = exchange(LSS, [0x11, 5, 0, 0, 0, 0, 0, 0])?;
-    if taken != [(0x7E4, [0x11, 0, 0, 0, 0, 0, 0, 0])] {
-        return Err(format!("answer to the node id: {taken:x?}").into());
-    }
-    let booted = exchange(LSS, [0x04, 0, 0, 0, 0, 0, 0, 0])?;
-    if !booted.contains(&(0x705, [0; 8])) {
-        return Err(format!("no boot-up message: {booted:x?}").into());
-    }
-    // Device type of a servo drive, by SDO.
-    let answer = exchange(0x605, [0x40, 0, 0x10, 0, 0, 0, 0, 0])?;
-    match answer.contains(&(0x585, [0x43, 0, 0x10, 0, 0x92, 0x01, 0x02, 0])) {
-        true => Ok(()),
-        false => Err(format!("answer to 1000h: {answer:x?}").into()),
-    }
 }

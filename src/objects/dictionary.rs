@@ -16,6 +16,7 @@ use super::{history, table};
 use crate::canopen::{Abort, Access, CommunicationParameters, Entry, Event, Group, Length, NmtState, ObjectDictionary};
 use crate::joint::configuration::Configuration;
 use crate::joint::state_machine::State;
+use crate::motor::calibration::Calibration;
 use crate::parameters::authentication::{KEY, STAGING};
 use crate::parameters::life_cycle::{Action, LifeCycle, Refusal};
 use crate::parameters::slots::SlotError;
@@ -262,7 +263,9 @@ impl<'a, P: Program> Objects<'a, P> {
         Ok(())
     }
 
-    /// Has the control step take a configuration.
+    /// Has the control step take a configuration. Functions of their own, here and below, because the stack has to bear their copies of records: not
+    /// beside the proof of an image.
+    #[inline(never)]
     fn configure(&mut self, configuration: &Configuration) -> Result<(), Abort> {
         match self.program.configure(configuration) {
             Ok(()) => {
@@ -282,6 +285,7 @@ impl<'a, P: Program> Objects<'a, P> {
         }
     }
 
+    #[inline(never)]
     fn command_configuration(&mut self, command: u32) -> Result<(), Abort> {
         match command {
             1 if self.armed() => Err(Abort::DEVICE_STATE),
@@ -299,6 +303,7 @@ impl<'a, P: Program> Objects<'a, P> {
     }
 
     /// Begins a calibration, or gives it up.
+    #[inline(never)]
     fn calibrate(&mut self, current: f32) -> Result<(), Abort> {
         if current == 0.0 {
             self.program.abort_calibration();
@@ -322,16 +327,23 @@ impl<'a, P: Program> Objects<'a, P> {
     /// Has the control step take what a calibration found, once there is something. With settings that do not go with it, it is staged only,
     /// and 2100h says which one is refused.
     fn take_calibration(&mut self) {
-        let Some(found) = self.calibration.result(self.program.calibration()) else { return };
+        if let Some(found) = self.calibration.result(self.program.calibration()) {
+            self.take(&found);
+        }
+    }
+
+    #[inline(never)]
+    fn take(&mut self, found: &Calibration) {
         let temperature = self.observed.winding_temperature;
-        self.staged = self.staged.calibrated(&found, temperature);
-        let configuration = self.configuration.calibrated(&found, temperature);
+        self.staged = self.staged.calibrated(found, temperature);
+        let configuration = self.configuration.calibrated(found, temperature);
         // Where the control step has not taken the one before, in the next millisecond again.
         if self.configure(&configuration) != Err(Abort::DEVICE_STATE) {
             self.calibration.taken();
         }
     }
 
+    #[inline(never)]
     fn write_compensation(&mut self, setting: Setting, number: u32) -> Result<(), Abort> {
         let mut configuration = self.configuration;
         if !setting.set(&mut configuration, number) {
@@ -342,6 +354,7 @@ impl<'a, P: Program> Objects<'a, P> {
         Ok(())
     }
 
+    #[inline(never)]
     fn write_image(&mut self, field: ImageField, number: u32) -> Result<(), Abort> {
         let failures = self.images.life().failures();
         let result = match field {
@@ -359,9 +372,9 @@ impl<'a, P: Program> Objects<'a, P> {
         kept.map_err(|error| self.refuse(error.into()))
     }
 
-    /// A function of its own: the record is 2 KiB of stack.
+    /// A function of its own: the record is more than 1 KiB of stack.
     #[inline(never)]
-    fn store_record(&mut self, stored: Stored) -> Result<(), Abort> {
+    fn store_record(&mut self, stored: &Stored) -> Result<(), Abort> {
         if self.single_bank && self.armed() {
             return Err(Abort::DEVICE_STATE);
         }
@@ -369,7 +382,7 @@ impl<'a, P: Program> Objects<'a, P> {
         let length = stored.encode(&mut record).ok_or(Abort::MEMORY)?;
         let record = record.get(..length).ok_or(Abort::MEMORY)?;
         self.program.store(record).map_err(|error| self.refuse(error.into()))?;
-        self.stored = stored;
+        self.stored = *stored;
         Ok(())
     }
 }
@@ -453,8 +466,12 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
         result.map_err(|failure| self.fail(failure))
     }
 
+    #[inline(never)]
     fn finish(&mut self) -> Result<(), Abort> {
         if let Some(key) = self.images.finish().map_err(|failure| self.fail(failure))? {
+            if self.single_bank && self.armed() {
+                return Err(Abort::DEVICE_STATE);
+            }
             self.program.provision(&key).map_err(|error| self.refuse(error.into()))?;
             self.images.set_key(key);
         }
@@ -465,6 +482,7 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
         self.images.abandon();
     }
 
+    #[inline(never)]
     fn store(&mut self, group: Group, communication: &CommunicationParameters) -> Result<(), Abort> {
         let mut stored = self.stored;
         if matches!(group, Group::All | Group::Application) {
@@ -473,9 +491,10 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
         if matches!(group, Group::All | Group::Communication) {
             stored.communication = Some((self.node_id.get(), *communication));
         }
-        self.store_record(stored)
+        self.store_record(&stored)
     }
 
+    #[inline(never)]
     fn restore(&mut self, group: Group) -> Result<(), Abort> {
         let mut stored = self.stored;
         if matches!(group, Group::All | Group::Application) {
@@ -484,16 +503,18 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
         if matches!(group, Group::All | Group::Communication) {
             stored.communication = None;
         }
-        self.store_record(stored)
+        self.store_record(&stored)
     }
 
+    #[inline(never)]
     fn store_node_id(&mut self, node_id: u8) -> Result<(), Abort> {
-        self.store_record(Stored { node_id, ..self.stored })?;
+        self.store_record(&Stored { node_id, ..self.stored })?;
         self.configuration.node_id = node_id;
         self.staged.node_id = node_id;
         Ok(())
     }
 
+    #[inline(never)]
     fn communication_parameters(&self, node_id: u8) -> CommunicationParameters {
         self.node_id.set(node_id);
         match self.stored.communication {

@@ -423,6 +423,10 @@ impl LifeCycle {
         if conditions.key.is_some() && left > 0 {
             return Err(Refusal::LockedOut { left, failures: self.failures });
         }
+        // A wrong tag is counted in flash before the client is answered.
+        if conditions.single_bank && conditions.armed && conditions.key.is_some() {
+            return Err(Refusal::Armed { command: Command::Verify });
+        }
         let upload = staging.get(..length).ok_or(Refusal::UploadTooLong { length })?;
         if !verification::authentic(upload, conditions.key)? {
             self.failures = self.failures.saturating_add(1);

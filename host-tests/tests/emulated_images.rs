@@ -1,0 +1,149 @@
+//! A friction image on its way into a board's program, as it is flashed, on the emulated boards: the board is silent until LSS gives it a node id, takes
+//! the image by block download, proves it, stores it, and starts with it again. How deep the stack got on the way is held against what it has.
+//!
+//! Needs the target; where it is missing the tests are reported as ignored, by name; with `CI` set they run and fail.
+
+#[allow(dead_code, reason = "each test uses its part")]
+mod bench;
+
+use bench::Bench;
+use bench::client::NODE;
+use bus::client::cob_id;
+use bus::client::sdo::Method;
+use emulator::board::{BG431BEsc1, MoteusR4, Wired};
+use emulator::cpu::Origin;
+use host_tests::bare_metal::target_installed;
+use host_tests::image_bytes::encoded;
+use host_tests::parameters::{image, tame};
+use joint_firmware::parameters::certificate::prove;
+use joint_firmware::parameters::image::MAX_GOLDEN;
+use libtest_mimic::{Arguments, Failed, Trial};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+
+/// Version of the image.
+const VERSION: u32 = 7;
+/// Least number of parameter sets in it, all of them with networks: what takes the most stack, time and room.
+const SETS: usize = 4;
+/// What a joint's own configuration permits, Nm and Nm/Nm in Q16.16.
+const OUTPUT: u32 = 5 << 16;
+const TORQUE_GAIN: u32 = 1 << 16;
+/// States and commands of 2212h.
+const VERIFY: u8 = 1;
+const COMMIT: u8 = 3;
+const ACTIVE: u32 = 7;
+
+fn main() {
+    let arguments = Arguments::from_args();
+    let ignored = std::env::var_os("CI").is_none() && !target_installed();
+    let trials = vec![
+        Trial::test("b_g431b_esc1_takes_an_image_and_starts_with_it", || {
+            takes_an_image(Bench::of("b-g431b-esc1-bus", BG431BEsc1::new)?)
+        }),
+        Trial::test("moteus_r4_takes_an_image_and_starts_with_it", || takes_an_image(Bench::new(MoteusR4::new)?)),
+        Trial::test("b_g431b_esc1_refuses_an_image_that_computes_otherwise", || {
+            refuses_an_image(Bench::of("b-g431b-esc1-bus", BG431BEsc1::new)?)
+        }),
+    ];
+    let trials = trials.into_iter().map(|trial| trial.with_ignored_flag(ignored)).collect();
+    libtest_mimic::run(&arguments, trials).exit();
+}
+
+/// The first image of a seed that a joint would take, with as many sets as there can be.
+fn sample() -> joint_firmware::parameters::image::Image {
+    let mut random = ChaCha8Rng::seed_from_u64(11);
+    loop {
+        let parameters = tame(&mut random);
+        let sets = parameters.sets.iter().filter(|set| set.network.is_some()).count();
+        let fits = |proved: joint_firmware::parameters::certificate::Certificate| {
+            proved.output <= OUTPUT && proved.torque_gain <= TORQUE_GAIN
+        };
+        if sets < SETS || !prove(&parameters).is_ok_and(fits) {
+            continue;
+        }
+        let mut image = image(&mut random, parameters, MAX_GOLDEN);
+        image.version = VERSION;
+        return image;
+    }
+}
+
+/// Silent without a node id, then part of the bus.
+fn take_part<W: Wired>(bench: &mut Bench<W>) -> Result<(), Failed> {
+    bench.run(0.2)?;
+    let silent = bench.exchange(cob_id::SDO_RECEIVE | u16::from(NODE), &[0x40, 0, 0x10, 0, 0, 0, 0, 0], 0.02)?;
+    if !silent.is_empty() {
+        return Err(format!("a node without a node id sends {silent:x?}").into());
+    }
+    bench.take_part()?;
+    // Device type of a servo drive.
+    expect("device type", bench.number(0x1000, 0)?, 0x0002_0192)
+}
+
+fn takes_an_image<W: Wired>(mut bench: Bench<W>) -> Result<(), Failed> {
+    let image = sample();
+    let bytes = encoded(&image);
+    take_part(&mut bench)?;
+    expect("version before", bench.number(0x2213, 1)?, 0)?;
+    bench.download(0x2210, 0, &bytes, Method::Block)?;
+    bench.download(0x2212, 1, &[VERIFY], Method::Automatic)?;
+    expect("result of verification", bench.number(0x2212, 3)?, 0)?;
+    bench.download(0x2212, 1, &[COMMIT], Method::Automatic)?;
+    for _ in 0..100 {
+        if bench.number(0x2212, 2)? == ACTIVE {
+            break;
+        }
+        bench.run(0.01)?;
+    }
+    expect("state", bench.number(0x2212, 2)?, ACTIVE)?;
+    expect("version", bench.number(0x2213, 1)?, VERSION)?;
+    // Everything that is stored beside images takes the same way through the SDO server.
+    bench.download(0x1010, 1, b"save", Method::Automatic)?;
+
+    // Whatever it learned before, it has from flash now.
+    let booted = bench.exchange(cob_id::NMT, &[0x81, NODE], 0.5)?;
+    bench.has_booted(&booted)?;
+    match bench.emulation.resets() {
+        [(_, Origin::Program)] => {}
+        resets => return Err(format!("{resets:?}\n{}", bench.log()).into()),
+    }
+    expect("version after the restart", bench.number(0x2213, 1)?, VERSION)?;
+    let read = bench.upload(0x2211, 0, Method::Block)?;
+    if read != bytes {
+        return Err(format!("{} other bytes than the {} stored", read.len(), bytes.len()).into());
+    }
+    if bench.log().contains("overruns: 0").then_some(()).is_none() && bench.log().contains("overruns") {
+        return Err(format!("control steps were missed:\n{}", bench.log()).into());
+    }
+    let (used, region) = bench.stack()?;
+    println!("{}: {used} of {region} B of stack used", W::NAME);
+    match used + MARGIN <= region {
+        true => Ok(()),
+        false => Err(format!("{used} of {region} B of stack used").into()),
+    }
+}
+
+/// Bytes of stack that nothing has touched: an exception's frame, twice.
+const MARGIN: u32 = 2 * 104;
+
+/// The golden vectors are evaluated on the device: one bit of one of them is enough.
+fn refuses_an_image<W: Wired>(mut bench: Bench<W>) -> Result<(), Failed> {
+    let mut image = sample();
+    let vector = image.golden.last_mut().ok_or("no golden vector")?;
+    vector.expected.physical = joint_firmware::quantity::Torque::from_bits(vector.expected.physical.to_bits() ^ 1);
+    take_part(&mut bench)?;
+    bench.download(0x2210, 0, &encoded(&image), Method::Block)?;
+    match bench.download(0x2212, 1, &[VERIFY], Method::Automatic) {
+        // Cannot be stored (CiA 301, abort codes).
+        Err(refused) if refused.message().is_some_and(|text| text.contains("08000020") || text.contains("134217760")) => {}
+        other => return Err(format!("verified: {other:?}").into()),
+    }
+    expect("state", bench.number(0x2212, 2)?, 1)?;
+    expect("version", bench.number(0x2213, 1)?, 0)
+}
+
+fn expect(what: &str, found: u32, expected: u32) -> Result<(), Failed> {
+    match found == expected {
+        true => Ok(()),
+        false => Err(format!("{what}: {found:#x} instead of {expected:#x}").into()),
+    }
+}
