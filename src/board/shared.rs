@@ -136,9 +136,9 @@ impl<T> Offering<T> {
         let place = unsafe { &mut *self.places.get().cast::<MaybeUninit<T>>().add(place) };
         let address = place.as_ptr();
         Some(match make(place) {
+            // Another value than the one in the place would leave that without one.
+            Ok(value) if !core::ptr::eq(value, address) => return None,
             Ok(value) => {
-                // Another value than the one in the place would leave that without one.
-                assert!(core::ptr::eq(value, address));
                 finish(value, in_use);
                 Ok(Prepared { value, preparer: &mut self.preparer })
             }

@@ -62,13 +62,13 @@ impl<W: Wired> Bench<W> {
 
     /// Writes an object.
     pub fn download(&mut self, index: u16, sub_index: u8, data: &[u8], method: Method) -> Result<(), Failed> {
-        let transfer = Transfer::download(Object { index, sub_index }, data, method, Settings::default());
+        let transfer = Transfer::download(Object { node: NODE, index, sub_index }, data, method, Settings::default());
         self.transfer(transfer).map(drop)
     }
 
     /// Reads an object.
     pub fn upload(&mut self, index: u16, sub_index: u8, method: Method) -> Result<Vec<u8>, Failed> {
-        self.transfer(Transfer::upload(Object { index, sub_index }, method, Settings::default()))
+        self.transfer(Transfer::upload(Object { node: NODE, index, sub_index }, method, Settings::default()))
     }
 
     /// Reads a number.

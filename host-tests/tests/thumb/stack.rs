@@ -90,7 +90,10 @@ impl<'a> Stack<'a> {
             }
             None => {}
         }
-        if ["rust_begin_unwind", "9panicking", "panic_already"].iter().any(|end| name.contains(end)) {
+        if ["rust_begin_unwind", "9panicking", "panic_already", "6faults10reset_with"]
+            .iter()
+            .any(|end| name.contains(end))
+        {
             return Depth::default();
         }
         self.depths.insert(start, None);

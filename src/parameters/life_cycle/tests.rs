@@ -205,6 +205,20 @@ fn one_bank_is_written_with_the_motor_off_two_at_any_time() {
 }
 
 #[test]
+fn one_bank_counts_wrong_tags_with_the_motor_off() {
+    let mut joint = Joint::new();
+    joint.key = Some(key());
+    joint.upload(&encoded(&image(1)));
+    joint.armed = true;
+    assert_eq!(joint.command(Command::Verify), Err(Refusal::Armed { command: Command::Verify }));
+    assert_eq!(joint.life.failures(), 0);
+    joint.single_bank = false;
+    assert_eq!(joint.command(Command::Verify), Err(Refusal::TagMissing));
+    (joint.single_bank, joint.armed) = (true, false);
+    assert_eq!(joint.command(Command::Verify), Err(Refusal::TagMissing));
+}
+
+#[test]
 fn rolling_back_goes_past_the_floor_and_leaves_it() {
     let mut joint = Joint::new();
     joint.life = LifeCycle::new(REQUIREMENTS, 9, 0, 0);
