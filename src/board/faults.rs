@@ -99,10 +99,7 @@ pub fn torn_words() -> u32 {
     TORN_WORDS.load(Ordering::Relaxed)
 }
 
-/// Inlined into what all panics end in: where the compiler sees the whole program, it finds that nobody reads their messages, and leaves out what would
-/// format them.
 #[panic_handler]
-#[inline(always)]
 fn panic(info: &PanicInfo) -> ! {
     super::bridge_off();
     cortex_m::interrupt::disable();
