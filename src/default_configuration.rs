@@ -11,12 +11,15 @@ use crate::joint::configuration::{
     MotorConfiguration, ThermalConfiguration, VelocitySource,
 };
 use crate::motor::angle::{Direction, ElectricalAngle, EncoderAlignment};
+use crate::sensors::analog::Analog;
 
 /// What a board brings, and the joint that it is until a configuration says otherwise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoardConfiguration {
     /// The bridge and its timing.
     pub bridge: BridgeConfiguration,
+    /// Its amplifiers and dividers.
+    pub analog: Analog,
     /// The joint, not commissioned.
     pub joint: Configuration,
 }
@@ -31,6 +34,15 @@ pub const B_G431B_ESC1: BoardConfiguration = BoardConfiguration {
         dead_time_band: 1.0,
         has_bridge_sensor: true,
         has_winding_sensor: false,
+    },
+    analog: Analog {
+        // Derived: 3.3 V / 4096 / (3 mOhm * 64/7); F, O. Codes fall with a current into the motor: the sense resistor lies
+        // between the low side and ground, and the low side conducts when the current is sampled. The sign is unconfirmed.
+        amperes_per_code: -0.029_38,
+        // Derived: about 2.06 V. The joint's calibration finds each phase's own.
+        current_zero: 2_557.0,
+        // Divider of 169 kOhm and 18 kOhm (N, K, R), at a reference of 3.3 V.
+        volts_per_code: 3.3 / 4_095.0 * (169.0 + 18.0) / 18.0,
     },
     joint: uncommissioned((8.0, 25.0), 0.0),
 };
@@ -48,11 +60,20 @@ pub const MOTEUS_R4: BoardConfiguration = BoardConfiguration {
         has_bridge_sensor: true,
         has_winding_sensor: false,
     },
+    analog: Analog {
+        // Derived: 3.3 V / 4096 / (0.5 mOhm * 20). The amplifier's output rises with a current into the motor (derived from
+        // the driver's datasheet and the place of the resistors; sign unconfirmed).
+        amperes_per_code: 0.0806,
+        // Half the reference. The joint's calibration finds each phase's own.
+        current_zero: 2_048.0,
+        // Divider of 100 kOhm and 4.7 kOhm.
+        volts_per_code: 0.017_947,
+    },
     joint: uncommissioned((10.0, 30.0), 2.0 / MOTEUS_R4_RATE),
 };
 
 /// Control steps a second, Hz.
-const MOTEUS_R4_RATE: f32 = 40_000.0;
+const MOTEUS_R4_RATE: f32 = 31_250.0;
 
 /// A joint that nobody has described, at a lowest and highest supply, V, with an encoder whose samples are so old, s.
 const fn uncommissioned(bus_voltage: (f32, f32), encoder_latency: f32) -> Configuration {

@@ -61,10 +61,10 @@ pub fn smuad(a: u32, b: u32) -> i32 {
     smlad(a, b, 0)
 }
 
-/// `value` shifted right by `distance` with its sign; 32 and more leave nothing but the sign.
+/// `value` shifted right by the lowest byte of `distance` with its sign; 32 and more leave nothing but the sign.
 #[cfg(target_arch = "arm")]
 #[inline(always)]
-pub fn asr(value: i32, distance: u8) -> i32 {
+pub fn asr(value: i32, distance: u32) -> i32 {
     let shifted;
     // SAFETY: as for `smlad`; the instruction looks at the lowest byte of the distance's register.
     unsafe {
@@ -72,18 +72,18 @@ pub fn asr(value: i32, distance: u8) -> i32 {
             "asr.w {shifted}, {value}, {distance}",
             shifted = lateout(reg) shifted,
             value = in(reg) value,
-            distance = in(reg) u32::from(distance),
+            distance = in(reg) distance,
             options(pure, nomem, nostack, preserves_flags)
         );
     }
     shifted
 }
 
-/// `value` shifted right by `distance` with its sign; 32 and more leave nothing but the sign.
+/// `value` shifted right by the lowest byte of `distance` with its sign; 32 and more leave nothing but the sign.
 #[cfg(not(target_arch = "arm"))]
 #[inline(always)]
-pub fn asr(value: i32, distance: u8) -> i32 {
-    value >> distance.min(31)
+pub fn asr(value: i32, distance: u32) -> i32 {
+    value >> (distance & 0xff).min(31)
 }
 
 /// `accumulator + floor(a b / 2^32)`; wraps.
@@ -104,6 +104,60 @@ pub fn pkhtb(first: i32, second: i32) -> u32 {
     (second as u32 & 0xffff_0000) | (first as u32 >> 16)
 }
 
+/// The lower half of a word with `HIGH` as its upper one.
+///
+/// The portable form is two instructions: the compiler keeps the constant in a register, or has to make it.
+#[cfg(target_arch = "arm")]
+#[inline(always)]
+pub fn movt<const HIGH: u16>(word: u32) -> u32 {
+    let mut packed = word;
+    // SAFETY: as for `smlad`.
+    unsafe {
+        core::arch::asm!(
+            "movt {packed}, #{high}",
+            packed = inout(reg) packed,
+            high = const HIGH,
+            options(pure, nomem, nostack, preserves_flags)
+        );
+    }
+    packed
+}
+
+/// The lower half of a word with `HIGH` as its upper one.
+#[cfg(not(target_arch = "arm"))]
+#[inline(always)]
+pub fn movt<const HIGH: u16>(word: u32) -> u32 {
+    word & 0xffff | u32::from(HIGH) << 16
+}
+
+/// The word of a table at `step` from its middle, held at the table's ends.
+///
+/// Addressed from the middle: the compiler would add half the table's length to every step.
+#[cfg(target_arch = "arm")]
+#[inline(always)]
+fn at_step(table: &[i32; TABLE_LEN], step: i32) -> i32 {
+    let middle = table.as_ptr().wrapping_add(TABLE_LEN / 2);
+    let word;
+    // SAFETY: a load from the table: the step is held in -256..=255, and the middle is its 256th word.
+    unsafe {
+        core::arch::asm!(
+            "ldr {word}, [{middle}, {step}, lsl #2]",
+            word = lateout(reg) word,
+            middle = in(reg) middle,
+            step = in(reg) step.clamp(-256, 255),
+            options(pure, readonly, nostack, preserves_flags)
+        );
+    }
+    word
+}
+
+/// The word of a table at `step` from its middle, held at the table's ends.
+#[cfg(not(target_arch = "arm"))]
+#[inline(always)]
+fn at_step(table: &[i32; TABLE_LEN], step: i32) -> i32 {
+    table[(step.clamp(-256, 255) + 256) as usize & (TABLE_LEN - 1)]
+}
+
 /// Words in an interpolation table.
 pub const TABLE_LEN: usize = 512;
 
@@ -114,10 +168,8 @@ pub const TABLE_LEN: usize = 512;
 /// last word is used, whose slope must be zero. Reads no memory outside the table for any `x`.
 #[inline(always)]
 pub fn interpolate(table: &[i32; TABLE_LEN], x: i32) -> i32 {
-    let step = (x >> 20).clamp(-256, 255);
+    let word = at_step(table, x >> 20);
     let fraction = (x >> 8) & 0xfff;
-    let index = (step + 256) as usize;
-    let word = table[index & (TABLE_LEN - 1)];
     word.wrapping_add((word as i16 as i32) * fraction)
 }
 
@@ -145,7 +197,7 @@ pub fn interpolate_product<const SHIFT: u32>(table: &[i32; TABLE_LEN], product: 
     let step = (product >> 32) as i32 >> (SHIFT - 12);
     let fraction = (product >> (SHIFT + 8)) as i32 & 0xfff;
     // Where holding would have changed something, the ends' slopes are zero, and any fraction will do.
-    let word = table[(step.clamp(-256, 255) + 256) as usize & (TABLE_LEN - 1)];
+    let word = at_step(table, step);
     word.wrapping_add((word as i16 as i32) * fraction)
 }
 
@@ -253,8 +305,8 @@ mod tests {
         }
 
         #[test]
-        fn a_shift_is_a_division_rounded_down(value: i32, distance: u8) {
-            let exact = value as i64 >> distance.min(63);
+        fn a_shift_is_a_division_rounded_down(value: i32, distance: u32) {
+            let exact = value as i64 >> (distance & 0xff).min(63);
             prop_assert_eq!(asr(value, distance) as i64, exact);
         }
 
@@ -269,6 +321,7 @@ mod tests {
             let word = pkhtb(first, second);
             prop_assert_eq!(word as i16 as i32, first >> 16);
             prop_assert_eq!((word as i32) >> 16, second >> 16);
+            prop_assert_eq!(movt::<0x7fff>(word), word & 0xffff | 0x7fff_0000);
         }
     }
 

@@ -1,4 +1,4 @@
-//! The boards' programs, built as they are flashed, and whether that is possible on this machine.
+//! The boards' programs, built as they are flashed, those of the probe, built in the same way, and whether that is possible on this machine.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -15,6 +15,63 @@ pub fn target_installed() -> bool {
     })
 }
 
+/// How a board's program is compiled.
+pub struct Board {
+    /// Its feature.
+    pub name: &'static str,
+    /// Optimisation, as in `.cargo/config.toml` and the board's own file beside it.
+    pub level: &'static str,
+}
+
+/// The boards.
+pub const BOARDS: [Board; 2] = [Board { name: "b-g431b-esc1", level: "s" }, Board { name: "moteus-r4", level: "2" }];
+
+impl Board {
+    /// Builds a program of `probe/src/bin` as this board's is, below a test's temporary folder; its path. `input` is a variable of the program's
+    /// build, and the file that it names; `features` are the
+    /// probe's.
+    ///
+    /// # Errors
+    /// What the compiler says.
+    pub fn probe(
+        &self,
+        program: &str,
+        input: Option<(&str, &[u8])>,
+        features: &[&str],
+        temporary: &str,
+    ) -> Result<PathBuf, String> {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("probe");
+        let target = Path::new(temporary).join("probe-as").join(self.name);
+        std::fs::create_dir_all(&target).map_err(|error| error.to_string())?;
+        let flags =
+            "-C linker=rust-lld -C link-arg=--nmagic -C target-cpu=cortex-m4 -C linker-plugin-lto -C codegen-units=1";
+        let flags = format!("{flags} -C opt-level={} -C link-arg=-T{}", self.level, folder.join("link.x").display());
+        let mut command = cargo();
+        command.args(["build", "--profile", "board", "--bin", program, "--target", TARGET]);
+        command.args(["--features", &features.join(",")]);
+        command.current_dir(&folder).env("CARGO_TARGET_DIR", &target).env("RUSTFLAGS", flags);
+        if let Some((variable, bytes)) = input {
+            let file = target.join(format!("{program}.bin"));
+            std::fs::write(&file, bytes).map_err(|error| error.to_string())?;
+            command.env(variable, file);
+        }
+        run(command)?;
+        Ok(target.join(TARGET).join("board").join(program))
+    }
+}
+
+fn cargo() -> Command {
+    Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+}
+
+fn run(mut command: Command) -> Result<(), String> {
+    let output = command.output().map_err(|error| error.to_string())?;
+    match output.status.success() {
+        true => Ok(()),
+        false => Err(String::from_utf8_lossy(&output.stderr).into_owned()),
+    }
+}
+
 /// Builds a program as it is flashed, below a test's temporary folder; its path. It is called as its board, with `-bus` behind it where that is a
 /// choice.
 ///
@@ -26,16 +83,11 @@ pub fn build(program: &str, temporary: &str) -> Result<PathBuf, String> {
     let own = format!(".cargo/{program}.toml");
     let own = root.join(&own).exists().then_some(["--config".to_owned(), own]);
     let features = program.strip_suffix("-bus").map_or(program.to_owned(), |board| format!("{board},bus"));
-    let output = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
-        .args(own.into_iter().flatten())
-        .args(["build", "--release", "-p", "joint-firmware", "--target", TARGET])
-        .args(["--no-default-features", "--features", &features])
-        .current_dir(root)
-        .env("CARGO_TARGET_DIR", &target)
-        .output();
-    let output = output.map_err(|error| error.to_string())?;
-    if !output.status.success() {
-        return Err(String::from_utf8_lossy(&output.stderr).into_owned());
-    }
+    let mut command = cargo();
+    command.args(own.into_iter().flatten());
+    command.args(["build", "--release", "-p", "joint-firmware", "--target", TARGET]);
+    command.args(["--no-default-features", "--features", &features]);
+    command.current_dir(root).env("CARGO_TARGET_DIR", &target);
+    run(command)?;
     Ok(target.join(TARGET).join("release/joint-firmware"))
 }

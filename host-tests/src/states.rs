@@ -3,6 +3,7 @@
 use joint_firmware::friction::FrictionParameters;
 use joint_firmware::friction::domain::Range;
 use joint_firmware::friction::network::{INPUTS, NetworkParameters};
+use joint_firmware::friction::regime::{Criterion, Measure};
 use joint_firmware::friction::state::{SIGNALS, Signal};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -30,6 +31,48 @@ pub fn signals(random: &mut ChaCha8Rng, parameters: &FrictionParameters) -> [i32
         _ => {}
     }
     signals
+}
+
+/// [`signals`] and the velocity of a coupled joint. In one state of eight the joint stands; in one of four a criterion's measure is at one of its
+/// thresholds, or one step beside it; in one of sixteen a signal is two margins outside of its range, or one step beside that.
+pub fn coupled(random: &mut ChaCha8Rng, parameters: &FrictionParameters) -> ([i32; SIGNALS], i32) {
+    let mut signals = signals(random, parameters);
+    let mut other = match random.random_range(0..4) {
+        0 => random.random(),
+        1 => [0, 1, -1, i32::MIN, i32::MAX][random.random_range(0..5)],
+        _ => within(random, parameters.domain.ranges[Signal::Velocity as usize]),
+    };
+    match random.random_range(0..16) {
+        0..2 => signals[Signal::Velocity as usize] = 0,
+        2..6 => to_threshold(random, parameters, &mut signals, &mut other),
+        6 => {
+            let place = random.random_range(0..SIGNALS);
+            let margins = parameters.domain.margin.saturating_mul(2);
+            signals[place] = beside(random, parameters.domain.ranges[place].widened(margins));
+        }
+        _ => {}
+    }
+    (signals, other)
+}
+
+/// Moves what a criterion looks at to one of its thresholds.
+fn to_threshold(
+    random: &mut ChaCha8Rng,
+    parameters: &FrictionParameters,
+    signals: &mut [i32; SIGNALS],
+    other: &mut i32,
+) {
+    let criteria = &parameters.selector.criteria;
+    let Some(Criterion { measure, enter, leave }) = criteria[random.random_range(0..criteria.len())] else { return };
+    let threshold = if random.random() { enter } else { leave };
+    let wanted = threshold.saturating_add(random.random_range(-1..=1));
+    let way = if random.random() { 1 } else { -1 };
+    let velocity = signals[Signal::Velocity as usize];
+    match measure {
+        Measure::Acceleration => signals[Signal::Acceleration as usize] = wanted.saturating_mul(way),
+        Measure::Speed => signals[Signal::Velocity as usize] = wanted.saturating_mul(way),
+        Measure::Coupled => *other = velocity.saturating_abs().saturating_sub(wanted).saturating_mul(way),
+    }
 }
 
 /// Uniform in a range.

@@ -9,7 +9,6 @@
 //! operation is enabled: there flash is written only while the joint is held off.
 //! Needs the target; where it is missing the tests are reported as ignored, by name; with `CI` set they run and fail.
 
-#[allow(dead_code, reason = "each test uses its part")]
 mod thumb;
 
 use host_tests::bare_metal::{self, target_installed};

@@ -3,12 +3,10 @@
 //!
 //! Needs the target; where it is missing the tests are reported as ignored, by name; with `CI` set they run and fail.
 
-#[allow(dead_code, reason = "each test uses its part")]
-mod bench;
-
-use bench::Bench;
-use emulator::board::{BG431BEsc1, MoteusR4, Wired};
+use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired};
 use host_tests::bare_metal::target_installed;
+use host_tests::emulated::Bench;
+use host_tests::emulated::bench::{actuator, program};
 use libtest_mimic::{Arguments, Failed, Trial};
 use plant::actuator::Fault;
 
@@ -30,6 +28,18 @@ fn main() {
     ];
     let trials = trials.into_iter().map(|trial| trial.with_ignored_flag(ignored)).collect();
     libtest_mimic::run(&arguments, trials).exit();
+}
+
+/// A board with its program, on a bench supply.
+fn bench<W: Wired>(board: impl FnOnce(Drivetrain) -> W) -> Result<Bench<W>, Failed> {
+    Bench::new(board, &program(W::NAME, env!("CARGO_TARGET_TMPDIR"))?)
+}
+
+/// The B-G431B-ESC1 with its rotor half a turn from the encoder's index: on it, noise alone would reach the index.
+fn esc1(name: &str) -> Result<Bench<BG431BEsc1>, Failed> {
+    let mut actuator = actuator();
+    actuator.sensors.encoder.zero = 0.5;
+    Bench::with(BG431BEsc1::new, &actuator, &program(name, env!("CARGO_TARGET_TMPDIR"))?)
 }
 
 /// It starts once, controls once a period and within it, and reports neither faults nor overruns.
@@ -60,20 +70,20 @@ fn starts<W: Wired>(bench: &mut Bench<W>, rate: u32, idle: &str) -> Result<(), F
 }
 
 fn esc1_starts() -> Result<(), Failed> {
-    starts(&mut Bench::new(BG431BEsc1::new)?, 20_000, "not ready to switch on")
+    starts(&mut esc1(BG431BEsc1::NAME)?, 20_000, "not ready to switch on")
 }
 
 fn esc1_bus_starts() -> Result<(), Failed> {
-    starts(&mut Bench::of("b-g431b-esc1-bus", BG431BEsc1::new)?, 20_000, "not ready to switch on")
+    starts(&mut esc1("b-g431b-esc1-bus")?, 20_000, "not ready to switch on")
 }
 
 fn moteus_starts() -> Result<(), Failed> {
-    starts(&mut Bench::new(MoteusR4::new)?, 40_000, "switch on disabled")
+    starts(&mut bench(MoteusR4::new)?, 31_250, "switch on disabled")
 }
 
 /// Somebody turns the link by hand, slowly: the rotor passes the index.
 fn esc1_index() -> Result<(), Failed> {
-    let mut bench = Bench::new(BG431BEsc1::new)?;
+    let mut bench = esc1(BG431BEsc1::NAME)?;
     bench.run(0.2)?;
     for _ in 0..700 {
         let drivetrain = bench.board().drivetrain();
@@ -94,7 +104,7 @@ fn esc1_index() -> Result<(), Failed> {
 }
 
 fn esc1_button() -> Result<(), Failed> {
-    let mut bench = Bench::new(BG431BEsc1::new)?;
+    let mut bench = esc1(BG431BEsc1::NAME)?;
     bench.run(0.2)?;
     bench.board().inputs().button = true;
     bench.run(0.1)?;
@@ -112,6 +122,6 @@ fn supply() -> Result<(), Failed> {
         bench.expect("fault: supply voltage too high")?;
         if bench.state() == "fault" { Ok(()) } else { Err(bench.log().into()) }
     }
-    over(Bench::new(BG431BEsc1::new)?)?;
-    over(Bench::new(MoteusR4::new)?)
+    over(esc1(BG431BEsc1::NAME)?)?;
+    over(bench(MoteusR4::new)?)
 }

@@ -81,8 +81,8 @@ impl Sequence<'_> {
 
 /// Code of a rank of the last sequence; `RANK` from 0 to 3.
 #[inline(always)]
-pub fn code<const RANK: usize>(adc: Adc) -> f32 {
-    f32::from(adc.jdr(RANK).read().jdata())
+pub fn code<const RANK: usize>(adc: Adc) -> u16 {
+    adc.jdr(RANK).read().jdata()
 }
 
 /// Whether a sequence has ended since [`acknowledge`].

@@ -45,7 +45,6 @@ use embassy_stm32::timer::qei;
 use embassy_stm32::timer::simple_pwm::PwmPin;
 use joint_firmware::default_configuration::{self, BoardConfiguration};
 use joint_firmware::joint::{Bridge, BridgeState, Measurements};
-use joint_firmware::motor::phases::Phases;
 use joint_firmware::sensors::incremental::Incremental;
 use joint_firmware::sensors::thermistor::Thermistor;
 
@@ -78,13 +77,6 @@ const DEAD_TIME_NS: u32 = (CONFIGURATION.bridge.dead_time * 1e9 + 0.5) as u32;
 /// The low sides conduct at least 2.5 µs around the top; that the amplifiers settle in that time is unconfirmed.
 const LARGEST_DUTY: f32 = CONFIGURATION.bridge.duty.1;
 
-/// A code, A (derived: 3.3 V / 4096 / (3 mOhm * 64/7); F, O). Codes fall with a current into the motor: the sense resistor lies
-/// between the low side and ground, and the low side conducts when the current is sampled. The sign is unconfirmed.
-const AMPERES_PER_CODE: f32 = -0.029_38;
-/// Code without current (derived: about 2.06 V). The joint's calibration finds each phase's own.
-const CURRENT_ZERO: f32 = 2_557.0;
-/// Divider of the supply: 169 kOhm and 18 kOhm (N, K, R), V a code at a reference of 3.3 V.
-const VOLTS_PER_CODE: f32 = 3.3 / FULL_SCALE * (169.0 + 18.0) / 18.0;
 /// Thermistor of the bridge (K, O; the network is unconfirmed).
 const BRIDGE_NTC: Thermistor = Thermistor { nominal: 10_000.0, beta: 3_425.0, divider: 4_700.0 };
 
@@ -272,14 +264,14 @@ impl Sensors {
             // Reading the captured count clears the flag.
             self.counts_kept = self.encoder.index(tim.ccr(2).read().ccr());
         }
-        let current = |code: f32| (code - CURRENT_ZERO) * AMPERES_PER_CODE;
+        let analog = &CONFIGURATION.analog;
         Measurements {
-            phase_currents: Phases {
-                a: current(adc::code::<0>(pac::ADC1)),
-                b: current(adc::code::<0>(pac::ADC2)),
-                c: current(adc::code::<1>(pac::ADC2)),
-            },
-            bus_voltage: adc::code::<1>(pac::ADC1) * VOLTS_PER_CODE,
+            phase_currents: analog.currents([
+                adc::code::<0>(pac::ADC1),
+                adc::code::<0>(pac::ADC2),
+                adc::code::<1>(pac::ADC2),
+            ]),
+            bus_voltage: analog.supply(adc::code::<1>(pac::ADC1)),
             encoder: self.encoder.angle(count),
             encoder_valid: self.counts_kept,
             encoder_referenced: self.encoder.is_referenced(),
@@ -304,7 +296,7 @@ fn tim1_broke() -> bool {
 
 /// Temperatures of bridge and winding, °C; NaN where the board has no sensor.
 pub fn temperatures() -> (f32, f32) {
-    (BRIDGE_NTC.temperature(adc::code::<2>(pac::ADC1) / FULL_SCALE), f32::NAN)
+    (BRIDGE_NTC.temperature(f32::from(adc::code::<2>(pac::ADC1)) / FULL_SCALE), f32::NAN)
 }
 
 /// Sets the bridge: off at once, or switching with the duties held for the next period.

@@ -66,13 +66,6 @@ const TOP: u16 = pwm::top(CONTROL_HZ);
 /// The low sides conduct at least 2.5 µs around the top; that the amplifiers settle in that time is unconfirmed.
 const LARGEST_DUTY: f32 = CONFIGURATION.bridge.duty.1;
 
-/// A code, A (derived: 3.3 V / 4096 / (0.5 mOhm * 20)). The amplifier's output rises with a current into the motor (derived from
-/// the driver's datasheet and the place of the resistors; sign unconfirmed).
-const AMPERES_PER_CODE: f32 = 0.0806;
-/// Code without current: half the reference. The joint's calibration finds each phase's own.
-const CURRENT_ZERO: f32 = 2_048.0;
-/// Divider of the supply: 100 kOhm and 4.7 kOhm, V a code.
-const VOLTS_PER_CODE: f32 = 0.017_947;
 /// Thermistor of the bridge.
 const BRIDGE_NTC: Thermistor = Thermistor { nominal: 47_000.0, beta: 4_050.0, divider: 10_000.0 };
 /// Thermistor of the motor, which the user fits: one like the bridge's is assumed.
@@ -249,18 +242,14 @@ impl Sensors {
     /// What is known now; temperatures and overrun are filled in by the caller.
     ///
     /// The encoder's angle is the one that the frame of the period before brought, which runs while the control step does: two periods old, because an
-    /// answer is to the command of the frame before. Waiting for a frame of this period would take 600 of the period's 4,250 cycles.
+    /// answer is to the command of the frame before. Waiting for a frame of this period would take 600 of the period's 5,440 cycles.
     #[inline(always)]
     pub fn measure(&mut self) -> Measurements {
-        let current = |code: f32| (code - CURRENT_ZERO) * AMPERES_PER_CODE;
+        let analog = &CONFIGURATION.analog;
         let (mut phase_currents, mut bus_voltage) = (Phases::uniform(0.0), 0.0);
         begin_frame(|| {
-            phase_currents = Phases {
-                a: current(adc::code::<0>(pac::ADC3)),
-                b: current(adc::code::<0>(pac::ADC1)),
-                c: current(adc::code::<0>(pac::ADC2)),
-            };
-            bus_voltage = adc::code::<1>(pac::ADC1) * VOLTS_PER_CODE;
+            phase_currents = analog.currents([pac::ADC3, pac::ADC1, pac::ADC2].map(adc::code::<0>));
+            bus_voltage = analog.supply(adc::code::<1>(pac::ADC1));
         });
         let angle = self.answer.take().and_then(as5047p::angle);
         // The last good angle stands in: a jump to zero would be worse for whoever looks at the angle only.
@@ -287,7 +276,7 @@ impl Sensors {
 
 /// Temperatures of bridge and winding, °C; NaN where there is no sensor.
 pub fn temperatures() -> (f32, f32) {
-    let fraction = |code: f32| code / FULL_SCALE;
+    let fraction = |code: u16| f32::from(code) / FULL_SCALE;
     let bridge = BRIDGE_NTC.temperature(fraction(adc::code::<0>(pac::ADC5)));
     (bridge, WINDING_NTC.temperature(fraction(adc::code::<1>(pac::ADC5))))
 }

@@ -10,7 +10,7 @@
 //! took longer than that. Loading is held while the three are written, so that a period never has the duties of two steps.
 
 use core::sync::atomic::{AtomicU16, Ordering};
-use joint_firmware::motor::number::{greater, lesser};
+use joint_firmware::motor::modulation::compare_value;
 use joint_firmware::motor::phases::Phases;
 
 /// Clock of the timers, Hz.
@@ -24,11 +24,11 @@ pub const fn top(frequency: u32) -> u16 {
     (TIMER_HZ / (2 * frequency)) as u16
 }
 
-/// Holds duties for the period after the next top. A duty that is no number is 0; the largest leaves the low side on long
+/// Holds duties for the period after the next top; the largest duty leaves the low side on long
 /// enough for the current to settle and be sampled.
 #[inline(always)]
 pub fn hold(duties: Phases, top: u16, largest_duty: f32) {
-    let compare = |duty: f32| (lesser(greater(duty, 0.0), largest_duty) * f32::from(top)) as u16;
+    let compare = |duty| compare_value(duty, top, largest_duty);
     let [a, b, c] = &HELD;
     a.store(compare(duties.a), Ordering::Relaxed);
     b.store(compare(duties.b), Ordering::Relaxed);

@@ -178,7 +178,7 @@ pub(crate) fn evaluate(
     Estimate {
         physical: physical.evaluate(&scaling.apply(&signals)),
         network: match network {
-            Some(network) => network.evaluate(&inputs.apply(&signals)),
+            Some(network) => network.evaluate(inputs, &signals),
             None => Torque::ZERO,
         },
     }

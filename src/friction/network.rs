@@ -9,7 +9,7 @@
 
 use super::domain::{Domain, Range};
 use super::smooth::tanh;
-use crate::dsp::{asr, pkhtb, saturate, smlad, smmla, smmul, smuad};
+use crate::dsp::{asr, movt, pkhtb, saturate, smlad, smmla, smmul, smuad};
 use crate::quantity::Torque;
 
 /// Inputs of the network: the first five [`Signal`](super::state::Signal)s.
@@ -43,41 +43,52 @@ pub struct NetworkParameters {
     pub scale: i32,
 }
 
-/// How one input reaches Q31: clamped to its range, centred, scaled.
+/// How one input reaches Q31: centred, clamped to its range, scaled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InputScale {
-    range: Range,
     centre: i32,
+    /// From the upper end of the centred range to that of 32 bits: what saturates when it is added has left the range.
+    above: i32,
     /// A power of two.
     factor: i32,
+    /// What adding `below` has moved, times the factor.
+    offset: i32,
+    /// As `above` for the lower end, negative.
+    below: i32,
     gain: i32,
 }
 
 impl InputScale {
+    /// Not prepared yet.
+    const NONE: Self = Self { centre: 0, above: 0, below: 0, factor: 0, offset: 0, gain: 0 };
+
     /// Maps `range` to [-1, 1]; an empty range gives zero for every input.
     pub fn new(range: Range) -> Self {
         let half_width = range.half_width();
-        let Some(divisor) = core::num::NonZeroU64::new(half_width as u64) else {
-            return Self { range, centre: range.centre(), factor: 1, gain: 0 };
-        };
+        let Some(divisor) = core::num::NonZeroU64::new(half_width as u64) else { return Self::NONE };
         // The centred value is first shifted left until the half width lies in [2^30, 2^31], then multiplied by a gain in
         // (2^29, 2^31): the high word of the product is below 2^29, so that a last shift by two gives Q31.
         let shift = half_width.leading_zeros().saturating_sub(1);
         let gain = (((1u64 << 61) - (1 << 33)) / divisor) >> shift;
         let gain = gain.min(i32::MAX as u64) as i32;
-        Self { range, centre: range.centre(), factor: 1i32.wrapping_shl(shift), gain }
+        let (centre, factor) = (range.centre(), 1i32.wrapping_shl(shift));
+        let above = i32::MAX.wrapping_sub(range.high.wrapping_sub(centre));
+        let below = i32::MIN.wrapping_sub(range.low.wrapping_sub(centre));
+        Self { centre, above, below, factor, offset: below.wrapping_neg().wrapping_mul(factor), gain }
     }
 
     /// The scaled inputs that the range can give, Q31: lowest and highest.
     pub(crate) fn interval(&self) -> (i32, i32) {
-        (self.apply(self.range.low), self.apply(self.range.high))
+        (self.apply(i32::MIN), self.apply(i32::MAX))
     }
 
-    /// The scaled input, Q31.
+    /// The scaled input, Q31. Clamped by sums that saturate: a comparison takes three instructions where one of them takes one.
     #[inline(always)]
     pub fn apply(&self, value: i32) -> i32 {
-        let centred = self.range.nearest(value).wrapping_sub(self.centre);
-        smmul(centred.wrapping_mul(self.factor), self.gain) << 2
+        let centred = value.saturating_sub(self.centre);
+        let not_above = centred.saturating_add(self.above).wrapping_sub(self.above);
+        let shifted = not_above.saturating_add(self.below).wrapping_mul(self.factor).wrapping_add(self.offset);
+        smmul(shifted, self.gain) << 2
     }
 }
 
@@ -92,58 +103,59 @@ pub struct Network {
     layers: Layers,
 }
 
-/// The network ready to be evaluated: weights packed in pairs.
+/// The network ready to be evaluated: the weights of layer 0 by input, the others packed in pairs.
 #[derive(Clone, Copy, Debug)]
 pub struct Layers {
-    first: [[i32; INPUTS + 1]; NEURONS],
-    hidden: [PackedLayer; 2],
+    biases: [i32; NEURONS],
+    first: [[i32; NEURONS]; INPUTS],
+    hidden: [[PackedNeuron; NEURONS]; 2],
     output: PackedNeuron,
-    output_shift: u8,
     scale: i32,
 }
 
-/// Five neurons, and how far each one's sum is shifted.
+/// Weights of a neuron in pairs, the bias last, and how far its sum is shifted: four words, which are loaded together.
 #[derive(Clone, Copy, Debug)]
-struct PackedLayer {
-    neurons: [PackedNeuron; NEURONS],
-    shifts: [u8; NEURONS],
+struct PackedNeuron {
+    pairs: [u32; 3],
+    shift: u32,
 }
 
-/// Weights of a neuron in pairs, the bias last.
-type PackedNeuron = [u32; 3];
+impl PackedNeuron {
+    fn new(neuron: &Neuron) -> Self {
+        let [a, b, c, d, e, bias] = neuron.weights;
+        let pack = |low: i16, high: i16| low as u16 as u32 | (high as u16 as u32) << 16;
+        let shift = neuron.fraction.saturating_sub(MIN_FRACTION).into();
+        Self { pairs: [pack(a, b), pack(c, d), pack(e, bias)], shift }
+    }
 
-fn packed(neuron: &Neuron) -> PackedNeuron {
-    let [a, b, c, d, e, bias] = neuron.weights;
-    let pack = |low: i16, high: i16| low as u16 as u32 | (high as u16 as u32) << 16;
-    [pack(a, b), pack(c, d), pack(e, bias)]
-}
-
-/// Distance by which a neuron's sum is shifted to Q25.
-fn shift(neuron: &Neuron) -> u8 {
-    neuron.fraction.saturating_sub(MIN_FRACTION)
-}
-
-/// A neuron's sum in Q25.
-#[inline(always)]
-fn sum(neuron: &PackedNeuron, shift: u8, activations: [u32; 3]) -> i32 {
-    let [first, second, third] = *neuron;
-    asr(smlad(third, activations[2], smlad(second, activations[1], smuad(first, activations[0]))), shift)
+    /// The neuron's sum in Q25.
+    #[inline(always)]
+    fn sum(&self, activations: [u32; 3]) -> i32 {
+        let Self { pairs: [first, second, third], shift } = *self;
+        asr(smlad(third, activations[2], smlad(second, activations[1], smuad(first, activations[0]))), shift)
+    }
 }
 
 /// The input that multiplies a bias: the largest value of Q15, in the upper half of the third pair.
-const ONE: i32 = 0x7fff_0000;
+const ONE: u16 = 0x7fff;
 
 #[inline(always)]
 fn activate(sums: [i32; NEURONS]) -> [u32; 3] {
     let [a, b, c, d, e] = sums;
     // In this order only one value at a time waits for its partner.
-    [pkhtb(tanh(a), tanh(b)), pkhtb(tanh(c), tanh(d)), pkhtb(tanh(e), ONE)]
+    [pkhtb(tanh(a), tanh(b)), pkhtb(tanh(c), tanh(d)), movt::<ONE>(tanh(e) as u32 >> 16)]
+}
+
+/// The activations of a layer of packed neurons.
+#[inline(always)]
+fn layer([a, b, c, d, e]: &[PackedNeuron; NEURONS], before: [u32; 3]) -> [u32; 3] {
+    let unit = |neuron: &PackedNeuron| tanh(neuron.sum(before));
+    [pkhtb(unit(a), unit(b)), pkhtb(unit(c), unit(d)), movt::<ONE>(unit(e) as u32 >> 16)]
 }
 
 impl Inputs {
     /// Not prepared yet.
-    pub(super) const NONE: Self =
-        Self([InputScale { range: Range { low: 0, high: 0 }, centre: 0, factor: 0, gain: 0 }; INPUTS]);
+    pub(super) const NONE: Self = Self([InputScale::NONE; INPUTS]);
 
     /// Prepares the scales for `domain`.
     pub fn new(domain: &Domain) -> Self {
@@ -155,14 +167,6 @@ impl Inputs {
     pub(crate) const fn scales(&self) -> &[InputScale; INPUTS] {
         &self.0
     }
-
-    /// The scaled inputs, Q31. `signals` in Q16.16, in the order of [`Signal`](super::state::Signal); each is clamped to its trained
-    /// range.
-    #[inline(always)]
-    pub fn apply(&self, signals: &[i32; super::state::SIGNALS]) -> [i32; INPUTS] {
-        let [s0, s1, s2, s3, s4] = &self.0;
-        [s0.apply(signals[0]), s1.apply(signals[1]), s2.apply(signals[2]), s3.apply(signals[3]), s4.apply(signals[4])]
-    }
 }
 
 impl Network {
@@ -173,42 +177,41 @@ impl Network {
 
     /// The network's torque. `signals` in Q16.16, in the order of [`Signal`](super::state::Signal).
     pub fn evaluate(&self, signals: &[i32; super::state::SIGNALS]) -> Torque {
-        self.layers.evaluate(&self.inputs.apply(signals))
+        self.layers.evaluate(&self.inputs, signals)
     }
 }
 
 impl Layers {
     /// Prepares the weights.
     pub fn new(parameters: &NetworkParameters) -> Self {
+        let [a, b, c, d, e] = &parameters.first;
+        let column = |input: usize| [a[input], b[input], c[input], d[input], e[input]];
         Self {
-            first: parameters.first,
-            hidden: parameters.hidden.map(|layer| PackedLayer {
-                neurons: layer.each_ref().map(packed),
-                shifts: layer.each_ref().map(shift),
-            }),
-            output: packed(&parameters.output),
-            output_shift: shift(&parameters.output),
+            biases: column(INPUTS),
+            first: [column(0), column(1), column(2), column(3), column(4)],
+            hidden: parameters.hidden.map(|layer| layer.each_ref().map(PackedNeuron::new)),
+            output: PackedNeuron::new(&parameters.output),
             scale: parameters.scale,
         }
     }
 
-    /// The network's torque for inputs [scaled](Inputs::apply).
+    /// The network's torque. `signals` in Q16.16, in the order of [`Signal`](super::state::Signal); each is clamped to its trained range.
     ///
-    /// Written out neuron by neuron: optimised for size, the compiler keeps a loop, and with it every sum in memory.
+    /// Written out, neuron by neuron and layer 0 input by input: optimised for size, the compiler keeps a loop, and with it every sum in memory.
     #[inline]
-    pub fn evaluate(&self, x: &[i32; INPUTS]) -> Torque {
-        let neuron = |weights: &[i32; INPUTS + 1]| {
-            let [w0, w1, w2, w3, w4, bias] = *weights;
-            smmla(w4, x[4], smmla(w3, x[3], smmla(w2, x[2], smmla(w1, x[1], smmla(w0, x[0], bias)))))
+    pub fn evaluate(&self, inputs: &Inputs, signals: &[i32; super::state::SIGNALS]) -> Torque {
+        let add = |[a, b, c, d, e]: [i32; NEURONS], [wa, wb, wc, wd, we]: &[i32; NEURONS], x: i32| {
+            [smmla(*wa, x, a), smmla(*wb, x, b), smmla(*wc, x, c), smmla(*wd, x, d), smmla(*we, x, e)]
         };
-        let [a, b, c, d, e] = &self.first;
-        let mut activations = activate([neuron(a), neuron(b), neuron(c), neuron(d), neuron(e)]);
-        for PackedLayer { neurons: [a, b, c, d, e], shifts } in &self.hidden {
-            let [sa, sb, sc, sd, se] = *shifts;
-            let neuron = |weights: &PackedNeuron, shift: u8| sum(weights, shift, activations);
-            activations = activate([neuron(a, sa), neuron(b, sb), neuron(c, sc), neuron(d, sd), neuron(e, se)]);
-        }
-        Torque::from_bits(to_torque(sum(&self.output, self.output_shift, activations), self.scale))
+        let ([s0, s1, s2, s3, s4], [w0, w1, w2, w3, w4]) = (&inputs.0, &self.first);
+        let sums = add(self.biases, w0, s0.apply(signals[0]));
+        let sums = add(sums, w1, s1.apply(signals[1]));
+        let sums = add(sums, w2, s2.apply(signals[2]));
+        let sums = add(sums, w3, s3.apply(signals[3]));
+        let activations = activate(add(sums, w4, s4.apply(signals[4])));
+        let [second, third] = &self.hidden;
+        let activations = layer(third, layer(second, activations));
+        Torque::from_bits(to_torque(self.output.sum(activations), self.scale))
     }
 }
 
@@ -302,6 +305,22 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn an_input_is_clamped_to_its_range_wherever_that_lies(
+            a in prop_oneof![any::<i32>(), Just(i32::MIN), Just(i32::MAX)],
+            b in prop_oneof![any::<i32>(), Just(i32::MIN), Just(i32::MAX)],
+            value: i32,
+            near in -2..=2i32,
+        ) {
+            let range = Range { low: a.min(b), high: a.max(b) };
+            let InputScale { centre, factor, gain, .. } = InputScale::new(range);
+            for value in [value, range.low.saturating_add(near), range.high.saturating_add(near), i32::MIN, i32::MAX] {
+                let centred = range.nearest(value).wrapping_sub(centre);
+                let scaled = smmul(centred.wrapping_mul(factor), gain) << 2;
+                prop_assert_eq!(InputScale::new(range).apply(value), scaled, "{} in {:?}", value, range);
+            }
+        }
+
         #[test]
         fn input_scaling_is_exact_to_two_parts_in_a_billion(a: i32, b: i32, t in 0.0f64..=1.0) {
             let range = Range { low: a.min(b), high: a.max(b) };

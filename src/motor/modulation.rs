@@ -47,6 +47,12 @@ pub struct Modulated {
     pub limited: bool,
 }
 
+/// Compare value of a centre-aligned timer that counts up to `top`, for a duty of at most `largest`. A duty that is no number is 0.
+#[inline(always)]
+pub fn compare_value(duty: f32, top: u16, largest: f32) -> u16 {
+    (lesser(greater(duty, 0.0), largest) * f32::from(top)) as u16
+}
+
 /// Modulation with its settings checked and prepared.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Modulator {

@@ -137,6 +137,13 @@ impl WindingTemperature {
         })
     }
 
+    /// The same model with both nodes at another temperature, °C; at the surroundings' where that is none that a sensor shows.
+    pub fn starting_at(&self, start: f32) -> Self {
+        let plausible = start >= PLAUSIBLE_SENSOR.0 && start <= PLAUSIBLE_SENSOR.1;
+        let node = Node::at(if plausible { start } else { self.settings.ambient });
+        Self { winding: node, housing: node, ..*self }
+    }
+
     /// One step with the mean square of the current's vector since the last one, A^2, and the sensor's reading, °C, or NaN where
     /// there is none. A current that is not a number counts as zero.
     pub fn step(&mut self, mean_square_current: f32, sensor: f32) {
@@ -237,6 +244,14 @@ mod tests {
         }
         let expected = 80.0 + 0.05 * 2.5 * (1.0 - (-8_000.0f32 / 5_000.0).exp());
         assert!((model.housing() - expected).abs() < 0.01, "{} {expected}", model.housing());
+    }
+
+    #[test]
+    fn a_start_that_no_sensor_shows_is_the_surroundings() {
+        let hot = WindingTemperature::new(&SETTINGS, 110.0).unwrap();
+        let starts = [40.0, f32::NAN, -300.0].map(|start| hot.starting_at(start).housing());
+        assert_eq!(starts, [40.0, SETTINGS.ambient, SETTINGS.ambient]);
+        assert_eq!(hot.starting_at(40.0), WindingTemperature::new(&SETTINGS, 40.0).unwrap());
     }
 
     #[test]

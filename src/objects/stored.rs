@@ -108,7 +108,7 @@ impl Stored {
     }
 
     /// The record's length. None where it does not fit, which a test rules out.
-    pub(super) fn encode(&self, record: &mut [u8; RECORD]) -> Option<usize> {
+    pub fn encode(&self, record: &mut [u8; RECORD]) -> Option<usize> {
         let mut writer = Writer { record, length: 0 };
         writer.put(&[FORMAT, self.node_id, self.communication.map_or(0, |(node_id, _)| node_id)])?;
         if let Some((configuration, ranges)) = &self.application {

@@ -1,5 +1,6 @@
 //! What a sensor's raw word means: pure functions that the board, the emulator and the tests share.
 
+pub mod analog;
 pub mod as5047p;
 pub mod incremental;
 pub mod thermistor;

@@ -114,12 +114,17 @@ fn winding(thermal: &ThermalSettings) -> Result<WindingTemperature, Configuratio
 #[embassy_executor::task]
 async fn keep_cool(mut winding: WindingTemperature) {
     let mut ticker = Ticker::every(Duration::from_hz(SLOW_RATE as u64));
+    ticker.next().await;
+    // The winding is as hot as it may be, the gear as warm as it probably is: as the electronics beside it when the power came.
+    let mut gear = winding.starting_at(board::temperatures().0);
     loop {
         ticker.next().await;
         let (_, sensor) = board::temperatures();
-        winding.step(control::mean_square_current(), sensor);
+        let mean_square = control::mean_square_current();
+        winding.step(mean_square, sensor);
+        gear.step(mean_square, sensor);
         // The gear has no sensor; it is bolted to the motor's housing.
-        control::set_slow(&Slow { derating: winding.derating(), gear_temperature: winding.housing() });
+        control::set_slow(&Slow { derating: winding.derating(), gear_temperature: gear.housing() });
     }
 }
 

@@ -18,7 +18,7 @@ pub struct Connection {
 
 /// Offers the board's own configuration. Returns what the thermal model needs, too.
 pub fn start(mut commands: Commands, _parts: Parts) -> Result<(Connection, ThermalSettings), NotStarted> {
-    let BoardConfiguration { bridge, joint } = &board::CONFIGURATION;
+    let BoardConfiguration { bridge, joint, .. } = &board::CONFIGURATION;
     // Nothing has been offered, so there is a place.
     let prepared = defmt::unwrap!(commands.active.prepare(|place| joint.prepare_in(bridge, place), |_, _| ()))?;
     let thermal = prepared.value().thermal;

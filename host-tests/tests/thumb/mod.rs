@@ -76,28 +76,6 @@ impl Program {
         self.symbols.get(name).copied()
     }
 
-    /// Addresses of a function.
-    pub fn function(&self, name: &str) -> Option<std::ops::Range<u32>> {
-        let (start, (size, _)) = self.functions.iter().find(|(_, (_, known))| known == name)?;
-        Some(*start..*start + *size)
-    }
-
-    /// Cycles of the instruction at `address` after the one at `before`, by the published timings (Cortex-M4 TRM, 3.3.1 and 7.2.3; 100166) without
-    /// wait states. A data-processing, multiply or store instruction takes 1, a load 2 but 1 right behind another load or store, several registers one more
-    /// than there are registers, a division 12 (the longest), a floating-point division or root 14, a multiplication with addition 3. A branch
-    /// that is taken takes 2 more (1 to 3 are published), counted with the instruction that it goes to.
-    pub fn cycles(&self, before: Option<u32>, address: u32) -> u64 {
-        let Some(first) = self.half(address) else { return 1 };
-        let second = self.half(address + 2).unwrap_or(0);
-        let (own, single) = timing(first, second);
-        let Some(before) = before else { return own };
-        let Some(previous) = self.half(before) else { return own };
-        let length = if previous >> 11 >= 0b11101 { 4 } else { 2 };
-        let refill = if before + length == address { 0 } else { 2 };
-        let follows = single && refill == 0 && timing(previous, self.half(before + 2).unwrap_or(0)).1;
-        refill + if follows { 1 } else { own }
-    }
-
     /// Address, size and name of the function that an address lies in.
     fn containing(&self, address: u32) -> Option<(u32, u32, &str)> {
         let (&start, (size, name)) = self.functions.range(..=address).next_back()?;
@@ -166,48 +144,6 @@ impl Program {
             }
         }
         reached
-    }
-}
-
-/// Cycles of an instruction by itself, and whether it loads or stores one register, which pipelines.
-fn timing(first: u32, second: u32) -> (u64, bool) {
-    let registers = |list: u32| u64::from(list.count_ones()) + 1;
-    if first >> 11 < 0b11101 {
-        return match first {
-            // ldr from the literal pool; loads and stores by register or immediate offset; from the stack.
-            _ if first >> 11 == 0b01001 => (2, true),
-            _ if first >> 12 == 0b0101 => (if first >> 9 & 7 >= 3 { 2 } else { 1 }, true),
-            _ if matches!(first >> 12, 0b0110..=0b1001) => (if first >> 11 & 1 == 1 { 2 } else { 1 }, true),
-            // ldm, stm; push, pop.
-            _ if first >> 12 == 0b1100 => (registers(first & 0xff), false),
-            _ if first & 0xf600 == 0xb400 => (registers(first & 0x1ff), false),
-            _ => (1, false),
-        };
-    }
-    match first {
-        // ldm, stm, push, pop; ldrd, strd and the exclusive ones.
-        _ if first & 0xfe40 == 0xe800 => (registers(second), false),
-        _ if first & 0xfe40 == 0xe840 => (3, false),
-        // Loads and stores of one register.
-        _ if first & 0xfe00 == 0xf800 => (if first >> 4 & 1 == 1 { 2 } else { 1 }, true),
-        // sdiv, udiv.
-        _ if first & 0xffd0 == 0xfb90 && second & 0xf0 == 0xf0 => (12, false),
-        // The floating-point unit: one register, several, two core registers.
-        _ if first & 0xff20 == 0xed00 => (if first >> 4 & 1 == 1 { 2 } else { 1 }, true),
-        _ if first & 0xffe0 == 0xec40 => (2, false),
-        _ if first & 0xfe00 == 0xec00 => (u64::from(second & 0xff) + 1, false),
-        // vdiv; vsqrt; vmla, vmls, vnmla, vnmls, vfma and their like.
-        _ if first & 0xffb0 == 0xee80 => (14, false),
-        _ if first & 0xffbf == 0xeeb1 && second & 0xc0 == 0xc0 => (14, false),
-        _ if first & 0xffb0 == 0xee00
-            || first & 0xffb0 == 0xee10
-            || first & 0xffb0 == 0xeea0
-            || first & 0xffb0 == 0xee90 =>
-        {
-            // Moves between a core and a floating-point register share this place: their lowest byte tells.
-            (if second & 0xf00 == 0xa00 && second & 0x10 == 0 { 3 } else { 1 }, false)
-        }
-        _ => (1, false),
     }
 }
 

@@ -88,11 +88,12 @@ impl BlockDownload {
             crc.value()
         });
         let crc_matches = crc.map(|crc| crc == u16::from_le_bytes([low, high]));
+        let is_end = command & 0xE3 == 0xC1;
         // The last segment may look like an end when it is repeated; only a checksum tells them apart.
-        if self.closing == Some(*request) && crc_matches != Some(true) {
+        if self.closing == Some(*request) && !(is_end && crc_matches == Some(true)) {
             return Ok((None, false));
         }
-        if command & 0xE3 != 0xC1 {
+        if !is_end {
             return Err(Abort::COMMAND);
         }
         if crc_matches == Some(false) {

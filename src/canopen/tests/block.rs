@@ -173,6 +173,18 @@ fn apply(disturbance: Disturbance, segments: &mut Vec<[u8; 8]>, keep_ends: bool)
     }
 }
 
+/// Its seven zeros have the checksum that stands in its second and third byte, so the checksum alone would take it for an end.
+#[test]
+fn the_only_segment_of_an_empty_download_may_come_twice() {
+    for crc in [false, true] {
+        let mut node = Node::booted();
+        let outcome = BlockDownload { data: &[], crc, size: false }.run(&mut node, |segments| {
+            apply(Disturbance::Repeat(0), segments, true);
+        });
+        assert_eq!((outcome, node.dictionary.domain.len()), (Outcome::Done, 0));
+    }
+}
+
 proptest! {
     /// A block of which nothing but the last segment arrives, twice in a row, is the one loss that ends in a time-out
     /// as well: it cannot be told from that segment's repetition.

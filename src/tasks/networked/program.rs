@@ -47,7 +47,7 @@ impl BoardProgram {
     /// The configuration to start with: the board's own where none is stored, or where the stored one is refused.
     #[inline(never)]
     pub fn configuration(&mut self) -> Configuration {
-        let BoardConfiguration { bridge, joint } = &board::CONFIGURATION;
+        let BoardConfiguration { bridge, joint, .. } = &board::CONFIGURATION;
         let configuration = self.stored().configuration(joint);
         if configuration.verify(bridge).is_ok() {
             return configuration;

@@ -57,6 +57,17 @@ pub trait Bus {
     fn read(&mut self, now: u64, address: u32, width: Width) -> Result<u32, Refusal>;
     /// A store.
     fn write(&mut self, now: u64, address: u32, width: Width, value: u32) -> Result<(), Refusal>;
+    /// A load from memory that answers at once and that nothing else hears of: most of the traffic, for which the core does nothing else.
+    /// None for everything else, which the core then [`read`](Self::read)s.
+    #[inline(always)]
+    fn load(&self, _address: u32, _width: Width) -> Option<u32> {
+        None
+    }
+    /// A store of that kind; false where it is none, and has to be a [`write`](Self::write).
+    #[inline(always)]
+    fn store(&mut self, _address: u32, _width: Width, _value: u32) -> bool {
+        false
+    }
     /// Half a word of code.
     fn fetch(&mut self, now: u64, address: u32) -> Result<u16, Refusal>;
     /// Where code may lie; what the core keeps decoded.
@@ -67,6 +78,11 @@ pub trait Bus {
     fn next_event(&self) -> u64;
     /// Does what is due up to `now`.
     fn advance(&mut self, now: u64);
+    /// Whether there may be signals that it was not told yet. Where there are none, asking for them would change nothing.
+    #[inline(always)]
+    fn has_news(&self) -> bool {
+        true
+    }
     /// What the core has to know; forgets `rewritten` and `reset`, which are told once.
     fn signals(&mut self) -> Signals;
 }

@@ -73,7 +73,11 @@ impl<W: Wired> Emulation<W> {
 
     /// Runs for so many seconds, through resets. What else ended the run, if anything did.
     pub fn run(&mut self, seconds: f64) -> Option<End> {
-        let end = Instant(self.now().0 + (seconds * 1e12) as u64);
+        self.run_until(Instant(self.now().0 + (seconds * 1e12) as u64))
+    }
+
+    /// Runs up to an instant, through resets. What else ended the run, if anything did.
+    pub fn run_until(&mut self, end: Instant) -> Option<End> {
         loop {
             let left = end.0.saturating_sub(self.now().0);
             if left == 0 {

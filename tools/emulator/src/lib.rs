@@ -15,3 +15,4 @@ pub mod memory;
 pub mod parts;
 pub mod program;
 pub mod rtt;
+pub mod variables;

@@ -1,7 +1,11 @@
 //! A bus with nothing but memory, for tests of the core and programs that need no chip.
 
 use crate::bus::{Bus, Refusal, Signals, Width};
+use crate::chip::memory;
 use std::ops::Range;
+
+/// Where accesses are those of SRAM, without wait states.
+const SRAM: Range<u32> = 0x2000_0000..0x4000_0000;
 
 /// Blocks of memory, each of which can be loaded, stored and executed, and a line of which the test decides.
 #[derive(Default)]
@@ -62,37 +66,37 @@ impl Memory {
     }
 
     #[inline(always)]
-    fn place(&self, address: u32) -> Option<(usize, usize)> {
-        self.blocks.iter().enumerate().find_map(|(i, block)| {
-            let at = address.wrapping_sub(block.start) as usize;
-            (at < block.bytes.len()).then_some((i, at))
-        })
+    fn get(&self, address: u32, width: Width) -> Option<u32> {
+        let inside = |block: &&Block| (address.wrapping_sub(block.start) as usize) < block.bytes.len();
+        let block = self.blocks.iter().find(inside)?;
+        memory::load(&block.bytes, address.wrapping_sub(block.start) as usize, width)
+    }
+
+    #[inline(always)]
+    fn put(&mut self, address: u32, width: Width, value: u32) -> Option<()> {
+        let inside = |block: &&mut Block| (address.wrapping_sub(block.start) as usize) < block.bytes.len();
+        let block = self.blocks.iter_mut().find(inside)?;
+        memory::store(&mut block.bytes, address.wrapping_sub(block.start) as usize, width, value)
     }
 }
 
 impl Bus for Memory {
-    #[inline(always)]
     fn read(&mut self, _: u64, address: u32, width: Width) -> Result<u32, Refusal> {
-        let (block, at) = self.place(address).ok_or(Refusal::NoAnswer)?;
-        let bytes = self.blocks[block].bytes.get(at..).unwrap_or_default();
-        let value = match width {
-            Width::Byte => bytes.first().map(|byte| u32::from(*byte)),
-            Width::Half => bytes.first_chunk().map(|bytes| u32::from(u16::from_le_bytes(*bytes))),
-            Width::Word => bytes.first_chunk().map(|bytes| u32::from_le_bytes(*bytes)),
-        };
-        value.ok_or(Refusal::NoAnswer)
+        self.get(address, width).ok_or(Refusal::NoAnswer)
+    }
+
+    fn write(&mut self, _: u64, address: u32, width: Width, value: u32) -> Result<(), Refusal> {
+        self.put(address, width, value).ok_or(Refusal::NoAnswer)
     }
 
     #[inline(always)]
-    fn write(&mut self, _: u64, address: u32, width: Width, value: u32) -> Result<(), Refusal> {
-        let (block, at) = self.place(address).ok_or(Refusal::NoAnswer)?;
-        let bytes = self.blocks[block].bytes.get_mut(at..).unwrap_or_default();
-        let done = match width {
-            Width::Byte => bytes.first_mut().map(|byte| *byte = value as u8),
-            Width::Half => bytes.first_chunk_mut().map(|bytes| *bytes = (value as u16).to_le_bytes()),
-            Width::Word => bytes.first_chunk_mut().map(|bytes| *bytes = value.to_le_bytes()),
-        };
-        done.ok_or(Refusal::NoAnswer)
+    fn load(&self, address: u32, width: Width) -> Option<u32> {
+        if SRAM.contains(&address) { self.get(address, width) } else { None }
+    }
+
+    #[inline(always)]
+    fn store(&mut self, address: u32, width: Width, value: u32) -> bool {
+        SRAM.contains(&address) && self.put(address, width, value).is_some()
     }
 
     fn fetch(&mut self, now: u64, address: u32) -> Result<u16, Refusal> {

@@ -11,6 +11,7 @@ use crate::chip::fdcan::line::{CanLine, Line};
 use crate::chip::time::Instant;
 use crate::chip::variant::{STM32G431CB, Variant};
 use crate::chip::wiring::{Pin, Pwm, Quadrature, SpiFrame, TimerName, Wiring};
+use std::cmp::Ordering;
 
 /// Counts a turn: 1,000 lines.
 const COUNTS: i64 = 4_000;
@@ -32,10 +33,7 @@ pub struct BG431BEsc1 {
     inputs: Inputs,
     line: Line,
     led: bool,
-    /// Counts of the encoder so far, and those at the last call.
-    count: i64,
-    last_fraction: Option<u32>,
-    told: i64,
+    encoder: Encoder,
 }
 
 impl BG431BEsc1 {
@@ -46,25 +44,8 @@ impl BG431BEsc1 {
             inputs: Inputs::default(),
             line: Line::new(1_000_000),
             led: false,
-            count: 0,
-            last_fraction: None,
-            told: 0,
+            encoder: Encoder::default(),
         }
-    }
-
-    fn follow_encoder(&mut self, at: Instant) {
-        let fraction = self.drivetrain.sample(at).encoder;
-        let before = *self.last_fraction.get_or_insert(fraction);
-        // Over all turns, 2^32 each; the encoder's own zero is the index.
-        let turned = i64::from(fraction.wrapping_sub(before) as i32);
-        self.last_fraction = Some(fraction);
-        self.count += turned;
-    }
-
-    /// The count with the index at its multiples of [`COUNTS`].
-    fn quarters(&self) -> i64 {
-        let origin = i64::from(self.last_fraction.unwrap_or(0)) - self.count.rem_euclid(1 << 32);
-        (i128::from(self.count + origin) * i128::from(COUNTS)).div_euclid(1 << 32) as i64
     }
 }
 
@@ -123,18 +104,8 @@ impl Wiring for BG431BEsc1 {
         if timer != TimerName::Tim4 {
             return Quadrature::default();
         }
-        self.follow_encoder(at);
-        let (before, count) = (self.told, self.quarters());
-        self.told = count;
-        // The pulse rises where a multiple of the turn is reached, whichever way.
-        let index = match count.cmp(&before) {
-            std::cmp::Ordering::Greater => Some(count.div_euclid(COUNTS) * COUNTS).filter(|index| *index > before),
-            std::cmp::Ordering::Less => {
-                Some((count + COUNTS - 1).div_euclid(COUNTS) * COUNTS).filter(|index| *index < before)
-            }
-            std::cmp::Ordering::Equal => None,
-        };
-        Quadrature { count, index }
+        let fraction = self.drivetrain.sample(at).encoder;
+        self.encoder.follow(fraction)
     }
 
     fn pwm(&mut self, at: Instant, pwm: &Pwm) {
@@ -151,5 +122,57 @@ impl Wiring for BG431BEsc1 {
 
     fn can(&mut self) -> Option<&mut dyn CanLine> {
         Some(&mut self.line)
+    }
+}
+
+/// The incremental encoder: its lines, of an angle that is known within a turn.
+#[derive(Clone, Debug, Default)]
+struct Encoder {
+    /// Angle over all turns, 2^32 a turn; the index is where it is a multiple of that. Nothing before the first look.
+    angle: Option<i64>,
+    /// Counts at the last look.
+    count: i64,
+}
+
+impl Encoder {
+    /// Follows the rotor to an angle of 2^32 a turn, by the shorter way.
+    fn follow(&mut self, fraction: u32) -> Quadrature {
+        let angle = match self.angle {
+            Some(angle) => angle + i64::from(fraction.wrapping_sub(angle as u32) as i32),
+            None => i64::from(fraction),
+        };
+        let count = (i128::from(angle) * i128::from(COUNTS)).div_euclid(1 << 32) as i64;
+        let before = if self.angle.is_some() { self.count } else { count };
+        // The pulse rises where a multiple of the turn is reached, whichever way.
+        let index = match count.cmp(&before) {
+            Ordering::Greater => Some(count.div_euclid(COUNTS) * COUNTS).filter(|index| *index > before),
+            Ordering::Less => Some((count + COUNTS - 1).div_euclid(COUNTS) * COUNTS).filter(|index| *index < before),
+            Ordering::Equal => None,
+        };
+        (self.angle, self.count) = (Some(angle), count);
+        Quadrature { count, index }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Counts and indices of angles in parts of a turn.
+    fn follow(turns: &[f64]) -> Vec<(i64, Option<i64>)> {
+        let mut encoder = Encoder::default();
+        let read = turns.iter().map(|turn| encoder.follow((turn.rem_euclid(1.0) * 4_294_967_296.0) as u32));
+        read.map(|quadrature| (quadrature.count, quadrature.index)).collect()
+    }
+
+    #[test]
+    fn the_index_is_where_the_turn_begins_and_nowhere_else() {
+        let noise = [0.5, 0.515_625, 0.484_375, 0.5];
+        assert_eq!(follow(&noise), [(2_000, None), (2_062, None), (1_937, None), (2_000, None)]);
+        assert_eq!(
+            follow(&[0.75, 1.0, 1.25, 0.75]),
+            [(3_000, None), (4_000, Some(4_000)), (5_000, None), (3_000, Some(4_000))]
+        );
+        assert_eq!(follow(&[0.25, -0.25, -0.5]), [(1_000, None), (-1_000, Some(0)), (-2_000, None)]);
     }
 }

@@ -6,10 +6,12 @@ pub mod b_g431b_esc1;
 pub mod drivetrain;
 pub mod electrics;
 pub mod moteus_r4;
+pub mod witnessed;
 
 pub use b_g431b_esc1::BG431BEsc1;
 pub use drivetrain::Drivetrain;
 pub use moteus_r4::MoteusR4;
+pub use witnessed::Witnessed;
 
 use crate::chip::Deviation;
 use crate::chip::fdcan::line::Line;

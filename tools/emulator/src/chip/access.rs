@@ -1,6 +1,6 @@
 //! The chip as the core's bus: memories first, as they are most of the traffic, then registers.
 
-use super::map::{self, Device};
+use super::map::{self, Device, Place};
 use super::rcc;
 use super::variant::ClockGate;
 use super::wiring::Wiring;
@@ -28,6 +28,16 @@ impl<W: Wiring> Bus for Chip<W> {
         }
     }
 
+    #[inline(always)]
+    fn load(&self, address: u32, width: Width) -> Option<u32> {
+        self.memory.read(address, width)
+    }
+
+    #[inline(always)]
+    fn store(&mut self, address: u32, width: Width, value: u32) -> bool {
+        self.memory.write(address, width, value).is_some()
+    }
+
     fn fetch(&mut self, now: u64, address: u32) -> Result<u16, Refusal> {
         self.read(now, address, Width::Half).map(|value| value as u16)
     }
@@ -51,6 +61,11 @@ impl<W: Wiring> Bus for Chip<W> {
 
     fn advance(&mut self, now: u64) {
         self.run_events(now);
+    }
+
+    #[inline]
+    fn has_news(&self) -> bool {
+        self.news
     }
 
     fn signals(&mut self) -> Signals {
@@ -82,18 +97,19 @@ impl<W: Wiring> Chip<W> {
             self.run_events(now);
             self.check_power()?;
         }
-        let Some((device, offset)) = map::locate(address, self.variant) else {
+        let Some(Place { device, offset, gate, .. }) = self.places.find(address, self.variant) else {
             if address & !0xfff == 0x1fff_7000 {
                 return self.memory.read_signature(address, width);
             }
             return Err(Self::nothing_at(address));
         };
-        if !self.is_clocked(device, address)? {
+        if !self.is_clocked(gate, device, address)? {
             return Ok(0);
         }
         let word = offset & !3;
         let value = match device {
             Device::Spi(index) => {
+                self.agenda.touch(self.spi_place(index));
                 let value = self.spis[index].read(offset, width)?;
                 self.refresh();
                 return Ok(value);
@@ -146,10 +162,10 @@ impl<W: Wiring> Chip<W> {
             self.refresh_slow();
             return Ok(());
         }
-        let Some((device, offset)) = map::locate(address, self.variant) else {
+        let Some(Place { device, offset, gate, .. }) = self.places.find(address, self.variant) else {
             return Err(Self::nothing_at(address));
         };
-        if !self.is_clocked(device, address)? {
+        if !self.is_clocked(gate, device, address)? {
             return Ok(());
         }
         if !Self::takes(device, offset, width) {
@@ -191,7 +207,10 @@ impl<W: Wiring> Chip<W> {
                 self.timers[index].write(offset, value, now)?;
                 self.tell(index, now);
             }
-            Device::Spi(index) => self.spis[index].write(offset, width, value, now)?,
+            Device::Spi(index) => {
+                self.agenda.touch(self.spi_place(index));
+                self.spis[index].write(offset, width, value, now)?;
+            }
             Device::Iwdg => {
                 if self.iwdg.write(offset, value, at)? == iwdg::Effect::StartOscillator {
                     self.rcc.start_lsi(at.instant());
@@ -238,6 +257,7 @@ impl<W: Wiring> Chip<W> {
 
     fn write_converter(&mut self, index: usize, offset: u32, value: u32, now: u64) -> Result<(), Refusal> {
         let at = self.moment(now);
+        self.agenda.touch(self.converter_place(index));
         let Self { converters, common, gpio, amplifiers, .. } = self;
         let divider = common[converters[index].description().group].divider();
         converters[index].write(offset, value, at, divider, |input| match input {
@@ -253,6 +273,7 @@ impl<W: Wiring> Chip<W> {
 
     /// Brings a timer up to a cycle.
     fn attend_timer(&mut self, index: usize, now: u64) {
+        self.agenda.touch(index);
         let timer = &mut self.timers[index];
         if timer.follows_encoder() {
             let quadrature = self.wiring.quadrature(self.clock.instant(now), timer.name());
@@ -281,6 +302,7 @@ impl<W: Wiring> Chip<W> {
     /// Resets what is behind a clock gate (7.1.1). The flash interface is reset in power-down only, where it never is.
     fn reset_behind(&mut self, gate: ClockGate, now: u64) {
         let variant = self.variant;
+        self.agenda.touch_all();
         for (timer, description) in self.timers.iter_mut().zip(variant.timers) {
             if description.gate == gate {
                 timer.reset();
@@ -324,8 +346,9 @@ impl<W: Wiring> Chip<W> {
     }
 
     /// Without its clock a peripheral is not to be accessed (7.2.16 "Peripheral clock enable registers").
-    fn is_clocked(&self, device: Device, address: u32) -> Result<bool, Refusal> {
-        match map::gate(device, self.variant) {
+    #[inline]
+    fn is_clocked(&self, gate: Option<ClockGate>, device: Device, address: u32) -> Result<bool, Refusal> {
+        match gate {
             Some(gate) if !self.rcc.is_enabled(gate) => {
                 let known = Deviation::WithoutClock { register: address & !3 };
                 if self.deviations.contains(&known) {

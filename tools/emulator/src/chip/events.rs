@@ -5,7 +5,7 @@ use super::memory::SRAM;
 use super::rcc::Cause;
 use super::time::Instant;
 use super::variant::{self, Input, OUTPUTS};
-use super::wiring::{Gate, Pwm, TimerName, Wiring};
+use super::wiring::{Gate, Leg, Pwm, TimerName, Wiring};
 use super::{Chip, syscfg::Alarm};
 use crate::bus::Signals;
 
@@ -21,18 +21,26 @@ impl<W: Wiring> Chip<W> {
     /// Does what is due at a cycle: timers first, as they start conversions.
     fn step(&mut self, cycle: u64) {
         for index in 0..self.timers.len() {
-            if self.timers[index].next() <= cycle {
+            if self.agenda.may_be_due(index, cycle) && self.timers[index].next() <= cycle {
+                self.agenda.touch(index);
                 self.timers[index].advance(cycle);
                 self.tell(index, cycle);
             }
         }
         for index in 0..self.converters.len() {
-            if self.converters[index].next() <= cycle {
+            let place = self.converter_place(index);
+            if self.agenda.may_be_due(place, cycle) && self.converters[index].next() <= cycle {
+                self.agenda.touch(place);
                 self.convert(index, cycle);
             }
         }
         for index in 0..self.spis.len() {
+            let place = self.spi_place(index);
+            if !self.agenda.may_be_due(place, cycle) {
+                continue;
+            }
             if let Some((mut frame, began)) = self.spis[index].ended(cycle, self.clock.frequency()) {
+                self.agenda.touch(place);
                 frame.began = self.clock.instant(began);
                 let answer = self.wiring.spi(self.clock.instant(cycle), &frame);
                 self.spis[index].answer(answer, cycle);
@@ -120,7 +128,9 @@ impl<W: Wiring> Chip<W> {
             _ => (None, None),
         };
         for trigger in [first.filter(|_| events.trigger), second.filter(|_| events.trigger2)].into_iter().flatten() {
-            for converter in &mut self.converters {
+            for index in 0..self.converters.len() {
+                self.agenda.touch(self.converter_place(index));
+                let converter = &mut self.converters[index];
                 if let Some(divider) = self.common[converter.description().group].divider() {
                     converter.trigger(trigger, cycle, divider);
                 }
@@ -130,20 +140,22 @@ impl<W: Wiring> Chip<W> {
 
     /// Releases what no pin carries.
     fn connected(&self, mut pwm: Pwm) -> Pwm {
-        let timer = pwm.timer;
-        let is_connected = |channel: u8, complementary: bool| {
-            OUTPUTS.iter().any(|output| {
-                (output.timer, output.channel, output.complementary) == (timer, channel, complementary)
-                    && self.gpio.mode(output.pin) == super::gpio::Mode::Alternate(output.function)
-            })
+        let carries = |output: &&variant::TimerOutput| {
+            output.timer == pwm.timer && self.gpio.mode(output.pin) == super::gpio::Mode::Alternate(output.function)
         };
-        for (leg, channel) in pwm.legs.iter_mut().zip(1..) {
-            if !is_connected(channel, false) {
-                leg.high = Gate::Released;
+        let (mut high, mut low) = ([Gate::Released; 3], [Gate::Released; 3]);
+        for output in OUTPUTS.iter().filter(carries) {
+            let leg = usize::from(output.channel).wrapping_sub(1);
+            let (gates, gate): (&mut [Gate; 3], fn(&Leg) -> Gate) = match output.complementary {
+                false => (&mut high, |leg| leg.high),
+                true => (&mut low, |leg| leg.low),
+            };
+            if let (Some(place), Some(leg)) = (gates.get_mut(leg), pwm.legs.get(leg)) {
+                *place = gate(leg);
             }
-            if !is_connected(channel, true) {
-                leg.low = Gate::Released;
-            }
+        }
+        for (leg, (high, low)) in pwm.legs.iter_mut().zip(high.into_iter().zip(low)) {
+            (leg.high, leg.low) = (high, low);
         }
         pwm
     }
@@ -151,6 +163,7 @@ impl<W: Wiring> Chip<W> {
     /// Tells the board of all timers' outputs anew: a pin was connected or disconnected.
     pub(super) fn tell_outputs(&mut self, cycle: u64) {
         for index in 0..self.timers.len() {
+            self.agenda.touch(index);
             self.timers[index].advance(cycle);
             self.timers[index].outputs_changed();
             self.tell(index, cycle);
@@ -167,33 +180,51 @@ impl<W: Wiring> Chip<W> {
             }
             false => u64::MAX,
         };
+        // The flash's state, its latency, a reset.
+        self.news = true;
         self.refresh();
+    }
+
+    /// Where a converter stands in the agenda: behind the timers.
+    #[inline]
+    pub(super) fn converter_place(&self, index: usize) -> usize {
+        self.timers.len() + index
+    }
+
+    /// Where an SPI stands in the agenda: behind the converters.
+    #[inline]
+    pub(super) fn spi_place(&self, index: usize) -> usize {
+        self.timers.len() + self.converters.len() + index
     }
 
     /// Something has changed: the earliest event, and the levels of the interrupts.
     pub(super) fn refresh(&mut self) {
-        let timers = self.timers.iter().map(|timer| timer.next());
-        let converters = self.converters.iter().map(|converter| converter.next());
-        let spis = self.spis.iter().map(|spi| spi.next());
-        self.next = timers.chain(converters).chain(spis).min().unwrap_or(u64::MAX).min(self.next_slow);
-
-        let mut lines = [0u32; 4];
-        let mut set = |line: u8, level: bool| lines[usize::from(line / 32)] |= u32::from(level) << (line % 32);
-        for timer in &self.timers {
-            for (line, level) in timer.description().lines.into_iter().zip(timer.interrupts()) {
-                set(line, level);
+        for (place, timer) in self.timers.iter().enumerate() {
+            if self.agenda.is_touched(place) {
+                let levels = timer.description().lines.into_iter().zip(timer.interrupts());
+                let lines = levels.filter(|(_, level)| *level).fold(0, |lines, (line, _)| lines | 1 << line);
+                self.agenda.note(place, timer.next(), lines);
             }
         }
-        for converter in &self.converters {
-            set(converter.description().line, converter.interrupts());
+        for (place, converter) in (self.timers.len()..).zip(&self.converters) {
+            if self.agenda.is_touched(place) {
+                let lines = u128::from(converter.interrupts()) << converter.description().line;
+                self.agenda.note(place, converter.next(), lines);
+            }
         }
-        for spi in &self.spis {
-            set(spi.description().line, spi.interrupts());
+        for (place, spi) in (self.timers.len() + self.converters.len()..).zip(&self.spis) {
+            if self.agenda.is_touched(place) {
+                self.agenda.note(place, spi.next(), u128::from(spi.interrupts()) << spi.description().line);
+            }
         }
+        self.next = self.agenda.next().min(self.next_slow);
+
+        let mut lines = self.agenda.lines();
         for (line, level) in variant::FDCAN_LINES.into_iter().zip(self.fdcan.interrupts()) {
-            set(line, level);
+            lines |= u128::from(level) << line;
         }
-        set(variant::FLASH_LINE, self.flash.interrupts());
+        lines |= u128::from(self.flash.interrupts()) << variant::FLASH_LINE;
+        self.news |= lines != self.lines;
         self.lines = lines;
     }
 
@@ -202,14 +233,17 @@ impl<W: Wiring> Chip<W> {
     pub(super) fn double_error(&mut self, cycle: u64) {
         self.alarm(cycle, Alarm::Ecc);
         self.next = self.next.min(cycle);
+        self.news = true;
     }
 
     pub(super) fn tell_signals(&mut self) -> Signals {
         let offset =
             |offsets: std::ops::Range<u32>| offsets.start + super::access::FLASH..offsets.end + super::access::FLASH;
         let stall = self.flash.stall().map(|(offsets, until)| (offset(offsets), self.clock.cycle(until)));
+        self.news = false;
+        let words = [0, 32, 64, 96].map(|bit| (self.lines >> bit) as u32);
         Signals {
-            lines: self.lines,
+            lines: words,
             nmi: self.flash.nmi(),
             reset: std::mem::take(&mut self.reset),
             rewritten: self.flash.take_rewritten().map(offset),

@@ -56,6 +56,40 @@ pub fn gate(device: Device, variant: &Variant) -> Option<ClockGate> {
     }
 }
 
+/// A peripheral's register, found.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    address: u32,
+    /// The peripheral.
+    pub device: Device,
+    /// Bytes from its first register.
+    pub offset: u32,
+    /// Its clock gate; none where it always runs.
+    pub gate: Option<ClockGate>,
+}
+
+/// Places that were found lately, by the lower bits of their addresses: finding one takes longer than most accesses.
+#[derive(Clone, Debug)]
+pub struct Places([Option<Place>; 64]);
+
+impl Places {
+    /// None yet.
+    pub(super) const fn new() -> Self {
+        Self([None; 64])
+    }
+
+    /// What is at an address; none where there is nothing that is modelled.
+    pub fn find(&mut self, address: u32, variant: &Variant) -> Option<Place> {
+        let lately = &mut self.0[(address / 4 % 64) as usize];
+        if let Some(place) = lately.filter(|place| place.address == address) {
+            return Some(place);
+        }
+        let (device, offset) = locate(address, variant)?;
+        *lately = Some(Place { address, device, offset, gate: gate(device, variant) });
+        *lately
+    }
+}
+
 /// The peripheral at an address, and the offset in it.
 pub fn locate(address: u32, variant: &Variant) -> Option<(Device, u32)> {
     let page = address & !0x3ff;

@@ -31,8 +31,8 @@ pub struct Memory {
 #[inline(always)]
 pub fn load(bytes: &[u8], offset: usize, width: Width) -> Option<u32> {
     Some(match width {
-        Width::Word => u32::from_le_bytes(*bytes.get(offset..)?.first_chunk()?),
-        Width::Half => u32::from(u16::from_le_bytes(*bytes.get(offset..)?.first_chunk()?)),
+        Width::Word => u32::from_le_bytes(*bytes.get(offset..offset.wrapping_add(4))?.first_chunk()?),
+        Width::Half => u32::from(u16::from_le_bytes(*bytes.get(offset..offset.wrapping_add(2))?.first_chunk()?)),
         Width::Byte => u32::from(*bytes.get(offset)?),
     })
 }
@@ -41,8 +41,10 @@ pub fn load(bytes: &[u8], offset: usize, width: Width) -> Option<u32> {
 #[inline(always)]
 pub fn store(bytes: &mut [u8], offset: usize, width: Width, value: u32) -> Option<()> {
     match width {
-        Width::Word => *bytes.get_mut(offset..)?.first_chunk_mut()? = value.to_le_bytes(),
-        Width::Half => *bytes.get_mut(offset..)?.first_chunk_mut()? = (value as u16).to_le_bytes(),
+        Width::Word => *bytes.get_mut(offset..offset.wrapping_add(4))?.first_chunk_mut()? = value.to_le_bytes(),
+        Width::Half => {
+            *bytes.get_mut(offset..offset.wrapping_add(2))?.first_chunk_mut()? = (value as u16).to_le_bytes()
+        }
         Width::Byte => *bytes.get_mut(offset)? = value as u8,
     }
     Some(())
@@ -89,26 +91,23 @@ impl Memory {
         &self.bytes
     }
 
+    /// Where an address would be in `bytes`, and far behind their end where it is neither's: below CCM SRAM it wraps.
     #[inline(always)]
-    fn place(&self, address: u32) -> Option<usize> {
-        let offset = address.wrapping_sub(SRAM);
-        if (offset as usize) < self.bytes.len() {
-            return Some(offset as usize);
-        }
-        let offset = address.wrapping_sub(CCM).checked_add(self.ccm)?;
-        (address >= CCM && (offset as usize) < self.bytes.len()).then_some(offset as usize)
+    fn place(&self, address: u32) -> usize {
+        let offset = if address < SRAM { address.wrapping_sub(CCM).saturating_add(self.ccm) } else { address - SRAM };
+        offset as usize
     }
 
     /// A load from SRAM; none where there is none.
     #[inline(always)]
     pub fn read(&self, address: u32, width: Width) -> Option<u32> {
-        load(&self.bytes, self.place(address)?, width)
+        load(&self.bytes, self.place(address), width)
     }
 
     /// A store to SRAM; none where there is none.
     #[inline(always)]
     pub fn write(&mut self, address: u32, width: Width, value: u32) -> Option<()> {
-        let place = self.place(address)?;
+        let place = self.place(address);
         store(&mut self.bytes, place, width, value)
     }
 

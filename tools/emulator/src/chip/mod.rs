@@ -26,17 +26,20 @@ pub mod variant;
 pub mod wiring;
 
 mod access;
+mod agenda;
 mod events;
 #[cfg(test)]
 mod tests;
 
 use crate::bus::Refusal;
 use adc::{Common, Converter};
+use agenda::Agenda;
 use crc::Crc;
 use fdcan::Fdcan;
 use flash::{Flash, Torn};
 use gpio::{Driven, Gpio, PORTS};
 use iwdg::Iwdg;
+use map::Places;
 use memory::Memory;
 use opamp::Amplifiers;
 use pwr::{Pwr, Range};
@@ -83,12 +86,16 @@ pub struct Chip<W> {
     crc: Crc,
     fdcan: Fdcan,
     deviations: Vec<Deviation>,
+    places: Places,
+    agenda: Agenda,
     /// Earliest event.
     next: u64,
     /// Earliest event of what counts time.
     next_slow: u64,
-    lines: [u32; 4],
+    lines: u128,
     reset: bool,
+    /// There may be signals that the core has not been told.
+    news: bool,
 }
 
 impl<W: Wiring> Chip<W> {
@@ -115,11 +122,15 @@ impl<W: Wiring> Chip<W> {
             crc: Crc::new(),
             fdcan: Fdcan::new(),
             deviations: Vec::new(),
+            places: Places::new(),
+            agenda: Agenda::new(),
+            news: true,
             next: u64::MAX,
             next_slow: u64::MAX,
-            lines: [0; 4],
+            lines: 0,
             reset: false,
         };
+        assert!(chip.spi_place(variant.spis.len()) <= agenda::PLACES, "{} has too many peripherals", variant.name);
         chip.refresh_slow();
         chip
     }
@@ -229,6 +240,7 @@ impl<W: Wiring> Chip<W> {
     fn alarm(&mut self, cycle: u64, alarm: Alarm) {
         if self.syscfg.breaks(alarm) {
             for index in 0..self.timers.len() {
+                self.agenda.touch(index);
                 self.timers[index].advance(cycle);
                 self.timers[index].alarm(alarm);
                 self.tell(index, cycle);
@@ -246,6 +258,7 @@ impl<W: Wiring> Chip<W> {
         for port in 0..PORTS {
             self.gpio.reset(port);
         }
+        self.agenda.touch_all();
         self.timers.iter_mut().for_each(Timer::reset);
         self.converters.iter_mut().for_each(Converter::reset);
         self.common.iter_mut().for_each(Common::reset);

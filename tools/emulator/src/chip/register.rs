@@ -31,6 +31,7 @@ pub struct Block {
     table: &'static [Register],
     /// Place in `table` of the register at each word; `NONE` where there is none.
     places: Vec<u8>,
+    /// By word; 0 where there is none.
     values: Vec<u32>,
 }
 
@@ -44,13 +45,15 @@ impl Block {
         for (place, register) in table.iter().enumerate() {
             places[(register.offset / 4) as usize] = place as u8;
         }
-        Self { name, chapter, table, places, values: table.iter().map(|register| register.reset).collect() }
+        let mut block = Self { name, chapter, table, places, values: vec![0; words as usize] };
+        block.reset();
+        block
     }
 
     /// Back to the values after reset.
     pub fn reset(&mut self) {
-        for (value, register) in self.values.iter_mut().zip(self.table) {
-            *value = register.reset;
+        for register in self.table {
+            self.values[(register.offset / 4) as usize] = register.reset;
         }
     }
 
@@ -65,19 +68,20 @@ impl Block {
         })
     }
 
-    /// What a register holds.
+    /// What a register of the table holds.
     ///
     /// # Panics
-    /// Where the peripheral has no such register: the caller names one of its table.
+    /// Behind the last register.
     #[inline]
     pub fn get(&self, offset: u32) -> u32 {
-        self.values[usize::from(self.places[(offset / 4) as usize])]
+        debug_assert!(self.place(offset).is_some(), "{} at {offset:#x}", self.name);
+        self.values[(offset / 4) as usize]
     }
 
     /// What a register holds; 0 where the peripheral does not have it.
     #[inline]
     pub fn get_or_zero(&self, offset: u32) -> u32 {
-        self.place(offset).map_or(0, |place| self.values[place])
+        self.values.get((offset / 4) as usize).copied().unwrap_or(0)
     }
 
     /// Lets a register hold a value, whatever bits exist.
@@ -86,24 +90,26 @@ impl Block {
     /// As [`get`](Self::get).
     #[inline]
     pub fn set(&mut self, offset: u32, value: u32) {
-        self.values[usize::from(self.places[(offset / 4) as usize])] = value;
+        debug_assert!(self.place(offset).is_some(), "{} at {offset:#x}", self.name);
+        self.values[(offset / 4) as usize] = value;
     }
 
     /// A load by the core.
     pub fn read(&self, offset: u32) -> Result<u32, Refusal> {
-        Ok(self.values[self.checked(offset)?])
+        self.checked(offset)?;
+        Ok(self.get(offset))
     }
 
     /// A store by the core: keeps the bits that exist. Returns what the register held before.
     pub fn write(&mut self, offset: u32, value: u32) -> Result<u32, Refusal> {
         let place = self.checked(offset)?;
         let Register { kept, refused, .. } = self.table[place];
-        let before = self.values[place];
+        let before = self.get(offset);
         let chosen = value & refused;
         if chosen != 0 {
             return Err(self.refuse(offset, &format!("bits {chosen:#x}")));
         }
-        self.values[place] = before & !kept | value & kept;
+        self.set(offset, before & !kept | value & kept);
         Ok(before)
     }
 

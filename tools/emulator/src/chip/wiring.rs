@@ -49,7 +49,7 @@ pub enum TimerName {
 }
 
 /// What a pin for a transistor's gate does until told otherwise.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Gate {
     /// High while the leg's reference is active, and low otherwise; the other way round where inverted.
     Switching {
@@ -68,7 +68,7 @@ pub enum Gate {
 }
 
 /// A PWM channel with its pins.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Leg {
     /// The compare value in force, in counts.
     pub compare: u32,
@@ -81,7 +81,7 @@ pub struct Leg {
 }
 
 /// A PWM timer's outputs from now on, until told otherwise.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Pwm {
     /// Which timer.
     pub timer: TimerName,
@@ -102,7 +102,7 @@ pub struct Pwm {
 }
 
 /// What an incremental encoder has done.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Quadrature {
     /// Edges of A and B so far, four a line, signed.
     pub count: i64,
@@ -111,7 +111,7 @@ pub struct Quadrature {
 }
 
 /// A frame on SPI, as the master sends it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct SpiFrame {
     /// Number of the peripheral, from 1.
     pub bus: u8,

@@ -26,13 +26,9 @@ impl<B: Bus> Cpu<B> {
         if address & (BYTES - 1) != 0 {
             return self.load_unaligned::<BYTES>(address);
         }
-        if address.wrapping_sub(SRAM.start) < SRAM.end - SRAM.start {
-            match self.bus.read(self.now, address, width(BYTES)) {
-                Ok(value) => Ok(value),
-                Err(refusal) => Err(self.refused(address, refusal)),
-            }
-        } else {
-            self.load_elsewhere(address, width(BYTES))
+        match self.bus.load(address, width(BYTES)) {
+            Some(value) => Ok(value),
+            None => self.load_elsewhere(address, width(BYTES)),
         }
     }
 
@@ -51,14 +47,10 @@ impl<B: Bus> Cpu<B> {
         if address & (BYTES - 1) != 0 {
             return self.store_unaligned::<BYTES>(address, value);
         }
-        if address.wrapping_sub(SRAM.start) < SRAM.end - SRAM.start && !self.code.in_sram {
-            match self.bus.write(self.now, address, width(BYTES), value) {
-                Ok(()) => Ok(()),
-                Err(refusal) => Err(self.refused(address, refusal)),
-            }
-        } else {
-            self.store_elsewhere(address, width(BYTES), value)
+        if !self.code.changes(address) && self.bus.store(address, width(BYTES), value) {
+            return Ok(());
         }
+        self.store_elsewhere(address, width(BYTES), value)
     }
 
     /// A store whose address has to be a multiple of the width (MemA).
@@ -75,12 +67,15 @@ impl<B: Bus> Cpu<B> {
         if address.wrapping_sub(PRIVATE) < PRIVATE_LENGTH {
             return self.read_private(address, width);
         }
+        if SRAM.contains(&address) {
+            return self.bus.read(self.now, address, width).map_err(|refusal| self.refused(address, refusal));
+        }
         self.wait_for(address);
         let value = self.bus.read(self.now, address, width);
         self.now += u64::from(self.bus.wait_states(address));
         // A device; or a word of the flash that its ECC cannot read, which is an interrupt at once.
         if address >= SRAM.end || self.bus.next_event() <= self.now {
-            self.read_signals();
+            self.read_news();
         }
         value.map_err(|refusal| self.refused(address, refusal))
     }
@@ -96,7 +91,7 @@ impl<B: Bus> Cpu<B> {
             self.code.forget(address..address.saturating_add(4));
         }
         if !SRAM.contains(&address) {
-            self.read_signals();
+            self.read_news();
         }
         done.map_err(|refusal| self.refused(address, refusal))
     }

@@ -10,8 +10,8 @@ pub(super) struct Code<B: Bus> {
     regions: Vec<Region>,
     /// The region that the program is in.
     current: Region,
-    /// Whether a store to SRAM can change code.
-    pub in_sram: bool,
+    /// From the first to behind the last address in SRAM at which something was ever decoded: a store there may change it.
+    changeable: Range<u32>,
 }
 
 #[derive(Clone, Copy)]
@@ -24,6 +24,9 @@ struct Region {
     wait_states: u64,
 }
 
+/// Places behind each region that stay empty: the last instruction of a region may be wide.
+const BEHIND: usize = 2;
+
 /// From here on memory is SRAM, by the architecture's map (B3.1).
 pub(super) const SRAM: Range<u32> = 0x2000_0000..0x4000_0000;
 
@@ -34,29 +37,46 @@ impl<B: Bus> Code<B> {
         for range in bus.code() {
             let length = range.end.saturating_sub(range.start) & !1;
             regions.push(Region { start: range.start & !1, length, offset, wait_states: 0 });
-            offset += length as usize / 2;
+            offset += length as usize / 2 + BEHIND;
         }
         let nowhere = Region { start: 0, length: 0, offset: 0, wait_states: 0 };
-        let in_sram = regions.iter().any(|region| region.start < SRAM.end && region.start + region.length > SRAM.start);
-        let mut code = Self { operations: vec![Self::unknown(); offset], current: nowhere, regions, in_sram };
+        let operations = vec![Self::unknown(); offset];
+        let mut code = Self { operations, current: nowhere, regions, changeable: 0..0 };
         code.set_wait_states(bus);
         code
     }
 
     fn unknown() -> Operation<B> {
-        let never = |_: &mut Cpu<B>, _: Operands| Err(Trap::End);
-        Operation { cycles: 0, ..Operation::new(never) }
+        let never = |_: &mut Cpu<B>, _: Operands| Err(Trap::End.into());
+        Operation::new(never).cycles(0)
     }
 
     /// The operation at an address of the current region, None elsewhere and where nothing is decoded yet.
     #[inline(always)]
     pub fn at(&self, address: u32) -> Option<Operation<B>> {
+        self.kept(self.place(address)?)
+    }
+
+    /// Where the operation for an address of the current region is kept. That of the next instruction is kept behind it, by its half-words.
+    #[inline(always)]
+    pub fn place(&self, address: u32) -> Option<usize> {
         let offset = address.wrapping_sub(self.current.start);
-        if offset >= self.current.length {
-            return None;
-        }
-        let operation = *self.operations.get(self.current.offset.wrapping_add((offset / 2) as usize))?;
-        (operation.length != 0).then_some(operation)
+        (offset < self.current.length).then(|| self.current.offset.wrapping_add((offset / 2) as usize))
+    }
+
+    /// What is kept at a place; None where nothing is decoded yet, and behind the region's end.
+    #[inline(always)]
+    pub fn kept(&self, place: usize) -> Option<Operation<B>> {
+        let operation = *self.operations.get(place)?;
+        (operation.timing.length != 0).then_some(operation)
+    }
+
+    /// Whether a store to an address may change what is decoded; always outside of SRAM, where programs seldom store.
+    #[inline(always)]
+    pub fn changes(&self, address: u32) -> bool {
+        // A word that begins up to three bytes before reaches into it.
+        let Range { start, end } = self.changeable;
+        address < SRAM.start || address.wrapping_sub(start).wrapping_add(3) < end.wrapping_sub(start).wrapping_add(3)
     }
 
     /// Whether an address lies in the current region.
@@ -104,9 +124,16 @@ impl<B: Bus> Code<B> {
     }
 
     fn keep(&mut self, address: u32, operation: Operation<B>) {
-        let offset = address.wrapping_sub(self.current.start);
-        if let Some(place) = self.operations.get_mut(self.current.offset + (offset / 2) as usize) {
-            *place = operation;
+        let Some(place) = self.place(address) else { return };
+        if SRAM.contains(&address) {
+            let end = address + u32::from(operation.timing.length);
+            self.changeable = match self.changeable.is_empty() {
+                true => address..end,
+                false => self.changeable.start.min(address)..self.changeable.end.max(end),
+            };
+        }
+        if let Some(kept) = self.operations.get_mut(place) {
+            *kept = operation;
         }
     }
 }

@@ -78,35 +78,32 @@ impl Interrupts {
 
     /// Recomputes what follows from the rest; to be called after every change.
     pub fn update(&mut self) {
-        let mut best: Option<(i16, u16)> = None;
-        let pending = self.numbers(self.system_pending, |word| self.enabled[word] & self.pending[word]);
-        for number in pending {
-            let priority = self.priority(number);
-            if best.is_none_or(|(most, _)| priority < most) {
-                best = Some((priority, number));
-            }
-        }
+        let pending = std::array::from_fn(|word| self.enabled[word] & self.pending[word]);
+        let best = self.most_urgent(self.system_pending, pending);
         self.best = best.map(|(priority, number)| (self.preemption(priority), number));
         self.current = self.priority_of_execution(true);
     }
 
-    /// Numbers of the exceptions whose bits are set, ascending.
-    fn numbers(&self, system: u32, external: impl Fn(usize) -> u32) -> impl Iterator<Item = u16> {
-        let words = [system, external(0), external(1), external(2), external(3)];
-        words.into_iter().enumerate().flat_map(|(place, mut word)| {
-            let base = if place == 0 { 0 } else { EXTERNAL + 32 * (place as u16 - 1) };
-            std::iter::from_fn(move || {
-                let bit = (word != 0).then(|| word.trailing_zeros() as u16)?;
+    /// The most urgent of the exceptions whose bits are set, the lowest number of several, with its priority.
+    fn most_urgent(&self, system: u32, external: [u32; 4]) -> Option<(i16, u16)> {
+        let mut best: Option<(i16, u16)> = None;
+        for (mut word, base) in [system].into_iter().chain(external).zip([0, 16, 48, 80, 112]) {
+            while word != 0 {
+                let number = base + word.trailing_zeros() as u16;
                 word &= word - 1;
-                Some(base + bit)
-            })
-        })
+                let priority = self.priority(number);
+                if best.is_none_or(|(most, _)| priority < most) {
+                    best = Some((priority, number));
+                }
+            }
+        }
+        best
     }
 
-    /// ExecutionPriority (B1.5.4).
+    /// ExecutionPriority (B1.5.4). Of priorities in order, their parts that preempt are in order too.
     fn priority_of_execution(&self, with_primask: bool) -> i16 {
-        let active = self.numbers(self.system_active, |word| self.active[word]);
-        let mut least = active.map(|number| self.preemption(self.priority(number))).min().unwrap_or(THREAD);
+        let active = self.most_urgent(self.system_active, self.active);
+        let mut least = active.map_or(THREAD, |(priority, _)| self.preemption(priority));
         if self.basepri != 0 {
             least = least.min(self.preemption(i16::from(self.basepri)));
         }

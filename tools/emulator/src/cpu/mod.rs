@@ -4,6 +4,7 @@
 //! core itself chooses is from its Technical Reference Manual (Arm 100166). An encoding that is not implemented, or whose outcome the
 //! architecture leaves open, ends the run and says where.
 //!
+//! - `run`: from one instruction to the next
 //! - `registers`, `reset`: what a debugger sees; special registers; how it all begins
 //! - `code`, `decode`, `operation`: half-words of code become calls, once
 //! - `execute`, `arithmetic`, `float`: what the calls do
@@ -29,6 +30,7 @@ mod interrupts;
 mod operation;
 mod registers;
 mod reset;
+mod run;
 mod system;
 mod system_timer;
 mod timing;
@@ -47,7 +49,7 @@ use code::Code;
 use cycle_counter::CycleCounter;
 use exceptions::Activation;
 use interrupts::Interrupts;
-use operation::{Operation, Trap};
+use operation::Trap;
 use std::collections::BTreeMap;
 use system::System;
 use system_timer::SystemTimer;
@@ -121,111 +123,6 @@ enum Sleep {
 }
 
 impl<B: Bus> Cpu<B> {
-    /// Runs until the cycle `until` is reached or something else ends the run. The instruction that reaches it completes.
-    pub fn run(&mut self, until: u64) -> End {
-        self.until = until;
-        // Whoever runs the core may have changed what it is connected to.
-        self.read_signals();
-        self.attention = 0;
-        match self.watch.is_some() {
-            true => self.run_watched::<true>(),
-            false => self.run_watched::<false>(),
-        }
-    }
-
-    /// Runs one instruction, and before it the entry of an exception that is due. Sleep is passed over. Says what ended the run, if
-    /// anything did.
-    pub fn step(&mut self) -> Option<End> {
-        self.until = u64::MAX;
-        self.read_signals();
-        let before = self.instructions;
-        // What was not decoded yet takes a turn by itself.
-        while self.instructions == before {
-            if let Some(end) = self.attend() {
-                return Some(end);
-            }
-            match self.watch.is_some() {
-                true => self.instruct::<true>(),
-                false => self.instruct::<false>(),
-            }
-        }
-        self.end.take()
-    }
-
-    fn run_watched<const WATCHED: bool>(&mut self) -> End {
-        loop {
-            if self.now >= self.attention
-                && let Some(end) = self.attend()
-            {
-                return end;
-            }
-            self.instruct::<WATCHED>();
-        }
-    }
-
-    #[inline(always)]
-    fn instruct<const WATCHED: bool>(&mut self) {
-        let pc = self.pc;
-        let Some(operation) = self.code.at(pc) else { return self.elsewhere(pc) };
-        if WATCHED && self.watched(pc) {
-            return;
-        }
-        self.pc = pc.wrapping_add(u32::from(operation.length));
-        // Wrapping, because checks here cost a tenth of the speed; neither counter comes near its end.
-        self.instructions = self.instructions.wrapping_add(1);
-        let cycles = operation.cycles.wrapping_sub(operation.overlaps & u8::from(self.single));
-        self.now = self.now.wrapping_add(u64::from(cycles));
-        self.single = operation.single;
-        let done = match self.it {
-            0 => (operation.execute)(self, operation.operands),
-            _ => self.in_block(operation, pc),
-        };
-        if let Err(trap) = done {
-            self.trapped(trap, pc);
-        }
-        if WATCHED {
-            self.watch_stack();
-        }
-    }
-
-    /// An instruction of an IT block: runs if its condition holds (A7.3.2).
-    fn in_block(&mut self, operation: Operation<B>, pc: u32) -> Result<(), Trap> {
-        let block = self.it;
-        self.it = if block & 7 == 0 { 0 } else { block & 0xe0 | block << 1 & 0x1f };
-        if !self.holds(block >> 4) {
-            self.now -= u64::from(operation.cycles) - 1;
-            self.single = false;
-            return Ok(());
-        }
-        self.in_it = true;
-        let (next, rest, handler) = (self.pc, self.it, self.exception);
-        let done = (operation.execute)(self, operation.operands);
-        self.in_it = false;
-        if done.is_err() {
-            self.it = block;
-        } else if rest != 0 && self.pc != next && self.exception == handler {
-            // A branch elsewhere than at the block's end. A return from a handler brings the block of what it interrupted with it.
-            return self.refuse(pc, operation.length, Refused::Unpredictable);
-        }
-        done
-    }
-
-    /// Whether a condition holds (ConditionPassed).
-    #[inline(always)]
-    fn holds(&self, condition: u8) -> bool {
-        let plain = match condition >> 1 {
-            0 => self.zero,
-            1 => self.carry,
-            2 => self.negative,
-            3 => self.overflow,
-            4 => self.carry && !self.zero,
-            5 => self.negative == self.overflow,
-            6 => !self.zero && self.negative == self.overflow,
-            _ => return true,
-        };
-        plain ^ (condition & 1 != 0)
-    }
-
     /// Everything that is not the next instruction: time that makes things happen, sleep, exceptions, the run's end.
     #[cold]
     fn attend(&mut self) -> Option<End> {
@@ -284,7 +181,16 @@ impl<B: Bus> Cpu<B> {
             self.pended();
         }
         self.bus.advance(self.now);
-        self.read_signals();
+        self.read_news();
+    }
+
+    /// Takes over what the bus has to say, if it has anything.
+    #[inline]
+    fn read_news(&mut self) {
+        match self.bus.has_news() {
+            true => self.read_signals(),
+            false => self.schedule(),
+        }
     }
 
     /// Takes over what the bus has to say.

@@ -30,6 +30,24 @@ pub(super) enum Trap {
     End,
 }
 
+/// What comes after an instruction if not the one behind it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Leave {
+    /// It has gone elsewhere, or begun an IT block: `Cpu::pc` and `Cpu::it` are to be looked at.
+    Jumped,
+    /// It did not complete.
+    Trapped(Trap),
+}
+
+impl From<Trap> for Leave {
+    fn from(trap: Trap) -> Self {
+        Self::Trapped(trap)
+    }
+}
+
+/// How an instruction ends; nearly always with the one behind it as the next.
+pub(super) type Done = Result<(), Leave>;
+
 /// Fields of an encoding, or what decoding made of them.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Operands {
@@ -46,12 +64,18 @@ pub(super) struct Operands {
 }
 
 /// Executes an instruction.
-pub(super) type Execute<B> = fn(&mut Cpu<B>, Operands) -> Result<(), Trap>;
+pub(super) type Execute<B> = fn(&mut Cpu<B>, Operands) -> Done;
 
-/// A decoded instruction. Each half-word of code has one, so it is kept small.
+/// A decoded instruction.
 pub(super) struct Operation<B: Bus> {
     pub execute: Execute<B>,
     pub operands: Operands,
+    pub timing: Timing,
+}
+
+/// How long an instruction is, and how long it takes.
+#[derive(Clone, Copy)]
+pub(super) struct Timing {
     /// Bytes; 0 for what is not decoded yet.
     pub length: u8,
     /// Cycles without wait states, branch and pipelining.
@@ -73,7 +97,8 @@ impl<B: Bus> Copy for Operation<B> {}
 impl<B: Bus> Operation<B> {
     /// One cycle, no operands; the length is filled in by `decode`.
     pub fn new(execute: Execute<B>) -> Self {
-        Self { execute, operands: Operands::default(), length: 0, cycles: 1, single: false, overlaps: 0 }
+        let timing = Timing { length: 0, cycles: 1, single: false, overlaps: 0 };
+        Self { execute, operands: Operands::default(), timing }
     }
 
     pub fn d(mut self, register: u32) -> Self {
@@ -101,15 +126,20 @@ impl<B: Bus> Operation<B> {
         self
     }
 
+    pub fn length(mut self, bytes: u8) -> Self {
+        self.timing.length = bytes;
+        self
+    }
+
     pub fn cycles(mut self, cycles: u32) -> Self {
-        self.cycles = cycles as u8;
+        self.timing.cycles = cycles as u8;
         self
     }
 
     /// Takes the cycles of a load or a store of one register.
     pub fn single(mut self, load: bool) -> Self {
-        self.single = true;
-        self.overlaps = u8::from(load);
+        self.timing.single = true;
+        self.timing.overlaps = u8::from(load);
         self.cycles(if load { 2 } else { 1 })
     }
 }

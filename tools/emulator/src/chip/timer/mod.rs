@@ -113,11 +113,10 @@ impl Timer {
         if !self.counter.running {
             return next;
         }
-        for channel in 0..4 {
-            let interrupt = self.block.get(DIER) >> (1 + channel) & 1 != 0;
-            if interrupt || channel == 3 && self.reference4_triggers() {
-                next = next.min(self.counter.reaches(self.compare[channel]));
-            }
+        // Bit of the channel's interrupt; the fourth reference may trigger as well.
+        let seen = self.block.get(DIER) >> 1 & 0xf | u32::from(self.reference4_triggers()) << 3;
+        for channel in (0..4).filter(|channel| seen >> channel & 1 != 0) {
+            next = next.min(self.counter.reaches(self.compare[channel]));
         }
         next
     }
@@ -230,8 +229,11 @@ impl Timer {
     /// Levels of the interrupts: update, capture and compare, break, trigger.
     #[inline]
     pub fn interrupts(&self) -> [bool; 4] {
-        let active = self.block.get(SR) & 0xffff;
         let enabled = self.block.get(DIER);
+        if enabled == 0 {
+            return [false; 4];
+        }
+        let active = self.block.get(SR) & 0xffff;
         let breaks = active & (BIF | SBIF) != 0 && enabled & BIE != 0;
         [active & enabled & UIF != 0, active & enabled & 0x1e != 0, breaks, false]
     }

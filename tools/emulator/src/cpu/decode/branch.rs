@@ -23,7 +23,7 @@ pub(super) fn decode<B: Bus>(address: u32, first: u32, second: u32) -> Decoded<B
         (0, _) if bits(first, 9, 7) != 7 => {
             let offset = sign << 20 | j2 << 19 | j1 << 18 | bits(first, 5, 0) << 12 | low << 1;
             let target = pc.wrapping_add(sign_extend(offset, 21));
-            Ok(op(branch::branch_if).x(bits(first, 9, 6)).immediate(target))
+            Ok(op(branch::branch_if_of(bits(first, 9, 6))).immediate(target))
         }
         (0, _) => special(first, second),
         // udf

@@ -60,7 +60,7 @@ pub(super) fn decode<B: Bus>(address: u32, first: u16, second: u16) -> Decoded<B
         false => narrow::decode(address, first),
         true => wide_decode(address, first, second),
     };
-    operation.map(|operation| Operation { length: if is_wide { 4 } else { 2 }, ..operation })
+    operation.map(|operation| operation.length(if is_wide { 4 } else { 2 }))
 }
 
 /// A5.3.

@@ -68,7 +68,7 @@ pub(super) fn decode<B: Bus>(address: u32, word: u32) -> Decoded<B> {
             15 => Ok(op(system::supervisor_call).immediate(byte)),
             condition => {
                 let target = pc.wrapping_add(sign_extend(byte << 1, 9));
-                Ok(op(branch::branch_if).x(condition).immediate(target))
+                Ok(op(branch::branch_if_of(condition)).immediate(target))
             }
         },
         28 => Ok(op(branch::branch).immediate(pc.wrapping_add(sign_extend(bits(word, 10, 0) << 1, 12)))),

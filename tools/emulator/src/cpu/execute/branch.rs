@@ -2,39 +2,62 @@
 
 use crate::bus::Bus;
 use crate::cpu::Cpu;
-use crate::cpu::operation::{Operands, Trap};
+use crate::cpu::operation::{Done, Execute, Leave, Operands};
 
 /// To `immediate`.
-pub(in crate::cpu) fn branch<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn branch<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     cpu.branch(o.immediate);
-    Ok(())
+    Err(Leave::Jumped)
 }
 
-/// To `immediate` if condition x holds.
-pub(in crate::cpu) fn branch_if<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
-    if cpu.holds(o.x) {
-        cpu.branch(o.immediate);
+/// To `immediate` if a condition holds.
+fn branch_if<B: Bus, const CONDITION: u8>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+    if !cpu.holds(CONDITION) {
+        return Ok(());
     }
-    Ok(())
+    cpu.branch(o.immediate);
+    Err(Leave::Jumped)
+}
+
+/// The branch of a condition; 14, which is no condition of a branch, and more always hold.
+pub(in crate::cpu) fn branch_if_of<B: Bus>(condition: u32) -> Execute<B> {
+    match condition {
+        0 => branch_if::<B, 0>,
+        1 => branch_if::<B, 1>,
+        2 => branch_if::<B, 2>,
+        3 => branch_if::<B, 3>,
+        4 => branch_if::<B, 4>,
+        5 => branch_if::<B, 5>,
+        6 => branch_if::<B, 6>,
+        7 => branch_if::<B, 7>,
+        8 => branch_if::<B, 8>,
+        9 => branch_if::<B, 9>,
+        10 => branch_if::<B, 10>,
+        11 => branch_if::<B, 11>,
+        12 => branch_if::<B, 12>,
+        13 => branch_if::<B, 13>,
+        _ => branch,
+    }
 }
 
 /// CBZ; CBNZ with x = 1.
-pub(in crate::cpu) fn branch_if_zero<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
-    if (cpu.get(o.n) == 0) == (o.x == 0) {
-        cpu.branch(o.immediate);
+pub(in crate::cpu) fn branch_if_zero<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+    if (cpu.get(o.n) == 0) != (o.x == 0) {
+        return Ok(());
     }
-    Ok(())
+    cpu.branch(o.immediate);
+    Err(Leave::Jumped)
 }
 
 /// BL.
-pub(in crate::cpu) fn call<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn call<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     cpu.r[14] = cpu.pc | 1;
     cpu.branch(o.immediate);
-    Ok(())
+    Err(Leave::Jumped)
 }
 
 /// BLX.
-pub(in crate::cpu) fn call_register<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn call_register<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     let target = cpu.get(o.m);
     cpu.r[14] = cpu.pc | 1;
     if target & 1 == 0 {
@@ -42,39 +65,40 @@ pub(in crate::cpu) fn call_register<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Re
         cpu.attention = 0;
     }
     cpu.branch(target & !1);
-    Ok(())
+    Err(Leave::Jumped)
 }
 
 /// BX.
-pub(in crate::cpu) fn branch_register<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
-    cpu.branch_exchange(cpu.get(o.m))
+pub(in crate::cpu) fn branch_register<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+    cpu.branch_exchange(cpu.get(o.m))?;
+    Err(Leave::Jumped)
 }
 
 /// MOV to the program counter: no change of state.
-pub(in crate::cpu) fn move_to_pc<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn move_to_pc<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     cpu.branch(cpu.get(o.m) & !1);
-    Ok(())
+    Err(Leave::Jumped)
 }
 
 /// ADD to the program counter, which is `immediate`.
-pub(in crate::cpu) fn add_to_pc<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn add_to_pc<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     cpu.branch(o.immediate.wrapping_add(cpu.get(o.m)) & !1);
-    Ok(())
+    Err(Leave::Jumped)
 }
 
 /// TBB; TBH with x = 1. From `immediate`, a table at n or, with 15, behind the instruction.
-pub(in crate::cpu) fn table<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn table<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     let start = if o.n == 15 { o.immediate } else { cpu.get(o.n) };
     let entry = match o.x {
         0 => cpu.load::<1>(start.wrapping_add(cpu.get(o.m)))?,
         _ => cpu.load::<2>(start.wrapping_add(cpu.get(o.m) << 1))?,
     };
     cpu.branch(o.immediate.wrapping_add(2 * entry));
-    Ok(())
+    Err(Leave::Jumped)
 }
 
 /// IT.
-pub(in crate::cpu) fn it<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn it<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     cpu.it = o.x;
-    Ok(())
+    Err(Leave::Jumped)
 }

@@ -5,7 +5,7 @@ use crate::cpu::Cpu;
 use crate::cpu::arithmetic::{
     ARITHMETIC, CARRY_CLEARED, CARRY_KEPT, EXTEND, LEFT, RIGHT, ROTATE, add_with_carry, shift, sign_extend,
 };
-use crate::cpu::operation::{Operands, Trap};
+use crate::cpu::operation::{Done, Execute, Operands};
 
 /// Operations, as wide encodings number them.
 pub(in crate::cpu) const AND: u8 = 0;
@@ -40,7 +40,7 @@ pub(in crate::cpu) const SHIFTED: u8 = 2;
 pub(in crate::cpu) fn data<B: Bus, const OPERATION: u8, const SECOND: u8, const FLAGS: u8>(
     cpu: &mut Cpu<B>,
     o: Operands,
-) -> Result<(), Trap> {
+) -> Done {
     let (second, carry) = match SECOND {
         CONSTANT => match u32::from(o.x) {
             CARRY_KEPT => (o.immediate, cpu.carry),
@@ -77,10 +77,7 @@ pub(in crate::cpu) fn data<B: Bus, const OPERATION: u8, const SECOND: u8, const 
 }
 
 /// Shifts n by the lowest byte of m.
-pub(in crate::cpu) fn shift_register<B: Bus, const KIND: u8, const FLAGS: u8>(
-    cpu: &mut Cpu<B>,
-    o: Operands,
-) -> Result<(), Trap> {
+pub(in crate::cpu) fn shift_register<B: Bus, const KIND: u8, const FLAGS: u8>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     let (result, carry) = shift(KIND, cpu.get(o.n), cpu.get(o.m) & 0xff, cpu.carry);
     if FLAGS == ALWAYS || FLAGS == OUTSIDE_IT && !cpu.in_it {
         cpu.set_negative_zero(result);
@@ -91,10 +88,7 @@ pub(in crate::cpu) fn shift_register<B: Bus, const KIND: u8, const FLAGS: u8>(
 }
 
 /// Shifts m by a constant: `SHIFTED` MOV with the kind known.
-pub(in crate::cpu) fn shift_immediate<B: Bus, const KIND: u8, const FLAGS: u8>(
-    cpu: &mut Cpu<B>,
-    o: Operands,
-) -> Result<(), Trap> {
+pub(in crate::cpu) fn shift_immediate<B: Bus, const KIND: u8, const FLAGS: u8>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     let (result, carry) = shift(KIND, cpu.get(o.m), o.immediate, cpu.carry);
     if FLAGS == ALWAYS || FLAGS == OUTSIDE_IT && !cpu.in_it {
         cpu.set_negative_zero(result);
@@ -105,19 +99,19 @@ pub(in crate::cpu) fn shift_immediate<B: Bus, const KIND: u8, const FLAGS: u8>(
 }
 
 /// ADDW, SUBW, ADR, ADD to the stack pointer: no flags.
-pub(in crate::cpu) fn add_immediate<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn add_immediate<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     let sum = cpu.get(o.n).wrapping_add(o.immediate);
     cpu.set_any(o.d, sum);
     Ok(())
 }
 
 /// MOVW, and what the program counter adds to.
-pub(in crate::cpu) fn constant<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn constant<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     cpu.set_any(o.d, o.immediate);
     Ok(())
 }
 
-pub(in crate::cpu) fn movt<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn movt<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     let value = cpu.get(o.d) & 0xffff | o.immediate << 16;
     cpu.set(o.d, value);
     Ok(())
@@ -129,7 +123,7 @@ fn mask(width: u8) -> u32 {
 }
 
 /// BFI; BFC has 15 as n. The lowest bit is m, the width x.
-pub(in crate::cpu) fn bfi<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn bfi<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     let field = mask(o.x) << (o.m & 31);
     let inserted = if o.n == 15 { 0 } else { cpu.get(o.n) << (o.m & 31) };
     let value = cpu.get(o.d) & !field | inserted & field;
@@ -137,13 +131,13 @@ pub(in crate::cpu) fn bfi<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), T
     Ok(())
 }
 
-pub(in crate::cpu) fn ubfx<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn ubfx<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     let value = cpu.get(o.n) >> (o.m & 31) & mask(o.x);
     cpu.set(o.d, value);
     Ok(())
 }
 
-pub(in crate::cpu) fn sbfx<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn sbfx<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     let value = sign_extend(cpu.get(o.n) >> (o.m & 31), u32::from(o.x.clamp(1, 32)));
     cpu.set(o.d, value);
     Ok(())
@@ -157,7 +151,7 @@ pub(in crate::cpu) const BYTES_UNSIGNED: u8 = 3;
 pub(in crate::cpu) const BYTE_SIGNED: u8 = 4;
 
 /// SXTH and its like, with rotation by `immediate`; n is added where it is not 15.
-pub(in crate::cpu) fn extend<B: Bus, const KIND: u8>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn extend<B: Bus, const KIND: u8>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     let value = cpu.get(o.m).rotate_right(o.immediate);
     let base = if o.n == 15 { 0 } else { cpu.get(o.n) };
     let halves =
@@ -175,7 +169,7 @@ pub(in crate::cpu) fn extend<B: Bus, const KIND: u8>(cpu: &mut Cpu<B>, o: Operan
 }
 
 /// REV, REV16, RBIT, REVSH: as wide encodings number them.
-pub(in crate::cpu) fn reverse<B: Bus, const KIND: u8>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn reverse<B: Bus, const KIND: u8>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     let value = cpu.get(o.m);
     let result = match KIND {
         0 => value.swap_bytes(),
@@ -187,14 +181,14 @@ pub(in crate::cpu) fn reverse<B: Bus, const KIND: u8>(cpu: &mut Cpu<B>, o: Opera
     Ok(())
 }
 
-pub(in crate::cpu) fn clz<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn clz<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     let zeros = cpu.get(o.m).leading_zeros();
     cpu.set(o.d, zeros);
     Ok(())
 }
 
 /// PKHBT, PKHTB (x = 1); the kind of the shift follows.
-pub(in crate::cpu) fn pkh<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn pkh<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     let kind = if o.x == 0 { LEFT } else { ARITHMETIC };
     let (shifted, _) = shift(kind, cpu.get(o.m), o.immediate, false);
     let first = cpu.get(o.n);
@@ -216,7 +210,7 @@ macro_rules! by_kind {
     };
 }
 
-pub(in crate::cpu) fn shift_register_of<B: Bus>(kind: u8, flags: u8) -> crate::cpu::operation::Execute<B> {
+pub(in crate::cpu) fn shift_register_of<B: Bus>(kind: u8, flags: u8) -> Execute<B> {
     match flags {
         NEVER => by_kind!(shift_register, NEVER, kind),
         ALWAYS => by_kind!(shift_register, ALWAYS, kind),
@@ -224,7 +218,7 @@ pub(in crate::cpu) fn shift_register_of<B: Bus>(kind: u8, flags: u8) -> crate::c
     }
 }
 
-pub(in crate::cpu) fn shift_immediate_of<B: Bus>(kind: u8, flags: u8) -> crate::cpu::operation::Execute<B> {
+pub(in crate::cpu) fn shift_immediate_of<B: Bus>(kind: u8, flags: u8) -> Execute<B> {
     match flags {
         NEVER => by_kind!(shift_immediate, NEVER, kind),
         ALWAYS => by_kind!(shift_immediate, ALWAYS, kind),
@@ -233,7 +227,7 @@ pub(in crate::cpu) fn shift_immediate_of<B: Bus>(kind: u8, flags: u8) -> crate::
 }
 
 /// The function of an operation, with the second operand and the flags that only decoding knows.
-pub(in crate::cpu) fn data_of<B: Bus>(operation: u8, second: u8, flags: u8) -> crate::cpu::operation::Execute<B> {
+pub(in crate::cpu) fn data_of<B: Bus>(operation: u8, second: u8, flags: u8) -> Execute<B> {
     macro_rules! flags {
         ($operation:ident, $second:ident) => {
             match flags {

@@ -4,7 +4,7 @@ use super::load_store::{BELOW, CHANGES, block};
 use crate::bus::Bus;
 use crate::cpu::Cpu;
 use crate::cpu::float::{self, Rounding};
-use crate::cpu::operation::{Execute, Operands, Trap};
+use crate::cpu::operation::{Done, Execute, Operands, Trap};
 
 impl<B: Bus> Cpu<B> {
     /// Every instruction of the unit begins with this.
@@ -39,7 +39,7 @@ pub(in crate::cpu) const VFNMA: u8 = 11;
 pub(in crate::cpu) const VFMA: u8 = 12;
 pub(in crate::cpu) const VFMS: u8 = 13;
 
-fn three<B: Bus, const OPERATION: u8>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+fn three<B: Bus, const OPERATION: u8>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     cpu.use_floating_point()?;
     let (d, n, m) = (cpu.float(o.d), cpu.float(o.n), cpu.float(o.m));
     let status = &mut cpu.floating;
@@ -85,21 +85,21 @@ pub(in crate::cpu) fn three_of<B: Bus>(operation: u8) -> Option<Execute<B>> {
 }
 
 /// VMOV of a constant.
-pub(in crate::cpu) fn vmov_constant<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn vmov_constant<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     cpu.use_floating_point()?;
     cpu.set_float(o.d, o.immediate);
     Ok(())
 }
 
 /// VMOV, VABS, VNEG: bits of m, of which `immediate` are cleared and x of the sign exchanged.
-pub(in crate::cpu) fn vmov<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn vmov<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     cpu.use_floating_point()?;
     let bits = cpu.float(o.m) & !o.immediate ^ u32::from(o.x) << 31;
     cpu.set_float(o.d, bits);
     Ok(())
 }
 
-pub(in crate::cpu) fn vsqrt<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn vsqrt<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     cpu.use_floating_point()?;
     let root = float::square_root(cpu.float(o.m), &mut cpu.floating);
     cpu.set_float(o.d, root);
@@ -107,7 +107,7 @@ pub(in crate::cpu) fn vsqrt<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(),
 }
 
 /// VCMP, with zero where `immediate` says so; VCMPE with x.
-pub(in crate::cpu) fn vcmp<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn vcmp<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     cpu.use_floating_point()?;
     let second = if o.immediate != 0 { 0 } else { cpu.float(o.m) };
     float::compare(cpu.float(o.d), second, o.x != 0, &mut cpu.floating);
@@ -122,7 +122,7 @@ pub(in crate::cpu) const TOP: u32 = 1;
 pub(in crate::cpu) const TO_HALF: u32 = 2;
 
 /// VCVT, VCVTR to integers and fixed point of `immediate` bits behind the point.
-pub(in crate::cpu) fn vcvt_to_fixed<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn vcvt_to_fixed<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     cpu.use_floating_point()?;
     let x = u32::from(o.x);
     let bits = if x & NARROW != 0 { 16 } else { 32 };
@@ -134,7 +134,7 @@ pub(in crate::cpu) fn vcvt_to_fixed<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Re
 }
 
 /// VCVT from integers, by the mode, and from fixed point, to nearest.
-pub(in crate::cpu) fn vcvt_from_fixed<B: Bus, const INTEGER: bool>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn vcvt_from_fixed<B: Bus, const INTEGER: bool>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     cpu.use_floating_point()?;
     let x = u32::from(o.x);
     let bits = if x & NARROW != 0 { 16 } else { 32 };
@@ -146,7 +146,7 @@ pub(in crate::cpu) fn vcvt_from_fixed<B: Bus, const INTEGER: bool>(cpu: &mut Cpu
 }
 
 /// VCVTB, VCVTT.
-pub(in crate::cpu) fn vcvt_half<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn vcvt_half<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     cpu.use_floating_point()?;
     let x = u32::from(o.x);
     let at = if x & TOP != 0 { 16 } else { 0 };
@@ -163,7 +163,7 @@ pub(in crate::cpu) fn vcvt_half<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result
 }
 
 /// VMOV to core register d from n.
-pub(in crate::cpu) fn to_core<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn to_core<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     cpu.use_floating_point()?;
     let bits = cpu.float(o.n);
     cpu.set(o.d, bits);
@@ -171,7 +171,7 @@ pub(in crate::cpu) fn to_core<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(
 }
 
 /// VMOV to n from core register d.
-pub(in crate::cpu) fn from_core<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn from_core<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     cpu.use_floating_point()?;
     let bits = cpu.get(o.d);
     cpu.set_float(o.n, bits);
@@ -179,7 +179,7 @@ pub(in crate::cpu) fn from_core<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result
 }
 
 /// VMOV to core registers d and x from m and the next.
-pub(in crate::cpu) fn two_to_core<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn two_to_core<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     cpu.use_floating_point()?;
     let (low, high) = (cpu.float(o.m), cpu.float(o.m + 1));
     cpu.set(o.d, low);
@@ -188,7 +188,7 @@ pub(in crate::cpu) fn two_to_core<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Resu
 }
 
 /// VMOV to m and the next from core registers d and x.
-pub(in crate::cpu) fn two_from_core<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn two_from_core<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     cpu.use_floating_point()?;
     let (low, high) = (cpu.get(o.d), cpu.get(o.x));
     cpu.set_float(o.m, low);
@@ -197,7 +197,7 @@ pub(in crate::cpu) fn two_from_core<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Re
 }
 
 /// VMRS; with 15 only the flags, to the core's.
-pub(in crate::cpu) fn vmrs<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn vmrs<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     cpu.use_floating_point()?;
     let bits = cpu.floating.bits();
     if o.d == 15 {
@@ -209,7 +209,7 @@ pub(in crate::cpu) fn vmrs<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), 
     Ok(())
 }
 
-pub(in crate::cpu) fn vmsr<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn vmsr<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     cpu.use_floating_point()?;
     cpu.floating = float::Status::from_bits(cpu.get(o.d));
     Ok(())
@@ -221,7 +221,7 @@ fn address<B: Bus>(cpu: &Cpu<B>, o: Operands) -> u32 {
 }
 
 /// VLDR of x registers.
-pub(in crate::cpu) fn vldr<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn vldr<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     cpu.use_floating_point()?;
     let at = address(cpu, o);
     if o.x == 2 {
@@ -237,7 +237,7 @@ pub(in crate::cpu) fn vldr<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), 
 }
 
 /// VSTR of x registers.
-pub(in crate::cpu) fn vstr<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn vstr<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     cpu.use_floating_point()?;
     let at = address(cpu, o);
     for i in 0..o.x {
@@ -247,7 +247,7 @@ pub(in crate::cpu) fn vstr<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), 
 }
 
 /// VLDM, VPOP: m registers from d on; x as for LDM.
-pub(in crate::cpu) fn vldm<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn vldm<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     cpu.use_floating_point()?;
     let (start, changed) = block(cpu.get(o.n), o.immediate, u32::from(o.x) & BELOW != 0);
     for i in 0..o.m {
@@ -261,7 +261,7 @@ pub(in crate::cpu) fn vldm<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), 
 }
 
 /// VSTM, VPUSH.
-pub(in crate::cpu) fn vstm<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn vstm<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     cpu.use_floating_point()?;
     let (start, changed) = block(cpu.get(o.n), o.immediate, u32::from(o.x) & BELOW != 0);
     for i in 0..o.m {

@@ -2,7 +2,7 @@
 
 use crate::bus::Bus;
 use crate::cpu::Cpu;
-use crate::cpu::operation::{Execute, Operands, Trap};
+use crate::cpu::operation::{Done, Execute, Leave, Operands, Trap};
 
 /// What is moved: the numbers of the narrow encodings with a register offset.
 pub(in crate::cpu) const STR: u8 = 0;
@@ -27,7 +27,7 @@ pub(in crate::cpu) const AFTER: u8 = 4;
 
 /// Loads d, or stores it.
 #[inline(always)]
-fn access<B: Bus, const WHAT: u8, const ADDRESS: u8>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+fn access<B: Bus, const WHAT: u8, const ADDRESS: u8>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     let (address, changed) = match ADDRESS {
         OFFSET => (cpu.get(o.n).wrapping_add(o.immediate), 0),
         INDEXED => (cpu.get(o.n).wrapping_add(cpu.get(o.m) << (o.immediate & 3)), 0),
@@ -39,14 +39,15 @@ fn access<B: Bus, const WHAT: u8, const ADDRESS: u8>(cpu: &mut Cpu<B>, o: Operan
         _ => (cpu.get(o.n), cpu.get(o.n).wrapping_add(o.immediate)),
     };
     let value = match WHAT {
-        STR => return cpu.store::<4>(address, cpu.get(o.d)).map(|()| write_back::<B, ADDRESS>(cpu, o.n, changed)),
-        STRH => {
-            let value = cpu.get(o.d) & 0xffff;
-            return cpu.store::<2>(address, value).map(|()| write_back::<B, ADDRESS>(cpu, o.n, changed));
-        }
-        STRB => {
-            let value = cpu.get(o.d) & 0xff;
-            return cpu.store::<1>(address, value).map(|()| write_back::<B, ADDRESS>(cpu, o.n, changed));
+        STR | STRH | STRB => {
+            let value = cpu.get(o.d);
+            match WHAT {
+                STR => cpu.store::<4>(address, value)?,
+                STRH => cpu.store::<2>(address, value & 0xffff)?,
+                _ => cpu.store::<1>(address, value & 0xff)?,
+            }
+            write_back::<B, ADDRESS>(cpu, o.n, changed);
+            return Ok(());
         }
         LDR => cpu.load::<4>(address)?,
         LDRH => cpu.load::<2>(address)?,
@@ -71,13 +72,14 @@ fn write_back<B: Bus, const ADDRESS: u8>(cpu: &mut Cpu<B>, base: u8, value: u32)
 }
 
 /// Loads the program counter.
-pub(in crate::cpu) fn load_branch<B: Bus, const ADDRESS: u8>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn load_branch<B: Bus, const ADDRESS: u8>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     let base = if ADDRESS == ABSOLUTE { 0 } else { cpu.get(o.n) };
     let offset = if ADDRESS == INDEXED { cpu.get(o.m) << (o.immediate & 3) } else { o.immediate };
     let changed = base.wrapping_add(offset);
     let target = cpu.load_aligned::<4>(if ADDRESS == AFTER { base } else { changed })?;
     write_back::<B, ADDRESS>(cpu, o.n, changed);
-    cpu.branch_exchange(target)
+    cpu.branch_exchange(target)?;
+    Err(Leave::Jumped)
 }
 
 pub(in crate::cpu) fn load_branch_of<B: Bus>(address: u8) -> Execute<B> {
@@ -127,7 +129,7 @@ pub(super) fn block(base: u32, bytes: u32, below: bool) -> (u32, u32) {
 }
 
 /// LDM, POP. Registers are loaded as they come; the base keeps its value where a load faults.
-pub(in crate::cpu) fn load_several<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn load_several<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     let base = cpu.get(o.n);
     let (mut address, changed) = block(base, 4 * o.immediate.count_ones(), u32::from(o.x) & BELOW != 0);
     let mut list = o.immediate & 0x7fff;
@@ -149,11 +151,13 @@ pub(in crate::cpu) fn load_several<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Res
     } else if u32::from(o.x) & CHANGES != 0 {
         cpu.set_any(o.n, changed);
     }
-    target.map_or(Ok(()), |target| cpu.branch_exchange(target))
+    let Some(target) = target else { return Ok(()) };
+    cpu.branch_exchange(target)?;
+    Err(Leave::Jumped)
 }
 
 /// STM, PUSH.
-pub(in crate::cpu) fn store_several<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn store_several<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     let (mut address, changed) = block(cpu.get(o.n), 4 * o.immediate.count_ones(), u32::from(o.x) & BELOW != 0);
     let mut list = o.immediate;
     while list != 0 {
@@ -178,7 +182,7 @@ fn pair_address<B: Bus>(cpu: &Cpu<B>, o: Operands) -> (u32, u32) {
 }
 
 /// LDRD to d and m.
-pub(in crate::cpu) fn ldrd<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn ldrd<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     let (address, changed) = pair_address(cpu, o);
     let first = cpu.load_aligned::<4>(address)?;
     let second = cpu.load_aligned::<4>(address.wrapping_add(4))?;
@@ -191,7 +195,7 @@ pub(in crate::cpu) fn ldrd<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), 
 }
 
 /// LDRD from an address that decoding knows.
-pub(in crate::cpu) fn ldrd_absolute<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn ldrd_absolute<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     let first = cpu.load_aligned::<4>(o.immediate)?;
     let second = cpu.load_aligned::<4>(o.immediate.wrapping_add(4))?;
     cpu.set(o.d, first);
@@ -200,7 +204,7 @@ pub(in crate::cpu) fn ldrd_absolute<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Re
 }
 
 /// STRD from d and m.
-pub(in crate::cpu) fn strd<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn strd<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     let (address, changed) = pair_address(cpu, o);
     cpu.store_aligned::<4>(address, cpu.get(o.d))?;
     cpu.store_aligned::<4>(address.wrapping_add(4), cpu.get(o.m))?;
@@ -211,7 +215,7 @@ pub(in crate::cpu) fn strd<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), 
 }
 
 /// LDREX: loads, and marks the address as its own. With a single core the monitor has no address (B.3.4.5 leaves its size open).
-pub(in crate::cpu) fn load_exclusive<B: Bus, const BYTES: u32>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn load_exclusive<B: Bus, const BYTES: u32>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     let address = cpu.get(o.n).wrapping_add(o.immediate);
     let value = cpu.load_aligned::<BYTES>(address)?;
     cpu.exclusive = true;
@@ -220,10 +224,10 @@ pub(in crate::cpu) fn load_exclusive<B: Bus, const BYTES: u32>(cpu: &mut Cpu<B>,
 }
 
 /// STREX: stores m if the mark is still there; d becomes 0 then, 1 otherwise.
-pub(in crate::cpu) fn store_exclusive<B: Bus, const BYTES: u32>(cpu: &mut Cpu<B>, o: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn store_exclusive<B: Bus, const BYTES: u32>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     let address = cpu.get(o.n).wrapping_add(o.immediate);
     if address & (BYTES - 1) != 0 {
-        return Err(Trap::Unaligned);
+        return Err(Trap::Unaligned.into());
     }
     let own = std::mem::take(&mut cpu.exclusive);
     if own {
@@ -234,7 +238,7 @@ pub(in crate::cpu) fn store_exclusive<B: Bus, const BYTES: u32>(cpu: &mut Cpu<B>
     Ok(())
 }
 
-pub(in crate::cpu) fn clear_exclusive<B: Bus>(cpu: &mut Cpu<B>, _: Operands) -> Result<(), Trap> {
+pub(in crate::cpu) fn clear_exclusive<B: Bus>(cpu: &mut Cpu<B>, _: Operands) -> Done {
     cpu.exclusive = false;
     Ok(())
 }

@@ -1,0 +1,315 @@
+//! Writes docs/budget.md: what the control step and its parts take on the board's core, beside their targets; the same network in other libraries;
+//! and what both boards' programs take of their memories.
+//!
+//! `cargo bench -p host-tests --bench budget > docs/budget.md`; needs the board's target.
+
+use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired};
+use emulator::cpu::Watch;
+use emulator::emulation::Emulation;
+use emulator::program::Program;
+use host_tests::bare_core::{Core, Cost};
+use host_tests::bare_metal::{BOARDS, Board, build};
+use host_tests::control_steps::{friction, image_bytes, input, record};
+use host_tests::counted_steps::{PARTS, Step, counted, spread};
+use host_tests::peer_networks::{Exact, scaled};
+use host_tests::states::within;
+use joint_firmware::friction::state::SIGNALS;
+use object::read::elf::{FileHeader, ProgramHeader};
+use plant::ActuatorParameters;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+use std::collections::HashMap;
+use std::error::Error;
+use std::path::Path;
+
+type Outcome<T> = Result<T, Box<dyn Error>>;
+
+/// Where the programs are built.
+const TEMPORARY: &str = env!("CARGO_TARGET_TMPDIR");
+/// Exception of the control interrupt, ADC1_2: interrupt 18 of both chips.
+const CONTROL: u16 = 16 + 18;
+/// Inputs that each network evaluates; as many as the program `networks` has room for.
+const INPUTS: usize = 200;
+/// Control interrupts of a board's program that are taken apart.
+const INTERRUPTS: usize = 100;
+/// How long the boards' programs run, s.
+const RUN: f64 = 1.2;
+
+/// A row of the first table: its name, its parts, and the most instructions and cycles that it should take.
+type Row = (&'static str, &'static [&'static str], Option<u64>, Option<u64>);
+
+const ROWS: [Row; 7] = [
+    ("network", &["network"], Some(230), Some(330)),
+    ("physical model", &["physical model"], None, None),
+    ("compensation: regimes, fade, limits", &["regimes", "compensation"], None, None),
+    ("the three together", &["network", "physical model", "regimes", "compensation"], None, Some(600)),
+    ("feedforward and energy guard", &["feedforward and guard"], None, None),
+    ("observer", &["observer"], None, None),
+    ("current control, with transforms and modulation", &["transforms", "current control", "modulation"], None, None),
+];
+
+/// Another way to evaluate the network: its name, the function that is counted, and the value of what it gives.
+type Peer<'a> = (&'a str, &'a str, &'a dyn Fn(i32) -> f64);
+
+/// Most cycles of a whole step, interrupt entry included: 30 % of a period of 20 kHz at 170 MHz.
+const WHOLE: u64 = 2500;
+
+fn main() -> Outcome<()> {
+    println!("# Budget\n");
+    println!(
+        "Written by `cargo bench -p host-tests --bench budget`: emulation, no hardware. Instructions are exact; cycles are the published timings without \
+         wait states,\nas they are where the control interrupt runs from (`tools/emulator/src/cpu/timing.rs`). Each board's code is compiled as its \
+         program is.\nA part that takes more instructions than `.ci/instructions` permits fails the tests (`control_step.rs`, which says how to change that)."
+    );
+    let image = image_bytes();
+    let runs = input(&image, &record()?);
+    let boards = [run::<BG431BEsc1>(&BOARDS[0], BG431BEsc1::new)?, run::<MoteusR4>(&BOARDS[1], MoteusR4::new)?];
+    let mut missed = Vec::new();
+    println!(
+        "\n## The control step\n\nFive runs of 200 steps, recorded in closed loop with the virtual joint and replayed: off; the physical model; all of the \
+         model; torque mode with energy\nguard; position mode. The model is a certified image with every term, a network in each of four sets and two criteria. \
+         Least, median and most of the\nsteps that a part runs in. What the compiler has inlined counts for where it was written. The board's part (converters, timer, report) is that of its program, as it\nis flashed, on the emulated board: {INTERRUPTS} control interrupts while the joint is off."
+    );
+    for (board, program) in BOARDS.iter().zip(&boards) {
+        let (_, runs) = counted(&board.probe("step", Some(("PROBE_RUNS", &runs)), &[], TEMPORARY)?)?;
+        let steps: Vec<Step> = runs.concat();
+        println!("\n### {}, optimised for \"{}\"\n", board.name, board.level);
+        println!("| | instructions | cycles | target | |\n|---|---|---|---|---|");
+        for (name, parts, instructions, cycles) in &ROWS {
+            let costs = steps.iter().map(|step| step.of(parts)).collect();
+            row(board, name, costs, *instructions, *cycles, &mut missed);
+        }
+        let rest = |step: &Step| {
+            let named: Vec<&str> = ROWS.iter().flat_map(|(_, parts, ..)| *parts).copied().collect();
+            step.of(&PARTS.map(|(name, _)| name).into_iter().filter(|name| !named.contains(name)).collect::<Vec<_>>())
+        };
+        row(board, "everything else of the joint", steps.iter().map(rest).collect(), None, None, &mut missed);
+        row(board, "the joint's control step", steps.iter().map(|step| step.sum).collect(), None, None, &mut missed);
+        let longest = steps.iter().map(|step| step.sum.cycles).max().unwrap_or(0);
+        let [least, median, most] = program.around;
+        let whole = longest + most;
+        verdict(board, "whole interrupt", whole, WHOLE, "cycles", &mut missed);
+        println!("| the board's part of the interrupt, entry and return | | {least} {median} {most} | | |");
+        let said = if whole <= WHOLE { "kept" } else { "missed" };
+        println!("| **both, the longest of each** | | {whole} | {WHOLE} cycles | {said} |");
+    }
+    networks(&image, &mut missed)?;
+    memories(&boards);
+    println!("\n## What is missed\n");
+    missed.iter().for_each(|line| println!("- {line}"));
+    if missed.is_empty() {
+        println!("Nothing.");
+    }
+    Ok(())
+}
+
+fn verdict(board: &Board, name: &str, most: u64, target: u64, unit: &str, missed: &mut Vec<String>) -> bool {
+    if most > target {
+        missed.push(format!(
+            "{}, {name}: {most} {unit}, {} more than the target of {target}",
+            board.name,
+            most - target
+        ));
+    }
+    most <= target
+}
+
+fn cells(costs: &[Cost]) -> ([u64; 3], [u64; 3]) {
+    (spread(costs.iter().map(|cost| cost.instructions)), spread(costs.iter().map(|cost| cost.cycles)))
+}
+
+fn row(
+    board: &Board,
+    name: &str,
+    costs: Vec<Cost>,
+    instructions: Option<u64>,
+    cycles: Option<u64>,
+    missed: &mut Vec<String>,
+) {
+    let (i, c) = cells(&costs);
+    let mut kept = true;
+    for (spread, target, unit) in [(i, instructions, "instructions"), (c, cycles, "cycles")] {
+        kept &= target.is_none_or(|target| verdict(board, name, spread[2], target, unit, missed));
+    }
+    let targets =
+        [instructions.map(|most| format!("{most} instructions")), cycles.map(|most| format!("{most} cycles"))];
+    let targets: Vec<String> = targets.into_iter().flatten().collect();
+    let said = if targets.is_empty() {
+        ""
+    } else if kept {
+        "kept"
+    } else {
+        "missed"
+    };
+    println!("| {name} | {} {} {} | {} {} {} | {} | {said} |", i[0], i[1], i[2], c[0], c[1], c[2], targets.join(", "));
+}
+
+fn networks(image: &[u8], missed: &mut Vec<String>) -> Outcome<()> {
+    let friction = friction();
+    let (domain, parameters) = (friction.domain, friction.sets[0].network.ok_or("no network")?);
+    let exact = Exact::new(&parameters);
+    let mut random = ChaCha8Rng::seed_from_u64(8);
+    let signals: Vec<[i32; SIGNALS]> =
+        (0..INPUTS).map(|_| domain.ranges.map(|range| within(&mut random, range))).collect();
+    let inputs: Vec<_> = signals.iter().map(|signals| scaled(&domain, signals)).collect();
+    let wanted: Vec<f64> = inputs.iter().map(|x| exact.output(*x)).collect();
+    let full_scale = wanted.iter().fold(0.0f64, |most, output| most.max(output.abs()));
+    let (bytes, step) = exact.bytes(&inputs);
+    println!(
+        "\n## The network in other libraries\n\nThe first set's network, {INPUTS} inputs drawn from the trained box, weights from memory. Ours clamps and scales \
+         its inputs from Q16.16 in what is\ncounted, and its call counts here; the others get theirs scaled. Error: the largest, in % of the largest output, against 64-bit floats. \
+         microflow 0.1 has no tanh and no inputs of more\nthan 8 bits: one is looked up beside it. embedded-nn 0.2 has no tanh for floats (its \
+         `fast_tanh_f32` is x / (1 + |x|), 0.5 at 1): libm's is called."
+    );
+    for board in &BOARDS {
+        let mut core = Core::start(&board.probe("networks", None, &["peers"], TEMPORARY)?)?;
+        core.run_to((1, 0))?;
+        core.write("IMAGE", image)?;
+        core.write_words("LENGTH", [image.len() as i32])?;
+        core.write_words("SIGNAL_ROWS", signals.iter().flatten().copied())?;
+        let floats = inputs.iter().flatten().map(|x| (*x as f32).to_bits() as i32);
+        core.write_words("FLOAT_ROWS", floats)?;
+        let rounded: Vec<u8> = inputs.iter().flatten().map(|x| (x * 127.0).round() as i8 as u8).collect();
+        core.write("BYTE_ROWS", &rounded)?;
+        core.write("FLOATS", &exact.floats())?;
+        core.write("BYTES", &bytes)?;
+        println!("\n{}, optimised for \"{}\":\n", board.name, board.level);
+        println!("| | instructions | cycles | largest error, % |\n|---|---|---|---|");
+        let single = |word: i32| f64::from(f32::from_bits(word as u32));
+        let own = |word: i32| f64::from(word) / 65536.0 / exact.scale;
+        let eight = |word: i32| f64::from(word) * step;
+        let rows: [Peer; 4] = [
+            ("this project's", "counted_own", &own),
+            ("plain Rust, f32, libm's tanhf", "counted_plain", &single),
+            ("embedded-nn 0.2, f32, libm's tanhf", "counted_embedded_nn", &single),
+            ("microflow 0.1, i8, tanh looked up", "counted_microflow", &eight),
+        ];
+        for (name, function, value) in rows {
+            let costs = core.calls(function)?;
+            let outputs = core.read_words("OUTPUTS", INPUTS)?;
+            let errors = outputs.iter().zip(&wanted).map(|(word, wanted)| (value(*word) - wanted).abs());
+            let error = 100.0 * errors.fold(0.0, f64::max) / full_scale;
+            let (i, c) = cells(&costs);
+            if costs.len() != INPUTS {
+                return Err(format!("{name}: {} calls", costs.len()).into());
+            }
+            if function == "counted_own" && i[0] != i[2] {
+                missed.push(format!(
+                    "{}: the network's instructions depend on its inputs, {} to {}",
+                    board.name, i[0], i[2]
+                ));
+            }
+            println!("| {name} | {} {} {} | {} {} {} | {error:.4} |", i[0], i[1], i[2], c[0], c[1], c[2]);
+        }
+    }
+    Ok(())
+}
+
+/// A board's program.
+struct Flashed {
+    name: &'static str,
+    flash: u64,
+    ram: u64,
+    ccm: u64,
+    /// Room for the stack, and how much of it was used: by the stack pointer, and by what was painted before.
+    stack: [u64; 3],
+    /// Cycles of the control interrupt that are not the joint's: least, median, most.
+    around: [u64; 3],
+}
+
+/// Builds a board's program, sums up what it takes, and lets it run.
+fn run<W: Wired>(board: &'static Board, wired: impl FnOnce(Drivetrain) -> W) -> Outcome<Flashed> {
+    let path = build(board.name, TEMPORARY)?;
+    let bytes = std::fs::read(&path)?;
+    let (mut flash, mut ram, mut ccm) = (0, 0, 0);
+    let header = object::elf::FileHeader32::<object::Endianness>::parse(&*bytes)?;
+    let endian = header.endian()?;
+    for segment in header.program_headers(endian, &*bytes)? {
+        if segment.p_type(endian) != object::elf::PT_LOAD {
+            continue;
+        }
+        flash += u64::from(segment.p_filesz(endian));
+        match segment.p_vaddr(endian) >> 28 {
+            2 => ram += u64::from(segment.p_memsz(endian)),
+            1 => ccm += u64::from(segment.p_memsz(endian)),
+            _ => {}
+        }
+    }
+    let program = Program::parse(bytes)?;
+    let symbol = |name: &str| program.symbol(name).map(|symbol| symbol.address).ok_or(format!("no {name}"));
+    let (end, start) = (symbol("_stack_end")?, symbol("_stack_start")?);
+    let mut parameters = ActuatorParameters::reference().aligned().without_payload();
+    parameters.bus.source_voltage = 18.0;
+    let mut emulation = Emulation::new(wired(Drivetrain::new(parameters, 25.0, 1)?), &program)?;
+    // Memory is full of junk after power-up: what has another value later has been written.
+    let painted = emulation.cpu.bus.sram().to_vec();
+    emulation.cpu.set_watch(Some(Watch::new()));
+    for _ in 0..(RUN / 0.02).round() as u32 {
+        if let Some(end) = emulation.run(0.02) {
+            return Err(format!("{}: {end}", board.name).into());
+        }
+        emulation.log();
+    }
+    let lowest = emulation.cpu.watch().and_then(Watch::lowest_main_stack).ok_or("no stack")?;
+    let region = (end - 0x2000_0000) as usize..(start - 0x2000_0000) as usize;
+    let untouched =
+        emulation.cpu.bus.sram()[region.clone()].iter().zip(&painted[region]).take_while(|(now, then)| now == then);
+    let painted = u64::from(start - end) - untouched.count() as u64;
+    let stack = [u64::from(start - end), u64::from(start - lowest), painted];
+    Ok(Flashed { name: board.name, flash, ram, ccm, stack, around: around(&mut emulation, &path)? })
+}
+
+/// Cycles of control interrupts that are not the joint's control step, least, median and most: entry, return, and what the board does before and behind it.
+/// The step is inlined into the handler: line tables tell its instructions, and what they call counts with them.
+fn around<W: Wired>(emulation: &mut Emulation<W>, path: &Path) -> Outcome<[u64; 3]> {
+    let loader = addr2line::Loader::new(path).map_err(|error| error.to_string())?;
+    let mut known: HashMap<u32, Option<bool>> = HashMap::new();
+    let cpu = &mut emulation.cpu;
+    cpu.set_watch(None);
+    let mut board = Vec::new();
+    for _ in 0..INTERRUPTS {
+        cpu.clear_exception_times();
+        let (mut in_joint, mut joint) = (false, 0);
+        let own = loop {
+            let (at, inside, before) = (cpu.register(15), cpu.exception() == CONTROL, cpu.now());
+            if let Some(end) = cpu.step() {
+                return Err(end.to_string().into());
+            }
+            if let Some(times) = cpu.exception_times().get(&CONTROL) {
+                break times.own_cycles;
+            }
+            if inside {
+                in_joint = known.entry(at).or_insert_with(|| belongs(&loader, at)).unwrap_or(in_joint);
+                joint += if in_joint { cpu.now() - before } else { 0 };
+            }
+        };
+        if joint == 0 {
+            return Err("no control step in the control interrupt".into());
+        }
+        board.push(own - joint);
+    }
+    Ok(spread(board))
+}
+
+/// Whether an instruction of the handler belongs to the joint's control step; none for what is called out of line.
+fn belongs(loader: &addr2line::Loader, address: u32) -> Option<bool> {
+    let mut frames = loader.find_frames(address.into()).ok()?;
+    let (mut joint, mut handler) = (false, false);
+    while let Ok(Some(frame)) = frames.next() {
+        let name = frame.function.as_ref().and_then(|function| function.raw_name().ok());
+        joint |= name.as_deref() == Some("control_step");
+        handler |= name.as_deref() == Some("ADC1_2");
+    }
+    handler.then_some(joint)
+}
+
+fn memories(boards: &[Flashed]) {
+    println!(
+        "\n## Memories\n\nBytes, from each program's headers; RAM includes the whole stack region. Stack: the most that {RUN} s from power-up took, by the stack \
+         pointer after every\ninstruction, and by what was overwritten of the junk that memory is full of after power-up.\n"
+    );
+    println!("| | flash | RAM | CCM SRAM | stack region | stack used | overwritten |\n|---|---|---|---|---|---|---|");
+    for Flashed { name, flash, ram, ccm, stack: [room, used, painted], .. } in boards {
+        println!("| {name} | {flash} | {ram} | {ccm} | {room} | {used} | {painted} |");
+    }
+}

@@ -1,0 +1,57 @@
+//! What a board's flash holds when it is switched on: the stored configuration and a friction image, in the slots that the program reads
+//! (`src/tasks/networked/store.rs`).
+
+use emulator::board::Wired;
+use emulator::emulation::Emulation;
+use emulator::program::Program;
+use joint_firmware::joint::configuration::Configuration;
+use joint_firmware::objects::{RECORD, Stored};
+use joint_firmware::parameters::slots::{BLANK, Layout, PAGE_WORDS, SlotFlash, Slots};
+use libtest_mimic::Failed;
+use node::flash::Flash;
+
+/// Pages of the program's parameters.
+const PAGES: usize = 6;
+
+/// What is kept.
+#[derive(Clone, Copy, Debug)]
+pub struct Kept<'a> {
+    /// Its node id is the one that LSS stored.
+    pub configuration: &'a Configuration,
+    /// None where it is empty.
+    pub image: &'a [u8],
+}
+
+impl Kept<'_> {
+    /// Writes it into the flash of a board that has not been started.
+    ///
+    /// # Errors
+    /// What does not fit.
+    pub fn write<W: Wired>(&self, emulation: &mut Emulation<W>, program: &Program) -> Result<(), Failed> {
+        let mut flash = Flash::erased(PAGES);
+        let mut store = |first, kind, bytes: &[u8]| -> Result<(), Failed> {
+            let layout = Layout::new(first, 1, kind).ok_or("no layout")?;
+            let mut slots = Slots::open(&mut flash, layout).map_err(|error| format!("{error:?}"))?;
+            Ok(slots.store(&mut flash, bytes).map_err(|error| format!("{error:?}"))?)
+        };
+        if !self.image.is_empty() {
+            store(0, 1, self.image)?;
+        }
+        let node_id = self.configuration.node_id;
+        let application = Some((*self.configuration, Stored::NOTHING.ranges()));
+        let mut record = [0; RECORD];
+        let stored = Stored { node_id, application, communication: None };
+        let length = stored.encode(&mut record).ok_or("the record does not fit")?;
+        store(2, 2, &record[..length])?;
+
+        let start = program.symbol("__parameters_start").ok_or("the program names no parameters")?.address;
+        for word in 0..PAGES * PAGE_WORDS {
+            let bytes = flash.read(word).map_err(|error| format!("{error:?}"))?;
+            let written = bytes != BLANK;
+            if written && !emulation.cpu.bus.program(start + 8 * word as u32, &bytes) {
+                return Err("the parameters lie outside of the flash".into());
+            }
+        }
+        Ok(())
+    }
+}

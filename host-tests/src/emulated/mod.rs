@@ -1,0 +1,11 @@
+//! The boards' programs on emulated boards: on a bench supply, driven by a CANopen master in emulated time, watched control step by
+//! control step.
+
+pub mod bench;
+pub mod kept;
+pub mod master;
+pub mod stack;
+pub mod twin;
+
+pub use bench::Bench;
+pub use twin::Twin;
