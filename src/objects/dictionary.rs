@@ -17,6 +17,7 @@ use crate::canopen::{Abort, Access, CommunicationParameters, Entry, Event, Group
 use crate::joint::configuration::Configuration;
 use crate::joint::state_machine::State;
 use crate::motor::calibration::Calibration;
+use crate::motor::number::exceeds;
 use crate::parameters::authentication::{KEY, STAGING};
 use crate::parameters::life_cycle::{Action, LifeCycle, Refusal};
 use crate::parameters::slots::SlotError;
@@ -25,6 +26,10 @@ use heapless::Deque;
 
 /// EMCYs that wait for the task; when they are more, the newest are dropped.
 const WAITING: usize = 8;
+/// Longest time that the erasing of a page takes, s (from memory, not measured: some 22 ms).
+const ERASING: f32 = 0.03;
+/// rad.
+const QUARTER_TURN: f32 = core::f32::consts::FRAC_PI_2;
 
 /// What the objects start with.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,7 +38,7 @@ pub struct Start {
     pub configuration: Configuration,
     /// The stored record, or [`Stored::NOTHING`].
     pub stored: Stored,
-    /// Code and parameters lie in one bank of flash: writing stops the program, so the motor has to be off.
+    /// Code and parameters lie in one bank of flash: writing stops the program, so the motor has to be off, and nearly at rest.
     pub single_bank: bool,
 }
 
@@ -187,8 +192,15 @@ impl<'a, P: Program> Objects<'a, P> {
         !off || calibration::runs(self.program.calibration())
     }
 
+    /// Whether the joint cannot do without its control steps for as long as the erasing of a page takes them on one bank: it is armed, or turns so fast
+    /// that the encoder would lose count of the turns.
+    fn needs_control(&self) -> bool {
+        let rotor = self.observed.telemetry.motion.velocity * self.configuration.gear.ratio;
+        self.armed() || exceeds(rotor, QUARTER_TURN / ERASING)
+    }
+
     fn circumstances(&self) -> Circumstances {
-        Circumstances { now: self.now, armed: self.armed(), single_bank: self.single_bank }
+        Circumstances { now: self.now, armed: self.needs_control(), single_bank: self.single_bank }
     }
 
     /// Reports a refusal of the life cycle.
@@ -375,7 +387,7 @@ impl<'a, P: Program> Objects<'a, P> {
     /// A function of its own: the record is more than 1 KiB of stack.
     #[inline(never)]
     fn store_record(&mut self, stored: &Stored) -> Result<(), Abort> {
-        if self.single_bank && self.armed() {
+        if self.single_bank && self.needs_control() {
             return Err(Abort::DEVICE_STATE);
         }
         let mut record = [0; RECORD];
@@ -469,7 +481,7 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
     #[inline(never)]
     fn finish(&mut self) -> Result<(), Abort> {
         if let Some(key) = self.images.finish().map_err(|failure| self.fail(failure))? {
-            if self.single_bank && self.armed() {
+            if self.single_bank && self.needs_control() {
                 return Err(Abort::DEVICE_STATE);
             }
             self.program.provision(&key).map_err(|error| self.refuse(error.into()))?;

@@ -128,7 +128,7 @@ pub enum Ending {
 pub struct Conditions<'a> {
     /// Time, ms.
     pub now: u64,
-    /// The motor is, or may be, under current.
+    /// The motor is, or may be, under current, or turns so fast that it cannot be left alone while a page is erased.
     pub armed: bool,
     /// Code and parameters lie in one bank: writing stops the program.
     pub single_bank: bool,
