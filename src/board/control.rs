@@ -223,8 +223,8 @@ pub fn hold_off() -> bool {
     }
     WORDS.held_off.store(true, Ordering::Release);
     // Where the joint was enabled in the last step, the next one disables it. Without control steps the watchdog ends this.
-    let before = WORDS.steps.load(Ordering::Relaxed);
-    while before != 0 && WORDS.steps.load(Ordering::Acquire) == before {}
+    let (runs, before) = (NVIC::is_enabled(Interrupt::ADC1_2), WORDS.steps.load(Ordering::Relaxed));
+    while runs && WORDS.steps.load(Ordering::Acquire) == before {}
     true
 }
 
