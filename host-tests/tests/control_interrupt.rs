@@ -6,9 +6,10 @@
 //! is a constant that is an address in the program's flash, from a literal pool or put together by instructions: data there would make the
 //! interrupt wait while the flash erases. An address that is computed otherwise is not found out. The calibration may lie in flash: it
 //! runs while the joint is off, and nothing is written to flash meanwhile. So may, in the program of the B-G431B-ESC1 with the bus, what runs only while
-//! operation is enabled: there flash is written only while the joint is held off.
+//! operation is enabled, or in braking, or at the start: there flash is written only while the joint is held off.
 //! Needs the target; where it is missing the tests are reported as ignored, by name; with `CI` set they run and fail.
 
+#[allow(dead_code, reason = "each test uses its part")]
 mod thumb;
 
 use host_tests::bare_metal::{self, target_installed};
@@ -18,7 +19,7 @@ use std::path::{Path, PathBuf};
 /// Each program with its handlers of the highest priority, and what of the control step may lie in flash.
 const PROGRAMS: [(&str, [&str; 2], fn(&str) -> bool); 3] = [
     ("b-g431b-esc1", ["ADC1_2", "TIM1_UP_TIM16"], calibrates),
-    ("b-g431b-esc1-bus", ["ADC1_2", "TIM1_UP_TIM16"], |name| calibrates(name) || compensates(name)),
+    ("b-g431b-esc1-bus", ["ADC1_2", "TIM1_UP_TIM16"], |name| calibrates(name) || seldom_or_operating(name)),
     ("moteus-r4", ["ADC1_2", "TIM2"], calibrates),
 ];
 /// Flash of the larger chip; the smaller one's begins at the same address.
@@ -72,13 +73,20 @@ fn calibrates(name: &str) -> bool {
         .any(|part| name.contains(part))
 }
 
-/// Whether a function runs only while operation is enabled: the friction model and what adds it ([`Joint::control_step`] asks for the state before).
+/// Whether a function runs only with the bridge on, in operation ([`Joint::control_step`] asks for the state before) or in braking, or only at the start:
+/// the friction model and what adds it, the brake, the measurement of the offsets.
 ///
 /// [`Joint::control_step`]: joint_firmware::joint::Joint::control_step
-fn compensates(name: &str) -> bool {
-    ["14joint_firmware8friction", "14joint_firmware12compensation", "19FrictionFeedforward5guard"]
-        .iter()
-        .any(|part| name.contains(part))
+fn seldom_or_operating(name: &str) -> bool {
+    [
+        "14joint_firmware8friction",
+        "14joint_firmware12compensation",
+        "19FrictionFeedforward5guard",
+        "10motion_law9MotionLaw5brake",
+        "7offsets7Offsets3add",
+    ]
+    .iter()
+    .any(|part| name.contains(part))
 }
 
 fn check(board: &str, handlers: [&str; 2], may_lie_in_flash: fn(&str) -> bool) -> Result<(), Failed> {
