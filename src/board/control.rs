@@ -224,7 +224,9 @@ pub fn hold_off() -> bool {
     WORDS.held_off.store(true, Ordering::Release);
     // Where the joint was enabled in the last step, the next one disables it. Without control steps the watchdog ends this.
     let (runs, before) = (NVIC::is_enabled(Interrupt::ADC1_2), WORDS.steps.load(Ordering::Relaxed));
-    while runs && WORDS.steps.load(Ordering::Acquire) == before {}
+    while runs && WORDS.steps.load(Ordering::Acquire) == before {
+        core::hint::spin_loop();
+    }
     true
 }
 
