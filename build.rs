@@ -22,8 +22,14 @@ fn main() {
         eprintln!("two boards are chosen: for the moteus r4 build with `--no-default-features --features moteus-r4`");
         std::process::exit(1);
     }
-    let read = |name: &str| fs::read_to_string(PathBuf::from("src/board").join(name)).expect(name);
-    let memory = read(board) + &read("sections.x");
+    // In each of them the first match counts.
+    let files: &[&str] = match (*board, env::var_os("CARGO_FEATURE_BUS")) {
+        // With the bus the smaller chip's memory is divided in another way.
+        ("b_g431b_esc1.x", Some(_)) => &["b_g431b_esc1_bus.x", "preparation.x", "sections.x"],
+        (board, _) => &[board, "preparation.x", "seldom.x", "sections.x"],
+    };
+    let read = |name: &&str| fs::read_to_string(PathBuf::from("src/board").join(name)).expect(name);
+    let memory: String = files.iter().map(read).collect();
     let folder = PathBuf::from(env::var_os("OUT_DIR").expect("OUT_DIR"));
     fs::write(folder.join("memory.x"), memory).expect("memory.x");
     println!("cargo:rustc-link-search={}", folder.display());

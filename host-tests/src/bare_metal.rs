@@ -78,19 +78,21 @@ fn run(mut command: Command) -> Result<(), String> {
     }
 }
 
-/// Builds a board's program as it is flashed, below a test's temporary folder; its path.
+/// Builds a program as it is flashed, below a test's temporary folder; its path. It is called as its board, with `-bus` behind it where that is a
+/// choice.
 ///
 /// # Errors
 /// What the compiler says.
-pub fn build(board: &str, temporary: &str) -> Result<PathBuf, String> {
+pub fn build(program: &str, temporary: &str) -> Result<PathBuf, String> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let target = Path::new(temporary).join("boards").join(board);
-    let own = format!(".cargo/{board}.toml");
+    let target = Path::new(temporary).join("boards").join(program);
+    let own = format!(".cargo/{program}.toml");
     let own = root.join(&own).exists().then_some(["--config".to_owned(), own]);
+    let features = program.strip_suffix("-bus").map_or(program.to_owned(), |board| format!("{board},bus"));
     let mut command = cargo();
     command.args(own.into_iter().flatten());
     command.args(["build", "--release", "-p", "joint-firmware", "--target", TARGET]);
-    command.args(["--no-default-features", "--features", board]);
+    command.args(["--no-default-features", "--features", &features]);
     command.current_dir(root).env("CARGO_TARGET_DIR", &target);
     run(command)?;
     Ok(target.join(TARGET).join("release/joint-firmware"))

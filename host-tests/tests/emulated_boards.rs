@@ -1,5 +1,5 @@
-//! Both boards' programs, as they are flashed, on the emulated boards: they start, control at their rate and within their period, see the
-//! supply, the rotor and the button, and answer on the bus.
+//! The boards' programs, as they are flashed, on the emulated boards: they start, control at their rate and within their period, see the
+//! supply, the rotor and the button.
 //!
 //! Needs the target; where it is missing the tests are reported as ignored, by name; with `CI` set they run and fail.
 
@@ -23,7 +23,7 @@ fn main() {
         Trial::test("b_g431b_esc1_is_ready_once_its_encoder_has_met_the_index", esc1_index),
         Trial::test("b_g431b_esc1_keeps_the_bridge_off_after_the_button", esc1_button),
         Trial::test("moteus_r4_starts_and_controls", moteus_starts),
-        Trial::test("moteus_r4_takes_a_node_id_and_answers", moteus_bus),
+        Trial::test("b_g431b_esc1_with_the_bus_starts_and_controls", esc1_bus_starts),
         Trial::test("a_supply_out_of_range_is_a_fault_on_both", supply),
     ];
     let trials = trials.into_iter().map(|trial| trial.with_ignored_flag(ignored)).collect();
@@ -36,10 +36,10 @@ fn bench<W: Wired>(board: impl FnOnce(Drivetrain) -> W) -> Result<Bench<W>, Fail
 }
 
 /// The B-G431B-ESC1 with its rotor half a turn from the encoder's index: on it, noise alone would reach the index.
-fn esc1() -> Result<Bench<BG431BEsc1>, Failed> {
+fn esc1(name: &str) -> Result<Bench<BG431BEsc1>, Failed> {
     let mut actuator = actuator();
     actuator.sensors.encoder.zero = 0.5;
-    Bench::with(BG431BEsc1::new, &actuator, &program(BG431BEsc1::NAME, env!("CARGO_TARGET_TMPDIR"))?)
+    Bench::with(BG431BEsc1::new, &actuator, &program(name, env!("CARGO_TARGET_TMPDIR"))?)
 }
 
 /// It starts once, controls once a period and within it, and reports neither faults nor overruns.
@@ -70,7 +70,11 @@ fn starts<W: Wired>(bench: &mut Bench<W>, rate: u32, idle: &str) -> Result<(), F
 }
 
 fn esc1_starts() -> Result<(), Failed> {
-    starts(&mut esc1()?, 20_000, "not ready to switch on")
+    starts(&mut esc1(BG431BEsc1::NAME)?, 20_000, "not ready to switch on")
+}
+
+fn esc1_bus_starts() -> Result<(), Failed> {
+    starts(&mut esc1("b-g431b-esc1-bus")?, 20_000, "not ready to switch on")
 }
 
 fn moteus_starts() -> Result<(), Failed> {
@@ -79,7 +83,7 @@ fn moteus_starts() -> Result<(), Failed> {
 
 /// Somebody turns the link by hand, slowly: the rotor passes the index.
 fn esc1_index() -> Result<(), Failed> {
-    let mut bench = esc1()?;
+    let mut bench = esc1(BG431BEsc1::NAME)?;
     bench.run(0.2)?;
     for _ in 0..700 {
         let drivetrain = bench.board().drivetrain();
@@ -100,7 +104,7 @@ fn esc1_index() -> Result<(), Failed> {
 }
 
 fn esc1_button() -> Result<(), Failed> {
-    let mut bench = esc1()?;
+    let mut bench = esc1(BG431BEsc1::NAME)?;
     bench.run(0.2)?;
     bench.board().inputs().button = true;
     bench.run(0.1)?;
@@ -118,26 +122,6 @@ fn supply() -> Result<(), Failed> {
         bench.expect("fault: supply voltage too high")?;
         if bench.state() == "fault" { Ok(()) } else { Err(bench.log().into()) }
     }
-    over(esc1()?)?;
+    over(esc1(BG431BEsc1::NAME)?)?;
     over(bench(MoteusR4::new)?)
-}
-
-/// CiA 305: a new node is silent until LSS gives it a node id. Then it boots and answers.
-fn moteus_bus() -> Result<(), Failed> {
-    let mut bench = bench(MoteusR4::new)?;
-    bench.run(0.2)?;
-    let request = [0x40, 0, 0x10, 0, 0, 0, 0, 0];
-    let silent = bench.exchange(0x605, &request, 0.02)?;
-    if !silent.is_empty() {
-        return Err(format!("a node without a node id sends {silent:x?}").into());
-    }
-    let booted = bench.give_node_id(5)?;
-    if !booted.contains(&(0x705, vec![0])) {
-        return Err(format!("no boot-up message: {booted:x?}").into());
-    }
-    // Device type of a servo drive.
-    match bench.upload(5, 0x1000, 0)?.as_slice() {
-        [0x92, 0x01, 0x02, 0] => Ok(()),
-        answer => Err(format!("1000h is {answer:x?}").into()),
-    }
 }

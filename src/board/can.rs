@@ -172,11 +172,11 @@ pub fn observe(observed: &Observed) {
 
 /// What was told by [`observe`], with the newest control step.
 pub fn observed() -> Option<Observed> {
-    let observed = critical_section::with(|section| OBSERVED.borrow(section).get())?;
-    Some(match control::report() {
-        Some(report) => Observed { telemetry: report.telemetry, latched: report.latched, ..observed },
-        None => observed,
-    })
+    let mut observed = critical_section::with(|section| OBSERVED.borrow(section).get())?;
+    if let Some(report) = control::report() {
+        (observed.telemetry, observed.latched) = (report.telemetry, report.latched);
+    }
+    Some(observed)
 }
 
 /// The next frame for the task.
@@ -298,8 +298,9 @@ fn transmit(sending: &mut TransmitQueue<TO_BUS>, now: u32) {
 
 impl Bus {
     fn take(&mut self, frame: &Frame) {
-        if let Some(observed) = observed() {
-            self.image.observe(&Observed { feedforward_torque: self.feedforward, ..observed });
+        if let Some(mut observed) = observed() {
+            observed.feedforward_torque = self.feedforward;
+            self.image.observe(&observed);
         }
         let shared = self.shared;
         match self.receiver.receive(frame, now(), &mut self.image, |frame| send(frame, shared)) {

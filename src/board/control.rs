@@ -27,6 +27,9 @@ struct Control {
     ends: Ends,
     /// The step before had not ended when this one should have begun.
     overrun: bool,
+    /// What the joint is commanded with while it is held off.
+    #[cfg(feature = "bus")]
+    off: Demand,
 }
 
 /// What tasks command the joint with; each of the two has one owner.
@@ -101,6 +104,9 @@ struct Words {
     /// A calibration is to begin, or to be given up.
     #[cfg(feature = "bus")]
     calibration_asked: AtomicBool,
+    /// The joint stays off, whatever it is commanded.
+    #[cfg(feature = "bus")]
+    held_off: AtomicBool,
 }
 
 /// A number in an atomic word.
@@ -137,15 +143,19 @@ static WORDS: Words = Words {
     mean_square_wanted: AtomicBool::new(false),
     #[cfg(feature = "bus")]
     calibration_asked: AtomicBool::new(false),
+    #[cfg(feature = "bus")]
+    held_off: AtomicBool::new(false),
 };
 
 static ACTIVE: Replaced<Active> = Replaced::new();
-static DEMAND: Newest<Demand> = Newest::new(Demand {
+static DEMAND: Newest<Demand> = Newest::new(NOBODY);
+/// What is commanded before anybody does.
+const NOBODY: Demand = Demand {
     controlword: Controlword::DISABLE_VOLTAGE,
     command: Command { mode: Mode::Torque, position: 0.0, velocity: 0.0, torque: 0.0, stiffness: 0.0, damping: 0.0 },
     sequence: 0,
     coupled: Coupled { velocity: 0.0, sequence: 0 },
-});
+};
 static REPORT: Newest<Report> = Newest::new(Report::NOTHING);
 #[cfg(feature = "bus")]
 static ASKED: Newest<Option<CalibrationSettings>> = Newest::new(None);
@@ -203,6 +213,33 @@ pub fn statistics() -> Statistics {
 /// Switches the bridge off from the next control step on, until the next reset. The joint sees a fault of the bridge.
 pub fn stop() {
     WORDS.stopped.store(true, Ordering::Relaxed);
+}
+
+/// Before flash is written where it holds the program, too: the joint is off, and stays so until [`release`]. False where it is under current; then
+/// nothing may be written. For the task that writes, and before the control interrupt starts.
+///
+/// What the control interrupt runs only while operation is enabled may lie in flash on such a board: with this it never waits for a write.
+#[cfg(feature = "bus")]
+pub fn hold_off() -> bool {
+    if !super::SINGLE_BANK || WORDS.held_off.load(Ordering::Relaxed) {
+        return true;
+    }
+    if WORDS.switching.load(Ordering::Relaxed) {
+        return false;
+    }
+    WORDS.held_off.store(true, Ordering::Release);
+    // Where the joint was enabled in the last step, the next one disables it. Without control steps the watchdog ends this.
+    let (runs, before) = (NVIC::is_enabled(Interrupt::ADC1_2), WORDS.steps.load(Ordering::Relaxed));
+    while runs && WORDS.steps.load(Ordering::Acquire) == before {
+        core::hint::spin_loop();
+    }
+    true
+}
+
+/// Nothing is written any more: the joint does again what it is commanded.
+#[cfg(feature = "bus")]
+pub fn release() {
+    WORDS.held_off.store(false, Ordering::Release);
 }
 
 /// Temperatures for the next control steps, °C; NaN where there is none.
@@ -274,7 +311,14 @@ pub fn exchange() -> Option<(Commands, Ends)> {
 /// [`Commands::active`] there is no control step, and the bridge stays off.
 #[inline(never)]
 pub fn start(sensors: Sensors, ends: Ends) {
-    let control = Control { sensors, joint: Joint::new(), ends, overrun: false };
+    let control = Control {
+        sensors,
+        joint: Joint::new(),
+        ends,
+        overrun: false,
+        #[cfg(feature = "bus")]
+        off: NOBODY,
+    };
     // SAFETY: the interrupt is not enabled yet, and this runs once: there is one pair of ends.
     unsafe { (*CONTROL.0.get()).write(control) };
     // SAFETY: thread mode at start; nothing else uses these registers of the core.
@@ -311,8 +355,15 @@ extern "C" fn ADC1_2() {
         gear_temperature: WORDS.gear_temperature.load(Ordering::Relaxed),
     };
 
+    let demand = control.ends.demand.newest();
+    #[cfg(feature = "bus")]
+    let held_off = super::SINGLE_BANK && WORDS.held_off.load(Ordering::Acquire);
+    #[cfg(feature = "bus")]
+    let demand = if held_off { &control.off } else { demand };
+    #[cfg(not(feature = "bus"))]
+    let held_off = false;
     let wanted = match control.ends.active.current() {
-        Some(active) => control.joint.control_step(active, control.ends.demand.newest(), &slow, &measurements),
+        Some(active) => control.joint.control_step(active, demand, &slow, &measurements),
         None => Bridge::OFF,
     };
     let bridge = if stopped { Bridge::OFF } else { wanted };
@@ -337,7 +388,8 @@ extern "C" fn ADC1_2() {
     let count = |counter: &AtomicU32, yes: bool| {
         counter.store(counter.load(Ordering::Relaxed).wrapping_add(yes.into()), Ordering::Relaxed);
     };
-    control.overrun = adc::ended(super::CONTROL_ADC);
+    // The vector table lies in flash: a step that waits for a write comes late, and controls nothing.
+    control.overrun = adc::ended(super::CONTROL_ADC) && !held_off;
     count(&WORDS.overruns, control.overrun);
     count(&WORDS.steps, true);
     let cycles = DWT::cycle_count().wrapping_sub(begin);

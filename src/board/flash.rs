@@ -1,9 +1,10 @@
 //! The pages of the flash that hold parameters; thread mode.
 //!
 //! embassy's driver erases and writes, with interrupts enabled. Where code and parameters share a bank, whatever fetches from flash
-//! stands still meanwhile, some 20 ms for a page (from memory, not measured): such a board writes with the motor off.
+//! stands still meanwhile, some 20 ms for a page (from memory, not measured): such a board writes with the motor off, and holds it off until it has
+//! written ([`control::hold_off`]).
 
-use super::{FLASH_START, faults};
+use super::{FLASH_START, control, faults};
 use core::ptr::addr_of;
 use embassy_stm32::Peri;
 use embassy_stm32::flash::{Blocking, Flash};
@@ -46,12 +47,18 @@ impl SlotFlash for Parameters {
     fn erase_page(&mut self, page: usize) -> Result<(), WriteError> {
         let refused = WriteError { word: page.saturating_mul(PAGE_WORDS) };
         let from = Self::offset(page.saturating_mul(PAGE), PAGE).ok_or(refused)?;
+        if !control::hold_off() {
+            return Err(refused);
+        }
         self.flash.blocking_erase(from, from + PAGE as u32).map_err(|_| refused)
     }
 
     fn program(&mut self, word: usize, bytes: [u8; DOUBLE_WORD]) -> Result<(), WriteError> {
         let refused = WriteError { word };
         let offset = Self::offset(word.saturating_mul(DOUBLE_WORD), DOUBLE_WORD).ok_or(refused)?;
+        if !control::hold_off() {
+            return Err(refused);
+        }
         self.flash.blocking_write(offset, &bytes).map_err(|_| refused)
     }
 

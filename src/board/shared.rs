@@ -124,11 +124,11 @@ impl<T> Offering<T> {
         Some(unsafe { &mut *self.places.get().cast::<MaybeUninit<T>>().add(place) })
     }
 
-    /// Makes a value, and has it finished in its place, looking at the one in use; none, and nothing happens, while the one before has not been
+    /// Has a value made in its place, and finished there, looking at the one in use; none, and nothing happens, while the one before has not been
     /// taken.
     pub fn prepare<E>(
         &mut self,
-        make: impl FnOnce() -> Result<T, E>,
+        make: impl for<'a> FnOnce(&'a mut MaybeUninit<T>) -> Result<&'a mut T, E>,
         finish: impl FnOnce(&mut T, Option<&T>),
     ) -> Option<Result<Prepared<'_, T>, E>> {
         let place = self.preparer.place()?;
@@ -140,7 +140,10 @@ impl<T> Offering<T> {
             .map(|place| unsafe { (*self.places.get().cast::<MaybeUninit<T>>().add(place)).assume_init_ref() });
         // SAFETY: the place is the preparer's until it is offered, which needs the borrow that this one becomes; it is one of the two.
         let place = unsafe { &mut *self.places.get().cast::<MaybeUninit<T>>().add(place) };
-        Some(match make_in(place, make) {
+        let address = place.as_ptr();
+        Some(match make(place) {
+            // Another value than the one in the place would leave that without one.
+            Ok(value) if !core::ptr::eq(value, address) => return None,
             Ok(value) => {
                 finish(value, in_use);
                 Ok(Prepared { value, preparer: &mut self.preparer })
@@ -148,12 +151,6 @@ impl<T> Offering<T> {
             Err(error) => Err(error),
         })
     }
-}
-
-/// A function of its own: the stack has to bear the value once, and no longer than until it lies in its place.
-#[inline(never)]
-fn make_in<T, E>(place: &mut MaybeUninit<T>, make: impl FnOnce() -> Result<T, E>) -> Result<&mut T, E> {
-    make().map(|value| place.write(value))
 }
 
 impl<T> Prepared<'_, T> {

@@ -176,6 +176,7 @@ impl<'a> Communication<'_, 'a> {
     }
 
     /// Sets an object to a value that has its length.
+    #[inline(never)]
     pub(super) fn write(
         &mut self,
         object: Object<'_>,

@@ -14,6 +14,7 @@ use crate::motor::observer::{Motion, ObserverGains, ObserverSettings};
 use crate::motor::thermal::{ThermalSettings, WindingTemperature};
 use crate::motor::transform::Dq;
 use crate::quantity::Torque;
+use core::mem::MaybeUninit;
 
 /// Steps of the slow task a second, Hz.
 pub const SLOW_RATE: f32 = 100.0;
@@ -178,16 +179,42 @@ pub struct Active {
 impl Configuration {
     /// Checks the whole record and prepares it for the control step on a bridge.
     pub fn prepare(&self, bridge: &BridgeConfiguration) -> Result<Active, ConfigurationError> {
-        self.check(bridge)?;
-        Active::new(self, bridge)
+        Ok(Checked::of(self, bridge)?.active(self, bridge))
+    }
+
+    /// The same in its place. A friction model's place is 2 KiB, which a board's stack would have to bear otherwise.
+    #[inline(never)]
+    pub fn prepare_in<'a>(
+        &self,
+        bridge: &BridgeConfiguration,
+        place: &'a mut MaybeUninit<Active>,
+    ) -> Result<&'a mut Active, ConfigurationError> {
+        let checked = Checked::of(self, bridge)?;
+        Ok(place.write(checked.active(self, bridge)))
+    }
+
+    /// Whether [`Configuration::prepare`] would refuse it.
+    pub fn verify(&self, bridge: &BridgeConfiguration) -> Result<(), ConfigurationError> {
+        Checked::of(self, bridge).map(|_| ())
     }
 }
 
-impl Active {
-    fn new(configuration: &Configuration, bridge: &BridgeConfiguration) -> Result<Self, ConfigurationError> {
+/// What of an [`Active`] can be refused.
+struct Checked {
+    field_oriented: FieldOrientedGains,
+    observer: ObserverGains,
+    settings: Settings,
+    thermal: ThermalSettings,
+    flux_linkage: f32,
+    rotor_velocity: f32,
+}
+
+impl Checked {
+    #[inline(never)]
+    fn of(configuration: &Configuration, bridge: &BridgeConfiguration) -> Result<Self, ConfigurationError> {
+        configuration.check(bridge)?;
         let Configuration { motor, gear, limits, gains, compensation, thermal, .. } = configuration;
         let rate = bridge.rate;
-        let period = 1.0 / rate;
         let pole_pairs = motor.alignment.pole_pairs as f32;
         // Torque is 3/2 times pole pairs times flux linkage times i_q.
         let flux_linkage = motor.torque_constant / (1.5 * pole_pairs);
@@ -198,11 +225,8 @@ impl Active {
             flux_linkage,
         };
         let (lowest_voltage, highest_voltage) = limits.bus_voltage;
-        let current_slope = CURRENT_NOISE * motor.current_limit * VOLTAGE_FILTER * rate;
-        let unexplained = |inductance: f32| UNEXPLAINED * highest_voltage + inductance * current_slope;
         let magnitude = if gear.ratio < 0.0 { -gear.ratio } else { gear.ratio };
         let rotor_velocity = OBSERVER_RESERVE * limits.velocity * magnitude;
-        let scales = Scales::new(gear, &motor.alignment, motor.torque_constant);
         let torque = |value: f32| Torque::from_bits((value * 65536.0) as i32);
         let heat = ThermalSettings {
             resistance: motor.resistance,
@@ -236,18 +260,44 @@ impl Active {
                 highest_velocity: rotor_velocity,
                 highest_acceleration: HIGHEST_ACCELERATION,
             })?,
+            settings: Settings::new(
+                compensation.request,
+                (compensation.gain * 65536.0) as u32,
+                torque(compensation.clamp),
+                torque(compensation.slew),
+                bridge.friction_rate(),
+            )?,
+            thermal: heat,
+            flux_linkage,
+            rotor_velocity,
+        })
+    }
+
+    /// Always inlined: what it gives is built where the caller wants it.
+    #[inline(always)]
+    fn active(self, configuration: &Configuration, bridge: &BridgeConfiguration) -> Active {
+        let Configuration { motor, gear, limits, gains, compensation, .. } = configuration;
+        let rate = bridge.rate;
+        let period = 1.0 / rate;
+        let pole_pairs = motor.alignment.pole_pairs as f32;
+        let (_, highest_voltage) = limits.bus_voltage;
+        let current_slope = CURRENT_NOISE * motor.current_limit * VOLTAGE_FILTER * rate;
+        let unexplained = |inductance: f32| UNEXPLAINED * highest_voltage + inductance * current_slope;
+        Active {
+            field_oriented: self.field_oriented,
+            observer: self.observer,
             alignment: motor.alignment,
-            scales,
+            scales: Scales::new(gear, &motor.alignment, motor.torque_constant),
             limits: *limits,
             current_limit: motor.current_limit,
             current_sum_limit: CURRENT_SUM * limits.over_current,
             implausible_voltage: Dq { d: unexplained(motor.inductance_d), q: unexplained(motor.inductance_q) },
             resistance: motor.resistance,
             inductance: Dq { d: motor.inductance_d, q: motor.inductance_q },
-            flux_linkage,
+            flux_linkage: self.flux_linkage,
             // Half an electrical radian: with it the torque would already be a tenth less than commanded.
             jump_limit: 0.5 / pole_pairs,
-            bridged_steps: (0.25 * TAU / rotor_velocity * rate) as u32,
+            bridged_steps: (0.25 * TAU / self.rotor_velocity * rate) as u32,
             deadline_steps: (limits.command_deadline * rate) as u32,
             motion: MotionGains {
                 period,
@@ -261,13 +311,7 @@ impl Active {
                 braking_steps: (gains.braking_time * rate) as u32,
             },
             compensation: CompensationGains {
-                settings: Settings::new(
-                    compensation.request,
-                    (compensation.gain * 65536.0) as u32,
-                    torque(compensation.clamp),
-                    torque(compensation.slew),
-                    bridge.friction_rate(),
-                )?,
+                settings: self.settings,
                 source: compensation.velocity_source,
                 inverse_standstill: 1.0 / compensation.standstill_velocity,
                 standstill: compensation.standstill_velocity,
@@ -276,10 +320,12 @@ impl Active {
             },
             bridge: *bridge,
             friction: None,
-            thermal: heat,
-        })
+            thermal: self.thermal,
+        }
     }
+}
 
+impl Active {
     /// The same with a verified friction model.
     pub fn with_friction(mut self, model: Option<FrictionModel>) -> Self {
         self.friction = model;

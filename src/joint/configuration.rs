@@ -206,6 +206,34 @@ impl core::fmt::Display for ConfigurationError {
 
 impl core::error::Error for ConfigurationError {}
 
+/// Name, unit and range of each number whose range does not depend on another: as a table they take a third less flash than as calls.
+const RANGES: [(&str, &str, f32, f32); 24] = [
+    ("control rate", "Hz", 1e3, 100e3),
+    ("dead time", "s", 0.0, 5e-6),
+    ("torque constant", "Nm/A", 1e-3, 5.0),
+    ("current limit", "A", 0.1, 200.0),
+    ("encoder's latency", "s", 0.0, 1e-3),
+    ("gear ratio's magnitude", "", 1.0, 500.0),
+    ("joint's zero", "rad", -1000.0, 1000.0),
+    ("torque limit", "Nm", 0.01, 2000.0),
+    ("velocity limit", "rad/s", 0.1, 200.0),
+    ("lowest position", "rad", -1000.0, 1000.0),
+    ("margin beyond the position limits", "rad", 1e-3, 10.0),
+    ("lowest supply voltage", "V", 5.0, 100.0),
+    ("bridge temperature limit", "°C", 40.0, 150.0),
+    ("winding temperature limit", "°C", 60.0, 200.0),
+    ("command deadline", "s", 1e-3, 10.0),
+    ("stiffness", "Nm/rad", 0.0, 1e5),
+    ("damping", "Nm s/rad", 0.0, 1e4),
+    ("integral gain", "Nm/rad", 0.0, 1e6),
+    ("acceleration", "rad/s²", 0.1, 1e5),
+    ("quick-stop deceleration", "rad/s²", 0.1, 1e5),
+    ("braking time", "s", 0.01, 10.0),
+    ("compensation gain", "", 0.0, 1.0),
+    ("compensation slew limit", "Nm/s", 0.5, 32e3),
+    ("standstill velocity", "rad/s", 1e-4, 10.0),
+];
+
 impl Configuration {
     /// Checks every number that [`Configuration::prepare`] does not check where it uses it.
     pub(super) fn check(&self, bridge: &BridgeConfiguration) -> Result<(), ConfigurationError> {
@@ -216,37 +244,42 @@ impl Configuration {
             return Err(ConfigurationError::PolePairs(self.motor.alignment.pole_pairs));
         }
         let Self { motor, gear, limits, gains, compensation, .. } = self;
-        check("control rate", "Hz", bridge.rate, 1e3, 100e3)?;
-        check("dead time", "s", bridge.dead_time, 0.0, 5e-6)?;
-        check("torque constant", "Nm/A", motor.torque_constant, 1e-3, 5.0)?;
-        check("current limit", "A", motor.current_limit, 0.1, 200.0)?;
-        check("encoder's latency", "s", motor.encoder_latency, 0.0, 1e-3)?;
         let magnitude = if gear.ratio < 0.0 { -gear.ratio } else { gear.ratio };
-        check("gear ratio's magnitude", "", magnitude, 1.0, 500.0)?;
-        check("joint's zero", "rad", gear.zero, -1000.0, 1000.0)?;
-        check("torque limit", "Nm", limits.torque, 0.01, 2000.0)?;
-        check("velocity limit", "rad/s", limits.velocity, 0.1, 200.0)?;
-        let (low, high) = limits.position;
-        check("lowest position", "rad", low, -1000.0, 1000.0)?;
-        check("highest position", "rad", high, low + 1e-3, 1000.0)?;
-        check("margin beyond the position limits", "rad", limits.position_margin, 1e-3, 10.0)?;
+        let ((lowest, highest), (lowest_supply, highest_supply)) = (limits.position, limits.bus_voltage);
+        // In the order of the table.
+        let values = [
+            bridge.rate,
+            bridge.dead_time,
+            motor.torque_constant,
+            motor.current_limit,
+            motor.encoder_latency,
+            magnitude,
+            gear.zero,
+            limits.torque,
+            limits.velocity,
+            lowest,
+            limits.position_margin,
+            lowest_supply,
+            limits.bridge_temperature,
+            limits.winding_temperature,
+            limits.command_deadline,
+            gains.stiffness,
+            gains.damping,
+            gains.integral,
+            gains.acceleration,
+            gains.quick_stop_deceleration,
+            gains.braking_time,
+            compensation.gain,
+            compensation.slew,
+            compensation.standstill_velocity,
+        ];
+        for ((name, unit, low, high), value) in RANGES.iter().zip(values) {
+            check(name, unit, value, *low, *high)?;
+        }
+        check("highest position", "rad", highest, lowest + 1e-3, 1000.0)?;
         check("over-current limit", "A", limits.over_current, 1.05 * motor.current_limit, 500.0)?;
-        let (low, high) = limits.bus_voltage;
-        check("lowest supply voltage", "V", low, 5.0, 100.0)?;
-        check("highest supply voltage", "V", high, low + 1.0, 100.0)?;
-        check("bridge temperature limit", "°C", limits.bridge_temperature, 40.0, 150.0)?;
-        check("winding temperature limit", "°C", limits.winding_temperature, 60.0, 200.0)?;
-        check("command deadline", "s", limits.command_deadline, 1e-3, 10.0)?;
-        check("stiffness", "Nm/rad", gains.stiffness, 0.0, 1e5)?;
-        check("damping", "Nm s/rad", gains.damping, 0.0, 1e4)?;
-        check("integral gain", "Nm/rad", gains.integral, 0.0, 1e6)?;
-        check("acceleration", "rad/s²", gains.acceleration, 0.1, 1e5)?;
-        check("quick-stop deceleration", "rad/s²", gains.quick_stop_deceleration, 0.1, 1e5)?;
-        check("braking time", "s", gains.braking_time, 0.01, 10.0)?;
-        check("compensation gain", "", compensation.gain, 0.0, 1.0)?;
+        check("highest supply voltage", "V", highest_supply, lowest_supply + 1.0, 100.0)?;
         check("compensation clamp", "Nm", compensation.clamp, 0.0, limits.torque)?;
-        check("compensation slew limit", "Nm/s", compensation.slew, 0.5, 32e3)?;
-        check("standstill velocity", "rad/s", compensation.standstill_velocity, 1e-4, 10.0)?;
         Ok(())
     }
 }

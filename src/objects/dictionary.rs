@@ -16,6 +16,8 @@ use super::{history, table};
 use crate::canopen::{Abort, Access, CommunicationParameters, Entry, Event, Group, Length, NmtState, ObjectDictionary};
 use crate::joint::configuration::Configuration;
 use crate::joint::state_machine::State;
+use crate::motor::calibration::Calibration;
+use crate::motor::number::exceeds;
 use crate::parameters::authentication::{KEY, STAGING};
 use crate::parameters::life_cycle::{Action, LifeCycle, Refusal};
 use crate::parameters::slots::SlotError;
@@ -24,6 +26,10 @@ use heapless::Deque;
 
 /// EMCYs that wait for the task; when they are more, the newest are dropped.
 const WAITING: usize = 8;
+/// Longest time that the erasing of a page takes, s (from memory, not measured: some 22 ms).
+const ERASING: f32 = 0.03;
+/// rad.
+const QUARTER_TURN: f32 = core::f32::consts::FRAC_PI_2;
 
 /// What the objects start with.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,7 +38,7 @@ pub struct Start {
     pub configuration: Configuration,
     /// The stored record, or [`Stored::NOTHING`].
     pub stored: Stored,
-    /// Code and parameters lie in one bank of flash: writing stops the program, so the motor has to be off.
+    /// Code and parameters lie in one bank of flash: writing stops the program, so the motor has to be off, and nearly at rest.
     pub single_bank: bool,
 }
 
@@ -186,8 +192,15 @@ impl<'a, P: Program> Objects<'a, P> {
         !off || calibration::runs(self.program.calibration())
     }
 
+    /// Whether the joint cannot do without its control steps for as long as the erasing of a page takes them on one bank: it is armed, or turns so fast
+    /// that the encoder would lose count of the turns.
+    fn needs_control(&self) -> bool {
+        let rotor = self.observed.telemetry.motion.velocity * self.configuration.gear.ratio;
+        self.armed() || exceeds(rotor, QUARTER_TURN / ERASING)
+    }
+
     fn circumstances(&self) -> Circumstances {
-        Circumstances { now: self.now, armed: self.armed(), single_bank: self.single_bank }
+        Circumstances { now: self.now, armed: self.needs_control(), single_bank: self.single_bank }
     }
 
     /// Reports a refusal of the life cycle.
@@ -262,7 +275,9 @@ impl<'a, P: Program> Objects<'a, P> {
         Ok(())
     }
 
-    /// Has the control step take a configuration.
+    /// Has the control step take a configuration. Functions of their own, here and below, because the stack has to bear their copies of records: not
+    /// beside the proof of an image.
+    #[inline(never)]
     fn configure(&mut self, configuration: &Configuration) -> Result<(), Abort> {
         match self.program.configure(configuration) {
             Ok(()) => {
@@ -282,6 +297,7 @@ impl<'a, P: Program> Objects<'a, P> {
         }
     }
 
+    #[inline(never)]
     fn command_configuration(&mut self, command: u32) -> Result<(), Abort> {
         match command {
             1 if self.armed() => Err(Abort::DEVICE_STATE),
@@ -299,6 +315,7 @@ impl<'a, P: Program> Objects<'a, P> {
     }
 
     /// Begins a calibration, or gives it up.
+    #[inline(never)]
     fn calibrate(&mut self, current: f32) -> Result<(), Abort> {
         if current == 0.0 {
             self.program.abort_calibration();
@@ -322,16 +339,23 @@ impl<'a, P: Program> Objects<'a, P> {
     /// Has the control step take what a calibration found, once there is something. With settings that do not go with it, it is staged only,
     /// and 2100h says which one is refused.
     fn take_calibration(&mut self) {
-        let Some(found) = self.calibration.result(self.program.calibration()) else { return };
+        if let Some(found) = self.calibration.result(self.program.calibration()) {
+            self.take(&found);
+        }
+    }
+
+    #[inline(never)]
+    fn take(&mut self, found: &Calibration) {
         let temperature = self.observed.winding_temperature;
-        self.staged = self.staged.calibrated(&found, temperature);
-        let configuration = self.configuration.calibrated(&found, temperature);
+        self.staged = self.staged.calibrated(found, temperature);
+        let configuration = self.configuration.calibrated(found, temperature);
         // Where the control step has not taken the one before, in the next millisecond again.
         if self.configure(&configuration) != Err(Abort::DEVICE_STATE) {
             self.calibration.taken();
         }
     }
 
+    #[inline(never)]
     fn write_compensation(&mut self, setting: Setting, number: u32) -> Result<(), Abort> {
         let mut configuration = self.configuration;
         if !setting.set(&mut configuration, number) {
@@ -342,6 +366,7 @@ impl<'a, P: Program> Objects<'a, P> {
         Ok(())
     }
 
+    #[inline(never)]
     fn write_image(&mut self, field: ImageField, number: u32) -> Result<(), Abort> {
         let failures = self.images.life().failures();
         let result = match field {
@@ -359,17 +384,17 @@ impl<'a, P: Program> Objects<'a, P> {
         kept.map_err(|error| self.refuse(error.into()))
     }
 
-    /// A function of its own: the record is 2 KiB of stack.
+    /// A function of its own: the record is more than 1 KiB of stack.
     #[inline(never)]
-    fn store_record(&mut self, stored: Stored) -> Result<(), Abort> {
-        if self.single_bank && self.armed() {
+    fn store_record(&mut self, stored: &Stored) -> Result<(), Abort> {
+        if self.single_bank && self.needs_control() {
             return Err(Abort::DEVICE_STATE);
         }
         let mut record = [0; RECORD];
         let length = stored.encode(&mut record).ok_or(Abort::MEMORY)?;
         let record = record.get(..length).ok_or(Abort::MEMORY)?;
         self.program.store(record).map_err(|error| self.refuse(error.into()))?;
-        self.stored = stored;
+        self.stored = *stored;
         Ok(())
     }
 }
@@ -453,8 +478,12 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
         result.map_err(|failure| self.fail(failure))
     }
 
+    #[inline(never)]
     fn finish(&mut self) -> Result<(), Abort> {
         if let Some(key) = self.images.finish().map_err(|failure| self.fail(failure))? {
+            if self.single_bank && self.needs_control() {
+                return Err(Abort::DEVICE_STATE);
+            }
             self.program.provision(&key).map_err(|error| self.refuse(error.into()))?;
             self.images.set_key(key);
         }
@@ -465,6 +494,7 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
         self.images.abandon();
     }
 
+    #[inline(never)]
     fn store(&mut self, group: Group, communication: &CommunicationParameters) -> Result<(), Abort> {
         let mut stored = self.stored;
         if matches!(group, Group::All | Group::Application) {
@@ -473,9 +503,10 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
         if matches!(group, Group::All | Group::Communication) {
             stored.communication = Some((self.node_id.get(), *communication));
         }
-        self.store_record(stored)
+        self.store_record(&stored)
     }
 
+    #[inline(never)]
     fn restore(&mut self, group: Group) -> Result<(), Abort> {
         let mut stored = self.stored;
         if matches!(group, Group::All | Group::Application) {
@@ -484,16 +515,18 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
         if matches!(group, Group::All | Group::Communication) {
             stored.communication = None;
         }
-        self.store_record(stored)
+        self.store_record(&stored)
     }
 
+    #[inline(never)]
     fn store_node_id(&mut self, node_id: u8) -> Result<(), Abort> {
-        self.store_record(Stored { node_id, ..self.stored })?;
+        self.store_record(&Stored { node_id, ..self.stored })?;
         self.configuration.node_id = node_id;
         self.staged.node_id = node_id;
         Ok(())
     }
 
+    #[inline(never)]
     fn communication_parameters(&self, node_id: u8) -> CommunicationParameters {
         self.node_id.set(node_id);
         match self.stored.communication {

@@ -60,7 +60,8 @@ impl From<ConfigurationError> for NotStarted {
     }
 }
 
-/// Starts everything; called once in thread mode. `medium` starts the interrupt executor.
+/// Starts everything; called once in thread mode. `medium` starts the interrupt executor. A function of its own: its stack is free again for the tasks.
+#[inline(never)]
 pub fn start(slow: Spawner, medium: impl FnOnce() -> SendSpawner, peripherals: Peripherals) {
     faults::report();
     match begin(slow, medium, peripherals) {

@@ -20,7 +20,7 @@ pub struct Connection {
 pub fn start(mut commands: Commands, _parts: Parts) -> Result<(Connection, ThermalSettings), NotStarted> {
     let BoardConfiguration { bridge, joint, .. } = &board::CONFIGURATION;
     // Nothing has been offered, so there is a place.
-    let prepared = defmt::unwrap!(commands.active.prepare(|| joint.prepare(bridge), |_, _| ()))?;
+    let prepared = defmt::unwrap!(commands.active.prepare(|place| joint.prepare_in(bridge, place), |_, _| ()))?;
     let thermal = prepared.value().thermal;
     prepared.offer();
     Ok((Connection { demand: commands.demand }, thermal))

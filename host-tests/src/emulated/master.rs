@@ -2,7 +2,8 @@
 
 use super::Bench;
 use bus::client::Object;
-use bus::client::cob_id::{SDO_RECEIVE, SDO_TRANSMIT};
+use bus::client::cob_id::{HEARTBEAT, LSS_MASTER, LSS_SLAVE, SDO_RECEIVE, SDO_TRANSMIT};
+use bus::client::lss::request;
 use bus::client::sdo::{Method, Settings, Transfer};
 use emulator::board::Wired;
 use emulator::chip::fdcan::line::CanFrame;
@@ -12,7 +13,8 @@ use std::time::Duration;
 
 /// Time that a master lets pass between two looks at the bus, s.
 const TICK: f64 = 0.000_25;
-const LSS_MASTER: u16 = 0x7E5;
+/// Time that an answer by LSS may take, s: storing writes flash.
+const LSS: f64 = 0.1;
 
 /// A data frame with an 11-bit identifier.
 pub type Heard = (u16, Vec<u8>);
@@ -47,18 +49,31 @@ impl<W: Wired> Bench<W> {
         Ok(heard(&mut self.emulation))
     }
 
-    /// Gives the only node on the bus an id by LSS (CiA 305); what it sends then.
+    /// Gives the only node on the bus an id by LSS (CiA 305), which it is to keep, and lets it boot.
     ///
     /// # Errors
-    /// It does not take it.
-    pub fn give_node_id(&mut self, id: u8) -> Result<Vec<Heard>, Failed> {
-        // All nodes to configuration; the id; back to waiting.
-        self.exchange(LSS_MASTER, &[0x04, 1, 0, 0, 0, 0, 0, 0], 0.02)?;
-        let taken = self.exchange(LSS_MASTER, &[0x11, id, 0, 0, 0, 0, 0, 0], 0.02)?;
-        if taken != [(0x7E4, vec![0x11, 0, 0, 0, 0, 0, 0, 0])] {
-            return Err(format!("answer to the node id: {taken:x?}").into());
+    /// It does not take it, or sends no boot-up message.
+    pub fn give_node_id(&mut self, id: u8) -> Result<(), Failed> {
+        self.exchange(LSS_MASTER, &request::switch_global(true), LSS)?;
+        for message in [request::configure_node_id(id), request::store()] {
+            let answers = self.exchange(LSS_MASTER, &message, LSS)?;
+            if answers != [(LSS_SLAVE, vec![message[0], 0, 0, 0, 0, 0, 0, 0])] {
+                return Err(format!("answer to {message:x?}: {answers:x?}").into());
+            }
         }
-        self.exchange(LSS_MASTER, &[0x04, 0, 0, 0, 0, 0, 0, 0], 0.02)
+        let booted = self.exchange(LSS_MASTER, &request::switch_global(false), LSS)?;
+        self.has_booted(id, &booted)
+    }
+
+    /// A node's boot-up message is among frames.
+    ///
+    /// # Errors
+    /// It is not.
+    pub fn has_booted(&self, id: u8, heard: &[Heard]) -> Result<(), Failed> {
+        match heard.contains(&(HEARTBEAT + u16::from(id), vec![0])) {
+            true => Ok(()),
+            false => Err(format!("no boot-up message: {heard:x?}\n{}", self.log()).into()),
+        }
     }
 
     /// Reads an object.
@@ -86,6 +101,17 @@ impl<W: Wired> Bench<W> {
     pub fn download(&mut self, node: u8, index: u16, sub_index: u8, data: &[u8]) -> Result<(), Failed> {
         let object = Object { node, index, sub_index };
         self.transfer(Transfer::download(object, data, Method::Automatic, Settings::default())).map(drop)
+    }
+
+    /// Reads a number of up to four bytes.
+    ///
+    /// # Errors
+    /// The joint refuses or is silent.
+    pub fn number(&mut self, node: u8, index: u16, sub_index: u8) -> Result<u32, Failed> {
+        let mut bytes = [0; 4];
+        let read = self.upload(node, index, sub_index)?;
+        bytes.iter_mut().zip(&read).for_each(|(place, byte)| *place = *byte);
+        Ok(u32::from_le_bytes(bytes))
     }
 
     fn transfer(&mut self, mut transfer: Transfer) -> Result<Vec<u8>, Failed> {

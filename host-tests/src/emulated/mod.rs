@@ -6,6 +6,7 @@ pub mod kept;
 pub mod master;
 pub mod motion;
 pub mod power;
+pub mod stack;
 pub mod twin;
 
 pub use bench::Bench;

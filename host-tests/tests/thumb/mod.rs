@@ -2,12 +2,16 @@
 //!
 //! Encodings: ARM DDI 0403, A5 and A7. Data between instructions is left out by the mapping symbols ($t, $d).
 
+mod registers;
+pub mod stack;
+
 use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A program with its functions.
 pub struct Program {
     functions: BTreeMap<u32, (u32, String)>,
+    symbols: BTreeMap<String, u32>,
     /// Whether code (true) or data begins at an address.
     mapping: BTreeMap<u32, bool>,
     /// Address and bytes of each section with code.
@@ -40,7 +44,7 @@ impl Program {
     /// The program in an ELF file.
     pub fn parse(bytes: &[u8]) -> Result<Self, object::Error> {
         let file = object::File::parse(bytes)?;
-        let (mut functions, mut mapping) = (BTreeMap::new(), BTreeMap::new());
+        let (mut functions, mut mapping, mut symbols) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
         for symbol in file.symbols() {
             let (name, address) = (symbol.name()?, symbol.address() as u32 & !1);
             match name.get(..2) {
@@ -49,17 +53,33 @@ impl Program {
                 _ if symbol.kind() == SymbolKind::Text && symbol.size() > 0 => {
                     functions.insert(address, (symbol.size() as u32, name.to_owned()));
                 }
-                _ => {}
+                _ => drop(symbols.insert(name.to_owned(), symbol.address() as u32)),
             }
         }
         let code = file.sections().filter(|section| section.kind() == object::SectionKind::Text);
         let code = code.map(|section| Ok((section.address() as u32, section.data()?.to_vec())));
-        Ok(Self { functions, mapping, code: code.collect::<Result<_, object::Error>>()? })
+        Ok(Self { functions, symbols, mapping, code: code.collect::<Result<_, object::Error>>()? })
     }
 
     /// Address of a function.
     pub fn address(&self, name: &str) -> Option<u32> {
         self.functions.iter().find(|(_, (_, known))| known == name).map(|(address, _)| *address)
+    }
+
+    /// Names of all functions that `is` picks.
+    pub fn named(&self, is: impl Fn(&str) -> bool) -> Vec<String> {
+        self.functions.values().filter(|(_, name)| is(name)).map(|(_, name)| name.clone()).collect()
+    }
+
+    /// Value of a symbol that is no function: an address.
+    pub fn symbol(&self, name: &str) -> Option<u32> {
+        self.symbols.get(name).copied()
+    }
+
+    /// Address, size and name of the function that an address lies in.
+    fn containing(&self, address: u32) -> Option<(u32, u32, &str)> {
+        let (&start, (size, name)) = self.functions.range(..=address).next_back()?;
+        (address < start + size).then_some((start, *size, name))
     }
 
     fn half(&self, address: u32) -> Option<u32> {
@@ -78,31 +98,24 @@ impl Program {
         let mut reached = Reached::default();
         let (mut waiting, mut seen) = (vec![entry], BTreeSet::new());
         while let Some(target) = waiting.pop() {
-            let Some((&start, (size, name))) = self.functions.range(..=target).next_back() else {
+            let Some((start, size, name)) = self.containing(target) else {
                 reached.unclear.push(format!("{target:#010x} is in no function"));
                 continue;
             };
-            if target >= start + size {
-                reached.unclear.push(format!("{target:#010x} is in no function"));
-                continue;
-            }
             if !seen.insert(start) {
                 continue;
             }
-            reached.functions.push((start, *size, name.clone()));
+            reached.functions.push((start, size, name.to_owned()));
             if leaf(name) {
                 continue;
             }
             let mut at = start;
-            // Lower halves that movw has put into each register.
-            let mut halves = [0; 16];
-            // What movw and movt have built in r12, as veneers do.
-            let mut veneer = None;
+            let mut registers = registers::Registers::default();
             while at < start + size {
                 if !self.is_code(at) {
                     if at % 4 == 0 && at + 4 <= start + size {
                         let word = self.half(at).zip(self.half(at + 2)).map(|(low, high)| high << 16 | low);
-                        reached.constants.extend(word.map(|word| (word, name.clone())));
+                        reached.constants.extend(word.map(|word| (word, name.to_owned())));
                     }
                     at += 2;
                     continue;
@@ -113,29 +126,17 @@ impl Program {
                 };
                 let wide = first >> 11 >= 0b11101;
                 let second = if wide { self.half(at + 2).unwrap_or(0) } else { 0 };
-                let flow = match (wide, first) {
-                    // bx r12 after movw r12 and movt r12.
-                    (false, 0x4760) => veneer.map_or(Flow::Unknown, |address: u32| Flow::To(address & !1)),
-                    (false, _) => narrow(first, at),
-                    (true, _) => wide_flow(first, second, at),
-                };
-                if wide && second & 0x8000 == 0 {
-                    let value = (first & 0xf) << 12 | (first >> 10 & 1) << 11 | (second >> 12 & 7) << 8 | second & 0xff;
-                    let register = (second >> 8 & 0xf) as usize;
-                    match first & 0xfbf0 {
-                        0xf240 => halves[register] = value,
-                        0xf2c0 => {
-                            let word = value << 16 | halves[register];
-                            reached.constants.push((word, name.clone()));
-                            veneer = (register == 12).then_some(word);
-                        }
-                        _ => {}
-                    }
-                }
+                let flow = if wide { wide_flow(first, second, at) } else { narrow(first, at) };
+                let known = (flow == Flow::Unknown).then(|| registers.called(first)).flatten();
+                let word = |address| Some(self.half(address)? | self.half(address + 2)? << 16);
+                reached.constants.extend(registers.follow(first, second, at, word).map(|word| (word, name.to_owned())));
                 match flow {
                     Flow::Next => {}
                     Flow::To(address) if (start..start + size).contains(&address) => {}
                     Flow::To(address) => waiting.push(address),
+                    Flow::Unknown if known.is_some_and(|address| self.containing(address).is_some()) => {
+                        waiting.extend(registers.loaded(first).filter(|address| self.containing(*address).is_some()));
+                    }
                     Flow::Unknown => reached.unclear.push(format!("{name}: who knows where {at:#010x} goes")),
                     Flow::Trap => reached.unclear.push(format!("{name}: trap at {at:#010x}")),
                 }

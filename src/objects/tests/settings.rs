@@ -170,6 +170,36 @@ fn a_joint_of_one_bank_stores_only_with_its_motor_off() {
 }
 
 #[test]
+fn a_joint_of_one_bank_stores_only_where_no_turn_of_its_encoder_is_lost_meanwhile() {
+    // A quarter turn of the rotor in the 30 ms that a page may take.
+    let limit = 0.25 * core::f32::consts::TAU / 0.03 / BOARD.joint.gear.ratio;
+    for (single_bank, velocity, expected) in [
+        (true, 0.99 * limit, Ok(())),
+        (true, 1.01 * limit, Err(0x0800_0022)),
+        (true, -1.01 * limit, Err(0x0800_0022)),
+        (true, f32::NAN, Err(0x0800_0022)),
+        (false, 1.01 * limit, Ok(())),
+    ] {
+        let mut node = Node::with(Stored::NOTHING, single_bank);
+        node.observed.telemetry.motion.velocity = velocity;
+        assert_eq!(node.download(0x1010, 1, b"save"), expected, "{velocity} rad/s");
+    }
+}
+
+#[test]
+fn a_joint_of_one_bank_takes_a_key_only_with_its_motor_off() {
+    let key: [u8; 32] = core::array::from_fn(|place| place as u8);
+    for (single_bank, expected) in [(true, Err(0x0800_0022)), (false, Ok(()))] {
+        let mut node = Node::with(Stored::NOTHING, single_bank);
+        node.observed.telemetry.state = State::OperationEnabled;
+        assert_eq!(node.download(0x2215, 6, &key), expected);
+        assert_eq!(node.objects.program().key.is_some(), expected.is_ok());
+        node.observed.telemetry.state = State::SwitchOnDisabled;
+        assert_eq!(node.download(0x2215, 6, &key).is_ok(), single_bank, "once");
+    }
+}
+
+#[test]
 fn a_flash_that_fails_is_reported_and_nothing_counts_as_stored() {
     let mut node = Node::new();
     node.objects.program().fails = Some(SlotError::NoPrevious);

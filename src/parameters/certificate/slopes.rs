@@ -15,7 +15,7 @@ pub(super) const FRACTION_BITS: u32 = 20;
 /// Combinations of the two ends of each neuron's interval in a layer.
 const COMBINATIONS: usize = 1 << NEURONS;
 /// Combinations of layer 2 that are kept at a time: all would be 2.5 KiB of stack, and what is computed again for each part is little.
-const AT_ONCE: usize = 16;
+const AT_ONCE: usize = 8;
 
 /// Slope over a scaled input in units of the network's output, Q20. `tanh_slopes`: per layer and neuron, Q14.
 #[inline(never)]

@@ -128,7 +128,7 @@ pub enum Ending {
 pub struct Conditions<'a> {
     /// Time, ms.
     pub now: u64,
-    /// The motor is, or may be, under current.
+    /// The motor is, or may be, under current, or turns so fast that it cannot be left alone while a page is erased.
     pub armed: bool,
     /// Code and parameters lie in one bank: writing stops the program.
     pub single_bank: bool,
@@ -422,6 +422,10 @@ impl LifeCycle {
         let left = self.lockout_left(conditions.now);
         if conditions.key.is_some() && left > 0 {
             return Err(Refusal::LockedOut { left, failures: self.failures });
+        }
+        // A wrong tag is counted in flash before the client is answered.
+        if conditions.single_bank && conditions.armed && conditions.key.is_some() {
+            return Err(Refusal::Armed { command: Command::Verify });
         }
         let upload = staging.get(..length).ok_or(Refusal::UploadTooLong { length })?;
         if !verification::authentic(upload, conditions.key)? {

@@ -85,7 +85,7 @@ pub enum Refusal {
     },
     /// Something that was begun has not come to its end.
     Busy,
-    /// One bank of flash: the program stands still while it is written, and the motor must be off.
+    /// One bank of flash: the program stands still while it is written, and the motor must be off and nearly at rest.
     Armed {
         /// The command.
         command: Command,
@@ -172,7 +172,9 @@ impl core::fmt::Display for Refusal {
             Self::State { command: Some(command), state } => write!(f, "{command:?} is not possible while {state:?}"),
             Self::State { command: None, state } => write!(f, "an upload is not possible while {state:?}"),
             Self::Busy => f.write_str("what was begun before has not come to its end"),
-            Self::Armed { command } => write!(f, "{command:?} writes the only bank of flash: the motor must be off"),
+            Self::Armed { command } => {
+                write!(f, "{command:?} writes the only bank of flash: the motor must be off and nearly at rest")
+            }
             Self::TrialTime { time } => write!(f, "trial of {time} ms, must be 1 to {MAX_TRIAL_MS}"),
             Self::Changed => f.write_str("the staging buffer does not hold what was verified"),
             Self::NotRun => f.write_str("the control step has not taken the image"),

@@ -205,6 +205,20 @@ fn one_bank_is_written_with_the_motor_off_two_at_any_time() {
 }
 
 #[test]
+fn one_bank_counts_wrong_tags_with_the_motor_off() {
+    let mut joint = Joint::new();
+    joint.key = Some(key());
+    joint.upload(&encoded(&image(1)));
+    joint.armed = true;
+    assert_eq!(joint.command(Command::Verify), Err(Refusal::Armed { command: Command::Verify }));
+    assert_eq!(joint.life.failures(), 0);
+    joint.single_bank = false;
+    assert_eq!(joint.command(Command::Verify), Err(Refusal::TagMissing));
+    (joint.single_bank, joint.armed) = (true, false);
+    assert_eq!(joint.command(Command::Verify), Err(Refusal::TagMissing));
+}
+
+#[test]
 fn rolling_back_goes_past_the_floor_and_leaves_it() {
     let mut joint = Joint::new();
     joint.life = LifeCycle::new(REQUIREMENTS, 9, 0, 0);
@@ -465,5 +479,5 @@ fn every_refusal_has_a_number_and_a_text_of_its_own() {
     let text = Refusal::Version { version: 1, floor: 2 }.to_string();
     assert_eq!(text, "image version 1, must be at least 2");
     let text = Refusal::Armed { command: Command::Commit }.to_string();
-    assert_eq!(text, "Commit writes the only bank of flash: the motor must be off");
+    assert_eq!(text, "Commit writes the only bank of flash: the motor must be off and nearly at rest");
 }

@@ -34,6 +34,7 @@ pub struct Verified {
 }
 
 /// Checks the tag; false where there must be none. Needs an image whose checksum is right.
+#[inline(never)]
 pub(super) fn authentic(upload: &[u8], key: Option<&Key>) -> Result<bool, Refusal> {
     let (image, tag) = split(upload);
     Image::content(image)?;

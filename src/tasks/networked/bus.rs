@@ -22,7 +22,7 @@ const AWAY: Duration = Duration::from_millis(100);
 pub struct Node {
     shared: &'static canopen::Shared,
     server: Server<'static>,
-    objects: Objects<'static, BoardProgram>,
+    objects: &'static mut Objects<'static, BoardProgram>,
     stored: StoredImages,
     /// What the control step has not taken yet.
     waiting: Option<Action>,
@@ -38,6 +38,8 @@ pub async fn serve(node: &'static mut Node) {
     loop {
         let frame = with_timeout(TICK, can::next()).await.ok();
         node.work(frame);
+        // Whatever it has written to flash is written.
+        control::release();
         // The transition stopped the joint; a start in the middle of that would let it fall.
         if node.objects.program().restart && control::report().is_none_or(|report| is_off(report.telemetry.state)) {
             faults::restart();
@@ -55,7 +57,7 @@ impl Node {
     pub fn new(
         shared: &'static canopen::Shared,
         server: Server<'static>,
-        objects: Objects<'static, BoardProgram>,
+        objects: &'static mut Objects<'static, BoardProgram>,
         stored: StoredImages,
     ) -> Self {
         Self {
@@ -70,13 +72,11 @@ impl Node {
     }
 
     fn work(&mut self, frame: Option<Frame>) {
-        if let Some(observed) = can::observed() {
-            self.objects.poll(Instant::now().as_millis(), &observed);
-        }
+        self.observe();
         self.act();
         self.keep_shadow();
         if let Some(frame) = frame {
-            if let Some(answer) = self.server.receive(&frame, can::now(), &mut self.objects) {
+            if let Some(answer) = self.server.receive(&frame, can::now(), self.objects) {
                 can::send(answer, self.shared);
             }
             self.act();
@@ -86,7 +86,7 @@ impl Node {
             self.server.emergency(emergency.code, emergency.register, emergency.information);
         }
         while can::has_room()
-            && let Some(frame) = self.server.poll(can::now(), &mut self.objects)
+            && let Some(frame) = self.server.poll(can::now(), self.objects)
         {
             can::send(frame, self.shared);
         }
@@ -94,7 +94,16 @@ impl Node {
         can::attend();
     }
 
+    /// A function of its own, as all that takes much of the stack and is not in the way of an image's proof.
+    #[inline(never)]
+    fn observe(&mut self) {
+        if let Some(observed) = can::observed() {
+            self.objects.poll(Instant::now().as_millis(), &observed);
+        }
+    }
+
     /// Reports an error-passive controller, and brings it back from bus-off.
+    #[inline(never)]
     fn mind_the_bus(&mut self) {
         let condition = can::condition();
         let (before, since) = self.condition;
@@ -107,12 +116,13 @@ impl Node {
             return;
         }
         if before == Condition::Off {
-            self.server.bus_off_recovered(&mut self.objects);
+            self.server.bus_off_recovered(self.objects);
         }
         self.server.error_passive(condition != Condition::Active);
     }
 
     /// Does what the life of an image asks for, until it asks for nothing or the control step has to be waited for.
+    #[inline(never)]
     fn act(&mut self) {
         loop {
             let action = self.waiting.take().unwrap_or_else(|| self.objects.take_action());
@@ -128,6 +138,7 @@ impl Node {
     }
 
     /// Has the image run in shadow that is to, again where a configuration took its place.
+    #[inline(never)]
     fn keep_shadow(&mut self) {
         let Some(length) = self.shadow.filter(|_| !shadow::runs()) else { return };
         let (staging, program) = self.objects.staging_and_program();

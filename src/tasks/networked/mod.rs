@@ -38,9 +38,11 @@ pub struct Connection {
 pub fn start(commands: Commands, parts: Parts) -> Result<(Connection, ThermalSettings), NotStarted> {
     let mut program =
         BoardProgram::new(commands.active, commands.calibration, Store::open(Parameters::new(parts.flash))?);
-    let (stored, configuration) = program.stored();
+    let configuration = program.configuration();
     let thermal = program.begin(&configuration)?;
-    let node = node::start(program, &stored, &configuration, commands.demand, parts.can);
+    // What a loss of power left undecided in flash is decided.
+    control::release();
+    let node = node::start(program, &configuration, commands.demand, parts.can);
     Ok((Connection { node }, thermal))
 }
 

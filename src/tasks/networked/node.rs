@@ -7,7 +7,7 @@ use embassy_stm32::can::CanConfigurator;
 use joint_firmware::canopen::{self, Identity, SdoSettings, Server};
 use joint_firmware::joint::Demand;
 use joint_firmware::joint::configuration::Configuration;
-use joint_firmware::objects::{Images, JointImage, Objects, Shared, Start, Stored};
+use joint_firmware::objects::{Images, JointImage, Objects, Shared, Start};
 use joint_firmware::parameters::authentication::STAGING;
 use joint_firmware::parameters::certificate::Limits;
 use joint_firmware::parameters::image::{Effort, Target};
@@ -27,7 +27,6 @@ static OBJECTS: Shared = Shared::new();
 #[inline(never)]
 pub fn start(
     mut program: BoardProgram,
-    stored: &Stored,
     configuration: &Configuration,
     demand: Publisher<Demand>,
     controller: CanConfigurator<'static>,
@@ -63,10 +62,22 @@ pub fn start(
     let life = LifeCycle::new(requirements, floor, program.guard.failures, 0);
     let key = program.guard.key.clone();
     let images_of_client = Images::new(BUFFER.init([0; STAGING]), life, key, images);
-    let start = Start { configuration: *configuration, stored: *stored, single_bank: board::SINGLE_BANK };
+    let start = Start { configuration: *configuration, stored: program.stored(), single_bank: board::SINGLE_BANK };
     let settings = SdoSettings { block_size: can::BLOCK, ..SdoSettings::default() };
     let server = Server::new(&BUS, identity, settings, configuration.node_id);
-    let node = NODE.init(Node::new(&BUS, server, Objects::new(&OBJECTS, program, images_of_client, &start), images));
+    let objects = objects(program, images_of_client, &start);
+    let node = NODE.init(Node::new(&BUS, server, objects, images));
     can::start(controller, &BUS, JointImage::new(&OBJECTS), demand);
     node
+}
+
+/// A function of its own, because the stack bears the objects twice in it.
+#[inline(never)]
+fn objects(
+    program: BoardProgram,
+    images: Images<'static>,
+    start: &Start,
+) -> &'static mut Objects<'static, BoardProgram> {
+    static PLACE: StaticCell<Objects<BoardProgram>> = StaticCell::new();
+    PLACE.init_with(|| Objects::new(&OBJECTS, program, images, start))
 }

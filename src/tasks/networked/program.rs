@@ -37,18 +37,23 @@ impl BoardProgram {
         Self { active, calibration: RefCell::new(calibration), store, guard, restart: false }
     }
 
-    /// The stored record, or none, and the configuration to start with: the board's own where none is stored, or where the stored one
-    /// is refused.
+    /// The stored record, or none.
     #[inline(never)]
-    pub fn stored(&mut self) -> (Stored, Configuration) {
+    pub fn stored(&mut self) -> Stored {
+        let joint = &board::CONFIGURATION.joint;
+        self.store.record().and_then(|record| Stored::decode(record, joint)).unwrap_or(Stored::NOTHING)
+    }
+
+    /// The configuration to start with: the board's own where none is stored, or where the stored one is refused.
+    #[inline(never)]
+    pub fn configuration(&mut self) -> Configuration {
         let BoardConfiguration { bridge, joint, .. } = &board::CONFIGURATION;
-        let stored = self.store.record().and_then(|record| Stored::decode(record, joint)).unwrap_or(Stored::NOTHING);
-        let configuration = stored.configuration(joint);
-        if configuration.prepare(bridge).is_ok() {
-            return (stored, configuration);
+        let configuration = self.stored().configuration(joint);
+        if configuration.verify(bridge).is_ok() {
+            return configuration;
         }
         defmt::error!("the stored configuration is refused: the board's own is in use");
-        (stored, Configuration { node_id: configuration.node_id, ..*joint })
+        Configuration { node_id: configuration.node_id, ..*joint }
     }
 
     /// Offers the first configuration, with the friction model in flash. Returns what the thermal model needs.
@@ -95,7 +100,7 @@ fn prepare<'a>(
 ) -> Option<Result<Prepared<'a, Active>, ConfigurationError>> {
     shadow::withdraw();
     active.prepare(
-        || configuration.prepare(&board::CONFIGURATION.bridge),
+        |place| configuration.prepare_in(&board::CONFIGURATION.bridge, place),
         |place, _| Image::prepare(image, board::CONFIGURATION.bridge.friction_rate(), &mut place.friction),
     )
 }
@@ -105,10 +110,10 @@ impl Program for BoardProgram {
         let bridge = &board::CONFIGURATION.bridge;
         shadow::withdraw();
         let prepared = self.active.prepare(
-            || configuration.prepare(bridge),
+            |place| configuration.prepare_in(bridge, place),
             |place, in_use| {
-                if let Some(in_use) = in_use {
-                    place.friction.clone_from(&in_use.friction);
+                if let Some(model) = in_use.and_then(|in_use| in_use.friction.as_ref()) {
+                    model.copy_to(&mut place.friction);
                 }
             },
         );

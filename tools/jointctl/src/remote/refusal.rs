@@ -40,7 +40,10 @@ const WORDS: [(u16, &str); 32] = [
     (0x0801, "the joint does not know the command"),
     (0x0802, "not possible where the image stands now"),
     (0x0803, "what was begun before has not come to its end"),
-    (0x0804, "the joint has one bank of flash: the motor must be off; `jointctl disable` switches it off"),
+    (
+        0x0804,
+        "the joint has one bank of flash: the motor must be off and nearly at rest; `jointctl disable` switches it off",
+    ),
     (0x0805, "the time of the trial is out of range"),
     (0x0806, "the joint's staging buffer does not hold what was verified"),
     (0x0807, "the control step has not taken the image"),
