@@ -94,6 +94,8 @@ pub fn build(program: &str, temporary: &str) -> Result<PathBuf, String> {
     command.args(["build", "--release", "-p", "joint-firmware", "--target", TARGET]);
     command.args(["--no-default-features", "--features", &features]);
     command.current_dir(root).env("CARGO_TARGET_DIR", &target);
+    // The cargo that runs the tests has set these as for the default program, and what is set cargo leaves.
+    command.env_remove("DEFMT_LOG").env_remove("DEFMT_RTT_BUFFER_SIZE");
     run(command)?;
     Ok(target.join(TARGET).join("release/joint-firmware"))
 }

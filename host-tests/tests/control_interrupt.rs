@@ -16,8 +16,10 @@ use host_tests::bare_metal::{self, target_installed};
 use libtest_mimic::{Arguments, Failed, Trial};
 use std::path::{Path, PathBuf};
 
-/// Each program with its handlers of the highest priority, and what of the control step may lie in flash.
-const PROGRAMS: [(&str, [&str; 2], fn(&str) -> bool); 3] = [
+/// A program, its handlers of the highest priority, and which functions of the control step may lie in flash.
+type Checked = (&'static str, [&'static str; 2], fn(&str) -> bool);
+
+const PROGRAMS: [Checked; 3] = [
     ("b-g431b-esc1", ["ADC1_2", "TIM1_UP_TIM16"], calibrates),
     ("b-g431b-esc1-bus", ["ADC1_2", "TIM1_UP_TIM16"], |name| calibrates(name) || seldom_or_operating(name)),
     ("moteus-r4", ["ADC1_2", "TIM2"], calibrates),

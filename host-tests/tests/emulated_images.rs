@@ -110,8 +110,7 @@ fn takes_an_image<W: Wired>(name: &str, board: impl FnOnce(Drivetrain) -> W) -> 
     let booted = bench.exchange(cob_id::NMT, &[0x81, NODE], 0.5)?;
     bench.has_booted(NODE, &booted)?;
     match bench.emulation.resets() {
-        // The program asks, the chip does.
-        [(_, Origin::Program), (_, Origin::Chip)] => {}
+        [(_, Origin::Program)] => {}
         resets => return Err(format!("{resets:?}\n{}", bench.log()).into()),
     }
     expect("version after the restart", bench.number(NODE, 0x2213, 1)?, VERSION)?;
