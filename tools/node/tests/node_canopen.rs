@@ -1,7 +1,7 @@
 //! node-canopen (npm: canopen) drives the virtual joint, in real time, through everything that it can do; over slcan by TCP.
 //!
 //! Without Node.js, or where node-canopen cannot be installed (its checksum is a native module, which npm builds), this is reported as ignored by
-//! name; with `CI` set it runs, and fails. With `EVERY_LENGTH` set, SDO transfers have every length from 1 to 2048 bytes.
+//! name; with `CI` set it runs, and fails.
 
 mod client;
 
@@ -18,8 +18,15 @@ fn main() {
     let must_run = std::env::var_os("CI").is_some();
     let modules = if arguments.list { Err("only listed".into()) } else { modules() };
     let ignored = !must_run && modules.is_err();
-    let trial = Trial::test("node_canopen_can_do_everything_with_the_joint", move || conformance(&modules));
-    libtest_mimic::run(&arguments, vec![trial.with_ignored_flag(ignored)]).exit();
+    let shared = modules.clone();
+    let trials = vec![
+        Trial::test("node_canopen_can_do_everything_with_the_joint", move || conformance(&modules)),
+        Trial::test("node_canopen_transfers_every_length_in_every_way", move || {
+            client::every_length(|first, step| run(&shared, "tests/lengths.js", &[], &[first, step]))
+        }),
+    ];
+    let trials = trials.into_iter().map(|trial| trial.with_ignored_flag(ignored)).collect();
+    libtest_mimic::run(&arguments, trials).exit();
 }
 
 /// A folder with node-canopen, made once in the build directory; or why there is none.
@@ -61,15 +68,19 @@ fn headers() -> Option<PathBuf> {
     prefix.join("include/node/node.h").exists().then_some(prefix)
 }
 
-fn conformance(modules: &Result<PathBuf, String>) -> Result<(), Failed> {
+/// A script on a bus of its own with a joint; what it printed.
+fn run(modules: &Result<PathBuf, String>, script: &str, images: &[Vec<u8>], more: &[&str]) -> Result<String, Failed> {
     let modules = modules.as_ref()?;
     let port = std::net::TcpListener::bind("127.0.0.1:0")?.local_addr()?.port();
     let mut joint = Joint::new(&format!("slcan:listen://127.0.0.1:{port}"))?;
     let mut command = Command::new("node");
-    command.arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/conformance.js"));
+    command.arg(Path::new(env!("CARGO_MANIFEST_DIR")).join(script));
     command.arg(modules).args([port.to_string(), client::NODE.to_string()]);
+    joint.run(command, tempfile::tempdir()?.path(), images, more)
+}
+
+fn conformance(modules: &Result<PathBuf, String>) -> Result<(), Failed> {
     let images = [SampleImage::constant(1, 0.25), SampleImage::constant(2, 0.5)];
-    let every: &[&str] = if std::env::var_os("EVERY_LENGTH").is_some() { &["every"] } else { &[] };
-    let text = joint.run(command, tempfile::tempdir()?.path(), &images, every)?;
+    let text = run(modules, "tests/conformance.js", &images, &[])?;
     if text.lines().last() == Some("done") { Ok(()) } else { Err(text.into()) }
 }

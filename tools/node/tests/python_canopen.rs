@@ -1,7 +1,6 @@
 //! python-canopen drives the virtual joint, in real time: with the example that is shipped, and through everything that it can do.
 //!
 //! Without Python, or where python-canopen cannot be installed, these are reported as ignored by name; with `CI` set they run, and fail.
-//! With `EVERY_LENGTH` set, SDO transfers have every length from 1 to 2048 bytes; that takes minutes.
 
 mod client;
 
@@ -19,10 +18,13 @@ fn main() {
     let must_run = std::env::var_os("CI").is_some();
     let python = if arguments.list { None } else { PACKAGES.python(env!("CARGO_TARGET_TMPDIR")) };
     let ignored = !must_run && python.is_none();
-    let (one, two) = (python.clone(), python);
+    let (one, two, three) = (python.clone(), python.clone(), python);
     let trials = vec![
         Trial::test("python_canopen_enables_turns_and_feeds_an_image_to_the_joint", move || drive(one.as_deref())),
         Trial::test("python_canopen_can_do_everything_with_the_joint", move || conformance(two.as_deref())),
+        Trial::test("python_canopen_transfers_every_length_in_every_way", move || {
+            client::every_length(|first, step| run(three.as_deref(), "tests/lengths.py", &[], &[first, step]))
+        }),
     ];
     let trials = trials.into_iter().map(|trial| trial.with_ignored_flag(ignored)).collect();
     libtest_mimic::run(&arguments, trials).exit();
@@ -62,7 +64,6 @@ fn drive(python: Option<&Path>) -> Result<(), Failed> {
 
 fn conformance(python: Option<&Path>) -> Result<(), Failed> {
     let images = [SampleImage::constant(1, 0.25), SampleImage::constant(2, 0.5)];
-    let every: &[&str] = if std::env::var_os("EVERY_LENGTH").is_some() { &["every"] } else { &[] };
-    let text = run(python, "tests/conformance.py", &images, every)?;
+    let text = run(python, "tests/conformance.py", &images, &[])?;
     if text.lines().last() == Some("done") { Ok(()) } else { Err(text.into()) }
 }

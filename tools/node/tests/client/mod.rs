@@ -12,6 +12,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Its node id.
 pub const NODE: u8 = 5;
 
+/// Bytes of the longest transfer.
+const LONGEST: usize = 2048;
+/// Joints, each with a client of its own, that share every length: most of a transfer is waiting.
+const SHARES: usize = 8;
+
 /// The joint and its bus.
 pub struct Joint {
     node: VirtualNode,
@@ -55,5 +60,26 @@ impl Joint {
             true => Ok(text),
             false => Err(format!("{text}{}", String::from_utf8_lossy(&output.stderr)).into()),
         }
+    }
+}
+
+/// Has clients with joints of their own transfer every length, a share each: `client` runs one that begins with a length and goes on in steps, and
+/// says how many lengths there were.
+pub fn every_length(client: impl Fn(&str, &str) -> Result<String, Failed> + Sync) -> Result<(), Failed> {
+    let share = |first: usize| -> Result<usize, String> {
+        let text = client(&first.to_string(), &SHARES.to_string());
+        let text = text.map_err(|error| error.message().unwrap_or("failed").to_owned())?;
+        text.trim().parse().map_err(|_| text)
+    };
+    let done = std::thread::scope(|scope| {
+        let shares: Vec<_> = (1..=SHARES).map(|first| scope.spawn(move || share(first))).collect();
+        shares
+            .into_iter()
+            .map(|share| share.join().unwrap_or_else(|_| Err("panicked".into())))
+            .collect::<Result<Vec<_>, _>>()
+    })?;
+    match done.iter().sum::<usize>() {
+        LONGEST => Ok(()),
+        count => Err(format!("{count} lengths instead of {LONGEST}").into()),
     }
 }
