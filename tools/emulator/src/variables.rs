@@ -327,6 +327,8 @@ fn pieces(unit: &Unit<'_>, entry: &Entry<'_, '_>) -> Result<Option<Vec<Piece>>, 
     while let Some(operation) = operations.next()? {
         match operation {
             gimli::Operation::Address { address } => last = Some(address as u32),
+            // Statics that the compiler has merged into one.
+            gimli::Operation::PlusConstant { value } => last = last.map(|address| address.wrapping_add(value as u32)),
             gimli::Operation::Piece { size_in_bits, bit_offset: None } => {
                 let size = (size_in_bits / 8) as u32;
                 pieces.push(Piece { offset, size, address: last.take() });
