@@ -260,7 +260,7 @@ fn run<W: Wired>(board: &'static Board, wired: impl FnOnce(Drivetrain) -> W) -> 
 }
 
 /// Cycles of control interrupts that are not the joint's control step, least, median and most: entry, return, and what the board does before and behind it.
-/// The step is inlined into the handler: line tables tell its instructions, and what they call counts with them.
+/// Line tables tell the step's instructions, inlined into the handler or not, and what they call counts with them.
 fn around<W: Wired>(emulation: &mut Emulation<W>, path: &Path) -> Outcome<[u64; 3]> {
     let loader = addr2line::Loader::new(path).map_err(|error| error.to_string())?;
     let mut known: HashMap<u32, Option<bool>> = HashMap::new();
@@ -300,7 +300,7 @@ fn belongs(loader: &addr2line::Loader, address: u32) -> Option<bool> {
         joint |= name.as_deref() == Some("control_step");
         handler |= name.as_deref() == Some("ADC1_2");
     }
-    handler.then_some(joint)
+    (handler || joint).then_some(joint)
 }
 
 fn memories(boards: &[Flashed]) {

@@ -1,6 +1,6 @@
 //! The joint on the bus: what the receive interrupt leaves, SDO, LSS, heartbeats, EMCYs, the life of images; thread mode.
 //!
-//! The proof of an image takes up to 19 million instructions (in emulation; 0.11 s at one a cycle), and writing one stalls for the flash. Neither has been
+//! The proof of an image takes up to 21 million instructions (in emulation; 0.12 s at one a cycle), and writing one stalls for the flash. Neither has been
 //! measured on a board. Meanwhile this task sends no heartbeat; NMT, SYNC and RPDOs act in the interrupt all the same.
 
 use super::program::BoardProgram;
