@@ -27,7 +27,8 @@ pub enum Cause {
 impl Cause {
     const ALL: [Self; 4] = [Self::Panic, Self::HardFault, Self::NonMaskable, Self::Unexpected];
 
-    const fn code(self) -> u32 {
+    /// As it is kept and as object 2301h:2 says it.
+    pub const fn code(self) -> u32 {
         match self {
             Self::Panic => 1,
             Self::HardFault => 2,
@@ -35,6 +36,28 @@ impl Cause {
             Self::Unexpected => 4,
         }
     }
+}
+
+/// Why the program started: what the chip says, and what stopped the program before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LastReset {
+    /// Bits of what has reset the chip since they were cleared at the start before, as in bits 25 to 31 of its register RCC_CSR (RM0440, section 7.4.30).
+    pub causes: u8,
+    /// None where the program did not stop by itself.
+    pub stop: Option<Record>,
+}
+
+impl LastReset {
+    /// Bit of [`LastReset::causes`]: the supply was too low, or came.
+    pub const POWER: u8 = 1 << 2;
+    /// Bit of [`LastReset::causes`]: the program asked for it.
+    pub const SOFTWARE: u8 = 1 << 3;
+    /// Bit of [`LastReset::causes`]: the watchdog was not fed.
+    pub const WATCHDOG: u8 = 1 << 4;
+    /// The supply came.
+    pub const POWER_UP: Self = Self { causes: Self::POWER, stop: None };
+    /// The program asked for it.
+    pub const REQUESTED: Self = Self { causes: Self::SOFTWARE, stop: None };
 }
 
 /// One stop of the program.
@@ -46,7 +69,7 @@ pub struct Record {
     pub address: u32,
     /// Depends on the cause.
     pub detail: u32,
-    /// Stops in a row, this one included, since the last start that found no record. Saturates.
+    /// Stops in a row, this one included, or 0 once the program has run for long enough since. Saturates.
     pub repeats: u32,
     /// End of the name of a source file, padded with zeros; all zero where there is none.
     pub place: [u8; PLACE],
@@ -75,6 +98,12 @@ impl Record {
             Some(previous) => previous.repeats.saturating_add(1),
             None => 1,
         };
+        self
+    }
+
+    /// The program has run for long enough since: the next stop is the first.
+    pub const fn forgotten(mut self) -> Self {
+        self.repeats = 0;
         self
     }
 
@@ -185,6 +214,7 @@ mod tests {
         let first = Record::new(Cause::Panic, 0, 1).after(None);
         let second = Record::new(Cause::HardFault, 0, 0).after(Some(&first));
         assert_eq!((first.repeats, second.repeats), (1, 2));
+        assert_eq!(first.after(Some(&second.forgotten())).repeats, 1);
         let many = Record { repeats: u32::MAX, ..first };
         assert_eq!(second.after(Some(&many)).repeats, u32::MAX);
     }

@@ -6,10 +6,12 @@
 use core::mem::MaybeUninit;
 use core::panic::PanicInfo;
 use core::ptr::{addr_of, addr_of_mut};
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::sync::atomic::{AtomicU8, AtomicU32, Ordering};
 use cortex_m::peripheral::SCB;
 use embassy_stm32::pac;
 use joint_firmware::parameters::ecc::{self, Decision, Storage};
+#[cfg(feature = "bus")]
+use joint_firmware::reset_record::LastReset;
 use joint_firmware::reset_record::{Cause, Record, WORDS};
 
 /// The region PANIC of the board's memory: the startup code does not touch it.
@@ -21,6 +23,9 @@ const CFSR: *const u32 = 0xe000_ed28 as *const u32;
 
 /// Words of the parameter slots that read with a double error: torn by a loss of power while they were written.
 static TORN_WORDS: AtomicU32 = AtomicU32::new(0);
+
+/// What reset the chip, [`LastReset::causes`](joint_firmware::reset_record::LastReset::causes).
+static CAUSES: AtomicU8 = AtomicU8::new(0);
 
 unsafe extern "C" {
     static __parameters_start: u8;
@@ -52,6 +57,7 @@ fn reset_with(record: Record) -> ! {
 pub fn report() {
     let flags = pac::RCC.csr().read();
     pac::RCC.csr().modify(|w| w.set_rmvf(true));
+    CAUSES.store((flags.0 >> 25) as u8, Ordering::Relaxed);
     defmt::info!(
         "start: power {}, watchdog {}, window watchdog {}, software {}, pin {}, option bytes {}, low power {}",
         flags.borrstf(),
@@ -63,6 +69,11 @@ pub fn report() {
         flags.lpwrrstf()
     );
     let Some(record) = Record::decode(&words()) else { return };
+    if record.repeats == 0 {
+        // The run before this one got over it.
+        store([0; WORDS]);
+        return;
+    }
     let cause = match record.cause {
         Cause::Panic => defmt::intern!("panic"),
         Cause::HardFault => defmt::intern!("hard fault"),
@@ -81,17 +92,27 @@ pub fn report() {
     );
 }
 
+/// What [`report`] has logged.
+#[cfg(feature = "bus")]
+#[inline(never)]
+pub fn last_reset() -> LastReset {
+    LastReset { causes: CAUSES.load(Ordering::Relaxed), stop: Record::decode(&words()) }
+}
+
 /// Starts the program anew, as a master asked for: bridge off first. Nothing is kept, as nothing went wrong.
 #[cfg(feature = "bus")]
 pub fn restart() -> ! {
     super::bridge_off();
+    store([0; WORDS]);
     cortex_m::asm::dsb();
     SCB::sys_reset()
 }
 
-/// Forgets the last stop: the program has run long enough since.
+/// Gets over the last stop: the program has run long enough since. It is there to be read up to the next start.
 pub fn forget() {
-    store([0; WORDS]);
+    if let Some(record) = Record::decode(&words()) {
+        store(record.forgotten().encode());
+    }
 }
 
 /// Parameter words that were found torn since the start.

@@ -3,7 +3,7 @@
 use super::calibration::{self, CalibrationState};
 use super::communication::default_communication;
 use super::emergency::{Emergency, Reports, of_refusal};
-use super::field::{ConfigurationField, Field, ImageField, Range, SetPoint};
+use super::field::{ConfigurationField, Field, ImageField, Range, ResetField, SetPoint};
 use super::images::{Circumstances, Failure, Images, StoredImages, abort};
 use super::observed::{Observed, signed};
 use super::program::{NotConfigured, Program};
@@ -12,7 +12,7 @@ use super::set_points::mode;
 use super::settings::Setting;
 use super::shared::Shared;
 use super::stored::{RECORD, Stored, is_range};
-use super::{history, table};
+use super::{history, last_reset, table};
 use crate::canopen::{Abort, Access, CommunicationParameters, Entry, Event, Group, Length, NmtState, ObjectDictionary};
 use crate::joint::configuration::Configuration;
 use crate::joint::state_machine::State;
@@ -58,6 +58,8 @@ pub struct Objects<'a, P> {
     single_bank: bool,
     now: u64,
     heartbeat_lost: bool,
+    /// Whether the start has been reported.
+    told_reset: bool,
     /// As it was when communication began; what is stored holds for it.
     node_id: Cell<u8>,
     reports: Reports,
@@ -86,6 +88,7 @@ impl<'a, P: Program> Objects<'a, P> {
             single_bank,
             now: 0,
             heartbeat_lost: false,
+            told_reset: false,
             node_id: Cell::new(0),
             reports: Reports::default(),
             emergencies: Deque::new(),
@@ -100,7 +103,8 @@ impl<'a, P: Program> Objects<'a, P> {
         let Start { configuration, stored, single_bank } = *start;
         self.images.restart(life, stored_images);
         (self.configuration, self.staged, self.refused) = (configuration, configuration, Refused::default());
-        (self.stored, self.single_bank, self.heartbeat_lost) = (stored, single_bank, false);
+        (self.stored, self.single_bank) = (stored, single_bank);
+        (self.heartbeat_lost, self.told_reset) = (false, false);
         for (range, value) in Range::ALL.into_iter().zip(stored.ranges()) {
             self.shared.set_range(range, value);
         }
@@ -231,6 +235,7 @@ impl<'a, P: Program> Objects<'a, P> {
             Field::Image(ImageField::Active) => self.images.active_length(),
             Field::Image(ImageField::Staging) => self.images.life().length() as u32,
             Field::History => self.program.history(history::length).unwrap_or(0),
+            Field::Reset(_) => last_reset::place(&self.program.last_reset()).len() as u32,
             Field::Configuration(_) => self.refused.name().len() as u32,
             _ => 0,
         }
@@ -249,6 +254,7 @@ impl<'a, P: Program> Objects<'a, P> {
             Field::Configuration(part) => self.refused.get(part).into(),
             Field::Calibration(part) => self.calibration.get(part, self.program.calibration()),
             Field::Image(part) => self.images.get(part, self.now).into(),
+            Field::Reset(part) => last_reset::get(&self.program.last_reset(), part).into(),
             Field::Server | Field::History => 0,
         }
     }
@@ -432,6 +438,9 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
             Field::Configuration(ConfigurationField::RefusedSetting) => {
                 history::copy(self.refused.name().as_bytes(), offset, out)
             }
+            Field::Reset(ResetField::Place) => {
+                history::copy(last_reset::place(&self.program.last_reset()), offset, out)
+            }
             field => history::copy(&self.value(field).to_le_bytes(), offset, out),
         };
         if done { Ok(()) } else { Err(Abort::DEVICE_STATE) }
@@ -539,6 +548,13 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
         match event {
             Event::State(state) => {
                 self.state = state;
+                // Behind the boot-up message, which forgets what waits to be sent.
+                if !self.told_reset && state == NmtState::PreOperational {
+                    self.told_reset = true;
+                    if let Some(emergency) = last_reset::emergency(&self.program.last_reset()) {
+                        self.report(emergency);
+                    }
+                }
                 self.program.abort_calibration();
             }
             Event::HeartbeatLost { .. } => {

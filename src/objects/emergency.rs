@@ -12,6 +12,10 @@ pub const AUTHENTICATION: u16 = 0xFF02;
 pub const PARAMETER: u16 = 0x6320;
 /// Flash could not be written or read. Information: code of the refusal (u16).
 pub const FLASH: u16 = 0x5530;
+/// The watchdog had to reset the program. Information: object 2301h:1, 0.
+pub const WATCHDOG: u16 = 0x6010;
+/// The program stopped by itself before this start. Information: object 2301h:1 and 2.
+pub const STOPPED: u16 = 0x6100;
 /// No error any more.
 const RESET: u16 = 0;
 /// A joint that wanders along the edge of the range reports it once in this time, ms.

@@ -29,6 +29,25 @@ pub enum Field {
     Image(ImageField),
     /// The control steps before a fault.
     History,
+    /// Why the program started.
+    Reset(ResetField),
+}
+
+/// A part of why the program started.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ResetField {
+    /// What reset the chip.
+    Causes,
+    /// What stopped the program.
+    Stop,
+    /// Address of the instruction that it stopped at.
+    Address,
+    /// What there is to say of it.
+    Detail,
+    /// Stops in a row.
+    Repeats,
+    /// Source file.
+    Place,
 }
 
 /// What is asked of the joint. Everything but the mode ends with the NMT state.

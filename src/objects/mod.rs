@@ -32,6 +32,7 @@ pub mod field;
 mod friction_statistics;
 mod history;
 mod images;
+mod last_reset;
 mod number;
 mod observed;
 mod process_image;

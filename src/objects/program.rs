@@ -7,6 +7,7 @@ use crate::motor::calibration::Progress;
 use crate::motor::setting::SettingError;
 use crate::parameters::authentication::Key;
 use crate::parameters::slots::SlotError;
+use crate::reset_record::LastReset;
 
 /// Why a configuration is not in use.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,6 +47,9 @@ pub trait Program {
     /// Reads the steps before a fault, while one is latched; none otherwise. `read` is short: it may hold the control step up, which
     /// then keeps the bridge off.
     fn history<R>(&self, read: impl FnOnce(&History) -> R) -> Option<R>;
+
+    /// Why the program started; the same until the next start, but for the stops in a row.
+    fn last_reset(&self) -> LastReset;
 
     /// The network tells something. Of a transition the objects know already.
     fn event(&mut self, event: Event);

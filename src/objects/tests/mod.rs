@@ -22,6 +22,7 @@ use crate::parameters::certificate::Limits;
 use crate::parameters::image::{Effort, Target};
 use crate::parameters::life_cycle::{LifeCycle, Requirements};
 use crate::parameters::slots::SlotError;
+use crate::reset_record::{Cause, LastReset, Record};
 use std::collections::VecDeque;
 
 pub const NODE: u8 = 5;
@@ -38,7 +39,6 @@ const IDENTITY: Identity<'static> = Identity {
 };
 
 /// A program that keeps everything in memory and does what it is told.
-#[derive(Default)]
 pub struct Memory {
     pub configured: Vec<Configuration>,
     pub busy: bool,
@@ -50,6 +50,25 @@ pub struct Memory {
     pub calibrations: Vec<f32>,
     pub calibration: Option<Progress>,
     pub fails: Option<SlotError>,
+    pub reset: LastReset,
+}
+
+impl Default for Memory {
+    fn default() -> Self {
+        Self {
+            configured: Vec::new(),
+            busy: false,
+            record: None,
+            kept: Vec::new(),
+            key: None,
+            image: Vec::new(),
+            history: None,
+            calibrations: Vec::new(),
+            calibration: None,
+            fails: None,
+            reset: LastReset::POWER_UP,
+        }
+    }
 }
 
 impl Program for Memory {
@@ -104,6 +123,10 @@ impl Program for Memory {
         self.history.as_ref().map(read)
     }
 
+    fn last_reset(&self) -> LastReset {
+        self.reset
+    }
+
     fn event(&mut self, _event: Event) {}
 }
 
@@ -127,6 +150,10 @@ impl Node {
     }
 
     pub fn with(stored: Stored, single_bank: bool) -> Self {
+        Self::started(stored, single_bank, LastReset::POWER_UP)
+    }
+
+    pub fn started(stored: Stored, single_bank: bool, reset: LastReset) -> Self {
         let bus: &canopen::Shared = Box::leak(Box::new(canopen::Shared::new()));
         let shared: &Shared = Box::leak(Box::new(Shared::new()));
         let requirements = Requirements {
@@ -143,7 +170,7 @@ impl Node {
             server: Server::new(bus, &IDENTITY, SdoSettings::default(), NODE),
             receiver: Receiver::new(bus),
             image: JointImage::new(shared),
-            objects: Objects::new(shared, Memory::default(), images, &start),
+            objects: Objects::new(shared, Memory { reset, ..Memory::default() }, images, &start),
             observed: Observed::default(),
             queue: VecDeque::new(),
             now: 0,

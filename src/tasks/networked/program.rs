@@ -16,6 +16,7 @@ use joint_firmware::objects::{NotConfigured, Program, Stored};
 use joint_firmware::parameters::authentication::Key;
 use joint_firmware::parameters::image::Image;
 use joint_firmware::parameters::slots::SlotError;
+use joint_firmware::reset_record::LastReset;
 
 /// The program around the objects.
 pub struct BoardProgram {
@@ -161,6 +162,10 @@ impl Program for BoardProgram {
 
     fn history<R>(&self, read: impl FnOnce(&History) -> R) -> Option<R> {
         board::control::history(read)
+    }
+
+    fn last_reset(&self) -> LastReset {
+        board::faults::last_reset()
     }
 
     fn event(&mut self, event: Event) {

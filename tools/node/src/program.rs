@@ -11,6 +11,7 @@ use joint_firmware::motor::setting::SettingError;
 use joint_firmware::objects::{NotConfigured, Program, Stored};
 use joint_firmware::parameters::authentication::Key;
 use joint_firmware::parameters::slots::SlotError;
+use joint_firmware::reset_record::LastReset;
 
 /// The program around the objects.
 #[derive(Debug)]
@@ -27,11 +28,22 @@ pub struct VirtualProgram {
     pub history: Option<History>,
     /// The network asked for a reset of the node.
     pub reset: bool,
+    /// Why it started.
+    pub last_reset: LastReset,
 }
 
 impl VirtualProgram {
     pub fn new(bridge: BridgeConfiguration, storage: Storage) -> Self {
-        Self { bridge, next: None, asked: None, calibration: None, storage, history: None, reset: false }
+        Self {
+            bridge,
+            next: None,
+            asked: None,
+            calibration: None,
+            storage,
+            history: None,
+            reset: false,
+            last_reset: LastReset::POWER_UP,
+        }
     }
 
     /// What is stored, and the configuration that a joint starts with: the board's where the stored one is refused.
@@ -96,6 +108,10 @@ impl Program for VirtualProgram {
 
     fn history<R>(&self, read: impl FnOnce(&History) -> R) -> Option<R> {
         self.history.as_ref().map(read)
+    }
+
+    fn last_reset(&self) -> LastReset {
+        self.last_reset
     }
 
     fn event(&mut self, event: Event) {

@@ -20,6 +20,7 @@ use joint_firmware::parameters::certificate::Limits;
 use joint_firmware::parameters::image::{Effort, Target};
 use joint_firmware::parameters::life_cycle::{Action, LifeCycle, Mode, Requirements};
 use joint_firmware::parameters::slots::SlotError;
+use joint_firmware::reset_record::LastReset;
 use plant::virtual_joint::{Setup, VirtualJointError};
 use plant::{ActuatorParameters, VirtualJoint};
 use std::collections::VecDeque;
@@ -337,6 +338,7 @@ impl VirtualNode {
         let now = self.microseconds() / 1_000;
         let defaults = self.setup.configuration;
         let program = self.objects.program();
+        program.last_reset = LastReset::REQUESTED;
         let (stored, configuration) = program.power_on(&defaults);
         let (life, stored_images) = life(self.requirements, &mut program.storage, now);
         let model = program.storage.images.model(self.friction_rate);

@@ -121,6 +121,8 @@ mod tests {
             code::PDO_LONG,
             code::PDO_DEADLINE,
             0x5530,
+            0x6010,
+            0x6100,
             0x6320,
             0xFF01,
         ] {

@@ -7,7 +7,7 @@ use super::image::{ImageStatus, StoredImage};
 use super::joint::RemoteJoint;
 use super::motion;
 use super::value::Value;
-use joint_firmware::objects::field::{Actual, Field, ImageField, SetPoint};
+use joint_firmware::objects::field::{Actual, Field, ImageField, ResetField, SetPoint};
 use joint_firmware::objects::settings::Setting;
 use joint_firmware::parameters::life_cycle::State;
 use std::fmt::Write;
@@ -37,6 +37,7 @@ pub fn page(joint: &RemoteJoint) -> Result<String, RemoteError> {
         ),
     );
     line("program", format!("{} on {}", text(0x100A)?, text(0x1009)?));
+    line("started", started(joint)?);
     line("state", motion::left(joint, joint.state()?)?);
     line("mode", mode(joint.raw(Field::SetPoint(SetPoint::Mode))? as i8));
     let faults = joint.faults()?;
@@ -137,6 +138,34 @@ pub fn show_entry(joint: &RemoteJoint, entry: Entry) -> Result<String, RemoteErr
         }
         _ => shown,
     })
+}
+
+/// What reset the chip, in the order of the bits of object 2301h:1.
+const CAUSES: [&str; 7] =
+    ["option bytes", "reset pin", "power", "the program", "the watchdog", "the window watchdog", "low-power mode"];
+/// What stops a program, by its number in object 2301h:2, from 1 on.
+const STOPS: [&str; 4] = ["a panic", "a hard fault", "a non-maskable interrupt", "an interrupt without a handler"];
+
+/// Object 2301h in words.
+fn started(joint: &RemoteJoint) -> Result<String, RemoteError> {
+    let raw = |part| joint.raw(Field::Reset(part));
+    let causes = raw(ResetField::Causes)?;
+    let causes = CAUSES.iter().enumerate().filter(|(bit, _)| causes >> bit & 1 == 1).map(|(_, cause)| *cause);
+    let mut text = format!("by {}", causes.collect::<Vec<_>>().join(", "));
+    let stop = raw(ResetField::Stop)?;
+    if stop != 0 {
+        let stop = (stop as usize).checked_sub(1).and_then(|number| STOPS.get(number)).copied();
+        let _ = write!(
+            text,
+            "; {} stopped it {} times in a row, last at {:08X}h, detail {}, {}",
+            stop.unwrap_or("something"),
+            raw(ResetField::Repeats)?,
+            raw(ResetField::Address)?,
+            raw(ResetField::Detail)?,
+            show(joint, Field::Reset(ResetField::Place))?
+        );
+    }
+    Ok(text)
 }
 
 fn mode(number: i8) -> String {

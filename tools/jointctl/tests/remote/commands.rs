@@ -63,7 +63,7 @@ fn a_joint_is_looked_at_set_moved_and_fed_from_the_command_line() {
     let desk = Desk::new();
     desk.write("first.img", &image(1, 0.25, 0));
     desk.write("second.img", &image(2, 0.5, 0));
-    desk.prints(&["info"], &["node            5: virtual joint", "image           none"]);
+    desk.prints(&["info"], &["node            5: virtual joint", "started         by power", "image           none"]);
     desk.prints(
         &["get", "bus-voltage", "gear", "6041"],
         &["bus-voltage (2021h:1)", " V\n", "gear-ratio", "statusword (6041h:0)"],

@@ -10,6 +10,7 @@ use joint_firmware::motor::setting::SettingError;
 use joint_firmware::objects::{NotConfigured, Program};
 use joint_firmware::parameters::authentication::Key;
 use joint_firmware::parameters::slots::SlotError;
+use joint_firmware::reset_record::LastReset;
 
 /// The program.
 #[derive(Debug)]
@@ -87,6 +88,10 @@ impl Program for Watched {
 
     fn history<R>(&self, read: impl FnOnce(&History) -> R) -> Option<R> {
         None.map(read)
+    }
+
+    fn last_reset(&self) -> LastReset {
+        LastReset::POWER_UP
     }
 
     fn event(&mut self, _event: Event) {}
