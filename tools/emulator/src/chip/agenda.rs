@@ -11,12 +11,18 @@ pub struct Agenda {
     lines: [u128; PLACES],
     /// Bit of each that may have changed since.
     changed: u32,
+    /// How many places are used, counted from the first.
+    used: usize,
+    /// The earliest cycle of all.
+    earliest: u64,
+    /// The levels of all lines.
+    all_lines: u128,
 }
 
 impl Agenda {
-    /// Nothing is known yet.
-    pub const fn new() -> Self {
-        Self { next: [u64::MAX; PLACES], lines: [0; PLACES], changed: u32::MAX }
+    /// Nothing is known yet of so many peripherals.
+    pub const fn new(used: usize) -> Self {
+        Self { next: [u64::MAX; PLACES], lines: [0; PLACES], changed: u32::MAX, used, earliest: u64::MAX, all_lines: 0 }
     }
 
     /// Somebody may have changed a peripheral: to be called with every access that can.
@@ -30,36 +36,56 @@ impl Agenda {
         self.changed = u32::MAX;
     }
 
-    /// Whether it may have changed.
+    /// The first of those that may have changed.
     #[inline]
-    pub const fn is_touched(&self, place: usize) -> bool {
-        self.changed >> (place % PLACES) & 1 != 0
+    pub const fn first_touched(&self) -> Option<usize> {
+        let place = self.changed.trailing_zeros() as usize;
+        if place < self.used { Some(place) } else { None }
     }
 
     /// What is true of a peripheral now: its next cycle, and the levels of its lines.
     #[inline]
-    pub const fn note(&mut self, place: usize, next: u64, lines: u128) {
-        self.next[place % PLACES] = next;
-        self.lines[place % PLACES] = lines;
+    pub fn note(&mut self, place: usize, next: u64, lines: u128) {
+        let before = std::mem::replace(&mut self.next[place % PLACES], next);
+        if next <= self.earliest {
+            self.earliest = next;
+        } else if before == self.earliest {
+            self.earliest = self.next.iter().fold(u64::MAX, |earliest, next| earliest.min(*next));
+        }
         self.changed &= !(1 << (place % PLACES));
+        if self.lines[place % PLACES] != lines {
+            self.lines[place % PLACES] = lines;
+            self.all_lines = self.lines.iter().fold(0, |all, lines| all | lines);
+        }
     }
 
-    /// Whether something is due at a cycle in a peripheral, or it may have changed.
+    /// Those of some places in which something is due at a cycle, or that may have changed: from the first to the last, as they are now.
     #[inline]
-    pub const fn may_be_due(&self, place: usize, cycle: u64) -> bool {
-        self.is_touched(place) || self.next[place % PLACES] <= cycle
+    pub fn due(&self, cycle: u64, places: std::ops::Range<usize>) -> impl Iterator<Item = usize> + use<> {
+        let mut due = places
+            .clone()
+            .zip(self.next.get(places.clone()).unwrap_or_default())
+            .fold(self.changed & ((1 << places.end) - (1 << places.start)), |due, (place, next)| {
+                due | u32::from(*next <= cycle) << place
+            });
+        std::iter::from_fn(move || {
+            let place = due.trailing_zeros() as usize;
+            // The lowest bit goes.
+            due &= due.wrapping_sub(1);
+            (place < PLACES).then_some(place)
+        })
     }
 
     /// The earliest cycle of all.
     #[inline]
-    pub fn next(&self) -> u64 {
-        self.next.iter().fold(u64::MAX, |earliest, next| earliest.min(*next))
+    pub const fn next(&self) -> u64 {
+        self.earliest
     }
 
     /// The levels of all lines.
     #[inline]
-    pub fn lines(&self) -> u128 {
-        self.lines.iter().fold(0, |all, lines| all | lines)
+    pub const fn lines(&self) -> u128 {
+        self.all_lines
     }
 }
 
@@ -69,7 +95,7 @@ mod tests {
 
     #[test]
     fn the_earliest_of_all_is_next_and_lines_are_together() {
-        let mut agenda = Agenda::new();
+        let mut agenda = Agenda::new(PLACES);
         agenda.note(3, 700, 1 << 25);
         agenda.note(9, 500, 1 << 100);
         assert_eq!((agenda.next(), agenda.lines()), (500, 1 << 25 | 1 << 100));
@@ -79,12 +105,14 @@ mod tests {
 
     #[test]
     fn what_was_touched_is_looked_at_until_it_is_noted() {
-        let mut agenda = Agenda::new();
+        let mut agenda = Agenda::new(PLACES);
         agenda.note(0, 100, 0);
-        assert!(!agenda.may_be_due(0, 99) && agenda.may_be_due(0, 100));
+        agenda.note(1, 90, 0);
+        let due = |agenda: &Agenda, cycle| agenda.due(cycle, 0..2).collect::<Vec<_>>();
+        assert_eq!([due(&agenda, 89), due(&agenda, 99), due(&agenda, 100)], [vec![], vec![1], vec![0, 1]]);
         agenda.touch(0);
-        assert!(agenda.may_be_due(0, 0) && agenda.is_touched(0));
+        assert_eq!((due(&agenda, 0), agenda.first_touched()), (vec![0], Some(0)));
         agenda.note(0, 100, 0);
-        assert!(!agenda.may_be_due(0, 0));
+        assert!(due(&agenda, 0).is_empty());
     }
 }

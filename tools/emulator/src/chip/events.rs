@@ -20,25 +20,23 @@ impl<W: Wiring> Chip<W> {
 
     /// Does what is due at a cycle: timers first, as they start conversions.
     fn step(&mut self, cycle: u64) {
-        for index in 0..self.timers.len() {
-            if self.agenda.may_be_due(index, cycle) && self.timers[index].next() <= cycle {
+        for index in self.agenda.due(cycle, 0..self.timers.len()) {
+            if self.timers[index].next() <= cycle {
                 self.agenda.touch(index);
                 self.timers[index].advance(cycle);
                 self.tell(index, cycle);
             }
         }
-        for index in 0..self.converters.len() {
-            let place = self.converter_place(index);
-            if self.agenda.may_be_due(place, cycle) && self.converters[index].next() <= cycle {
+        let first = self.converter_place(0);
+        for place in self.agenda.due(cycle, first..first + self.converters.len()) {
+            if self.converters[place - first].next() <= cycle {
                 self.agenda.touch(place);
-                self.convert(index, cycle);
+                self.convert(place - first, cycle);
             }
         }
-        for index in 0..self.spis.len() {
-            let place = self.spi_place(index);
-            if !self.agenda.may_be_due(place, cycle) {
-                continue;
-            }
+        let first = self.spi_place(0);
+        for place in self.agenda.due(cycle, first..first + self.spis.len()) {
+            let index = place - first;
             if let Some((mut frame, began)) = self.spis[index].ended(cycle, self.clock.frequency()) {
                 self.agenda.touch(place);
                 frame.began = self.clock.instant(began);
@@ -197,25 +195,28 @@ impl<W: Wiring> Chip<W> {
         self.timers.len() + self.converters.len() + index
     }
 
+    /// The next cycle of the peripheral at a place of the agenda, and the levels of its lines.
+    fn look_at(&self, place: usize) -> (u64, u128) {
+        if let Some(timer) = self.timers.get(place) {
+            let levels = timer.description().lines.into_iter().zip(timer.interrupts());
+            let lines = levels.filter(|(_, level)| *level).fold(0, |lines, (line, _)| lines | 1 << line);
+            return (timer.next(), lines);
+        }
+        let place = place - self.timers.len();
+        if let Some(converter) = self.converters.get(place) {
+            return (converter.next(), u128::from(converter.interrupts()) << converter.description().line);
+        }
+        match self.spis.get(place - self.converters.len()) {
+            Some(spi) => (spi.next(), u128::from(spi.interrupts()) << spi.description().line),
+            None => (u64::MAX, 0),
+        }
+    }
+
     /// Something has changed: the earliest event, and the levels of the interrupts.
     pub(super) fn refresh(&mut self) {
-        for (place, timer) in self.timers.iter().enumerate() {
-            if self.agenda.is_touched(place) {
-                let levels = timer.description().lines.into_iter().zip(timer.interrupts());
-                let lines = levels.filter(|(_, level)| *level).fold(0, |lines, (line, _)| lines | 1 << line);
-                self.agenda.note(place, timer.next(), lines);
-            }
-        }
-        for (place, converter) in (self.timers.len()..).zip(&self.converters) {
-            if self.agenda.is_touched(place) {
-                let lines = u128::from(converter.interrupts()) << converter.description().line;
-                self.agenda.note(place, converter.next(), lines);
-            }
-        }
-        for (place, spi) in (self.timers.len() + self.converters.len()..).zip(&self.spis) {
-            if self.agenda.is_touched(place) {
-                self.agenda.note(place, spi.next(), u128::from(spi.interrupts()) << spi.description().line);
-            }
+        while let Some(place) = self.agenda.first_touched() {
+            let (next, lines) = self.look_at(place);
+            self.agenda.note(place, next, lines);
         }
         self.next = self.agenda.next().min(self.next_slow);
 

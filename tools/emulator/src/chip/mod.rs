@@ -123,7 +123,7 @@ impl<W: Wiring> Chip<W> {
             fdcan: Fdcan::new(),
             deviations: Vec::new(),
             places: Places::new(),
-            agenda: Agenda::new(),
+            agenda: Agenda::new(variant.timers.len() + variant.converters.len() + variant.spis.len()),
             news: true,
             next: u64::MAX,
             next_slow: u64::MAX,
