@@ -11,7 +11,8 @@ use std::collections::HashMap;
 use std::path::Path;
 
 /// Parts of a control step, and how their functions' names begin behind `joint_firmware::`.
-pub const PARTS: [(&str, &[&str]); 16] = [
+pub const PARTS: [(&str, &[&str]); 17] = [
+    ("network's inputs", &["friction::network::InputScale::"]),
     ("network", &["friction::network::"]),
     ("physical model", &["friction::physical::"]),
     ("regimes", &["friction::regime::", "friction::FrictionModel::"]),
