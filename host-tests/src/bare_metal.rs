@@ -1,6 +1,7 @@
 //! The boards' programs, built as they are flashed, those of the probe, built in the same way, and whether that is possible on this machine.
 
 use joint_firmware::default_configuration::{B_G431B_ESC1, MOTEUS_R4};
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -47,22 +48,21 @@ impl Board {
         temporary: &str,
     ) -> Result<PathBuf, String> {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("probe");
-        let target = Path::new(temporary).join("probe-as").join(self.name);
-        std::fs::create_dir_all(&target).map_err(|error| error.to_string())?;
+        let own = Path::new(temporary).join("probe-as").join(self.name);
+        std::fs::create_dir_all(&own).map_err(|error| error.to_string())?;
         let flags =
             "-C linker=rust-lld -C link-arg=--nmagic -C target-cpu=cortex-m4 -C linker-plugin-lto -C codegen-units=1";
         let flags = format!("{flags} -C opt-level={} -C link-arg=-T{}", self.level, folder.join("link.x").display());
         let mut command = cargo();
         command.args(["build", "--profile", "board", "--bin", program, "--target", TARGET]);
         command.args(["--features", &features.join(",")]);
-        command.current_dir(&folder).env("CARGO_TARGET_DIR", &target).env("RUSTFLAGS", flags);
+        command.current_dir(&folder).env("RUSTFLAGS", flags);
         if let Some((variable, bytes)) = input {
-            let file = target.join(format!("{program}.bin"));
+            let file = own.join(format!("{program}.bin"));
             std::fs::write(&file, bytes).map_err(|error| error.to_string())?;
             command.env(variable, file);
         }
-        run(command)?;
-        Ok(target.join(TARGET).join("board").join(program))
+        built(command, &format!("board/{program}"), temporary, own.join(program))
     }
 }
 
@@ -70,12 +70,29 @@ fn cargo() -> Command {
     Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
 }
 
-fn run(mut command: Command) -> Result<(), String> {
-    let output = command.output().map_err(|error| error.to_string())?;
-    match output.status.success() {
-        true => Ok(()),
-        false => Err(String::from_utf8_lossy(&output.stderr).into_owned()),
-    }
+/// Has cargo build a program in the folder that all programs share, so that none compiles what another has, and keeps it at `place`. One at a time: programs of
+/// one name replace each other.
+fn built(mut command: Command, program: &str, temporary: &str, place: PathBuf) -> Result<PathBuf, String> {
+    let shared = Path::new(temporary).join("programs");
+    let mut build = || -> std::io::Result<Result<(), String>> {
+        std::fs::create_dir_all(&shared)?;
+        let turn = File::create(shared.join("turn"))?;
+        turn.lock()?;
+        let output = command.env("CARGO_TARGET_DIR", &shared).output()?;
+        if !output.status.success() {
+            return Ok(Err(String::from_utf8_lossy(&output.stderr).into_owned()));
+        }
+        let program = std::fs::read(shared.join(TARGET).join(program))?;
+        // Somebody may be reading it.
+        if std::fs::read(&place).ok().as_ref() != Some(&program) {
+            let new = place.with_extension("new");
+            std::fs::write(&new, program)?;
+            std::fs::rename(new, &place)?;
+        }
+        Ok(Ok(()))
+    };
+    build().map_err(|error| error.to_string())??;
+    Ok(place)
 }
 
 /// Builds a program as it is flashed, below a test's temporary folder; its path. It is called as its board, with `-bus` behind it where that is a
@@ -85,7 +102,8 @@ fn run(mut command: Command) -> Result<(), String> {
 /// What the compiler says.
 pub fn build(program: &str, temporary: &str) -> Result<PathBuf, String> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let target = Path::new(temporary).join("boards").join(program);
+    let folder = Path::new(temporary).join("flashed");
+    std::fs::create_dir_all(&folder).map_err(|error| error.to_string())?;
     let own = format!(".cargo/{program}.toml");
     let own = root.join(&own).exists().then_some(["--config".to_owned(), own]);
     let features = program.strip_suffix("-bus").map_or(program.to_owned(), |board| format!("{board},bus"));
@@ -93,9 +111,8 @@ pub fn build(program: &str, temporary: &str) -> Result<PathBuf, String> {
     command.args(own.into_iter().flatten());
     command.args(["build", "--release", "-p", "joint-firmware", "--target", TARGET]);
     command.args(["--no-default-features", "--features", &features]);
-    command.current_dir(root).env("CARGO_TARGET_DIR", &target);
+    command.current_dir(root);
     // The cargo that runs the tests has set these as for the default program, and what is set cargo leaves.
     command.env_remove("DEFMT_LOG").env_remove("DEFMT_RTT_BUFFER_SIZE");
-    run(command)?;
-    Ok(target.join(TARGET).join("release/joint-firmware"))
+    built(command, "release/joint-firmware", temporary, folder.join(program))
 }

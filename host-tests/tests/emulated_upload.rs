@@ -13,7 +13,7 @@ use host_tests::emulated::Bench;
 use host_tests::emulated::bench::{actuator, program};
 use host_tests::emulated::kept::{Kept, configuration};
 use host_tests::emulated::master::{Heard, heard, send};
-use host_tests::emulated::twin::Observed;
+use host_tests::emulated::observed::Observed;
 use host_tests::image_bytes::encoded;
 use host_tests::parameters;
 use joint_firmware::compensation::Request;

@@ -15,6 +15,8 @@ use std::sync::Arc;
 pub const SUPPLY: f64 = 18.0;
 /// What runs at most between two looks at the log, whose buffer is small, ps.
 const PART: u64 = 20_000_000_000;
+/// A turn of the rotor and some more, rad.
+const TURN: f64 = 1.1 * std::f64::consts::TAU;
 
 /// The actuator on the bench: the reference, aligned, without a payload, on the supply.
 pub fn actuator() -> ActuatorParameters {
@@ -115,6 +117,29 @@ impl<W: Wired> Bench<W> {
                 Some(end) => return Err(format!("after {:.6} s: {end}", self.emulation.now().seconds()).into()),
             }
         }
+    }
+
+    /// Somebody turns the link by hand, slowly, until the rotor has turned once: an incremental encoder has met its index. `reached` as in
+    /// [`run_with`](Self::run_with).
+    ///
+    /// # Errors
+    /// As there; or the link is stuck.
+    pub fn turn_by_hand(
+        &mut self,
+        mut reached: impl FnMut(&mut Emulation<W>) -> Result<(), Failed>,
+    ) -> Result<(), Failed> {
+        let from = self.board().drivetrain().actuator().state().rotor_angle;
+        for _ in 0..2_000 {
+            let drivetrain = self.board().drivetrain();
+            let state = drivetrain.actuator().state();
+            if state.rotor_angle - from > TURN {
+                drivetrain.external_torque = 0.0;
+                return self.run_with(0.001, reached);
+            }
+            drivetrain.external_torque = (200.0 * (0.25 - state.joint.velocity)).clamp(-10.0, 10.0);
+            self.run_with(0.001, &mut reached)?;
+        }
+        Err("the link does not turn".into())
     }
 
     /// The log so far.

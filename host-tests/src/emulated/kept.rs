@@ -1,7 +1,7 @@
 //! What a board's flash holds when it is switched on: the stored configuration and a friction image, in the slots that the program reads
 //! (`src/tasks/networked/store.rs`).
 
-use super::twin::Observed;
+use super::observed::Observed;
 use emulator::board::Wired;
 use emulator::emulation::Emulation;
 use emulator::program::Program;

@@ -5,6 +5,7 @@ pub mod bench;
 pub mod kept;
 pub mod master;
 pub mod motion;
+pub mod observed;
 pub mod power;
 pub mod stack;
 pub mod twin;

@@ -7,44 +7,25 @@
 //!
 //! As the plant is moved by the compare values alone, and is the same program on both sides, equal duties in every step make an equal closed loop.
 
-use emulator::board::{MoteusR4, Wired};
-use emulator::bus::{Bus as _, Width};
-use emulator::chip::Chip;
+use super::observed::{Memory, Observed, Reading};
 use emulator::emulation::Emulation;
 use emulator::variables::{Variable, VariableError, Variables};
 use joint_firmware::compensation::Output;
-use joint_firmware::default_configuration::{BoardConfiguration, MOTEUS_R4};
+use joint_firmware::default_configuration::BoardConfiguration;
 use joint_firmware::joint::state_machine::Controlword;
 use joint_firmware::joint::{
     Active, Bridge, BridgeState, Command, Coupled, Demand, Joint, Measurements, Mode, Slow, Telemetry,
 };
 use joint_firmware::motor::modulation::compare_value;
-use joint_firmware::sensors::as5047p;
 use libtest_mimic::Failed;
 use std::collections::BTreeMap;
-
-/// What the twin reads on a board.
-pub trait Observed: Wired {
-    /// The board's part of the configuration.
-    const CONFIGURATION: BoardConfiguration;
-    /// Injected data registers of the phases a, b, c and of the supply.
-    const CODES: [u32; 4];
-    /// The pin of the bridge's fault line, low where there is a fault: input data register and bit.
-    const FAULT: (u32, u32);
-}
-
-impl Observed for MoteusR4 {
-    const CONFIGURATION: BoardConfiguration = MOTEUS_R4;
-    // ADC3, ADC1 and ADC2 rank 1, ADC1 rank 2 (RM0440, 21.7.22).
-    const CODES: [u32; 4] = [0x5000_0480, 0x5000_0080, 0x5000_0180, 0x5000_0084];
-    const FAULT: (u32, u32) = (0x4800_0410, 6);
-}
 
 /// What a step was given.
 struct Given {
     demand: Demand,
     slow: Slow,
     measured: Measurements,
+    encoder: Reading,
     stopped: bool,
     mean_square_wanted: bool,
     /// Which place the parameters were in before the step.
@@ -82,9 +63,9 @@ impl<'v> Twin<'v> {
     ///
     /// # Errors
     /// A variable that the program does not have.
-    pub fn new(variables: &'v Variables, coming: Active) -> Result<Self, Failed> {
+    pub fn new<W: Observed>(variables: &'v Variables, coming: Active) -> Result<Self, Failed> {
         Ok(Self {
-            variables: Fields::of(variables)?,
+            variables: Fields::of::<W>(variables)?,
             joint: Joint::new(),
             coming: Some(coming),
             active: None,
@@ -105,7 +86,7 @@ impl<'v> Twin<'v> {
     /// A difference.
     pub fn look<W: Observed>(&mut self, emulation: &mut Emulation<W>) -> Result<(), Failed> {
         let now = emulation.cpu.now();
-        let memory = &mut Memory { bus: &mut emulation.cpu.bus, now };
+        let memory = &mut Memory::new(&mut emulation.cpu.bus, now);
         let coming = self.read(memory)?;
         if let Some(given) = self.given.replace(coming) {
             self.compare(given, memory).map_err(|error| {
@@ -124,25 +105,22 @@ impl<'v> Twin<'v> {
             }
             codes
         };
-        let (fault, bit) = W::FAULT;
-        let driver_fault = memory.word(fault)? >> bit & 1 == 0;
+        let bridge_fault = W::bridge_fault(memory)?;
         let stopped = memory.bits(&fields.stopped)? != 0;
-        let answer = match memory.variant(&fields.answer)? {
-            ("Some", Some(content)) => Some(memory.bits(&content)? as u16),
-            _ => None,
-        };
-        let angle = answer.and_then(as5047p::angle);
         let analog = &W::CONFIGURATION.analog;
         let measured = Measurements {
             phase_currents: analog.currents([a, b, c]),
             bus_voltage: analog.supply(supply),
-            // Where the encoder did not answer, its last good angle stands in: see `compare`.
-            encoder: angle.unwrap_or_default(),
-            encoder_valid: angle.is_some(),
-            encoder_referenced: true,
-            winding_temperature: memory.real(&fields.winding_temperature)?,
+            // Filled in after the step: see `compare`.
+            encoder: 0,
+            encoder_valid: false,
+            encoder_referenced: false,
+            winding_temperature: match &fields.winding_temperature {
+                Some(variable) => memory.real(variable)?,
+                None => f32::NAN,
+            },
             bridge_temperature: memory.real(&fields.bridge_temperature)?,
-            bridge_fault: driver_fault || stopped,
+            bridge_fault: bridge_fault || stopped,
             overrun: memory.bits(&fields.overrun)? != 0,
         };
         let slow =
@@ -151,6 +129,7 @@ impl<'v> Twin<'v> {
             demand: fields.demand(memory)?,
             slow,
             measured,
+            encoder: W::encoder(memory, &fields.encoder)?,
             stopped,
             mean_square_wanted: memory.bits(&fields.mean_square_wanted)? != 0,
             place: fields.place(memory)?,
@@ -165,10 +144,12 @@ impl<'v> Twin<'v> {
             return Err(format!("the step measured a supply of {supply} V, the converter {codes:?} V").into());
         }
         given.measured.bus_voltage = supply;
-        if given.measured.encoder_valid {
-            self.angle = given.measured.encoder;
-        }
+        let encoder = W::encoder_taken(memory, &self.variables.encoder, given.encoder)?;
+        // Where the encoder did not answer, its last good angle stands in.
+        self.angle = encoder.angle.unwrap_or(self.angle);
         given.measured.encoder = self.angle;
+        given.measured.encoder_valid = encoder.angle.is_some();
+        given.measured.encoder_referenced = encoder.referenced;
         if self.variables.place(memory)? != given.place {
             self.active = Some(self.coming.take().ok_or("parameters that were not expected")?);
         }
@@ -253,9 +234,10 @@ fn numbers(telemetry: &Telemetry) -> [(&'static str, u32); 12] {
 struct Fields<'v> {
     stopped: Variable<'v>,
     overrun: Variable<'v>,
-    answer: Variable<'v>,
+    encoder: Vec<Variable<'v>>,
     bridge_temperature: Variable<'v>,
-    winding_temperature: Variable<'v>,
+    /// None without a sensor there: the compiler has seen that it is never written.
+    winding_temperature: Option<Variable<'v>>,
     derating: Variable<'v>,
     gear_temperature: Variable<'v>,
     mean_square_wanted: Variable<'v>,
@@ -331,7 +313,7 @@ impl<'v> Demanded<'v> {
 const FRESH: u64 = 1 << 7;
 
 impl<'v> Fields<'v> {
-    fn of(variables: &'v Variables) -> Result<Self, VariableError> {
+    fn of<W: Observed>(variables: &'v Variables) -> Result<Self, VariableError> {
         let word = |name: &str| variables.get(&format!("control::WORDS.{name}"));
         let control = |name: &str| variables.get(&format!("control::CONTROL.{name}"));
         let held = |phase: usize| variables.get(&format!("pwm::HELD.{phase}"));
@@ -340,9 +322,9 @@ impl<'v> Fields<'v> {
         Ok(Self {
             stopped: word("stopped")?,
             overrun: control("overrun")?,
-            answer: control("sensors.answer")?,
+            encoder: W::ENCODER.iter().map(|name| control(name)).collect::<Result<_, _>>()?,
             bridge_temperature: word("bridge_temperature")?,
-            winding_temperature: word("winding_temperature")?,
+            winding_temperature: W::WINDING_SENSOR.then(|| word("winding_temperature")).transpose()?,
             derating: word("derating")?,
             gear_temperature: word("gear_temperature")?,
             mean_square_wanted: word("mean_square_wanted")?,
@@ -372,29 +354,5 @@ impl<'v> Fields<'v> {
             ("Some", Some(content)) => Some(memory.bits(&content)?),
             _ => None,
         })
-    }
-}
-
-/// The chip's memory, to look at.
-struct Memory<'c, W> {
-    bus: &'c mut Chip<W>,
-    now: u64,
-}
-
-impl<W: Observed> Memory<'_, W> {
-    fn word(&mut self, address: u32) -> Result<u32, Failed> {
-        Ok(self.bus.read(self.now, address, Width::Word).map_err(|refusal| format!("{address:#x}: {refusal:?}"))?)
-    }
-
-    fn bits(&mut self, variable: &Variable<'_>) -> Result<u64, Failed> {
-        Ok(variable.bits(self.bus, self.now)?)
-    }
-
-    fn real(&mut self, variable: &Variable<'_>) -> Result<f32, Failed> {
-        Ok(variable.real(self.bus, self.now)?)
-    }
-
-    fn variant<'v>(&mut self, variable: &Variable<'v>) -> Result<(&'v str, Option<Variable<'v>>), Failed> {
-        Ok(variable.variant(self.bus, self.now)?)
     }
 }

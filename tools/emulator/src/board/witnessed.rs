@@ -36,6 +36,19 @@ impl Hasher for Words {
         }
     }
 
+    // As `write` would, without going through bytes: what is hashed are mostly small numbers and enumerations.
+    fn write_u8(&mut self, word: u8) {
+        self.write_u64(u64::from(word));
+    }
+
+    fn write_u32(&mut self, word: u32) {
+        self.write_u64(u64::from(word));
+    }
+
+    fn write_usize(&mut self, word: usize) {
+        self.write_u64(word as u64);
+    }
+
     fn write_u64(&mut self, word: u64) {
         // An odd factor (2^64 divided by the golden ratio) and a rotation: no word is lost by those behind it.
         self.0 = (self.0.rotate_left(23) ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15);

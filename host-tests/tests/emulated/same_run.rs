@@ -1,16 +1,13 @@
 //! The emulated boards are deterministic: a program's run is the same to the picosecond and the bit whenever it is repeated, however its time is cut
 //! into pieces, whether or not somebody watches, and by whichever clone it is gone on with.
-//!
-//! Needs the target; where it is missing the tests are reported as ignored, by name; with `CI` set they run and fail.
 
 use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired, Witnessed};
 use emulator::chip::fdcan::line::CanFrame;
 use emulator::cpu::{End, Watch};
 use emulator::emulation::Emulation;
 use emulator::program::Program;
-use host_tests::bare_metal::target_installed;
 use host_tests::emulated::bench::program;
-use libtest_mimic::{Arguments, Failed, Trial};
+use libtest_mimic::{Failed, Trial};
 use plant::ActuatorParameters;
 
 /// Cycles of the core, 170 MHz but for the first moments, between two things that somebody does.
@@ -18,15 +15,12 @@ const STEP: u64 = 170_000;
 /// How many of them: control has begun, and the bus has answered.
 const STEPS: u64 = 300;
 
-fn main() {
-    let arguments = Arguments::from_args();
-    let ignored = std::env::var_os("CI").is_none() && !target_installed();
-    let trials = vec![
+/// What is shown here.
+pub fn trials() -> Vec<Trial> {
+    vec![
         Trial::test("b_g431b_esc1_does_the_same_every_time", || same_every_time(BG431BEsc1::new)),
         Trial::test("moteus_r4_does_the_same_every_time", || same_every_time(MoteusR4::new)),
-    ];
-    let trials = trials.into_iter().map(|trial| trial.with_ignored_flag(ignored)).collect();
-    libtest_mimic::run(&arguments, trials).exit();
+    ]
 }
 
 /// How a run is made.

@@ -1,12 +1,9 @@
 //! A friction image on its way into a board's program, as it is flashed, on the emulated boards: the board is silent until LSS gives it a node id, takes
 //! the image by block download, proves it, stores it, and starts with it again. How deep the stack got on the way is held against what it has.
-//!
-//! Needs the target; where it is missing the tests are reported as ignored, by name; with `CI` set they run and fail.
 
 use bus::client::cob_id;
 use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired};
 use emulator::cpu::Origin;
-use host_tests::bare_metal::target_installed;
 use host_tests::emulated::Bench;
 use host_tests::emulated::bench::program;
 use host_tests::emulated::stack::PaintedStack;
@@ -16,7 +13,7 @@ use joint_firmware::friction::physical::PhysicalParameters;
 use joint_firmware::parameters::certificate::{Certificate, prove};
 use joint_firmware::parameters::image::Image;
 use joint_firmware::quantity::Torque;
-use libtest_mimic::{Arguments, Failed, Trial};
+use libtest_mimic::{Failed, Trial};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 
@@ -37,16 +34,13 @@ const VERIFY: u8 = 1;
 const COMMIT: u8 = 3;
 const ACTIVE: u32 = 7;
 
-fn main() {
-    let arguments = Arguments::from_args();
-    let ignored = std::env::var_os("CI").is_none() && !target_installed();
-    let trials = vec![
+/// What is shown here.
+pub fn trials() -> Vec<Trial> {
+    vec![
         Trial::test("b_g431b_esc1_takes_an_image_and_starts_with_it", || takes_an_image(ESC1, BG431BEsc1::new)),
         Trial::test("moteus_r4_takes_an_image_and_starts_with_it", || takes_an_image(MoteusR4::NAME, MoteusR4::new)),
         Trial::test("b_g431b_esc1_refuses_an_image_that_computes_otherwise", refuses_an_image),
-    ];
-    let trials = trials.into_iter().map(|trial| trial.with_ignored_flag(ignored)).collect();
-    libtest_mimic::run(&arguments, trials).exit();
+    ]
 }
 
 /// The first image of a seed that a joint would take, with as many sets as there can be.

@@ -1,13 +1,10 @@
 //! The boards' programs, as they are flashed, on the emulated boards: they start, control at their rate and within their period, see the
 //! supply, the rotor and the button.
-//!
-//! Needs the target; where it is missing the tests are reported as ignored, by name; with `CI` set they run and fail.
 
 use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired};
-use host_tests::bare_metal::target_installed;
 use host_tests::emulated::Bench;
 use host_tests::emulated::bench::{actuator, program};
-use libtest_mimic::{Arguments, Failed, Trial};
+use libtest_mimic::{Failed, Trial};
 use plant::actuator::Fault;
 
 /// Exception of the control interrupt, ADC1_2: interrupt 18 of both chips.
@@ -15,19 +12,16 @@ const CONTROL: u16 = 16 + 18;
 /// Time after power-up by which the second line of the log has come, s.
 const SETTLED: f64 = 1.1;
 
-fn main() {
-    let arguments = Arguments::from_args();
-    let ignored = std::env::var_os("CI").is_none() && !target_installed();
-    let trials = vec![
+/// What is shown here.
+pub fn trials() -> Vec<Trial> {
+    vec![
         Trial::test("b_g431b_esc1_starts_and_controls", esc1_starts),
         Trial::test("b_g431b_esc1_is_ready_once_its_encoder_has_met_the_index", esc1_index),
         Trial::test("b_g431b_esc1_keeps_the_bridge_off_after_the_button", esc1_button),
         Trial::test("moteus_r4_starts_and_controls", moteus_starts),
         Trial::test("b_g431b_esc1_with_the_bus_starts_and_controls", esc1_bus_starts),
         Trial::test("a_supply_out_of_range_is_a_fault_on_both", supply),
-    ];
-    let trials = trials.into_iter().map(|trial| trial.with_ignored_flag(ignored)).collect();
-    libtest_mimic::run(&arguments, trials).exit();
+    ]
 }
 
 /// A board with its program, on a bench supply.
@@ -85,18 +79,9 @@ fn moteus_starts() -> Result<(), Failed> {
 fn esc1_index() -> Result<(), Failed> {
     let mut bench = esc1(BG431BEsc1::NAME)?;
     bench.run(0.2)?;
-    for _ in 0..700 {
-        let drivetrain = bench.board().drivetrain();
-        let velocity = drivetrain.actuator().state().joint.velocity;
-        drivetrain.external_torque = (200.0 * (0.25 - velocity)).clamp(-10.0, 10.0);
-        bench.run(0.001)?;
-    }
-    let turned = bench.board().drivetrain().actuator().state().rotor_angle;
-    if turned < std::f64::consts::TAU {
-        return Err(format!("the rotor turned by {turned} rad only").into());
-    }
-    bench.board().drivetrain().external_torque = 0.0;
-    bench.run(SETTLED - 0.9)?;
+    bench.turn_by_hand(|_| Ok(()))?;
+    // A line of the log a second.
+    bench.run(1.1)?;
     match bench.state().as_str() {
         "switch on disabled" => Ok(()),
         state => Err(format!("{state}:\n{}", bench.log()).into()),

@@ -4,12 +4,9 @@
 //! After each: it starts, reads back the old content or the new one, whole, over the bus; the same after another start; it is able to move;
 //! and it can store again. The words that were being written read as every kind of [`Torn`] word. What is not tried everywhere, because it takes long,
 //! is drawn by a fixed seed, and counted.
-//!
-//! Needs the target; where it is missing the tests are reported as ignored, by name; with `CI` set they run and fail.
 
 use emulator::board::MoteusR4;
 use emulator::chip::flash::Torn;
-use host_tests::bare_metal::target_installed;
 use host_tests::emulated::Bench;
 use host_tests::emulated::bench::{actuator, program};
 use host_tests::emulated::kept::{Kept, configuration};
@@ -17,7 +14,7 @@ use host_tests::emulated::master::Heard;
 use host_tests::emulated::power::Writing;
 use joint_firmware::compensation::Request;
 use joint_firmware::friction::regime::Selector;
-use libtest_mimic::{Arguments, Failed, Trial};
+use libtest_mimic::{Failed, Trial};
 use node::SampleImage;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -33,16 +30,13 @@ const MARKS: u64 = 5;
 /// Longest time from a request to its last operation, s.
 const LONGEST: f64 = 0.4;
 
-fn main() {
-    let arguments = Arguments::from_args();
-    let ignored = std::env::var_os("CI").is_none() && !target_installed();
-    let trials = vec![
+/// What is shown here.
+pub fn trials() -> Vec<Trial> {
+    vec![
         Trial::test("an_image_is_the_old_one_or_the_new_one", || survives(&Content::IMAGE)),
         Trial::test("a_configuration_is_the_old_one_or_the_new_one", || survives(&Content::CONFIGURATION)),
         Trial::test("the_first_key_is_there_or_not", || survives(&Content::KEY)),
-    ];
-    let trials = trials.into_iter().map(|trial| trial.with_ignored_flag(ignored)).collect();
-    libtest_mimic::run(&arguments, trials).exit();
+    ]
 }
 
 type Board = Bench<MoteusR4>;

@@ -1,19 +1,17 @@
-//! The control loop of the flashed program on the emulated board, in closed loop with the plant, is the host's: a million control steps, the same bits in
-//! each.
+//! The control loop of the flashed programs on both emulated boards, in closed loop with the plant, is the host's: a million control steps, the same bits
+//! in each.
 //!
 //! Random joints' friction models with networks and regimes, driven over the bus through reversals, beyond the trained box and back, and into
 //! faults. See [`host_tests::emulated::twin`] for what is compared.
-//!
-//! Needs the target; where it is missing the tests are reported as ignored, by name; with `CI` set they run and fail.
 
-use emulator::board::{Drivetrain, MoteusR4, Wired};
+use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4};
 use emulator::program::Program;
 use emulator::variables::Variables;
-use host_tests::bare_metal::target_installed;
 use host_tests::emulated::bench::{actuator, program};
 use host_tests::emulated::kept::{Kept, configuration};
 use host_tests::emulated::master::send;
-use host_tests::emulated::twin::{Observed, Seen};
+use host_tests::emulated::observed::Observed;
+use host_tests::emulated::twin::Seen;
 use host_tests::emulated::{Bench, Twin};
 use host_tests::image_bytes::encoded;
 use host_tests::parameters;
@@ -22,7 +20,7 @@ use joint_firmware::friction::state::Signal;
 use joint_firmware::joint::Active;
 use joint_firmware::joint::configuration::Configuration;
 use joint_firmware::parameters::image::Image;
-use libtest_mimic::{Arguments, Failed, Trial};
+use libtest_mimic::{Failed, Trial};
 use plant::actuator::Fault;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -32,33 +30,37 @@ use std::sync::Mutex;
 
 /// Control steps that are compared at least.
 const STEPS: u64 = 1_000_000;
-/// Joints that they are spread over.
+/// Joints that they are spread over, half of them on either board.
 const JOINTS: u64 = 12;
+/// Programs of the boards with the bus.
+const PROGRAMS: [&str; 2] = ["moteus-r4", "b-g431b-esc1-bus"];
 /// Between two set-points, s.
 const SET_POINT: f64 = 0.005;
 const NODE: u8 = 5;
 /// Exception of the control interrupt, ADC1_2: interrupt 18.
 const CONTROL: u16 = 16 + 18;
 
-fn main() {
-    let arguments = Arguments::from_args();
-    let ignored = std::env::var_os("CI").is_none() && !target_installed();
-    let trials = vec![Trial::test("every_control_step_of_the_flashed_program_is_the_hosts", same_steps)];
-    let trials = trials.into_iter().map(|trial| trial.with_ignored_flag(ignored)).collect();
-    libtest_mimic::run(&arguments, trials).exit();
+/// What is shown here.
+pub fn trials() -> Vec<Trial> {
+    vec![Trial::test("every_control_step_of_the_flashed_programs_is_the_hosts", same_steps)]
 }
 
 fn same_steps() -> Result<(), Failed> {
-    let program = program(MoteusR4::NAME, env!("CARGO_TARGET_TMPDIR"))?;
-    let variables = Variables::of(&program)?;
+    let [moteus, esc1] = PROGRAMS.map(|name| program(name, env!("CARGO_TARGET_TMPDIR")));
+    let (moteus, esc1) = (moteus?, esc1?);
+    let (of_moteus, of_esc1) = (Variables::of(&moteus)?, Variables::of(&esc1)?);
     let (next, outcomes) = (Mutex::new(0..JOINTS), Mutex::new(Vec::new()));
     let work = || {
         // Taken before the joint is driven: the other threads need the lock.
         let take = || next.lock().ok().and_then(|mut next| next.next());
         while let Some(joint) = take() {
-            let outcome = drive(joint, &program, &variables).map_err(|error| {
+            let outcome = match board(joint) {
+                0 => drive(MoteusR4::new, joint, &moteus, &of_moteus),
+                _ => drive(BG431BEsc1::new, joint, &esc1, &of_esc1),
+            };
+            let outcome = outcome.map(|(seen, most)| (board(joint), seen, most)).map_err(|error| {
                 let error = error.message().unwrap_or("failed").to_owned();
-                format!("joint {joint}: {error}")
+                format!("joint {joint}, {}: {error}", PROGRAMS[board(joint)])
             });
             if let Ok(mut outcomes) = outcomes.lock() {
                 outcomes.push(outcome);
@@ -71,30 +73,37 @@ fn same_steps() -> Result<(), Failed> {
         }
     });
     let outcomes = outcomes.into_inner().map_err(|_| "a joint panicked")?;
-    let (mut steps, mut switching, mut faults, mut longest) = (0, 0, 0, 0);
+    let (mut steps, mut switching, mut faults, mut longest) = ([0; 2], 0, 0, [0; 2]);
     let mut compensation = BTreeMap::<String, u64>::new();
     for outcome in outcomes {
-        let (seen, most) = outcome?;
-        longest = longest.max(most);
-        steps += seen.steps;
+        let (board, seen, most) = outcome?;
+        longest[board] = most.max(longest[board]);
+        steps[board] += seen.steps;
         switching += seen.switching;
         faults += seen.faults;
         for (what, count) in seen.compensation {
             *compensation.entry(what).or_default() += count;
         }
     }
+    let sum: u64 = steps.iter().sum();
     println!(
-        "{steps} control steps compared, {switching} with the bridge on, {faults} with a fault present; with the bridge on, by what acted:"
+        "{sum} control steps compared, {switching} with the bridge on, {faults} with a fault present; with the bridge on, by what acted:"
     );
     for (what, count) in &compensation {
         println!("{count:>9}  {what}");
     }
-    let period = 170e6 / f64::from(MoteusR4::CONFIGURATION.bridge.rate);
-    println!("the longest control interrupt took {longest} of a period's {period} cycles");
-    if longest as f64 > 0.85 * period {
-        return Err("the control interrupt leaves less than 15 % of the period to everything else".into());
+    let rates = [MoteusR4::CONFIGURATION.bridge.rate, BG431BEsc1::CONFIGURATION.bridge.rate];
+    for (board, rate) in rates.into_iter().enumerate() {
+        let (name, period, longest) = (PROGRAMS[board], 170e6 / f64::from(rate), longest[board]);
+        println!(
+            "{name}: {} steps; the longest control interrupt took {longest} of a period's {period} cycles",
+            steps[board]
+        );
+        if longest as f64 > 0.85 * period {
+            return Err("the control interrupt leaves less than 15 % of the period to everything else".into());
+        }
     }
-    if steps < STEPS || switching * 2 < steps || faults == 0 {
+    if sum < STEPS || steps.contains(&0) || switching * 2 < sum || faults == 0 {
         return Err("too few steps, or too little happened".into());
     }
     for needed in [
@@ -113,8 +122,18 @@ fn same_steps() -> Result<(), Failed> {
     Ok(())
 }
 
+/// Which board a joint is on: both have models, temperatures and faults of all kinds.
+const fn board(joint: u64) -> usize {
+    (joint / 2 % 2) as usize
+}
+
 /// A joint of its own for each number: what was compared, and the cycles of its longest control interrupt.
-fn drive(joint: u64, program: &Program, variables: &Variables) -> Result<(Seen, u64), Failed> {
+fn drive<W: Observed>(
+    board: fn(Drivetrain) -> W,
+    joint: u64,
+    program: &Program,
+    variables: &Variables,
+) -> Result<(Seen, u64), Failed> {
     let mut random = ChaCha8Rng::seed_from_u64(joint);
     let actuator = actuator();
     let request = match joint % 5 {
@@ -122,21 +141,32 @@ fn drive(joint: u64, program: &Program, variables: &Variables) -> Result<(Seen, 
         4 => Request::Off,
         _ => Request::PhysicalAndNetwork,
     };
-    let configuration = configuration::<MoteusR4>(&actuator, NODE, request);
+    let configuration = configuration::<W>(&actuator, NODE, request);
     let mut friction = parameters::tame(&mut random);
     // The bench is at room temperature, and so is the box of every second joint.
     if joint.is_multiple_of(2) {
         friction.domain.ranges[Signal::Temperature as usize] = parameters::range(10.0, 40.0);
     }
     let image = encoded(&parameters::image(&mut random, friction, 1));
-    let active = prepared::<MoteusR4>(&configuration, &image)?;
+    let active = prepared::<W>(&configuration, &image)?;
 
-    let mut bench = Bench::with(|drivetrain: Drivetrain| MoteusR4::new(drivetrain), &actuator, program)?;
+    let mut bench = Bench::with(board, &actuator, program)?;
     Kept { configuration: &configuration, image: &image }.write(&mut bench.emulation, program)?;
-    let mut twin = Twin::new(variables, active)?;
+    let mut twin = Twin::new::<W>(variables, active)?;
     bench.stop_at_control_steps(program)?;
 
-    let periods = (STEPS / JOINTS) as f64 / f64::from(MoteusR4::CONFIGURATION.bridge.rate) / SET_POINT;
+    if W::INDEX {
+        bench.turn_by_hand(|emulation| twin.look(emulation))?;
+    }
+    let mut look = |bench: &mut Bench<W>, seconds: f64| {
+        bench
+            .run_with(seconds, |emulation| match emulation.resets() {
+                [] => twin.look(emulation),
+                resets => Err(format!("the chip was reset: {resets:?}").into()),
+            })
+            .map_err(|error| Failed::from(format!("{}\n{}", error.message().unwrap_or_default(), bench.log())))
+    };
+    let periods = (STEPS / JOINTS) as f64 / f64::from(W::CONFIGURATION.bridge.rate) / SET_POINT;
     let amplitude = 0.4 + 0.35 * joint as f64;
     // Start-up and enabling come on top.
     for period in 0..periods as u32 + 40 {
@@ -158,12 +188,7 @@ fn drive(joint: u64, program: &Program, variables: &Variables) -> Result<(Seen, 
         frame.extend([9, period as u8]);
         frame.extend(((1e3 * velocity) as i32).to_le_bytes());
         send(&mut bench.emulation, 0x300 + u16::from(NODE), &frame)?;
-        bench
-            .run_with(SET_POINT, |emulation| match emulation.resets() {
-                [] => twin.look(emulation),
-                resets => Err(format!("the chip was reset: {resets:?}").into()),
-            })
-            .map_err(|error| format!("{}\n{}", error.message().unwrap_or_default(), bench.log()))?;
+        look(&mut bench, SET_POINT)?;
     }
     let times = bench.emulation.cpu.exception_times().get(&CONTROL).ok_or("no control interrupt")?;
     Ok((twin.seen().clone(), times.most))

@@ -1,0 +1,31 @@
+//! The flashed programs on the emulated boards: a file a promise. One program of tests, because each that has a core in it compiles it anew.
+//!
+//! Needs the target; where it is missing the tests are reported as ignored, by name; with `CI` set they run and fail.
+
+mod boards;
+mod control_loop;
+mod faults;
+mod full_bus;
+mod images;
+mod power_cut;
+mod same_run;
+
+use host_tests::bare_metal::target_installed;
+use libtest_mimic::Arguments;
+
+fn main() {
+    let arguments = Arguments::from_args();
+    let ignored = std::env::var_os("CI").is_none() && !target_installed();
+    // The longest first.
+    let rooms = [
+        power_cut::trials(),
+        control_loop::trials(),
+        faults::trials(),
+        full_bus::trials(),
+        boards::trials(),
+        images::trials(),
+        same_run::trials(),
+    ];
+    let trials = rooms.into_iter().flatten().map(|trial| trial.with_ignored_flag(ignored)).collect();
+    libtest_mimic::run(&arguments, trials).exit();
+}
