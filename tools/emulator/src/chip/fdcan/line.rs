@@ -160,7 +160,8 @@ pub struct Line {
     /// Duration of a bit, ps.
     bit: u64,
     part: Part,
-    waiting: Vec<(Instant, CanFrame)>,
+    /// Of the host's; of one identifier, in the order that they are to be sent.
+    waiting: VecDeque<(Instant, CanFrame)>,
     under_way: Option<(Sender, Instant, Event)>,
     /// Nobody may begin before.
     idle: Instant,
@@ -176,7 +177,7 @@ impl Line {
         Self {
             bit: 1_000_000_000_000 / bit_rate,
             part: Part::None,
-            waiting: Vec::new(),
+            waiting: VecDeque::new(),
             under_way: None,
             idle: Instant(0),
             acknowledged: true,
@@ -198,13 +199,18 @@ impl Line {
     /// The host sends a frame, from an instant on as soon as it wins arbitration. Say so to the chip
     /// ([`Chip::wiring_changed`](super::super::Chip::wiring_changed)).
     pub fn send(&mut self, at: Instant, frame: CanFrame) {
-        self.waiting.push((at, frame));
+        self.waiting.push_back((at, frame));
         self.begin(at);
     }
 
     /// The oldest frame of the controller's that the host has not taken.
     pub fn receive(&mut self) -> Option<(Instant, CanFrame)> {
         self.sent.pop_front()
+    }
+
+    /// The host tries again with a frame, before those that wait behind it.
+    fn again(&mut self, from: Instant, frame: CanFrame) {
+        self.waiting.push_front((from, frame));
     }
 
     /// Begins a frame where the line is idle and somebody wants to send.
@@ -259,10 +265,10 @@ impl CanLine for Line {
             };
             let began = end.0.saturating_sub(frame.bits() * self.bit);
             if began >= at.0 {
-                if let Sender::Host(frame) = sender {
-                    self.waiting.push((Instant(began), frame));
-                }
                 self.under_way = None;
+                if let Sender::Host(frame) = sender {
+                    self.again(Instant(began), frame);
+                }
             }
         }
         self.begin(at);
@@ -282,8 +288,7 @@ impl CanLine for Line {
         self.idle = Instant(end.0 + after * self.bit);
         match (sender, event) {
             (Sender::Controller(frame), Event::Sent(_)) => self.sent.push_back((end, frame)),
-            // The host tries again.
-            (Sender::Host(frame), Event::Disturbed { .. }) => self.waiting.push((self.idle, frame)),
+            (Sender::Host(frame), Event::Disturbed { .. }) => self.again(self.idle, frame),
             _ => {}
         }
         // What the controller sends next it says itself; until then the host may begin.
@@ -320,5 +325,35 @@ mod tests {
             CanFrame::standard(0x101, &[]).unwrap(),
         ];
         assert!(order.windows(2).all(|pair| pair[0].priority() < pair[1].priority()));
+    }
+    /// What ended up to when nothing happens any more.
+    fn events(line: &mut Line) -> Vec<Event> {
+        std::iter::from_fn(|| line.take(line.next())).collect()
+    }
+
+    #[test]
+    fn frames_of_one_identifier_keep_their_order() {
+        let frames = [1, 2, 3, 4].map(|number| CanFrame::standard(0x605, &[number]).unwrap());
+        let own = CanFrame::standard(0x185, &[]).unwrap();
+        let listening = Part::Listening { bit: 1_000_000 };
+
+        // The controller asks for the bus in the intermission, and wins.
+        let mut line = Line::new(1_000_000);
+        line.take_part(Instant(0), listening);
+        frames.iter().for_each(|frame| line.send(Instant(0), *frame));
+        let end = line.next();
+        assert_eq!(line.take(end), Some(Event::Received(frames[0])));
+        line.take_part(end, Part::Sending { bit: 1_000_000, frame: own });
+        let rest =
+            [Event::Sent(own), Event::Received(frames[1]), Event::Received(frames[2]), Event::Received(frames[3])];
+        assert_eq!(events(&mut line), rest);
+
+        // A frame is destroyed.
+        let mut line = Line::new(1_000_000);
+        line.take_part(Instant(0), listening);
+        frames.iter().for_each(|frame| line.send(Instant(0), *frame));
+        line.disturb(line.next());
+        let all = frames.map(Event::Received);
+        assert_eq!(events(&mut line), [[Event::Disturbed { own: false }].as_slice(), &all].concat());
     }
 }
