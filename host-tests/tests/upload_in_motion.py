@@ -55,6 +55,8 @@ def order(command):
     node.sdo.download(0x2212, 1, bytes([command]))
 
 
+# The node has something to send all the time, also amid the segments of a block.
+node.sdo.download(0x1017, 0, struct.pack("<H", 5))
 node.nmt.state = "OPERATIONAL"
 thread = threading.Thread(target=commands)
 thread.start()

@@ -45,7 +45,7 @@ pub trait Transport: Send + Sync + std::fmt::Debug {
     /// hear it. After [`BusError::Gone`] every call fails.
     fn send(&self, frame: &Frame) -> Result<(), BusError>;
 
-    /// The next frame; none when nothing came within `timeout`, which may be zero (a socket waits some milliseconds even then).
+    /// The next frame; none when nothing came within `timeout`, which may be zero (a serial line and SocketCAN may wait some milliseconds even then).
     fn receive(&self, timeout: Duration) -> Result<Option<Frame>, BusError>;
 
     /// Frames that came and could not be kept or understood, since the bus was opened.

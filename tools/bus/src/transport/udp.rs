@@ -110,11 +110,15 @@ impl Transport for Multicast {
         let gone = |error| BusError::gone(&self.name, error, ADVICE);
         loop {
             let rest = deadline.saturating_duration_since(Instant::now());
-            // Zero would mean "for ever".
-            self.input.set_read_timeout(Some(rest.max(Duration::from_micros(1)))).map_err(gone)?;
+            // A timeout of zero would mean "for ever", and the kernel makes one of a microsecond some milliseconds.
+            self.input.set_nonblocking(rest.is_zero()).map_err(gone)?;
+            if !rest.is_zero() {
+                self.input.set_read_timeout(Some(rest)).map_err(gone)?;
+            }
             let mut datagram = [0; LONGEST];
             match self.input.recv_from(&mut datagram) {
-                Ok((_, from)) if from == self.own => {}
+                // Not what was asked for, and what waits behind it has come already.
+                Ok((_, from)) if from == self.own => continue,
                 Ok((length, _)) => match decode(datagram.get(..length).unwrap_or_default()) {
                     Message::Frame(frame) => return Ok(Some(frame)),
                     Message::Other => {}
