@@ -351,8 +351,8 @@ mod tests {
         // A frame is destroyed.
         let mut line = Line::new(1_000_000);
         line.take_part(Instant(0), listening);
+        line.disturb(Instant(100_000_000));
         frames.iter().for_each(|frame| line.send(Instant(0), *frame));
-        line.disturb(line.next());
         let all = frames.map(Event::Received);
         assert_eq!(events(&mut line), [[Event::Disturbed { own: false }].as_slice(), &all].concat());
     }
