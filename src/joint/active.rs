@@ -29,8 +29,13 @@ const HIGHEST_ACCELERATION: f32 = 1e6;
 /// Largest sum of the phase currents as a part of the over-current limit: at the current limit, three sensors that are 2 % off
 /// and noise of 1 % make up half of it.
 const CURRENT_SUM: f32 = 0.1;
-/// Voltage that may be unexplained as a part of the highest supply: what a dead time of 1 % of the period makes, not compensated at all.
-const UNEXPLAINED: f32 = 0.015;
+/// Voltage that may be unexplained as a part of the highest supply, besides the dead time's.
+const UNEXPLAINED: f32 = 0.003;
+/// Voltage that the dead time takes as a part of the supply, for its part of the period: 4/3 of it in space-vector components.
+const DEAD_TIME: f32 = 4.0 / 3.0;
+/// Part of that which is not compensated although the current is large: a phase's around its zero crossing is half of all, and the transistors' delays
+/// come on top. Near zero current it is all.
+const UNCOMPENSATED: f32 = 0.75;
 /// Noise of a current as a part of the current limit that may be taken for a change: differentiated with the windings' inductance it
 /// is a voltage, in windings of many turns more than all the rest.
 const CURRENT_NOISE: f32 = 0.005;
@@ -150,8 +155,12 @@ pub struct Active {
     pub current_limit: f32,
     /// Largest sum of the phase currents, A.
     pub current_sum_limit: f32,
-    /// Voltage that the motor's equations may leave unexplained without current and at rest, V.
+    /// Voltage that the motor's equations may leave unexplained at rest, V.
     pub implausible_voltage: Dq,
+    /// And besides without current, where none of the dead time is compensated, V.
+    pub uncompensated_voltage: f32,
+    /// One over the current from which the dead time is compensated, 1/A.
+    pub inverse_dead_time_band: f32,
     /// Electrical constants for that check: resistance, Ω, inductances, H, and flux linkage, Wb.
     pub resistance: f32,
     /// H.
@@ -282,7 +291,9 @@ impl Checked {
         let pole_pairs = motor.alignment.pole_pairs as f32;
         let (_, highest_voltage) = limits.bus_voltage;
         let current_slope = CURRENT_NOISE * motor.current_limit * VOLTAGE_FILTER * rate;
-        let unexplained = |inductance: f32| UNEXPLAINED * highest_voltage + inductance * current_slope;
+        let dead_time_voltage = DEAD_TIME * bridge.dead_time * rate * highest_voltage;
+        let large = UNEXPLAINED * highest_voltage + UNCOMPENSATED * dead_time_voltage;
+        let unexplained = |inductance: f32| large + inductance * current_slope;
         Active {
             field_oriented: self.field_oriented,
             observer: self.observer,
@@ -292,6 +303,8 @@ impl Checked {
             current_limit: motor.current_limit,
             current_sum_limit: CURRENT_SUM * limits.over_current,
             implausible_voltage: Dq { d: unexplained(motor.inductance_d), q: unexplained(motor.inductance_q) },
+            uncompensated_voltage: (1.0 - UNCOMPENSATED) * dead_time_voltage,
+            inverse_dead_time_band: 1.0 / bridge.dead_time_band,
             resistance: motor.resistance,
             inductance: Dq { d: motor.inductance_d, q: motor.inductance_q },
             flux_linkage: self.flux_linkage,

@@ -14,7 +14,7 @@ use super::active::{Active, VOLTAGE_FILTER};
 use super::fault::{Fault, Faults};
 use super::signals::Measurements;
 use crate::motor::field_oriented::FieldOrientedOutput;
-use crate::motor::number::{exceeds, magnitude, or_zero};
+use crate::motor::number::{exceeds, greater, magnitude, or_zero};
 use crate::motor::observer::Observation;
 use crate::motor::phases::Phases;
 use crate::motor::transform::Dq;
@@ -206,7 +206,11 @@ impl Monitor {
         };
         // A wrong resistance shows along the current only: across it the bound is close.
         let turning = INDUCED_ERROR * (magnitude(memory.induced.d) + magnitude(memory.induced.q));
-        let explained = |current: f32| turning + RESISTANCE_ERROR * resistance * magnitude(current);
+        // Nor is what of the dead time is not compensated, with little current.
+        let largest = greater(magnitude(memory.current.d), magnitude(memory.current.q));
+        let uncompensated = greater(1.0 - largest * active.inverse_dead_time_band, 0.0);
+        let rest = turning + active.uncompensated_voltage * uncompensated;
+        let explained = |current: f32| rest + RESISTANCE_ERROR * resistance * magnitude(current);
         let contradicts = exceeds(left.d, active.implausible_voltage.d + explained(memory.current.d))
             || exceeds(left.q, active.implausible_voltage.q + explained(memory.current.q));
         let found = memory.steps.step(contradicts, UNEXPLAINED_STEPS);

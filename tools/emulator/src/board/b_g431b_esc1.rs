@@ -3,7 +3,7 @@
 //! Parts by docs/boards.md: shunts of 3 mOhm with 1.5 kOhm to the amplifier's input, 22 kOhm from there to 3.3 V and 2.2 kOhm to ground; supply
 //! divided by 169 and 18 kOhm; the bridge's thermistor of 10 kOhm, beta 3425 K, with 4.7 kOhm to ground.
 
-use super::drivetrain::Drivetrain;
+use super::drivetrain::{CYCLE, Drivetrain};
 use super::electrics::{Ntc, divided, node};
 use super::{Inputs, Wired};
 use crate::chip::Deviation;
@@ -113,6 +113,7 @@ impl Wiring for BG431BEsc1 {
         if pwm.timer == TimerName::Tim1 {
             // The gate drivers have no enable: the gates decide.
             self.drivetrain.enable(at, true);
+            self.drivetrain.set_dead_time(pwm.dead_time as f64 * CYCLE * 1e-12);
             self.drivetrain.pwm(at, pwm);
         }
     }

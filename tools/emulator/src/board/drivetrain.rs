@@ -29,6 +29,8 @@ pub struct Drivetrain {
     on: [f64; 3],
     /// The bridge follows its inputs.
     enabled: bool,
+    /// What the actuator has been given, s; none before it was given any.
+    dead_time: Option<f64>,
     /// It switched since `moved`, if only for a part of it.
     switched: bool,
     /// When it last ceased to switch.
@@ -61,6 +63,7 @@ impl Drivetrain {
             pwm: None,
             on: [0.0; 3],
             enabled: false,
+            dead_time: None,
             switched: false,
             off_since: None,
             external_torque: 0.0,
@@ -99,6 +102,14 @@ impl Drivetrain {
     /// Whether the bridge follows its inputs from now on: an enable line, a gate driver.
     pub fn enable(&mut self, at: Instant, enabled: bool) {
         self.change(at, |drivetrain| drivetrain.enabled = enabled);
+    }
+
+    /// Both switches of a leg are off for so long at each edge from now on, s; the plant takes 5 us at most.
+    pub fn set_dead_time(&mut self, seconds: f64) {
+        let seconds = seconds.clamp(0.0, 5e-6);
+        if self.dead_time != Some(seconds) && self.actuator.set_dead_time(seconds).is_ok() {
+            self.dead_time = Some(seconds);
+        }
     }
 
     /// The timer's outputs from now on.
@@ -182,7 +193,7 @@ fn ticks(pwm: &Pwm, counts: f64) -> f64 {
 }
 
 /// A cycle of the core while PWM runs, ps: both boards' programs run it at 170 MHz.
-const CYCLE: f64 = 1e12 / 170e6;
+pub(super) const CYCLE: f64 = 1e12 / 170e6;
 
 /// Whether the timer drives the gates of all legs.
 fn is_switching(pwm: &Pwm) -> bool {

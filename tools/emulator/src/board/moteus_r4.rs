@@ -130,6 +130,7 @@ impl Wiring for MoteusR4 {
     fn pwm(&mut self, at: Instant, pwm: &Pwm) {
         if pwm.timer == TimerName::Tim2 {
             self.enable(at);
+            self.drivetrain.set_dead_time(self.driver.dead_time());
             self.drivetrain.pwm(at, pwm);
         }
     }

@@ -67,6 +67,11 @@ impl Drv8353 {
         self.is_awake(at) && !self.has_fault() && self.registers[2] & COAST == 0
     }
 
+    /// Dead time between the switches of a half bridge, s: bits 9 and 8 of the over-current control.
+    pub fn dead_time(&self) -> f64 {
+        [50e-9, 100e-9, 200e-9, 400e-9][usize::from(self.registers[5] >> 8 & 0b11)]
+    }
+
     /// Something went wrong in the bridge: bits of fault status 1. They stay until they are cleared, and pull nFAULT low.
     pub fn fail(&mut self, status: u16) {
         self.registers[0] |= status & DATA | FAULT;
@@ -183,6 +188,14 @@ mod tests {
         driver.exchange(LATER, &frame(2 << 11 | 1));
         assert!(!driver.has_fault() && driver.drives(LATER));
         assert_eq!(driver.register(2), Some(0), "the request clears itself");
+    }
+
+    #[test]
+    fn the_dead_time_is_that_of_its_register() {
+        let mut driver = awake();
+        assert!((driver.dead_time() - 100e-9).abs() < 1e-15);
+        driver.exchange(LATER, &frame(5 << 11 | 0b10 << 8));
+        assert!((driver.dead_time() - 200e-9).abs() < 1e-15);
     }
 
     #[test]

@@ -94,6 +94,17 @@ impl Inverter {
         Ok(Self { parameters, duties: Delay::new(parameters.duty_delay, [0.5; 3]), temperature })
     }
 
+    /// Another dead time from now on, 0 to 5e-6 s: that of a timer or a gate driver that a program configures.
+    ///
+    /// # Errors
+    /// A dead time that is outside its range.
+    pub fn set_dead_time(&mut self, seconds: f64) -> Result<(), ParameterError> {
+        let parameters = InverterParameters { dead_time: seconds, ..self.parameters };
+        parameters.validate()?;
+        self.parameters = parameters;
+        Ok(())
+    }
+
     /// Temperature of the bridge, °C.
     #[must_use]
     pub fn temperature(&self) -> f64 {

@@ -185,6 +185,14 @@ impl Actuator {
         self.schedule(fault, self.state.time, f64::INFINITY)
     }
 
+    /// Another dead time of the bridge from now on, 0 to 5e-6 s.
+    ///
+    /// # Errors
+    /// A dead time that is outside its range.
+    pub fn set_dead_time(&mut self, seconds: f64) -> Result<(), ParameterError> {
+        self.inverter.set_dead_time(seconds)
+    }
+
     /// Plans `fault` from `start` to before `end` (s since the start of the actuator; `end` may be infinite).
     ///
     /// # Errors
