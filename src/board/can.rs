@@ -298,12 +298,16 @@ fn transmit(sending: &mut TransmitQueue<TO_BUS>, now: u32) {
 
 impl Bus {
     fn take(&mut self, frame: &Frame) {
-        if let Some(mut observed) = observed() {
+        // What is known of the joint is much to copy, and TPDOs alone need it.
+        let now = now();
+        if self.receiver.is_sync(frame, now)
+            && let Some(mut observed) = observed()
+        {
             observed.feedforward_torque = self.feedforward;
             self.image.observe(&observed);
         }
         let shared = self.shared;
-        match self.receiver.receive(frame, now(), &mut self.image, |frame| send(frame, shared)) {
+        match self.receiver.receive(frame, now, &mut self.image, |frame| send(frame, shared)) {
             Route::Server if RECEIVED.try_send(*frame).is_err() => count(&DROPS.task),
             Route::Server | Route::Done => {}
         }

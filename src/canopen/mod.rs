@@ -22,7 +22,7 @@
 //!
 //! So a stop is never behind anything: no queue and no mailbox lies between the controller and [`Receiver`], and when
 //! it returns the next frame meets the new state. A flood of other nodes' frames costs the interrupt a few comparisons
-//! each and never reaches the queue. The queue may be as short as one SDO block ([`SdoSettings::block_size`]); what it
+//! each and never reaches the queue, and of a flood of SYNC one in [`SHORTEST_SYNC`] counts. The queue may be as short as one SDO block ([`SdoSettings::block_size`]); what it
 //! drops the protocol sends again or ends by time-out.
 //!
 //! The NMT state belongs to the interrupt. The task changes it where the server itself does (boot-up, object 1029h),
@@ -70,7 +70,7 @@ pub use frame::Frame;
 pub use nmt::{NmtState, Reset};
 pub use parameters::{CONSUMERS, CommunicationParameters, MAPPED, PDOS, PdoParameters};
 pub use pdo::{MappedObject, ProcessImage};
-pub use receiver::{Receiver, Route};
+pub use receiver::{Receiver, Route, SHORTEST_SYNC};
 pub use sdo::SdoSettings;
 pub use server::Server;
 pub use shared::{NO_NODE_ID, Shared};

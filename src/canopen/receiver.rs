@@ -13,6 +13,10 @@ use super::pdo::transmit::{Synchronous, assemble};
 use super::shared::{Epoch, Shared};
 use super::{LSS_MASTER, NMT, SDO_RECEIVE};
 
+/// A SYNC sooner after one that counted does not count, us: at 1 Mbit/s not even one full TPDO fits between the two. Without this a bus full of nothing
+/// but SYNC, 20,000 a second, leaves tasks no time.
+pub const SHORTEST_SYNC: u32 = 180;
+
 /// What remains to be done with a frame.
 #[must_use = "a frame for the server has to be given to it"]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,12 +35,20 @@ pub struct Receiver<'a> {
     known: Epoch,
     waiting: [Option<Waiting>; PDOS],
     synchronous: [Synchronous; PDOS],
+    /// When the last SYNC that counted came.
+    synchronised: Option<u32>,
 }
 
 impl<'a> Receiver<'a> {
     /// One for each [`Shared`].
     pub fn new(shared: &'a Shared) -> Self {
-        Self { shared, known: shared.epoch(), waiting: [None; PDOS], synchronous: [Synchronous::default(); PDOS] }
+        Self {
+            shared,
+            known: shared.epoch(),
+            waiting: [None; PDOS],
+            synchronous: [Synchronous::default(); PDOS],
+            synchronised: None,
+        }
     }
 
     /// Takes one frame, received at `now` (microseconds, wrapping). `send` gets up to four TPDOs, after SYNC only.
@@ -57,11 +69,24 @@ impl<'a> Receiver<'a> {
             id if id == SDO_RECEIVE | u16::from(node_id) => {
                 return if self.shared.state().communicates() { Route::Server } else { Route::Done };
             }
-            id if id == self.shared.sync_cob_id() => self.synchronise(image, send),
+            id if id == self.shared.sync_cob_id() => {
+                if self.is_sync(frame, now) {
+                    self.synchronise(now, image, send);
+                }
+            }
             id @ 0x701..=0x77F => self.hear((id & 0x7F) as u8, frame.data(), now),
             id => self.take(id, frame.data(), now, image),
         }
         Route::Done
+    }
+
+    /// Whether a frame received at `now` is a SYNC that counts, so that [`Receiver::receive`] asks for what TPDOs carry.
+    pub fn is_sync(&self, frame: &Frame, now: u32) -> bool {
+        // Time wraps: of the SYNCs that come after an hour, one in 20 million is taken for one that came too soon.
+        let soon = |before| now.wrapping_sub(before) < SHORTEST_SYNC;
+        frame.id() == self.shared.sync_cob_id()
+            && self.shared.state() == NmtState::Operational
+            && !self.synchronised.is_some_and(soon)
     }
 
     /// NMT, at once: whatever comes in the next frame meets the new state.
@@ -85,16 +110,15 @@ impl<'a> Receiver<'a> {
         self.known = epoch;
         self.waiting = [None; PDOS];
         self.synchronous = [Synchronous::default(); PDOS];
+        self.synchronised = None;
         for registers in &self.shared.receive {
             registers.received().forget();
         }
         image.state_changed(epoch.state());
     }
 
-    fn synchronise(&mut self, image: &mut impl ProcessImage, mut send: impl FnMut(Frame)) {
-        if self.shared.state() != NmtState::Operational {
-            return;
-        }
+    fn synchronise(&mut self, now: u32, image: &mut impl ProcessImage, mut send: impl FnMut(Frame)) {
+        self.synchronised = Some(now);
         image.sync();
         for ((registers, synchronous), pdo) in self.shared.transmit.iter().zip(&mut self.synchronous).zip(0..) {
             if registers.id().is_some() && synchronous.is_due(self.shared, registers, pdo) {

@@ -20,8 +20,14 @@ use std::f64::consts::TAU;
 const NODE: u8 = 5;
 /// Between two set-points, s.
 const SET_POINT: f64 = 0.001;
+/// How often a second the joint goes to and fro: it keeps up, and its current crosses zero often.
+const REVERSALS: f64 = 5.0;
 /// How long each load lasts, in set-points.
 const LASTS: u32 = 200;
+/// How long each flood lasts, in set-points: longer than the watchdog's time-out.
+const FLOODED: u32 = 300;
+/// Part of the core that is left to the tasks.
+const LEFT: f64 = 0.05;
 /// How much earlier or later than a period after the one before a control step may begin, ps: 1 us.
 const JITTER: u64 = 1_000_000;
 /// The bus is full: part of the time that frames and what is between them take.
@@ -56,6 +62,16 @@ const LOADS: [Load; 3] = [
         let frame = |part| (0x300 + u16::from(NODE), set_point(number.wrapping_mul(9).wrapping_add(part), 0x0F, 0.5));
         (0..9).map(frame).collect()
     }),
+];
+
+/// Frames so short and so many that they leave nothing of the bus to anybody whose identifier is higher. Set-points may starve: the joint stops then.
+const FLOODS: [(&str, fn(u32) -> Heard); 6] = [
+    ("SYNC", |_| (0x080, Vec::new())),
+    ("NMT commands that change nothing", |_| (0x000, vec![1, NODE])),
+    ("NMT commands that stop and start", |number| (0x000, vec![1 + (number % 2) as u8, NODE])),
+    ("RPDOs that are too short", |_| (0x300 + u16::from(NODE), Vec::new())),
+    ("SDO requests that are too short", |_| (0x600 + u16::from(NODE), Vec::new())),
+    ("LSS requests that are too short", |_| (0x7E5, Vec::new())),
 ];
 
 /// Controlword, mode, counter and velocity, rad/s.
@@ -132,6 +148,17 @@ fn on_time<W: Observed>(name: &str, board: fn(Drivetrain) -> W) -> Result<(), Fa
             bad.push(format!("{load}: {:?}\n{}", bench.emulation.resets(), bench.log()));
         }
     }
+    for (flood, frame) in FLOODS {
+        let (frames, left) = withstands(&mut bench, frame, period)
+            .map_err(|error| format!("{flood}: {}\n{}", error.message().unwrap_or_default(), bench.log()))?;
+        println!(
+            "{name}, nothing but {flood}: {frames} frames in {FLOODED} ms leave {:.1} % of the core",
+            100.0 * left
+        );
+        if left < LEFT {
+            bad.push(format!("{flood}: {left} of the core is left"));
+        }
+    }
     let (used, region) = stack.used(&mut bench.emulation)?;
     println!("{name}: {used} of {region} B of stack used");
     if used + MARGIN > region {
@@ -146,7 +173,7 @@ fn under<W: Observed>(bench: &mut Bench<W>, frames: fn(u32) -> Vec<Heard>) -> Re
     heard(&mut bench.emulation);
     let from = bench.emulation.now();
     for number in 0..LASTS {
-        let velocity = (TAU * f64::from(number) * SET_POINT).sin();
+        let velocity = (TAU * REVERSALS * f64::from(number) * SET_POINT).sin();
         let own = (0x300 + u16::from(NODE), set_point(number, 0x0F, velocity));
         for (id, data) in frames(number).into_iter().chain([own]) {
             send(&mut bench.emulation, id, &data)?;
@@ -167,6 +194,41 @@ fn under<W: Observed>(bench: &mut Bench<W>, frames: fn(u32) -> Vec<Heard>) -> Re
         bench.run(SET_POINT)?;
     }
     Ok((steps, (bits as f64 / microseconds).min(1.0)))
+}
+
+/// The control steps go on under a flood, and the node is there after it; how many frames came, and which part of the core no interrupt took.
+fn withstands<W: Observed>(bench: &mut Bench<W>, frame: fn(u32) -> Heard, period: u64) -> Result<(u32, f64), Failed> {
+    let (mut steps, mut number) = (Steps::default(), 0);
+    let from = bench.emulation.cpu.now();
+    bench.emulation.cpu.clear_exception_times();
+    for _ in 0..FLOODED {
+        let mut bits = 0;
+        while bits < (1e6 * SET_POINT) as u64 {
+            let (id, data) = frame(number);
+            number += 1;
+            send(&mut bench.emulation, id, &data)?;
+            bits += taken(id, &data)?;
+        }
+        bench.run_with(SET_POINT, |emulation: &mut Emulation<W>| {
+            steps.note(emulation.now());
+            Ok(())
+        })?;
+    }
+    let cpu = &bench.emulation.cpu;
+    let interrupts: u64 = cpu.exception_times().values().map(|times| times.own_cycles).sum();
+    let left = 1.0 - interrupts as f64 / (cpu.now() - from) as f64;
+    let (least, most) = steps.gap.ok_or("no control steps")?;
+    if least + JITTER < period || most > period + JITTER {
+        return Err(format!("control steps {least} to {most} ps apart").into());
+    }
+    if !bench.emulation.resets().is_empty() {
+        return Err(format!("{:?}", bench.emulation.resets()).into());
+    }
+    send(&mut bench.emulation, 0x000, &[0x01, NODE])?;
+    bench.run(10.0 * SET_POINT)?;
+    heard(&mut bench.emulation);
+    bench.number(NODE, 0x6041, 0)?;
+    Ok((number, left))
 }
 
 /// Bits of the bus, at 1 Mbit/s.

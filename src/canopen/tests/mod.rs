@@ -255,6 +255,12 @@ impl Node {
         sent
     }
 
+    /// SYNC, as soon after the one before as it counts: the frames that the interrupt sends.
+    pub fn sync(&mut self) -> Vec<Frame> {
+        self.now = self.now.wrapping_add(SHORTEST_SYNC);
+        self.interrupt(&frame(0x80, &[]))
+    }
+
     /// The task, until it has nothing to do: the frames that it sends.
     pub fn task(&mut self) -> Vec<Frame> {
         let mut sent = Vec::new();

@@ -126,7 +126,7 @@ fn an_rpdo_received_before_operational_is_not_applied_later() {
     node.interrupt(&frame(0x205, &[1; 6]));
     node.interrupt(&frame(0x305, &[1; 8]));
     node.bus(0, &[1, 0]);
-    node.interrupt(&frame(0x80, &[]));
+    node.sync();
     node.run(10);
     assert!(node.image.set_points.is_empty() && node.image.received.is_empty());
 }

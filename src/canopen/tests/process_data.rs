@@ -19,10 +19,10 @@ fn a_synchronous_rpdo_counts_with_the_next_sync_and_the_newest_wins() {
     node.interrupt(&frame(RPDO2, &[1; 8]));
     node.interrupt(&frame(RPDO2, &[2; 8]));
     assert!(node.image.set_points.is_empty());
-    node.interrupt(&frame(0x80, &[]));
+    node.sync();
     assert_eq!(node.image.set_points, BTreeMap::from([(U64.0, 0x0202_0202_0202_0202)]));
     node.image.set_points.clear();
-    node.interrupt(&frame(0x80, &[]));
+    node.sync();
     assert!(node.image.set_points.is_empty());
 }
 
@@ -32,11 +32,11 @@ fn an_rpdo_that_waits_for_sync_is_forgotten_with_the_state_and_with_its_mapping(
     node.interrupt(&frame(RPDO2, &[1; 8]));
     node.interrupt(&frame(0, &[2, 0]));
     node.interrupt(&frame(0, &[1, 0]));
-    node.interrupt(&frame(0x80, &[]));
+    node.sync();
     assert!(node.image.set_points.is_empty());
     node.interrupt(&frame(RPDO2, &[1; 8]));
     map(&mut node, 0x1401, 0x1601, 0x305, &[U8]).unwrap();
-    node.interrupt(&frame(0x80, &[]));
+    node.sync();
     assert!(node.image.set_points.is_empty());
 }
 
@@ -47,9 +47,9 @@ fn rpdos_outside_operational_change_nothing_and_are_not_applied_later() {
         node.interrupt(&frame(0, &[command, 0]));
         node.interrupt(&frame(RPDO1, &[1; 6]));
         node.interrupt(&frame(RPDO2, &[1; 8]));
-        node.interrupt(&frame(0x80, &[]));
+        node.sync();
         node.interrupt(&frame(0, &[1, 0]));
-        node.interrupt(&frame(0x80, &[]));
+        node.sync();
         assert_eq!(node.task(), []);
         assert!(node.image.set_points.is_empty() && node.image.received.is_empty());
     }
@@ -84,13 +84,35 @@ fn an_rpdo_that_misses_its_deadline_is_reported_once_and_watched_from_the_next_o
 fn a_synchronous_tpdo_leaves_within_the_interrupt_of_its_sync() {
     let mut node = Node::operational();
     let expected = frame(0x185, &[0x10, 0x02, 0x20, 0x03, 0x00, 0x20]);
-    assert_eq!(node.interrupt(&frame(0x80, &[])), [expected]);
+    assert_eq!(node.sync(), [expected]);
     assert_eq!(node.image.syncs, 1);
     node.write(0x1800, 2, &[3]).unwrap();
-    let sent = (0..9).map(|_| node.interrupt(&frame(0x80, &[])).len()).collect::<Vec<_>>();
+    let sent = (0..9).map(|_| node.sync().len()).collect::<Vec<_>>();
     assert_eq!(sent, [0, 0, 1, 0, 0, 1, 0, 0, 1]);
     node.bus(0, &[0x80, 0]);
-    assert_eq!(node.interrupt(&frame(0x80, &[])), []);
+    assert_eq!(node.sync(), []);
+}
+
+#[test]
+fn of_syncs_that_follow_too_soon_none_counts() {
+    let mut node = Node::operational();
+    let sync = frame(0x80, &[]);
+    // A bus full of them, one in 50 us, over the wrap of the clock.
+    let count = |node: &mut Node, interval: u32| {
+        let counted = (0..40_000).filter(|_| {
+            node.now = node.now.wrapping_add(interval);
+            !node.interrupt(&sync).is_empty()
+        });
+        counted.count()
+    };
+    assert_eq!(count(&mut node, SHORTEST_SYNC.div_ceil(4)), 10_000);
+    assert_eq!(count(&mut node, SHORTEST_SYNC), 40_000);
+    assert_eq!(count(&mut node, SHORTEST_SYNC - 1), 20_000);
+    // The first one in a new state counts.
+    assert_eq!(node.sync().len(), 1);
+    node.bus(0, &[0x80, NODE]);
+    node.bus(0, &[1, NODE]);
+    assert_eq!(node.interrupt(&sync).len(), 1);
 }
 
 #[test]
@@ -100,7 +122,7 @@ fn sync_can_be_moved_to_a_free_identifier_only() {
         assert_eq!(node.write(0x1005, 0, &refused.to_le_bytes()), Err(Abort::VALUE.0), "{refused:#x}");
     }
     node.write(0x1005, 0, &0x90u32.to_le_bytes()).unwrap();
-    assert_eq!(node.interrupt(&frame(0x80, &[])), []);
+    assert_eq!(node.sync(), []);
     assert_eq!(node.interrupt(&frame(0x90, &[])).len(), 1);
 }
 
@@ -109,11 +131,11 @@ fn a_tpdo_of_type_0_follows_its_event_with_the_next_sync() {
     let mut node = Node::operational();
     node.write(0x1800, 2, &[0]).unwrap();
     // Once when the node became operational.
-    assert_eq!(node.interrupt(&frame(0x80, &[])).len(), 1);
-    assert_eq!(node.interrupt(&frame(0x80, &[])).len(), 0);
+    assert_eq!(node.sync().len(), 1);
+    assert_eq!(node.sync().len(), 0);
     node.shared.trigger(0);
     assert_eq!(node.task(), []);
-    assert_eq!(node.interrupt(&frame(0x80, &[])).len(), 1);
+    assert_eq!(node.sync().len(), 1);
 }
 
 #[test]
@@ -166,7 +188,7 @@ fn a_mapping_set_up_at_run_time_is_what_counts() {
     assert_eq!(node.read(0x1603, 2), Ok(U8.0.into()));
     map(&mut node, 0x1803, 0x1A03, 0x445, &[U64]).unwrap();
     node.write(0x1803, 2, &[1]).unwrap();
-    let sent = node.interrupt(&frame(0x80, &[]));
+    let sent = node.sync();
     assert_eq!(sent.last(), Some(&frame(0x445, &(0xA5A5_A5A5_0000_0000 | u64::from(U64.0)).to_le_bytes())));
 }
 

@@ -19,7 +19,7 @@ mod general {
             7, "error 7", U32, RO, UNMAPPED, S; "", 1.0, ANY; "The one before"
             8, "error 8", U32, RO, UNMAPPED, S; "", 1.0, ANY; "The one before"
         }
-        0x1005 "COB-ID SYNC" { 0, "COB-ID SYNC", U32, RW, UNMAPPED, S; "", 1.0, ANY; "Identifier of SYNC" }
+        0x1005 "COB-ID SYNC" { 0, "COB-ID SYNC", U32, RW, UNMAPPED, S; "", 1.0, ANY; "Identifier of SYNC; one less than 180 us after another does not count" }
         0x1008 "device name" { 0, "device name", Text, RO, UNMAPPED, S; "", 1.0, ANY; "Name of the device" }
         0x1009 "hardware version" { 0, "hardware version", Text, RO, UNMAPPED, S; "", 1.0, ANY; "The board" }
         0x100A "software version" { 0, "software version", Text, RO, UNMAPPED, S; "", 1.0, ANY; "The program" }
