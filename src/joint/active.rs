@@ -159,8 +159,8 @@ pub struct Active {
     pub implausible_voltage: Dq,
     /// And besides without current, where none of the dead time is compensated, V.
     pub uncompensated_voltage: f32,
-    /// One over the current from which the dead time is compensated, 1/A.
-    pub inverse_dead_time_band: f32,
+    /// How much less of it an ampere of torque current leaves, V/A.
+    pub compensated_slope: f32,
     /// Electrical constants for that check: resistance, Ω, inductances, H, and flux linkage, Wb.
     pub resistance: f32,
     /// H.
@@ -304,7 +304,7 @@ impl Checked {
             current_sum_limit: CURRENT_SUM * limits.over_current,
             implausible_voltage: Dq { d: unexplained(motor.inductance_d), q: unexplained(motor.inductance_q) },
             uncompensated_voltage: (1.0 - UNCOMPENSATED) * dead_time_voltage,
-            inverse_dead_time_band: 1.0 / bridge.dead_time_band,
+            compensated_slope: (1.0 - UNCOMPENSATED) * dead_time_voltage / bridge.dead_time_band,
             resistance: motor.resistance,
             inductance: Dq { d: motor.inductance_d, q: motor.inductance_q },
             flux_linkage: self.flux_linkage,

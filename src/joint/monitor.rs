@@ -207,9 +207,8 @@ impl Monitor {
         // A wrong resistance shows along the current only: across it the bound is close.
         let turning = INDUCED_ERROR * (magnitude(memory.induced.d) + magnitude(memory.induced.q));
         // Nor is what of the dead time is not compensated, with little current.
-        let largest = greater(magnitude(memory.current.d), magnitude(memory.current.q));
-        let uncompensated = greater(1.0 - largest * active.inverse_dead_time_band, 0.0);
-        let rest = turning + active.uncompensated_voltage * uncompensated;
+        let uncompensated = active.uncompensated_voltage - active.compensated_slope * magnitude(memory.current.q);
+        let rest = turning + greater(uncompensated, 0.0);
         let explained = |current: f32| rest + RESISTANCE_ERROR * resistance * magnitude(current);
         let contradicts = exceeds(left.d, active.implausible_voltage.d + explained(memory.current.d))
             || exceeds(left.q, active.implausible_voltage.q + explained(memory.current.q));
