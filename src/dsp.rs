@@ -98,6 +98,12 @@ pub fn smmul(a: i32, b: i32) -> i32 {
     ((a as i64 * b as i64) >> 32) as i32
 }
 
+/// `a b / 2^32`, rounded half up.
+#[inline(always)]
+pub fn smmulr(a: i32, b: i32) -> i32 {
+    ((a as i64 * b as i64 + (1 << 31)) >> 32) as i32
+}
+
 /// The upper halves of two words, packed: `second` above `first`.
 #[inline(always)]
 pub fn pkhtb(first: i32, second: i32) -> u32 {

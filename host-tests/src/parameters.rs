@@ -2,7 +2,9 @@
 //! ones use every bit that an image may hold.
 
 use joint_firmware::friction::domain::{Domain, Range};
-use joint_firmware::friction::network::{INPUTS, MAX_FRACTION, MIN_FRACTION, NEURONS, NetworkParameters, Neuron};
+use joint_firmware::friction::network::{
+    INPUTS, MAX_FRACTION, MAX_SCALE, MIN_FRACTION, NEURONS, NetworkParameters, Neuron,
+};
 use joint_firmware::friction::physical::{Coefficients, Dimension, PhysicalParameters, Terms};
 use joint_firmware::friction::regime::{Criterion, MAX_CRITERIA, Measure, Selector};
 use joint_firmware::friction::state::{SIGNALS, Signal};
@@ -224,7 +226,7 @@ fn extreme_network(random: &mut ChaCha8Rng) -> NetworkParameters {
         }),
         hidden,
         output,
-        scale: bits(random),
+        scale: bits(random).clamp(-MAX_SCALE, MAX_SCALE),
     }
 }
 

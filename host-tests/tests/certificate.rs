@@ -5,7 +5,7 @@ use host_tests::parameters::{extreme, frictionless, range, tame};
 use host_tests::states::signals;
 use host_tests::wide;
 use joint_firmware::friction::domain::Range;
-use joint_firmware::friction::network::{NetworkParameters, Neuron};
+use joint_firmware::friction::network::{MAX_SCALE, NetworkParameters, Neuron};
 use joint_firmware::friction::physical::Terms;
 use joint_firmware::friction::state::{JointState, SIGNALS, Signal};
 use joint_firmware::friction::{Estimate, FrictionModel, FrictionParameters};
@@ -222,7 +222,7 @@ fn bounds_hold_for_whatever_an_image_can_hold() {
 
 /// A network that passes the measured torque on from neuron 0 to neuron 0, with the largest weights.
 fn steepest_network() -> NetworkParameters {
-    let mut network = NetworkParameters { scale: i32::MAX, ..Default::default() };
+    let mut network = NetworkParameters { scale: MAX_SCALE, ..Default::default() };
     let neuron = Neuron { weights: [31 << 10, 0, 0, 0, 0, 0], fraction: 10 };
     network.first[0][Signal::MeasuredTorque as usize] = i32::MAX;
     network.output = Neuron { fraction: 10, ..Default::default() };
@@ -235,6 +235,7 @@ fn steepest_network() -> NetworkParameters {
 fn a_slope_beyond_all_numbers_is_not_proved_to_be_a_small_one() {
     let mut parameters = frictionless();
     parameters.domain.ranges = [Range::ANY; SIGNALS];
+    parameters.domain.ranges[Signal::MeasuredTorque as usize] = range(-1.0, 1.0);
     parameters.sets[0].network = Some(steepest_network());
     let proved = prove(&parameters).expect("nothing overflows");
     assert_eq!(proved.torque_gain, u32::MAX);

@@ -4,7 +4,7 @@
 use host_tests::image_bytes::{encoded, sealed};
 use host_tests::parameters::{extreme, frictionless, image, tame};
 use joint_firmware::friction::domain::Range;
-use joint_firmware::friction::network::Neuron;
+use joint_firmware::friction::network::{MAX_SCALE, NetworkParameters, Neuron};
 use joint_firmware::friction::physical::Terms;
 use joint_firmware::friction::regime::{Criterion, Measure};
 use joint_firmware::friction::state::{SIGNALS, Signal};
@@ -139,7 +139,7 @@ fn layout(criteria: usize, networks: u8, golden: usize) -> Vec<Byte> {
                 bytes.extend([Free; 12]);
                 bytes.extend([Field(10, 20), Reserved]);
             }
-            bytes.extend([Free, Free, Free, Free, Reserved, Reserved]);
+            bytes.extend([Dependent, Dependent, Dependent, Dependent, Reserved, Reserved]); // the scale: 25 bits
         }
     }
     for _ in 0..golden {
@@ -365,7 +365,7 @@ fn what_could_not_be_read_back_is_not_written() {
     };
     let criterion = Criterion { measure: Measure::Speed, enter: 5, leave: 6 };
     let neuron = |fraction| Neuron { fraction, ..Default::default() };
-    let mut network = joint_firmware::friction::network::NetworkParameters::default();
+    let mut network = NetworkParameters::default();
     (network.hidden, network.output) = ([[neuron(10); 5]; 2], neuron(20));
     let with_network = |image: &mut Image, fraction: u8| {
         let mut network = network;
@@ -384,6 +384,10 @@ fn what_could_not_be_read_back_is_not_written() {
     assert_eq!(refused(&|image| image.friction.sets[0].physical.terms = Terms(1 << 14)), "terms");
     assert_eq!(refused(&|image| with_network(image, 9)), "fraction bits");
     assert_eq!(refused(&|image| with_network(image, 21)), "fraction bits");
+    for scale in [MAX_SCALE + 1, -MAX_SCALE - 1] {
+        let network = NetworkParameters { scale, ..network };
+        assert_eq!(refused(&|image| image.friction.sets[0].network = Some(network)), "scale");
+    }
     assert_eq!(
         refused(&|image| image.friction.sets[1] = ParameterSet { network: Some(network), ..Default::default() }),
         "index of a set in use"

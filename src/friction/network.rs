@@ -9,7 +9,7 @@
 
 use super::domain::{Domain, Range};
 use super::smooth::tanh;
-use crate::dsp::{asr, movt, pkhtb, saturate, smlad, smmla, smmul, smuad};
+use crate::dsp::{asr, movt, pkhtb, smlad, smmla, smmul, smmulr, smuad};
 use crate::quantity::Torque;
 
 /// Inputs of the network: the first five [`Signal`](super::state::Signal)s.
@@ -20,6 +20,10 @@ pub const NEURONS: usize = 5;
 pub const MIN_FRACTION: u8 = 10;
 /// Most fraction bits of a 16-bit weight: |weight| < 1/32.
 pub const MAX_FRACTION: u8 = 20;
+
+/// Largest torque for an output of 1, Q16.16: below 256 Nm. With seven bits more it fits a word still, and the upper word of its product with the output
+/// is the torque.
+pub const MAX_SCALE: i32 = (1 << 24) - 1;
 
 /// A neuron of layers 1 to 3: five weights and a bias with a common power-of-two scale.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -39,7 +43,7 @@ pub struct NetworkParameters {
     pub hidden: [[Neuron; NEURONS]; 2],
     /// Layer 3, linear.
     pub output: Neuron,
-    /// Torque for an output of 1, Nm in Q16.16.
+    /// Torque for an output of 1, Nm in Q16.16, -[`MAX_SCALE`] to [`MAX_SCALE`].
     pub scale: i32,
 }
 
@@ -191,7 +195,7 @@ impl Layers {
             first: [column(0), column(1), column(2), column(3), column(4)],
             hidden: parameters.hidden.map(|layer| layer.each_ref().map(PackedNeuron::new)),
             output: PackedNeuron::new(&parameters.output),
-            scale: parameters.scale,
+            scale: output_scale(parameters.scale),
         }
     }
 
@@ -215,10 +219,15 @@ impl Layers {
     }
 }
 
-/// Output sum (Q25) times scale (Q16.16), rounded half up, saturated.
+/// The scale (Q16.16) for [`to_torque`], in Q23.
+pub(crate) fn output_scale(scale: i32) -> i32 {
+    scale.clamp(-MAX_SCALE, MAX_SCALE) << 7
+}
+
+/// Output sum (Q25) times [`output_scale`], rounded half up.
 #[inline(always)]
 pub(crate) fn to_torque(sum: i32, scale: i32) -> i32 {
-    saturate((sum as i64 * scale as i64 + (1 << 24)) >> 25)
+    smmulr(sum, scale)
 }
 
 #[cfg(test)]
@@ -305,6 +314,15 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn the_torque_is_the_output_times_the_scale_rounded_half_up(
+            sum in prop_oneof![any::<i32>(), Just(i32::MIN), Just(i32::MAX)],
+            scale in prop_oneof![-MAX_SCALE..=MAX_SCALE, Just(-MAX_SCALE), Just(MAX_SCALE), -2..=2i32],
+        ) {
+            let exact = (sum as i64 * scale as i64 + (1 << 24)) >> 25;
+            prop_assert_eq!(to_torque(sum, output_scale(scale)) as i64, exact);
+        }
+
         #[test]
         fn an_input_is_clamped_to_its_range_wherever_that_lies(
             a in prop_oneof![any::<i32>(), Just(i32::MIN), Just(i32::MAX)],

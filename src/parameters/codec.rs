@@ -3,7 +3,7 @@
 use super::certificate::Limits;
 use super::image::{CRC_LENGTH, Effort, FORMAT, GoldenVector, Image, ImageError, MAGIC, MAX_GOLDEN, Target};
 use crate::friction::domain::{Domain, Range};
-use crate::friction::network::{INPUTS, MAX_FRACTION, MIN_FRACTION, NEURONS, NetworkParameters};
+use crate::friction::network::{INPUTS, MAX_FRACTION, MAX_SCALE, MIN_FRACTION, NEURONS, NetworkParameters};
 use crate::friction::physical::{Coefficients, PhysicalParameters, Terms};
 use crate::friction::regime::{Criterion, MAX_SETS, Measure, Selector};
 use crate::friction::state::{SIGNALS, Signal};
@@ -170,7 +170,7 @@ fn decode_network(reader: &mut Reader, network: &mut NetworkParameters) {
         neuron.fraction = reader.checked_u8("fraction bits", MIN_FRACTION, MAX_FRACTION);
         reader.reserved(1);
     }
-    network.scale = reader.i32();
+    network.scale = reader.checked_i32("scale", -MAX_SCALE, MAX_SCALE);
     reader.reserved(2);
 }
 

@@ -41,7 +41,7 @@
 //! | 5 x 6 x 4 | network layer 0: per neuron five weights in Q26 and a bias in Q25 |
 //! | 10 x 14 | layers 1 and 2: per neuron five weights and a bias, 16 bits each, their fraction bits (8 bits, 10 to 20), a reserved byte |
 //! | 14 | layer 3, one neuron of the same form |
-//! | 4 | torque for an output of 1, Q16.16 |
+//! | 4 | torque for an output of 1, Q16.16, below 256 Nm |
 //! | 2 | reserved |
 //!
 //! A golden vector is 36 bytes: the index of the set (1 byte), three reserved, the six signals (Q16.16, in the order of [`Signal`]),
@@ -52,7 +52,7 @@
 
 use super::certificate::Limits;
 use super::codec::{Reader, Writer, decode_content, encode_content};
-use crate::friction::network::{MAX_FRACTION, MIN_FRACTION};
+use crate::friction::network::{MAX_FRACTION, MAX_SCALE, MIN_FRACTION};
 use crate::friction::physical::Terms;
 use crate::friction::state::{JointState, SIGNALS, Signal};
 use crate::friction::{Estimate, FrictionModel, FrictionParameters, ParameterSet};
@@ -340,6 +340,7 @@ impl Image {
             for neuron in network.hidden.iter().flatten().chain([&network.output]) {
                 field("fraction bits", neuron.fraction as i64, MIN_FRACTION as i64, MAX_FRACTION as i64)?;
             }
+            field("scale", network.scale as i64, -MAX_SCALE as i64, MAX_SCALE as i64)?;
         }
         field("number of golden vectors", golden.len() as i64, 1, MAX_GOLDEN as i64)?;
         golden.iter().try_for_each(|vector| field("golden vector's set", vector.set as i64, 0, last))

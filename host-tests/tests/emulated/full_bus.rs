@@ -64,8 +64,11 @@ const LOADS: [Load; 3] = [
     }),
 ];
 
+/// The frames of a flood, by their number.
+type Flood = (&'static str, fn(u32) -> Heard);
+
 /// Frames so short and so many that they leave nothing of the bus to anybody whose identifier is higher. Set-points may starve: the joint stops then.
-const FLOODS: [(&str, fn(u32) -> Heard); 6] = [
+const FLOODS: [Flood; 6] = [
     ("SYNC", |_| (0x080, Vec::new())),
     ("NMT commands that change nothing", |_| (0x000, vec![1, NODE])),
     ("NMT commands that stop and start", |number| (0x000, vec![1 + (number % 2) as u8, NODE])),

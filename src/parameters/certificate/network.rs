@@ -5,7 +5,7 @@ use super::{bisect, slopes, tanh_at};
 use crate::dsp::smmul;
 use crate::friction::domain::Domain;
 use crate::friction::network::{
-    INPUTS, InputScale, Inputs, MIN_FRACTION, NEURONS, NetworkParameters, Neuron, to_torque,
+    INPUTS, InputScale, Inputs, MIN_FRACTION, NEURONS, NetworkParameters, Neuron, output_scale, to_torque,
 };
 use crate::friction::state::Signal;
 
@@ -60,10 +60,11 @@ pub(super) fn bounds(parameters: &NetworkParameters, domain: &Domain, depth: u32
 
 #[inline(never)]
 fn torque_bounds(root: Cell, parameters: &NetworkParameters, depth: u32) -> Interval {
+    let scale = output_scale(parameters.scale);
     bisect(
         root,
         depth,
-        &|cell| Layers::of(cell, parameters).output.map(|sum| to_torque(sum as i32, parameters.scale) as i64),
+        &|cell| Layers::of(cell, parameters).output.map(|sum| to_torque(sum as i32, scale) as i64),
         &|a, b| a.union(b),
         &|found, new| found.contains(*new),
         &|cell| split(cell, parameters),

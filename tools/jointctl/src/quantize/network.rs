@@ -5,7 +5,9 @@ use super::full_scale::from_q16;
 use super::full_scale::to_integer;
 use crate::network::{FIRMWARE_HIDDEN, InputBox, Network};
 use joint_firmware::friction::domain::Domain;
-use joint_firmware::friction::network::{INPUTS, MAX_FRACTION, MIN_FRACTION, NEURONS, NetworkParameters, Neuron};
+use joint_firmware::friction::network::{
+    INPUTS, MAX_FRACTION, MAX_SCALE, MIN_FRACTION, NEURONS, NetworkParameters, Neuron,
+};
 
 /// Largest sum of a neuron's weights and bias that fits: Q25 in layer 0, Q15 times at least 10 fraction bits in the others.
 const SUM_LIMIT: f64 = 64.0;
@@ -39,7 +41,7 @@ pub fn quantize(network: &Network) -> Result<NetworkParameters, QuantizeError> {
     let bias = bias * network.output_scale();
     let largest = torques.iter().fold(bias.abs(), |most, t| most.max(t.abs()));
     let scale = (largest * 65536.0).ceil().max(1.0);
-    parameters.scale = to_integer("scale of the network", scale, 1.0, 1.0, f64::from(i32::MAX))?;
+    parameters.scale = to_integer("scale of the network", scale / 65536.0, 65536.0, 1.0, f64::from(MAX_SCALE))?;
     let weights: Vec<f64> = torques.iter().map(|t| t * 65536.0 / scale).collect();
     parameters.output = neuron(3, 0, &weights, bias * 65536.0 / scale)?;
     Ok(parameters)
