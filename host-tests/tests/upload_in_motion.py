@@ -18,7 +18,7 @@ network = canopen.Network()
 network.connect(interface="udp_multicast", channel=group, port=port)
 node = network.add_node(node_id, canopen.objectdictionary.ObjectDictionary())
 # The emulated board may be slower than the clock on the wall.
-node.sdo.RESPONSE_TIMEOUT = 10
+node.sdo.RESPONSE_TIMEOUT = 60
 image = open(path, "rb").read()
 wanted = [0x06, 0.0]
 over = threading.Event()
@@ -44,7 +44,7 @@ def commands():
 
 
 def until(reached, what):
-    for _ in range(200):
+    for _ in range(1200):
         if reached():
             return
         time.sleep(0.05)
