@@ -10,6 +10,7 @@ use crate::motor::angle::{Direction, EncoderAlignment, STEPS, TAU};
 use crate::motor::current::{CurrentSettings, MotorConstants};
 use crate::motor::field_oriented::FieldOrientedGains;
 use crate::motor::modulation::ModulationSettings;
+use crate::motor::number::greater;
 use crate::motor::observer::{Motion, ObserverGains, ObserverSettings};
 use crate::motor::thermal::{ThermalSettings, WindingTemperature};
 use crate::motor::transform::Dq;
@@ -29,8 +30,10 @@ const HIGHEST_ACCELERATION: f32 = 1e6;
 /// Largest sum of the phase currents as a part of the over-current limit: at the current limit, three sensors that are 2 % off
 /// and noise of 1 % make up half of it.
 const CURRENT_SUM: f32 = 0.1;
-/// Voltage that may be unexplained as a part of the highest supply, besides the dead time's.
-const UNEXPLAINED: f32 = 0.003;
+/// Voltage that may be unexplained in any case, as a part of the highest supply.
+const UNEXPLAINED: f32 = 0.015;
+/// And besides what of the dead time is not compensated.
+const BESIDES_DEAD_TIME: f32 = 0.003;
 /// Voltage that the dead time takes as a part of the supply, for its part of the period: 4/3 of it in space-vector components.
 const DEAD_TIME: f32 = 4.0 / 3.0;
 /// Part of that which is not compensated although the current is large: a phase's around its zero crossing is half of all, and the transistors' delays
@@ -291,9 +294,11 @@ impl Checked {
         let pole_pairs = motor.alignment.pole_pairs as f32;
         let (_, highest_voltage) = limits.bus_voltage;
         let current_slope = CURRENT_NOISE * motor.current_limit * VOLTAGE_FILTER * rate;
-        let dead_time_voltage = DEAD_TIME * bridge.dead_time * rate * highest_voltage;
-        let large = UNEXPLAINED * highest_voltage + UNCOMPENSATED * dead_time_voltage;
-        let unexplained = |inductance: f32| large + inductance * current_slope;
+        let dead_time = DEAD_TIME * bridge.dead_time * rate;
+        let part = |uncompensated: f32| greater(UNEXPLAINED, BESIDES_DEAD_TIME + uncompensated * dead_time);
+        let (large, small) = (part(UNCOMPENSATED), part(1.0));
+        let uncompensated_voltage = (small - large) * highest_voltage;
+        let unexplained = |inductance: f32| large * highest_voltage + inductance * current_slope;
         Active {
             field_oriented: self.field_oriented,
             observer: self.observer,
@@ -303,8 +308,8 @@ impl Checked {
             current_limit: motor.current_limit,
             current_sum_limit: CURRENT_SUM * limits.over_current,
             implausible_voltage: Dq { d: unexplained(motor.inductance_d), q: unexplained(motor.inductance_q) },
-            uncompensated_voltage: (1.0 - UNCOMPENSATED) * dead_time_voltage,
-            compensated_slope: (1.0 - UNCOMPENSATED) * dead_time_voltage / bridge.dead_time_band,
+            uncompensated_voltage,
+            compensated_slope: uncompensated_voltage / bridge.dead_time_band,
             resistance: motor.resistance,
             inductance: Dq { d: motor.inductance_d, q: motor.inductance_q },
             flux_linkage: self.flux_linkage,
