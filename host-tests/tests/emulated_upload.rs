@@ -136,7 +136,7 @@ fn upload(python: Option<&Path>) -> Result<(), Failed> {
     let folder = tempfile::tempdir()?;
     let path: PathBuf = folder.path().join("second.img");
     std::fs::write(&path, encoded(&image(2, 0.8)))?;
-    let port = std::net::UdpSocket::bind("0.0.0.0:0")?.local_addr()?.port();
+    let port = bus::free_port().ok_or("no port is free")?;
     let bus = bus::open(&format!("udp:{GROUP}:{port}"))?;
     let (stop, part) = (AtomicBool::new(false), AtomicUsize::new(0));
     let mut script = Command::new(python)

@@ -20,4 +20,4 @@ pub mod pacing;
 pub mod transport;
 
 pub use joint_firmware::canopen::Frame;
-pub use transport::{BusError, Transport, open};
+pub use transport::{BusError, Transport, free_port, open};

@@ -33,7 +33,7 @@ fn main() {
 }
 
 fn port() -> u16 {
-    std::net::UdpSocket::bind("0.0.0.0:0").unwrap().local_addr().unwrap().port()
+    bus::free_port().unwrap()
 }
 
 fn member(port: u16) -> Arc<dyn Transport> {

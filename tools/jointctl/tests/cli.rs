@@ -233,8 +233,7 @@ effort = { column = "tau", unit = "Nm" }
 #[test]
 fn a_virtual_joint_on_a_bus_is_found_and_a_bus_without_one_is_an_error() {
     let folder = tempfile::tempdir().unwrap();
-    // The system chooses a port that is free; nobody else takes it within a moment.
-    let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+    let port = bus::free_port().unwrap();
     let (listening, calling) = (format!("slcan:listen://127.0.0.1:{port}"), format!("slcan:tcp://127.0.0.1:{port}"));
     let start = || {
         let mut joint = Command::new(env!("CARGO_BIN_EXE_jointctl"))

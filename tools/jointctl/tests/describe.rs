@@ -41,7 +41,7 @@ fn compare(python: Option<&Path>) -> Result<(), Failed> {
             return Err(String::from_utf8_lossy(&written.stderr).into_owned().into());
         }
     }
-    let port = std::net::UdpSocket::bind("0.0.0.0:0")?.local_addr()?.port();
+    let port = bus::free_port().ok_or("no port is free")?;
     let bus = bus::open(&format!("udp:{GROUP}:{port}"))?;
     let parameters = ActuatorParameters::reference().aligned().without_payload();
     let options = Options { node_id: NODE, serial: 12, seed: 1 };

@@ -68,16 +68,11 @@ fn headers() -> Option<PathBuf> {
     prefix.join("include/node/node.h").exists().then_some(prefix)
 }
 
-/// Below those that the system gives to clients: one of these that is free is a client's in the next moment.
-const PORTS: std::ops::Range<u16> = 21_000..21_200;
-
 /// A script on a bus of its own with a joint; what it printed.
 fn run(modules: &Result<PathBuf, String>, script: &str, images: &[Vec<u8>], more: &[&str]) -> Result<String, Failed> {
     let modules = modules.as_ref()?;
-    let (port, mut joint) = PORTS
-        .clone()
-        .find_map(|port| Some((port, Joint::new(&format!("slcan:listen://127.0.0.1:{port}")).ok()?)))
-        .ok_or("no port is free")?;
+    let port = bus::free_port().ok_or("no port is free")?;
+    let mut joint = Joint::new(&format!("slcan:listen://127.0.0.1:{port}"))?;
     let mut command = Command::new("node");
     command.arg(Path::new(env!("CARGO_MANIFEST_DIR")).join(script));
     command.arg(modules).args([port.to_string(), client::NODE.to_string()]);

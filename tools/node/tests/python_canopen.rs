@@ -40,7 +40,7 @@ const PACKAGES: Packages = Packages {
 /// A script on a bus of its own with a joint; what it printed.
 fn run(python: Option<&Path>, script: &str, images: &[Vec<u8>], more: &[&str]) -> Result<String, Failed> {
     let python = PACKAGES.required(python)?;
-    let port = std::net::UdpSocket::bind("0.0.0.0:0")?.local_addr()?.port();
+    let port = bus::free_port().ok_or("no port is free")?;
     let mut joint = Joint::new(&format!("udp:{GROUP}:{port}"))?;
     let mut command = Command::new(python);
     command.arg(Path::new(env!("CARGO_MANIFEST_DIR")).join(script));

@@ -17,6 +17,7 @@
 
 mod error;
 mod msgpack;
+mod port;
 mod serial;
 mod slcan;
 mod slcan_listen;
@@ -28,6 +29,7 @@ mod virtual_bus;
 
 pub use error::BusError;
 pub use joint_firmware::canopen::Frame;
+pub use port::free_port;
 
 use crate::pacing::Statistics;
 use std::sync::Arc;

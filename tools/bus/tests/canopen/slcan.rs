@@ -11,13 +11,9 @@ use std::time::{Duration, Instant};
 
 const SECOND: Duration = Duration::from_secs(1);
 
-fn free_port() -> u16 {
-    TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
-}
-
 /// A client connected to a listening program of this project.
 fn connected() -> (Arc<dyn Transport>, Arc<dyn Transport>) {
-    let port = free_port();
+    let port = bus::free_port().unwrap();
     let adapter = open(&format!("slcan:listen://127.0.0.1:{port}")).unwrap();
     // The adapter answers while somebody receives from it.
     let opening = std::thread::spawn(move || open(&format!("slcan:tcp://127.0.0.1:{port}")));
@@ -69,7 +65,7 @@ fn an_adapter_that_hangs_up_is_told_from_one_that_is_silent() {
 
 #[test]
 fn the_next_client_is_served_when_one_hangs_up() {
-    let port = free_port();
+    let port = bus::free_port().unwrap();
     let adapter = open(&format!("slcan:listen://127.0.0.1:{port}")).unwrap();
     for round in 0..3u8 {
         let mut client = TcpStream::connect(("127.0.0.1", port)).unwrap();

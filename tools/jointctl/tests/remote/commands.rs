@@ -14,7 +14,7 @@ struct Desk {
 
 impl Desk {
     fn new() -> Self {
-        let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+        let port = bus::free_port().unwrap();
         let served = Served::on(&format!("slcan:listen://127.0.0.1:{port}"), &[NODE]);
         Self { _served: served, client: format!("slcan:tcp://127.0.0.1:{port}"), folder: tempfile::tempdir().unwrap() }
     }
