@@ -13,8 +13,8 @@ use super::pdo::transmit::{Synchronous, assemble};
 use super::shared::{Epoch, Shared};
 use super::{LSS_MASTER, NMT, SDO_RECEIVE};
 
-/// A SYNC sooner after one that counted does not count, us: at 1 Mbit/s not even one full TPDO fits between the two. Without this a bus full of nothing
-/// but SYNC, 20,000 a second, leaves tasks no time.
+/// A SYNC sooner after one that counted does not count, us: at 1 Mbit/s a SYNC and a single full TPDO take 160 to 190. Without this a bus full of
+/// nothing but SYNC, 20,000 a second, leaves tasks no time.
 pub const SHORTEST_SYNC: u32 = 180;
 
 /// What remains to be done with a frame.
