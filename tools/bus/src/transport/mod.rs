@@ -132,7 +132,7 @@ mod tests {
 
     #[test]
     fn a_connection_that_nobody_accepts_is_named() {
-        let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+        let port = free_port().unwrap();
         let message = refused(&format!("slcan:tcp://127.0.0.1:{port}"));
         assert!(message.contains("listen"), "{message}");
     }
