@@ -179,13 +179,9 @@ fn under<W: Observed>(bench: &mut Bench<W>, frames: fn(u32) -> Vec<Heard>) -> Re
         let velocity = (TAU * REVERSALS * f64::from(number) * SET_POINT).sin();
         let own = (0x300 + u16::from(NODE), set_point(number, 0x0F, velocity));
         for (id, data) in frames(number).into_iter().chain([own]) {
-            send(&mut bench.emulation, id, &data)?;
-            bits += taken(id, &data)?;
+            bits += put(bench, id, &data)?;
         }
-        bench.run_with(SET_POINT, |emulation: &mut Emulation<W>| {
-            steps.note(emulation.now());
-            Ok(())
-        })?;
+        watch(bench, &mut steps)?;
         for (id, data) in heard(&mut bench.emulation) {
             bits += taken(id, &data)?;
         }
@@ -209,13 +205,9 @@ fn withstands<W: Observed>(bench: &mut Bench<W>, frame: fn(u32) -> Heard, period
         while bits < (1e6 * SET_POINT) as u64 {
             let (id, data) = frame(number);
             number += 1;
-            send(&mut bench.emulation, id, &data)?;
-            bits += taken(id, &data)?;
+            bits += put(bench, id, &data)?;
         }
-        bench.run_with(SET_POINT, |emulation: &mut Emulation<W>| {
-            steps.note(emulation.now());
-            Ok(())
-        })?;
+        watch(bench, &mut steps)?;
     }
     let cpu = &bench.emulation.cpu;
     let interrupts: u64 = cpu.exception_times().values().map(|times| times.own_cycles).sum();
@@ -232,6 +224,20 @@ fn withstands<W: Observed>(bench: &mut Bench<W>, frame: fn(u32) -> Heard, period
     heard(&mut bench.emulation);
     bench.number(NODE, 0x6041, 0)?;
     Ok((number, left))
+}
+
+/// Puts a frame on the bus; its bits.
+fn put<W: Observed>(bench: &mut Bench<W>, id: u16, data: &[u8]) -> Result<u64, Failed> {
+    send(&mut bench.emulation, id, data)?;
+    taken(id, data)
+}
+
+/// The control steps of a set-point's time.
+fn watch<W: Observed>(bench: &mut Bench<W>, steps: &mut Steps) -> Result<(), Failed> {
+    bench.run_with(SET_POINT, |emulation: &mut Emulation<W>| {
+        steps.note(emulation.now());
+        Ok(())
+    })
 }
 
 /// Bits of the bus, at 1 Mbit/s.
