@@ -45,7 +45,7 @@ impl Core {
         if !program.segments().all(|(address, bytes)| memory.set(address, bytes)) {
             return Err("the program does not fit into the memory".to_owned());
         }
-        let mut cpu = Cpu::new(memory);
+        let mut cpu = memory.core();
         cpu.reset(0).map_err(|refusal| format!("{refusal:?}"))?;
         Ok(Self { cpu, program })
     }

@@ -153,7 +153,7 @@ fn own_core_same_bits() -> Result<(), Failed> {
     if !program.segments().all(|(address, bytes)| memory.set(address, bytes)) {
         return Err("the program does not fit into the memory".into());
     }
-    let mut cpu = Cpu::new(memory);
+    let mut cpu = memory.core();
     cpu.reset(0).map_err(|refusal| format!("{refusal:?}"))?;
     let mut hashes = Vec::new();
     loop {

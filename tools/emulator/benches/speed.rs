@@ -1,7 +1,7 @@
 //! Prints how fast the core is on this machine: `cargo bench -p emulator`. Instructions a second on three loops that never sleep, on a bus of
 //! memory alone; the mix of each is in its comment.
 
-use emulator::cpu::{Cpu, End};
+use emulator::cpu::End;
 use emulator::memory::Memory;
 use std::time::Instant;
 
@@ -25,7 +25,7 @@ fn main() {
         let vectors = [DATA + 0x1000, start | 1].map(u32::to_le_bytes).concat();
         // The unit is switched on by an instruction of its own: str r1, [r0].
         assert!(memory.set(CODE, &vectors) && memory.set(start, &bytes) && memory.set(CODE + 0x80, &[1, 0x60]));
-        let mut cpu = Cpu::new(memory);
+        let mut cpu = memory.core();
         cpu.reset(CODE).expect("vectors");
         cpu.set_register(15, CODE + 0x80);
         cpu.set_register(0, 0xe000_ed88);

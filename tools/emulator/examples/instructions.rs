@@ -31,7 +31,7 @@ fn reset(cpu: &mut Cpu<Memory>) -> std::io::Result<()> {
 
 fn main() -> std::io::Result<()> {
     let memory = Memory::new().with(DATA - 0x1000..DATA + 0x1000, false).with(CODE, true);
-    let mut cpu = Cpu::new(memory);
+    let mut cpu = memory.core();
     reset(&mut cpu)?;
     let mut input = BufReader::with_capacity(1 << 20, std::io::stdin().lock());
     let mut output = BufWriter::with_capacity(1 << 20, std::io::stdout().lock());

@@ -62,7 +62,7 @@ impl<W: Wired> Emulation<W> {
         for deviation in W::DEVIATIONS {
             chip.allow(*deviation);
         }
-        let mut cpu = Cpu::new(chip);
+        let mut cpu = W::core(chip);
         cpu.reset(VECTORS).map_err(|_| EmulationError::NoVectors)?;
         Ok(Self { cpu, rtt: Rtt::of(program), resets: Vec::new() })
     }

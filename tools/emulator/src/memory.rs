@@ -2,6 +2,7 @@
 
 use crate::bus::{Bus, Refusal, Signals, Width};
 use crate::chip::memory;
+use crate::cpu::Cpu;
 use std::ops::Range;
 
 /// Where accesses are those of SRAM, without wait states.
@@ -24,6 +25,11 @@ struct Block {
 }
 
 impl Memory {
+    /// A core that is connected to it: not generic, so that its operations are compiled here and not in every program that runs one.
+    pub fn core(self) -> Cpu<Self> {
+        Cpu::new(self)
+    }
+
     /// No memory at all.
     pub fn new() -> Self {
         Self::default()

@@ -6,11 +6,12 @@
 use super::drivetrain::{CYCLE, Drivetrain};
 use super::electrics::{Ntc, divided, node};
 use super::{Inputs, Wired};
-use crate::chip::Deviation;
 use crate::chip::fdcan::line::{CanLine, Line};
 use crate::chip::time::Instant;
 use crate::chip::variant::{STM32G431CB, Variant};
 use crate::chip::wiring::{Pin, Pwm, Quadrature, SpiFrame, TimerName, Wiring};
+use crate::chip::{Chip, Deviation};
+use crate::cpu::Cpu;
 use std::cmp::Ordering;
 
 /// Counts a turn: 1,000 lines.
@@ -54,6 +55,10 @@ impl Wired for BG431BEsc1 {
     const NAME: &'static str = "b-g431b-esc1";
     // The bridge is switched off first of all, before TIM1 has a clock: without one it drives nothing.
     const DEVIATIONS: &'static [Deviation] = &[Deviation::WithoutClock { register: 0x4001_2c44 }];
+
+    fn core(chip: Chip<Self>) -> Cpu<Chip<Self>> {
+        Cpu::new(chip)
+    }
 
     fn drivetrain(&mut self) -> &mut Drivetrain {
         &mut self.drivetrain

@@ -13,10 +13,11 @@ pub use drivetrain::Drivetrain;
 pub use moteus_r4::MoteusR4;
 pub use witnessed::Witnessed;
 
-use crate::chip::Deviation;
 use crate::chip::fdcan::line::Line;
 use crate::chip::variant::Variant;
 use crate::chip::wiring::Wiring;
+use crate::chip::{Chip, Deviation};
+use crate::cpu::Cpu;
 
 /// What a person or a broken part does to a board.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -41,6 +42,12 @@ pub trait Wired: Wiring {
 
     /// What the program does against the manual, knowingly.
     const DEVIATIONS: &'static [Deviation];
+
+    /// A core for its chip. A board says this itself, so that a core's thousand operations are compiled with the board, once, and not again in every
+    /// program that runs it.
+    fn core(chip: Chip<Self>) -> Cpu<Chip<Self>>
+    where
+        Self: Sized;
 
     /// Bridge, motor and joint.
     fn drivetrain(&mut self) -> &mut Drivetrain;

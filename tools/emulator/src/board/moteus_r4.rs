@@ -6,11 +6,12 @@
 use super::drivetrain::Drivetrain;
 use super::electrics::{Ntc, divided};
 use super::{Inputs, Wired};
-use crate::chip::Deviation;
 use crate::chip::fdcan::line::{CanLine, Line};
 use crate::chip::time::Instant;
 use crate::chip::variant::{STM32G474CE, Variant};
 use crate::chip::wiring::{Pin, Pwm, Quadrature, SpiFrame, TimerName, Wiring};
+use crate::chip::{Chip, Deviation};
+use crate::cpu::Cpu;
 use crate::parts::as5047p::{As5047p, Field};
 use crate::parts::drv8353::Drv8353;
 
@@ -69,6 +70,10 @@ impl Wired for MoteusR4 {
     // The bridge is switched off first of all, before the ports have clocks: without them the pins are no outputs.
     const DEVIATIONS: &'static [Deviation] =
         &[Deviation::WithoutClock { register: 0x4800_0418 }, Deviation::WithoutClock { register: 0x4800_0018 }];
+
+    fn core(chip: Chip<Self>) -> Cpu<Chip<Self>> {
+        Cpu::new(chip)
+    }
 
     fn drivetrain(&mut self) -> &mut Drivetrain {
         &mut self.drivetrain

@@ -4,11 +4,12 @@
 //! Host only.
 
 use super::{Drivetrain, Inputs, Wired};
-use crate::chip::Deviation;
 use crate::chip::fdcan::line::{CanLine, Line};
 use crate::chip::time::Instant;
 use crate::chip::variant::Variant;
 use crate::chip::wiring::{Pin, Pwm, Quadrature, SpiFrame, TimerName, Wiring};
+use crate::chip::{Chip, Deviation};
+use crate::cpu::Cpu;
 use crate::emulation::Emulation;
 use std::hash::{Hash, Hasher};
 
@@ -88,6 +89,10 @@ impl<W: Wired> Wired for Witnessed<W> {
     const VARIANT: &'static Variant = W::VARIANT;
     const NAME: &'static str = W::NAME;
     const DEVIATIONS: &'static [Deviation] = W::DEVIATIONS;
+
+    fn core(chip: Chip<Self>) -> Cpu<Chip<Self>> {
+        Cpu::new(chip)
+    }
 
     fn drivetrain(&mut self) -> &mut Drivetrain {
         self.board.drivetrain()

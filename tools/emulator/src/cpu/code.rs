@@ -156,7 +156,7 @@ impl<B: Bus> Cpu<B> {
             }),
         };
         match halves {
-            Ok((first, second)) if self.code.holds(pc) => match decode::decode(pc, first, second) {
+            Ok((first, second)) if self.code.holds(pc) => match (self.decode)(pc, first, second) {
                 Ok(operation) => self.code.keep(pc, operation),
                 Err(why) => {
                     let length = if decode::wide(first) { 4 } else { 2 };

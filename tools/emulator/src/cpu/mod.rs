@@ -47,6 +47,7 @@ pub use watch::{Call, Watch};
 use crate::bus::Bus;
 use code::Code;
 use cycle_counter::CycleCounter;
+use decode::Decode;
 use exceptions::Activation;
 use interrupts::Interrupts;
 use operation::Trap;
@@ -105,6 +106,8 @@ pub struct Cpu<B: Bus> {
     end: Option<End>,
     trapped_address: u32,
     code: Code<B>,
+    /// Makes operations. A pointer: whoever calls the decoder by name has all operations compiled, and programs that only run a core need not.
+    decode: Decode<B>,
     /// Memory that does not answer before a cycle.
     stall: Option<(std::ops::Range<u32>, u64)>,
     interrupts: Interrupts,

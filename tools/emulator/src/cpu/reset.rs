@@ -5,7 +5,7 @@ use super::cycle_counter::CycleCounter;
 use super::interrupts::Interrupts;
 use super::system::System;
 use super::system_timer::SystemTimer;
-use super::{Cpu, float};
+use super::{Cpu, decode, float};
 use crate::bus::{Bus, Refusal, Width};
 use std::collections::BTreeMap;
 
@@ -46,6 +46,7 @@ impl<B: Bus> Cpu<B> {
             end: None,
             trapped_address: 0,
             code,
+            decode: decode::decode,
             stall: None,
             interrupts: Interrupts::new(),
             system: System::default(),

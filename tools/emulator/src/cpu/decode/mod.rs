@@ -52,6 +52,9 @@ fn unless<B: Bus>(open: bool, operation: Operation<B>) -> Decoded<B> {
     if open { Err(Refused::Unpredictable) } else { Ok(operation) }
 }
 
+/// [`decode`] of some core.
+pub(super) type Decode<B> = fn(u32, u16, u16) -> Decoded<B>;
+
 /// The instruction at `address`; the second half-word counts only if it is wide.
 pub(super) fn decode<B: Bus>(address: u32, first: u16, second: u16) -> Decoded<B> {
     let is_wide = wide(first);

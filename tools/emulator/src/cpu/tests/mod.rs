@@ -33,7 +33,7 @@ pub(super) fn machine(code: &[u16]) -> Cpu<Memory> {
     for number in 2..144 {
         assert!(memory.set(VECTORS + 4 * u32::from(number), &(handler(number) | 1).to_le_bytes()));
     }
-    let mut cpu = Cpu::new(memory);
+    let mut cpu = memory.core();
     for number in 2..144 {
         assert!(cpu.bus.set(handler(number), &0x4770u16.to_le_bytes()));
     }
