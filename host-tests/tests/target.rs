@@ -6,7 +6,7 @@
 #[path = "../probe/src/sequence.rs"]
 mod sequence;
 
-use emulator::cpu::{Cpu, End};
+use emulator::cpu::End;
 use emulator::memory::Memory;
 use emulator::program::Program;
 use host_tests::bare_metal::{TARGET, target_installed};
