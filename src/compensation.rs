@@ -4,10 +4,9 @@
 //! asked for falls back by itself (network, then physical, then nothing) and every step says what it did and why. Switched off,
 //! or without a model, the torque is exactly zero: the loop computes the same bits as one without compensation.
 
-use crate::friction::FrictionModel;
-use crate::friction::domain::Weights;
 use crate::friction::regime::Memory;
 use crate::friction::state::{JointState, SIGNALS, Signal};
+use crate::friction::{Estimate, FrictionModel};
 use crate::quantity::Torque;
 
 /// What the operator asks for.
@@ -175,23 +174,24 @@ impl Default for Output {
     }
 }
 
-/// Compensation of one joint, from one control step to the next.
+/// Compensation of one joint, from one evaluation to the next.
 ///
-/// A step has two halves, about as long as each other: [`begin`](Self::begin) with a state, [`finish`](Self::finish) with what it gives. A loop that has no
-/// time for both in one period does them in two.
+/// An evaluation has three stages, none of them much longer than the network alone, so that a control loop can do one in a step:
+/// [`begin`](Self::begin) with a state (regime and network), [`go_on`](Self::go_on) (physical model), [`finish`](Self::finish) (the torque).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Compensation {
     memory: Memory,
     last: Torque,
     begun: Option<Begun>,
+    /// What the second stage leaves for the third.
+    estimate: Option<Estimate>,
 }
 
-/// What the first half of a step leaves for the second.
+/// What the first stage leaves for the others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Begun {
     signals: [i32; SIGNALS],
-    weights: Weights,
-    physical: Torque,
+    network: Torque,
 }
 
 /// Weights come in Q31 and a torque in Q16.16: `i32::MAX` counts as one, so that a full weight changes no bit. Never larger in
@@ -207,35 +207,50 @@ impl Compensation {
     pub fn reset(&mut self) {
         self.memory = Memory::default();
         self.last = Torque::ZERO;
-        self.begun = None;
+        (self.begun, self.estimate) = (None, None);
     }
 
-    /// Both halves at once.
+    /// All stages at once.
     pub fn step(&mut self, model: Option<&FrictionModel>, settings: &Settings, state: &JointState) -> Output {
         self.begin(model, settings, state);
+        self.go_on(model);
         self.finish(model, settings)
     }
 
-    /// First half of a step in a state: regime, physical model, and how much of it counts.
+    /// First stage: the regime of a state, and what its network gives.
     #[inline]
     pub fn begin(&mut self, model: Option<&FrictionModel>, settings: &Settings, state: &JointState) {
         self.begun = match (settings.request, model) {
             (Request::Off, _) | (_, None) => None,
             (_, Some(model)) => {
                 let signals = state.signals();
-                let physical = model.begin(state, &mut self.memory);
-                Some(Begun { signals, weights: model.fade().weights(&signals), physical })
+                model.enter(state, &mut self.memory);
+                Some(Begun { signals, network: model.by_network(&signals, &self.memory) })
             }
         };
     }
 
-    /// Second half of a step: the network, and the torque. Without a model, or switched off, it goes to zero at the slew rate, stays there
-    /// exactly, and the past is forgotten. A model that came after the first half finishes what another one has begun, within clamp and slew limit.
+    /// Second stage: what the physical model gives. A model that came after the first stage goes on with what another one has begun, within clamp and
+    /// slew limit.
+    #[inline]
+    pub fn go_on(&mut self, model: Option<&FrictionModel>) {
+        self.estimate = match (&self.begun, model) {
+            (Some(Begun { signals, network }), Some(model)) => {
+                Some(Estimate { physical: model.by_physical_model(signals, &self.memory), network: *network })
+            }
+            _ => None,
+        };
+    }
+
+    /// Third stage: how much of the model counts, and the torque. Without a model, or switched off, it goes to zero at the slew rate, stays there
+    /// exactly, and the past is forgotten.
     #[inline]
     pub fn finish(&mut self, model: Option<&FrictionModel>, settings: &Settings) -> Output {
-        let (Some(begun), Some(model)) = (&self.begun, model) else { return self.fade_out(settings) };
-        let weights = begun.weights;
-        let estimate = model.finish(begun.physical, &begun.signals, &mut self.memory);
+        let (Some(begun), Some(estimate), Some(model)) = (&self.begun, self.estimate, model) else {
+            return self.fade_out(settings);
+        };
+        let weights = model.fade().weights(&begun.signals);
+        let estimate = model.fade_in(estimate, &mut self.memory);
         let physical = weigh(estimate.physical.to_bits(), weights.physical);
         let network = weigh(estimate.network.to_bits(), weights.network);
         let full = self.permitted(physical.saturating_add(network), settings);

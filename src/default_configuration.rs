@@ -28,7 +28,6 @@ pub struct BoardConfiguration {
 pub const B_G431B_ESC1: BoardConfiguration = BoardConfiguration {
     bridge: BridgeConfiguration {
         rate: 20_000.0,
-        spreads_friction: false,
         // The low sides conduct at least 2.5 µs around the top: dead time, settling of the amplifiers, two conversions.
         duty: (0.0, 0.95),
         dead_time: 800e-9,
@@ -54,7 +53,6 @@ pub const MOTEUS_R4: BoardConfiguration = BoardConfiguration {
     bridge: BridgeConfiguration {
         rate: MOTEUS_R4_RATE,
         // A period has 4,250 cycles: too few for all of it in each.
-        spreads_friction: true,
         // The low sides conduct at least 2.5 µs around the top: dead time, settling of the amplifiers, one conversion.
         duty: (0.0, 0.9),
         // As the gate driver is configured.

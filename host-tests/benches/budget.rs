@@ -14,6 +14,7 @@ use host_tests::counted_steps::{PARTS, Step, counted, spread};
 use host_tests::peer_networks::{Exact, scaled};
 use host_tests::states::within;
 use joint_firmware::friction::state::SIGNALS;
+use joint_firmware::joint::configuration::FRICTION_STEPS;
 use object::read::elf::{FileHeader, ProgramHeader};
 use plant::ActuatorParameters;
 use rand_chacha::ChaCha8Rng;
@@ -38,17 +39,15 @@ const RUN: f64 = 1.2;
 /// A row of the first table: its name, its parts, and the most instructions and cycles that it should take.
 type Row = (&'static str, &'static [&'static str], Option<u64>, Option<u64>);
 
+/// Friction and compensation, without the feedforward around them.
+const FRICTION: &[&str] = &["network's inputs", "network", "physical model", "regimes", "compensation"];
+
 const ROWS: [Row; 8] = [
     ("network, from its inputs in Q31", &["network"], Some(230), Some(330)),
     ("the network's inputs, clamped and scaled", &["network's inputs"], None, None),
     ("physical model", &["physical model"], None, None),
     ("compensation: regimes, fade, limits", &["regimes", "compensation"], None, None),
-    (
-        "all of this together",
-        &["network's inputs", "network", "physical model", "regimes", "compensation"],
-        None,
-        Some(600),
-    ),
+    ("all of this that is in one step", FRICTION, None, Some(600)),
     ("feedforward and energy guard", &["feedforward and guard"], None, None),
     ("observer", &["observer"], None, None),
     ("current control, with transforms and modulation", &["transforms", "current control", "modulation"], None, None),
@@ -68,22 +67,32 @@ fn main() -> Outcome<()> {
          program is.\nA part that takes more instructions than `.ci/instructions` permits fails the tests (`control_step.rs`, which says how to change that)."
     );
     let image = image_bytes();
+    let steps = input(&image, &record()?);
     let boards = [run::<BG431BEsc1>(&BOARDS[0], BG431BEsc1::new)?, run::<MoteusR4>(&BOARDS[1], MoteusR4::new)?];
     let mut missed = Vec::new();
     println!(
         "\n## The control step\n\nFive runs of 200 steps, recorded in closed loop with the virtual joint and replayed: off; the physical model; all of the \
          model; torque mode with energy\nguard; position mode. The model is a certified image with every term, a network in each of four sets and two criteria. \
-         Least, median and most of the\nsteps that a part runs in. What the compiler has inlined counts for where it was written. The moteus r4 evaluates friction over two steps, so\nnone has all of it. The board's part (converters, timer, report) is that of its program, as it\nis flashed, on the emulated board: {INTERRUPTS} control interrupts while the joint is off."
+         Least, median and most of the\nsteps that a part runs in. What the compiler has inlined counts for where it was written. An evaluation of friction is spread over {FRICTION_STEPS} steps:\na step has one stage of it. The board's part (converters, timer, report) is that of its program, as it\nis flashed, on the emulated board: {INTERRUPTS} control interrupts while the joint is off."
     );
     for (board, program) in BOARDS.iter().zip(&boards) {
-        let runs = input(board.spreads_friction, &image, &record(board.spreads_friction)?);
-        let (_, runs) = counted(&board.probe("step", Some(("PROBE_RUNS", &runs)), &[], TEMPORARY)?)?;
+        let (_, runs) = counted(&board.probe("step", Some(("PROBE_RUNS", &steps)), &[], TEMPORARY)?)?;
         let steps: Vec<Step> = runs.concat();
         println!("\n### {}, optimised for \"{}\"\n", board.name, board.level);
         println!("| | instructions | cycles | target | |\n|---|---|---|---|---|");
+        let evaluations = || runs.iter().flat_map(|run| run.chunks_exact(FRICTION_STEPS as usize));
+        let evaluation = |steps: &[Step]| {
+            let mut sum = Cost::default();
+            steps.iter().for_each(|step| sum += step.of(FRICTION));
+            sum
+        };
         for (name, parts, instructions, cycles) in &ROWS {
             let costs = steps.iter().map(|step| step.of(parts)).collect();
             row(board, name, costs, *instructions, *cycles, &mut missed);
+            if *parts == FRICTION {
+                let costs = evaluations().map(evaluation).collect();
+                row(board, "a whole evaluation of friction", costs, None, None, &mut missed);
+            }
         }
         let rest = |step: &Step| {
             let named: Vec<&str> = ROWS.iter().flat_map(|(_, parts, ..)| *parts).copied().collect();

@@ -1,6 +1,5 @@
 //! The boards' programs, built as they are flashed, those of the probe, built in the same way, and whether that is possible on this machine.
 
-use joint_firmware::default_configuration::{B_G431B_ESC1, MOTEUS_R4};
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -23,15 +22,10 @@ pub struct Board {
     pub name: &'static str,
     /// Optimisation, as in `.cargo/config.toml` and the board's own file beside it.
     pub level: &'static str,
-    /// Whether its control loop evaluates friction over two steps.
-    pub spreads_friction: bool,
 }
 
 /// The boards.
-pub const BOARDS: [Board; 2] = [
-    Board { name: "b-g431b-esc1", level: "s", spreads_friction: B_G431B_ESC1.bridge.spreads_friction },
-    Board { name: "moteus-r4", level: "2", spreads_friction: MOTEUS_R4.bridge.spreads_friction },
-];
+pub const BOARDS: [Board; 2] = [Board { name: "b-g431b-esc1", level: "s" }, Board { name: "moteus-r4", level: "2" }];
 
 impl Board {
     /// Builds a program of `probe/src/bin` as this board's is, below a test's temporary folder; its path. `input` is a variable of the program's

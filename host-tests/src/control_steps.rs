@@ -80,22 +80,21 @@ pub fn image_bytes() -> Vec<u8> {
     encoded(&image(&mut ChaCha8Rng::seed_from_u64(6), friction, 1))
 }
 
-/// What the program `step` is built around: whether friction is spread, the image behind its length, then the steps.
-pub fn input(spreads_friction: bool, image: &[u8], steps: &[[u32; WORDS]]) -> Vec<u8> {
-    let mut runs = vec![spreads_friction.into()];
-    runs.extend((image.len() as u16).to_le_bytes());
+/// What the program `step` is built around: the image behind its length, then the steps.
+pub fn input(image: &[u8], steps: &[[u32; WORDS]]) -> Vec<u8> {
+    let mut runs = (image.len() as u16).to_le_bytes().to_vec();
     runs.extend_from_slice(image);
     runs.extend(steps.iter().flatten().flat_map(|word| word.to_le_bytes()));
     runs
 }
 
-/// The start and all runs in closed loop with the virtual joint, with friction spread over two steps or not: what the control step was told.
+/// The start and all runs in closed loop with the virtual joint: what the control step was told.
 ///
 /// # Errors
 /// The virtual joint cannot be made, or has not stayed enabled.
-pub fn record(spreads_friction: bool) -> Result<Vec<[u32; WORDS]>, Box<dyn std::error::Error>> {
+pub fn record() -> Result<Vec<[u32; WORDS]>, Box<dyn std::error::Error>> {
     let parameters = ActuatorParameters::reference().aligned();
-    let (configuration, bridge) = replay::configuration(&SCENARIOS[0], spreads_friction);
+    let (configuration, bridge) = replay::configuration(&SCENARIOS[0]);
     let mut started = VirtualJoint::new(parameters, &Setup { configuration, bridge }, 25.0, 3)?;
     let mut steps = Vec::new();
     let mut step = |joint: &mut VirtualJoint, demand: &Demand| {
@@ -109,7 +108,7 @@ pub fn record(spreads_friction: bool) -> Result<Vec<[u32; WORDS]>, Box<dyn std::
     }
     for scenario in &SCENARIOS {
         let mut joint = started.clone();
-        let (configuration, bridge) = replay::configuration(scenario, spreads_friction);
+        let (configuration, bridge) = replay::configuration(scenario);
         joint.set_active(configuration.prepare(&bridge)?);
         joint.set_friction(Some(FrictionModel::new(&friction(), bridge.friction_rate())));
         for n in 0..STEPS {
@@ -123,16 +122,16 @@ pub fn record(spreads_friction: bool) -> Result<Vec<[u32; WORDS]>, Box<dyn std::
 }
 
 /// The hashes of all runs on this machine; none where the image is refused.
-pub fn replayed_here(spreads_friction: bool, image: &[u8], steps: &[[u32; WORDS]]) -> Option<Vec<u32>> {
+pub fn replayed_here(image: &[u8], steps: &[[u32; WORDS]]) -> Option<Vec<u32>> {
     let mut steps = steps.iter().map(replay::measured);
-    let active = replay::prepare(&SCENARIOS[0], spreads_friction, image)?;
+    let active = replay::prepare(&SCENARIOS[0], image)?;
     let mut started = Joint::new();
     for n in 0..START {
         let (measured, slow) = steps.next()?;
         started.control_step(&active, &replay::starting(n), &slow, &measured);
     }
     let run = |scenario: &Scenario| {
-        let active = replay::prepare(scenario, spreads_friction, image)?;
+        let active = replay::prepare(scenario, image)?;
         let mut joint = started.clone();
         (0..STEPS).try_fold(SEED, |sum, n| {
             let (measured, slow) = steps.next()?;

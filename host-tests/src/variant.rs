@@ -26,14 +26,9 @@ pub struct Variant {
 /// As [`Setup::of`] configures it, physical model and network.
 pub const DEFAULT: Variant = Variant { name: "all layers", configure: |_| {}, prepare: |_| {} };
 
-/// Friction evaluated over two control steps, as the moteus r4 does at twice this rate: here 10,000 times a second.
-pub const SPREAD: Variant =
-    Variant { name: "friction over two steps", configure: |s| s.bridge.spreads_friction = true, ..DEFAULT };
-
 /// The default and everything that can be taken away from it.
-pub const ALL: [Variant; 9] = [
+pub const ALL: [Variant; 8] = [
     DEFAULT,
-    SPREAD,
     Variant { name: "velocity always the measured one", configure: |s| measured(&mut s.configuration), ..DEFAULT },
     Variant { name: "no network", configure: |s| s.configuration.compensation.request = Request::Physical, ..DEFAULT },
     Variant { name: "gain 1 for 0.98", configure: |s| s.configuration.compensation.gain = 1.0, ..DEFAULT },

@@ -37,25 +37,24 @@ fn main() {
 /// What the program is built around, and the hashes of the runs on this machine.
 type Recorded = (Vec<u8>, Vec<u32>);
 
-fn recorded(board: &Board) -> Result<&'static Recorded, Failed> {
-    static RECORDED: [OnceLock<Result<Recorded, String>>; 2] = [const { OnceLock::new() }; 2];
-    let spread = board.spreads_friction;
+fn recorded() -> Result<&'static Recorded, Failed> {
+    static RECORDED: OnceLock<Result<Recorded, String>> = OnceLock::new();
     let record = || {
-        let (image, steps) = (image_bytes(), record(spread).map_err(|error| error.to_string())?);
-        let hashes = replayed_here(spread, &image, &steps).ok_or("the image is refused")?;
-        Ok((input(spread, &image, &steps), hashes))
+        let (image, steps) = (image_bytes(), record().map_err(|error| error.to_string())?);
+        let hashes = replayed_here(&image, &steps).ok_or("the image is refused")?;
+        Ok((input(&image, &steps), hashes))
     };
-    RECORDED[usize::from(spread)].get_or_init(record).as_ref().map_err(Failed::from)
+    RECORDED.get_or_init(record).as_ref().map_err(Failed::from)
 }
 
 fn build(board: &Board) -> Result<PathBuf, Failed> {
-    let (input, _) = recorded(board)?;
+    let (input, _) = recorded()?;
     Ok(board.probe("step", Some(("PROBE_RUNS", input)), &[], env!("CARGO_TARGET_TMPDIR"))?)
 }
 
 fn costs_what_it_may(board: &Board) -> Result<(), Failed> {
     let (hashes, runs) = counted(&build(board)?)?;
-    let (_, expected) = recorded(board)?;
+    let (_, expected) = recorded()?;
     if hashes != *expected {
         return Err(format!("core {hashes:08x?}, host {expected:08x?}").into());
     }
@@ -78,7 +77,7 @@ fn same_bits_on_qemu(board: &Board) -> Result<(), Failed> {
         .output()?;
     let text = format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
     let hashes: Vec<u32> = text.lines().filter_map(|line| u32::from_str_radix(line.trim(), 16).ok()).collect();
-    let (_, expected) = recorded(board)?;
+    let (_, expected) = recorded()?;
     match hashes == *expected {
         true => Ok(()),
         false => Err(format!("qemu {hashes:08x?}, host {expected:08x?}; {text}").into()),

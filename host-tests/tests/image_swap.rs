@@ -12,18 +12,8 @@ use plant::virtual_joint::Setup;
 
 #[test]
 fn the_torque_moves_by_no_more_than_the_slew_limit_when_models_are_swapped_in_motion() {
-    swapped_in_motion(false);
-}
-
-#[test]
-fn nor_where_friction_is_spread_over_two_steps() {
-    swapped_in_motion(true);
-}
-
-fn swapped_in_motion(spreads_friction: bool) {
     let parameters = ActuatorParameters::reference().aligned();
-    let mut setup = Setup::of(&parameters).compensating(Request::Physical);
-    setup.bridge.spreads_friction = spreads_friction;
+    let setup = Setup::of(&parameters).compensating(Request::Physical);
     let rate = setup.bridge.friction_rate();
     let model = |factor: f64| {
         let friction = parameters.joint.friction.scaled(&FrictionFactors::uniform(factor)).unwrap();
@@ -39,7 +29,7 @@ fn swapped_in_motion(spreads_friction: bool) {
     let (mut before, mut largest, mut swaps) = (0.0, 0.0f64, 0);
     let mut at_swap = 0.0f64;
     for n in 0..steps {
-        // Also between the two halves of an evaluation.
+        // Between all stages of an evaluation.
         if n % 4_001 == 2_000 {
             joint.set_friction(models[swaps % 3].clone());
             swaps += 1;

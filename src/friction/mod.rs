@@ -143,23 +143,35 @@ impl FrictionModel {
     /// Friction in this state, with regime selection and cross-fade.
     #[inline]
     pub fn step(&self, state: &JointState, memory: &mut Memory) -> Estimate {
-        let physical = self.begin(state, memory);
-        self.finish(physical, &state.signals(), memory)
+        let signals = state.signals();
+        self.enter(state, memory);
+        let network = self.by_network(&signals, memory);
+        let physical = self.by_physical_model(&signals, memory);
+        self.fade_in(Estimate { physical, network }, memory)
     }
 
-    /// First half of a step: chooses the regime's parameter set; friction by its physical model.
+    /// Chooses the regime's parameter set.
     #[inline]
-    pub fn begin(&self, state: &JointState, memory: &mut Memory) -> Torque {
-        let set = self.selector.select(state, memory.set.unwrap_or(0));
-        memory.enter(set);
-        by_physical_model(&self.scaling, &self.set(set).0, &state.signals())
+    pub fn enter(&self, state: &JointState, memory: &mut Memory) {
+        memory.enter(self.selector.select(state, memory.set.unwrap_or(0)));
     }
 
-    /// Second half of a step: adds the network for the same signals to what [`begin`](Self::begin) gave, and cross-fades from the regime before.
+    /// What the regime's network gives; zero without one.
     #[inline]
-    pub fn finish(&self, physical: Torque, signals: &[i32; SIGNALS], memory: &mut Memory) -> Estimate {
-        let network = by_network(&self.inputs, &self.set(memory.set.unwrap_or(0)).1, signals);
-        memory.fade(Estimate { physical, network }, self.fade_decrement)
+    pub fn by_network(&self, signals: &[i32; SIGNALS], memory: &Memory) -> Torque {
+        by_network(&self.inputs, &self.set(memory.set.unwrap_or(0)).1, signals)
+    }
+
+    /// What the regime's physical model gives.
+    #[inline]
+    pub fn by_physical_model(&self, signals: &[i32; SIGNALS], memory: &Memory) -> Torque {
+        by_physical_model(&self.scaling, &self.set(memory.set.unwrap_or(0)).0, signals)
+    }
+
+    /// The cross-fade from the regime before to this regime's estimate.
+    #[inline]
+    pub fn fade_in(&self, estimate: Estimate, memory: &mut Memory) -> Estimate {
+        memory.fade(estimate, self.fade_decrement)
     }
 
     /// Friction in this state by parameter set `set` (taken modulo [`MAX_SETS`]).

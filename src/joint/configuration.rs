@@ -7,6 +7,10 @@ use crate::compensation::SettingsError;
 use crate::motor::angle::EncoderAlignment;
 use crate::motor::setting::{SettingError, check};
 
+/// Control steps of an evaluation of friction, each of which does a stage of it: its torque is held for as many, and belongs to a state that is
+/// up to twice as old.
+pub const FRICTION_STEPS: u32 = 3;
+
 /// Motor and encoder on its shaft.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotorConfiguration {
@@ -112,9 +116,6 @@ pub struct CompensationConfiguration {
 pub struct BridgeConfiguration {
     /// Control steps a second, Hz; 1 kHz to 100 kHz.
     pub rate: f32,
-    /// Friction is evaluated over two control steps, half of it in each, and its torque held meanwhile: for a control loop that has no time
-    /// for all of it in every step. Its state is then up to two steps old.
-    pub spreads_friction: bool,
     /// Least and greatest duty of a high side that leaves room to sample the shunts; 0 to 0.4, 0.6 to 1.
     pub duty: (f32, f32),
     /// Dead time, s; 0 to 5 µs.
@@ -130,7 +131,7 @@ pub struct BridgeConfiguration {
 impl BridgeConfiguration {
     /// Evaluations of friction a second, Hz: the rate that a friction model and its settings are prepared for.
     pub const fn friction_rate(&self) -> u32 {
-        self.rate as u32 / if self.spreads_friction { 2 } else { 1 }
+        self.rate as u32 / FRICTION_STEPS
     }
 }
 

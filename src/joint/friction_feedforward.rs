@@ -80,10 +80,20 @@ pub struct FrictionFeedforward {
     speed: f32,
     /// Reference velocity, rad/s, as a first-order lag follows it; what it lacks is its acceleration.
     reference: Option<f32>,
-    /// The second half of an evaluation is due.
-    half: bool,
+    /// What of an evaluation is due.
+    stage: Stage,
     /// What the last evaluation came to.
     output: Output,
+}
+
+/// The stages of an evaluation of friction, of which every control step does one: friction changes slowly, and a step has to be short.
+/// There are [`FRICTION_STEPS`](super::configuration::FRICTION_STEPS) of them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Stage {
+    #[default]
+    Network,
+    Physical,
+    Torque,
 }
 
 /// To Q16.16; held at the ends of the range, zero for what is not a number.
@@ -97,7 +107,7 @@ impl FrictionFeedforward {
     pub fn reset(&mut self) {
         self.compensation.reset();
         (self.withheld, self.speed, self.reference) = (0.0, 0.0, None);
-        (self.half, self.output) = (false, Output::NOTHING);
+        (self.stage, self.output) = (Stage::default(), Output::NOTHING);
     }
 
     /// One control step. `measured_torque` is the torque of the measured current, Nm.
@@ -118,23 +128,29 @@ impl FrictionFeedforward {
         let velocity = reference.unwrap_or(motion.velocity);
         let acceleration = self.acceleration(gains.period, reference, motion);
         let model = active.friction.as_ref();
-        let spread = active.bridge.spreads_friction;
-        if !(spread && self.half) {
-            let state = JointState {
-                position: Position::from_bits(q16(motion.position)),
-                velocity: Velocity::from_bits(q16(velocity)),
-                acceleration: Acceleration::from_bits(q16(acceleration)),
-                theoretical_torque: Torque::from_bits(q16(wanted.torque)),
-                measured_torque: Torque::from_bits(q16(measured_torque)),
-                temperature: Temperature::from_bits(q16(surroundings.temperature)),
-                coupled_velocity: Velocity::from_bits(q16(surroundings.coupled_velocity)),
-            };
-            self.compensation.begin(model, &gains.settings, &state);
-        }
-        if !spread || self.half {
-            self.output = self.compensation.finish(model, &gains.settings);
-        }
-        self.half = !self.half;
+        self.stage = match self.stage {
+            Stage::Network => {
+                let state = JointState {
+                    position: Position::from_bits(q16(motion.position)),
+                    velocity: Velocity::from_bits(q16(velocity)),
+                    acceleration: Acceleration::from_bits(q16(acceleration)),
+                    theoretical_torque: Torque::from_bits(q16(wanted.torque)),
+                    measured_torque: Torque::from_bits(q16(measured_torque)),
+                    temperature: Temperature::from_bits(q16(surroundings.temperature)),
+                    coupled_velocity: Velocity::from_bits(q16(surroundings.coupled_velocity)),
+                };
+                self.compensation.begin(model, &gains.settings, &state);
+                Stage::Physical
+            }
+            Stage::Physical => {
+                self.compensation.go_on(model);
+                Stage::Torque
+            }
+            Stage::Torque => {
+                self.output = self.compensation.finish(model, &gains.settings);
+                Stage::Network
+            }
+        };
         let output = self.output;
         let speed = if velocity < 0.0 { -velocity } else { velocity };
         let standstill = within(speed * gains.inverse_standstill, 0.0, 1.0);

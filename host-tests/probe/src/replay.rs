@@ -42,8 +42,8 @@ pub const WORDS: usize = 10;
 /// Steps between two commands: a bus at 1 kHz.
 const COMMAND_STEPS: u32 = 20;
 
-/// The joint of a scenario: a motor of 0.2 ohm behind a gear of 50, on 36 V, with friction spread over two steps or not.
-pub fn configuration(scenario: &Scenario, spreads_friction: bool) -> (Configuration, BridgeConfiguration) {
+/// The joint of a scenario: a motor of 0.2 ohm behind a gear of 50, on 36 V.
+pub fn configuration(scenario: &Scenario) -> (Configuration, BridgeConfiguration) {
     let mut joint = B_G431B_ESC1.joint;
     joint.motor.resistance = 0.2;
     (joint.motor.inductance_d, joint.motor.inductance_q) = (1.8e-4, 2.2e-4);
@@ -61,7 +61,6 @@ pub fn configuration(scenario: &Scenario, spreads_friction: bool) -> (Configurat
     joint.compensation.standstill_velocity = 0.01;
     let bridge = BridgeConfiguration {
         rate: 20_000.0,
-        spreads_friction,
         duty: (0.02, 0.95),
         dead_time: 5e-7,
         dead_time_band: 0.3,
@@ -72,8 +71,8 @@ pub fn configuration(scenario: &Scenario, spreads_friction: bool) -> (Configurat
 }
 
 /// Everything prepared; none where an image or the configuration is refused.
-pub fn prepare(scenario: &Scenario, spreads_friction: bool, image: &[u8]) -> Option<Active> {
-    let (configuration, bridge) = configuration(scenario, spreads_friction);
+pub fn prepare(scenario: &Scenario, image: &[u8]) -> Option<Active> {
+    let (configuration, bridge) = configuration(scenario);
     let image = Image::decode(image).ok()?;
     let active = configuration.prepare(&bridge).ok()?;
     Some(active.with_friction(Some(FrictionModel::new(&image.friction, bridge.friction_rate()))))

@@ -16,7 +16,7 @@ use core_support::{exit, print};
 use joint_firmware::joint::{Active, Bridge, Demand, Joint, Measurements, Slow};
 use replay::{SCENARIOS, SEED, START, STEPS, WORDS, demand, hash, measured, prepare, starting};
 
-/// Whether friction is spread over two steps (a byte, 0 or 1), the image behind its length (two bytes, little-endian), then the steps of the start and of
+/// The image behind its length (two bytes, little-endian), then the steps of the start and of
 /// all runs, little-endian words.
 static RUNS: &[u8] = include_bytes!(env!("PROBE_RUNS"));
 
@@ -34,18 +34,16 @@ fn counted_step(joint: &mut Joint, active: &Active, demand: &Demand, slow: &Slow
 
 #[unsafe(no_mangle)]
 extern "C" fn run() -> ! {
-    let Some((spread, rest)) = RUNS.split_first() else { exit() };
-    let spread = *spread != 0;
-    let Some((length, rest)) = rest.split_first_chunk::<2>() else { exit() };
+    let Some((length, rest)) = RUNS.split_first_chunk::<2>() else { exit() };
     let Some((image, mut rest)) = rest.split_at_checked(u16::from_le_bytes(*length) as usize) else { exit() };
     let mut started = Joint::new();
-    let Some(active) = prepare(&SCENARIOS[0], spread, core::hint::black_box(image)) else { exit() };
+    let Some(active) = prepare(&SCENARIOS[0], core::hint::black_box(image)) else { exit() };
     for n in 0..START {
         let Some((measured, slow)) = next(&mut rest) else { exit() };
         counted_step(&mut started, &active, &starting(n), &slow, &measured);
     }
     for scenario in &SCENARIOS {
-        let Some(active) = prepare(scenario, spread, core::hint::black_box(image)) else { exit() };
+        let Some(active) = prepare(scenario, core::hint::black_box(image)) else { exit() };
         let mut joint = started.clone();
         let mut sum = SEED;
         for n in 0..STEPS {

@@ -95,7 +95,6 @@ impl Setup {
             },
             bridge: BridgeConfiguration {
                 rate: RATE,
-                spreads_friction: false,
                 duty: (0.02, 0.95),
                 dead_time: parameters.inverter.dead_time as f32,
                 dead_time_band: (3.0 * parameters.inverter.clamping_current) as f32,
