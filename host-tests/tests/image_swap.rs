@@ -1,9 +1,10 @@
-//! A friction model is replaced while the joint moves: the torque stays within its slew limit and no step is missed.
+//! Friction in motion, step by step: an evaluation takes three, and where the model is replaced meanwhile the torque stays within its slew limit.
 
 use host_tests::driving::{demand, enabled};
 use host_tests::informed::informed;
 use joint_firmware::compensation::Request;
 use joint_firmware::friction::FrictionModel;
+use joint_firmware::joint::configuration::FRICTION_STEPS;
 use joint_firmware::joint::state_machine::State;
 use plant::actuator::ActuatorParameters;
 use plant::excitation::{Segment, Trajectory};
@@ -47,4 +48,27 @@ fn the_torque_moves_by_no_more_than_the_slew_limit_when_models_are_swapped_in_mo
     assert!(swaps >= 6 && at_swap > 2.0, "{swaps} swaps, compensation up to {at_swap} Nm");
     println!("{swaps} swaps, largest step {largest:.4} Nm, slew limit {slew:.4} Nm an evaluation");
     assert!(largest <= slew * 1.001, "{largest} Nm in a step, slew limit {slew} Nm");
+}
+
+#[test]
+fn the_torque_of_an_evaluation_is_held_until_the_next_one_is_done() {
+    let parameters = ActuatorParameters::reference().aligned();
+    let setup = Setup::of(&parameters).compensating(Request::Physical);
+    let model = FrictionModel::new(&informed(&parameters, &parameters.joint.friction), setup.bridge.friction_rate());
+    let mut joint = enabled(&parameters, &setup, 0.0, 1).unwrap();
+    joint.set_friction(Some(model));
+    let trajectory = Trajectory::new(vec![Segment::Move { to: 1.2, speed: 1.0, acceleration: 20.0 }]).unwrap();
+    let steps = (trajectory.duration() / joint.period()) as u64;
+    let outputs: Vec<_> = (0..steps)
+        .map(|n| {
+            let demand = demand(&joint, &trajectory, n);
+            joint.step(&demand, 0.0).compensated.output
+        })
+        .collect();
+    let changes: Vec<usize> = (1..outputs.len()).filter(|n| outputs[*n] != outputs[n - 1]).collect();
+    let gaps: Vec<usize> = changes.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    assert!(gaps.iter().all(|gap| gap % FRICTION_STEPS as usize == 0), "{gaps:?}");
+    // While the velocity changes, so does friction.
+    let at_once = gaps.iter().filter(|gap| **gap == FRICTION_STEPS as usize).count();
+    assert!(at_once > 1000, "{at_once} of {} evaluations gave another torque than the one before", gaps.len());
 }
