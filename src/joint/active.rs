@@ -3,14 +3,13 @@
 use super::configuration::{
     BridgeConfiguration, Configuration, ConfigurationError, GearConfiguration, Limits, VelocitySource,
 };
-use super::friction_feedforward::GuardGains;
 use crate::compensation::Settings;
 use crate::friction::FrictionModel;
 use crate::motor::angle::{Direction, EncoderAlignment, STEPS, TAU};
 use crate::motor::current::{CurrentSettings, MotorConstants};
 use crate::motor::field_oriented::FieldOrientedGains;
 use crate::motor::modulation::ModulationSettings;
-use crate::motor::number::greater;
+use crate::motor::number::{greater, within};
 use crate::motor::observer::{Motion, ObserverGains, ObserverSettings};
 use crate::motor::thermal::{ThermalSettings, WindingTemperature};
 use crate::motor::transform::Dq;
@@ -42,6 +41,12 @@ const UNCOMPENSATED: f32 = 0.75;
 /// Noise of a current as a part of the current limit that may be taken for a change: differentiated with the windings' inductance it
 /// is a voltage, in windings of many turns more than all the rest.
 const CURRENT_NOISE: f32 = 0.005;
+/// Time in which the energy guard takes compensation away, s.
+const BACK_OFF: f32 = 0.005;
+/// Time in which it comes back, s.
+const RECOVERY: f32 = 0.1;
+/// Time over which the energy guard compares the speed, s.
+const MEMORY: f32 = 0.01;
 /// Part of a step's unexplained voltage that goes into its filter: a time constant of 8 steps.
 pub(super) const VOLTAGE_FILTER: f32 = 0.125;
 
@@ -122,6 +127,25 @@ pub struct MotionGains {
     pub quick_stop_step: f32,
     /// Steps that braking may take.
     pub braking_steps: u32,
+}
+
+/// The energy guard's time constants as parts of a control step: what would be divisions in every step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GuardGains {
+    /// Part of a step's speed that goes into its mean.
+    pub mean: f32,
+    /// What is taken away in a step.
+    pub back_off: f32,
+    /// What comes back in a step.
+    pub recovery: f32,
+}
+
+impl GuardGains {
+    /// For a control loop of `rate` Hz.
+    fn new(rate: f32) -> Self {
+        let per_step = 1.0 / rate;
+        Self { mean: within(per_step / MEMORY, 0.0, 1.0), back_off: per_step / BACK_OFF, recovery: per_step / RECOVERY }
+    }
 }
 
 /// What compensation uses besides the friction model.

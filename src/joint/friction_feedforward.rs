@@ -15,35 +15,10 @@ use crate::friction::state::JointState;
 use crate::motor::number::{greater, or_zero, within};
 use crate::quantity::{Acceleration, Position, Temperature, Torque, Velocity};
 
-/// Time in which the guard takes compensation away, s.
-const BACK_OFF: f32 = 0.005;
-/// Time in which it comes back, s.
-const RECOVERY: f32 = 0.1;
-/// Time over which the guard compares the speed, s.
-const MEMORY: f32 = 0.01;
 /// Time over which the reference's acceleration is taken, s: several commands of a bus at 1 kHz.
 const DERIVATIVE: f32 = 0.004;
-/// Growth of the speed over that time, as a fraction, from which the joint counts as speeding up.
+/// Growth of the speed against its mean, as a fraction, from which the joint counts as speeding up.
 const GROWTH: f32 = 0.01;
-
-/// The energy guard's time constants as parts of a control step: what would be divisions in every step.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GuardGains {
-    /// Part of a step's speed that goes into its mean.
-    mean: f32,
-    /// What is taken away in a step.
-    back_off: f32,
-    /// What comes back in a step.
-    recovery: f32,
-}
-
-impl GuardGains {
-    /// For a control loop of `rate` Hz.
-    pub(super) fn new(rate: f32) -> Self {
-        let per_step = 1.0 / rate;
-        Self { mean: within(per_step / MEMORY, 0.0, 1.0), back_off: per_step / BACK_OFF, recovery: per_step / RECOVERY }
-    }
-}
 
 /// What compensation did in a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
