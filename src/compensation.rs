@@ -79,14 +79,14 @@ pub enum SettingsError {
     Gain(u32),
     /// The clamp must not be negative.
     Clamp(Torque),
-    /// The slew limit is too small for the control rate to keep: the torque moves in whole steps of Q16.16.
+    /// The slew limit is too small for the rate of evaluations to keep: the torque moves in whole steps of Q16.16.
     Slew {
         /// Slew limit in a second.
         slew: Torque,
-        /// Least slew limit, one step of Q16.16 a control step.
+        /// Least slew limit, one step of Q16.16 an evaluation.
         least: Torque,
     },
-    /// The control rate must be positive.
+    /// The rate of evaluations must be positive.
     Rate(u32),
 }
 
@@ -96,16 +96,19 @@ impl core::fmt::Display for SettingsError {
             Self::Gain(gain) => write!(f, "compensation gain is {gain}/65536, must be 0 to 65536"),
             Self::Clamp(clamp) => write!(f, "compensation clamp is {clamp}, must not be negative"),
             Self::Slew { slew, least } => {
-                write!(f, "compensation slew limit is {slew} a second, must be at least {least} at this control rate")
+                write!(
+                    f,
+                    "compensation slew limit is {slew} a second, must be at least {least} at this rate of evaluations"
+                )
             }
-            Self::Rate(rate) => write!(f, "control rate is {rate} Hz, must be positive"),
+            Self::Rate(rate) => write!(f, "rate of evaluations is {rate} Hz, must be positive"),
         }
     }
 }
 
 impl core::error::Error for SettingsError {}
 
-/// How much compensation is permitted. New settings take effect with the next step; a torque beyond a new, lower clamp comes down
+/// How much compensation is permitted. New settings take effect with the next evaluation; a torque beyond a new, lower clamp comes down
 /// to it at the slew rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
@@ -114,13 +117,13 @@ pub struct Settings {
     gain: i32,
     /// Q16.16, not negative.
     clamp: i32,
-    /// Q16.16 per control step, at least 1.
+    /// Q16.16 per evaluation, at least 1.
     slew: i32,
 }
 
 impl Settings {
-    /// Checks and prepares settings for a control loop of `rate` Hz: `gain` in Q16.16 (0 to 1), `clamp` the largest magnitude
-    /// of the torque, `slew` its largest change in a second, at least one step of Q16.16 a control step (0.31 Nm/s at 20 kHz).
+    /// Checks and prepares settings for `rate` evaluations a second: `gain` in Q16.16 (0 to 1), `clamp` the largest magnitude
+    /// of the torque, `slew` its largest change in a second, at least one step of Q16.16 an evaluation (0.31 Nm/s at 20 kHz).
     pub fn new(request: Request, gain: u32, clamp: Torque, slew: Torque, rate: u32) -> Result<Self, SettingsError> {
         let Some(rate) = core::num::NonZeroU32::new(rate) else { return Err(SettingsError::Rate(rate)) };
         if gain > 1 << 16 {
@@ -142,7 +145,7 @@ impl Settings {
     }
 }
 
-/// The outcome of one control step.
+/// The outcome of one evaluation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Output {
     /// Torque to add to the command.

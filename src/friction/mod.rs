@@ -2,7 +2,7 @@
 //!
 //! `state` says what the model looks at, `domain` where it was identified, `physical` and `network` are its two parts, `smooth` holds the functions that both
 //! share, `regime` chooses between parameter sets. Here they are put together: [`FrictionModel`] is prepared once from an
-//! image's parameters, outside the control interrupt, and evaluated once a control step.
+//! image's parameters, outside the control interrupt, and evaluated there at a fixed rate.
 
 pub mod domain;
 pub mod network;
@@ -62,7 +62,7 @@ pub struct FrictionModel {
     scaling: Scaling,
     inputs: Inputs,
     sets: [(PreparedTerms, Option<Layers>); MAX_SETS],
-    /// Cross-fade per control step, Q31.
+    /// Cross-fade per evaluation, Q31.
     fade_decrement: i32,
 }
 
@@ -77,7 +77,7 @@ impl FrictionModel {
         fade_decrement: 0,
     };
 
-    /// Prepares `parameters` for a control loop of `rate` Hz (at least 1).
+    /// Prepares `parameters` for `rate` evaluations a second (at least 1).
     pub fn new(parameters: &FrictionParameters, rate: u32) -> Self {
         let mut model = Self::NONE;
         model.set_up(&parameters.domain, &parameters.selector, rate);

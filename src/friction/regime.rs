@@ -3,7 +3,7 @@
 //! Criteria: |acceleration| (accelerating against uniform motion) and |velocity| (high against low speed) are the mobile-robot
 //! paper's two ways to divide motion (001, section 3.1); own speed against that of a coupled joint is the WAM's (003,
 //! section II.C). After a change-over the last output of the old set fades into the new set's, so the torque has no step,
-//! stays between the two, and costs one evaluation a step.
+//! stays between the two, and no second evaluation is needed.
 
 use super::Estimate;
 use super::state::JointState;
@@ -84,7 +84,7 @@ impl Selector {
     }
 }
 
-/// What the selection remembers from one control step to the next.
+/// What the selection remembers from one evaluation to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Memory {
     /// Index of the set in use; nothing before the first step.
