@@ -323,8 +323,8 @@ fn settings_out_of_range_are_refused_with_value_and_limit() {
     assert_eq!(clamp.to_string(), "compensation clamp is -0.5 Nm, must not be negative");
     let slew = refused(0, 0.0, 0.25, 1 << 15);
     assert_eq!(slew, SettingsError::Slew { slew: nm(0.25), least: nm(0.5) });
-    let text = "compensation slew limit is 0.25 Nm a second, must be at least 0.5 Nm at this control rate";
+    let text = "compensation slew limit is 0.25 Nm a second, must be at least 0.5 Nm at this rate of evaluations";
     assert_eq!(slew.to_string(), text);
-    assert_eq!(refused(0, 0.0, 1.0, 0).to_string(), "control rate is 0 Hz, must be positive");
+    assert_eq!(refused(0, 0.0, 1.0, 0).to_string(), "rate of evaluations is 0 Hz, must be positive");
     assert!(Settings::new(Request::Physical, 0, Torque::ZERO, nm(0.5), 1 << 15).is_ok());
 }
