@@ -123,7 +123,7 @@ pub struct Settings {
 
 impl Settings {
     /// Checks and prepares settings for `rate` evaluations a second: `gain` in Q16.16 (0 to 1), `clamp` the largest magnitude
-    /// of the torque, `slew` its largest change in a second, at least one step of Q16.16 an evaluation (0.31 Nm/s at 20 kHz).
+    /// of the torque, `slew` its largest change in a second, at least one step of Q16.16 an evaluation (0.06 Nm/s at 4 kHz).
     pub fn new(request: Request, gain: u32, clamp: Torque, slew: Torque, rate: u32) -> Result<Self, SettingsError> {
         let Some(rate) = core::num::NonZeroU32::new(rate) else { return Err(SettingsError::Rate(rate)) };
         if gain > 1 << 16 {
@@ -179,22 +179,21 @@ impl Default for Output {
 
 /// Compensation of one joint, from one evaluation to the next.
 ///
-/// An evaluation has three stages, none of them much longer than the network alone, so that a control loop can do one in a step:
-/// [`begin`](Self::begin) with a state (regime and network), [`go_on`](Self::go_on) (physical model), [`finish`](Self::finish) (the torque).
+/// An evaluation has four stages, none of them longer than the physical model, so that a control loop can do one in a step:
+/// [`begin`](Self::begin) with a state (its regime), [`network`](Self::network), [`physical_model`](Self::physical_model),
+/// [`finish`](Self::finish) (the torque).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Compensation {
     memory: Memory,
     last: Torque,
     begun: Option<Begun>,
-    /// What the second stage leaves for the third.
-    estimate: Option<Estimate>,
 }
 
-/// What the first stage leaves for the others.
+/// An evaluation that is under way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Begun {
     signals: [i32; SIGNALS],
-    network: Torque,
+    estimate: Estimate,
 }
 
 /// Weights come in Q31 and a torque in Q16.16: `i32::MAX` counts as one, so that a full weight changes no bit. Never larger in
@@ -210,50 +209,55 @@ impl Compensation {
     pub fn reset(&mut self) {
         self.memory = Memory::default();
         self.last = Torque::ZERO;
-        (self.begun, self.estimate) = (None, None);
+        self.begun = None;
     }
 
     /// All stages at once.
     pub fn step(&mut self, model: Option<&FrictionModel>, settings: &Settings, state: &JointState) -> Output {
         self.begin(model, settings, state);
-        self.go_on(model);
+        self.network(model);
+        self.physical_model(model);
         self.finish(model, settings)
     }
 
-    /// First stage: the regime of a state, and what its network gives.
+    /// First stage: the regime of a state.
     #[inline]
     pub fn begin(&mut self, model: Option<&FrictionModel>, settings: &Settings, state: &JointState) {
         self.begun = match (settings.request, model) {
             (Request::Off, _) | (_, None) => None,
             (_, Some(model)) => {
-                let signals = state.signals();
                 model.enter(state, &mut self.memory);
-                Some(Begun { signals, network: model.by_network(&signals, &self.memory) })
+                Some(Begun { signals: state.signals(), estimate: Estimate::default() })
             }
         };
     }
 
-    /// Second stage: what the physical model gives. A model that came after the first stage goes on with what another one has begun, within clamp and
-    /// slew limit.
+    /// Second stage: what the regime's network gives. A model that came after the first stage goes on with what another one has begun, within
+    /// clamp and slew limit.
     #[inline]
-    pub fn go_on(&mut self, model: Option<&FrictionModel>) {
-        self.estimate = match (&self.begun, model) {
-            (Some(Begun { signals, network }), Some(model)) => {
-                Some(Estimate { physical: model.by_physical_model(signals, &self.memory), network: *network })
-            }
-            _ => None,
-        };
+    pub fn network(&mut self, model: Option<&FrictionModel>) {
+        if let (Some(Begun { signals, estimate }), Some(model)) = (&mut self.begun, model) {
+            estimate.network = model.by_network(signals, &self.memory);
+        }
     }
 
-    /// Third stage: how much of the model counts, and the torque. Without a model, or switched off, it goes to zero at the slew rate, stays there
+    /// Third stage: what the regime's physical model gives.
+    #[inline]
+    pub fn physical_model(&mut self, model: Option<&FrictionModel>) {
+        if let (Some(Begun { signals, estimate }), Some(model)) = (&mut self.begun, model) {
+            estimate.physical = model.by_physical_model(signals, &self.memory);
+        }
+    }
+
+    /// Last stage: how much of the model counts, and the torque. Without a model, or switched off, it goes to zero at the slew rate, stays there
     /// exactly, and the past is forgotten.
     #[inline]
     pub fn finish(&mut self, model: Option<&FrictionModel>, settings: &Settings) -> Output {
-        let (Some(begun), Some(estimate), Some(model)) = (&self.begun, self.estimate, model) else {
+        let (Some(Begun { signals, estimate }), Some(model)) = (&self.begun, model) else {
             return self.fade_out(settings);
         };
-        let weights = model.fade().weights(&begun.signals);
-        let estimate = model.fade_in(estimate, &mut self.memory);
+        let weights = model.fade().weights(signals);
+        let estimate = model.fade_in(*estimate, &mut self.memory);
         let physical = weigh(estimate.physical.to_bits(), weights.physical);
         let network = weigh(estimate.network.to_bits(), weights.network);
         let full = self.permitted(physical.saturating_add(network), settings);

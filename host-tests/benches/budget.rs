@@ -14,7 +14,7 @@ use host_tests::counted_steps::{PARTS, Step, counted, spread};
 use host_tests::peer_networks::{Exact, scaled};
 use host_tests::states::within;
 use joint_firmware::friction::state::SIGNALS;
-use joint_firmware::joint::configuration::FRICTION_STEPS;
+use joint_firmware::joint::motion_loop::MOTION_STEPS;
 use object::read::elf::{FileHeader, ProgramHeader};
 use plant::ActuatorParameters;
 use rand_chacha::ChaCha8Rng;
@@ -73,14 +73,14 @@ fn main() -> Outcome<()> {
     println!(
         "\n## The control step\n\nFive runs of 200 steps, recorded in closed loop with the virtual joint and replayed: off; the physical model; all of the \
          model; torque mode with energy\nguard; position mode. The model is a certified image with every term, a network in each of four sets and two criteria. \
-         Least, median and most of the\nsteps that a part runs in. What the compiler has inlined counts for where it was written. An evaluation of friction is spread over {FRICTION_STEPS} steps:\na step has one stage of it. The board's part (converters, timer, report) is that of its program, as it\nis flashed, on the emulated board: {INTERRUPTS} control interrupts while the joint is off."
+         Least, median and most of the\nsteps that a part runs in. What the compiler has inlined counts for where it was written. A round of the motion loop takes {MOTION_STEPS} steps:\na step has one stage of it, four of them friction. The board's part (converters, timer, report) is that of its program, as it\nis flashed, on the emulated board: {INTERRUPTS} control interrupts while the joint is off."
     );
     for (board, program) in BOARDS.iter().zip(&boards) {
         let (_, runs) = counted(&board.probe("step", Some(("PROBE_RUNS", &steps)), &[], TEMPORARY)?)?;
         let steps: Vec<Step> = runs.concat();
         println!("\n### {}, optimised for \"{}\"\n", board.name, board.level);
         println!("| | instructions | cycles | target | |\n|---|---|---|---|---|");
-        let evaluations = || runs.iter().flat_map(|run| run.chunks_exact(FRICTION_STEPS as usize));
+        let evaluations = || runs.iter().flat_map(|run| run.chunks_exact(MOTION_STEPS as usize));
         let evaluation = |steps: &[Step]| {
             let mut sum = Cost::default();
             steps.iter().for_each(|step| sum += step.of(FRICTION));

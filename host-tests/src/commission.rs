@@ -25,7 +25,7 @@ pub fn commission(parameters: &ActuatorParameters, setup: &Setup, seed: u64) -> 
     let mut prepared = prepare(&folder.path().join("dataset.toml")).map_err(|error| error.to_string())?;
     let options = Options { restarts: 2, samples: 4000, reference: false, ..Options::default() };
     let fitted = fit(&mut prepared, &options, &Silent).map_err(|error| error.to_string())?;
-    let model = FrictionModel::new(&fitted.image.friction, setup.bridge.friction_rate());
+    let model = FrictionModel::new(&fitted.image.friction, setup.bridge.motion_rate());
     let network = fitted.image.friction.sets.iter().any(|set| set.network.is_some());
     Ok(Commissioned { model, network })
 }

@@ -110,7 +110,7 @@ pub fn record() -> Result<Vec<[u32; WORDS]>, Box<dyn std::error::Error>> {
         let mut joint = started.clone();
         let (configuration, bridge) = replay::configuration(scenario);
         joint.set_active(configuration.prepare(&bridge)?);
-        joint.set_friction(Some(FrictionModel::new(&friction(), bridge.friction_rate())));
+        joint.set_friction(Some(FrictionModel::new(&friction(), bridge.motion_rate())));
         for n in 0..STEPS {
             let state = step(&mut joint, &replay::demand(scenario, n));
             if state != State::OperationEnabled {

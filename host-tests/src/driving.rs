@@ -40,7 +40,7 @@ pub fn follow(
     let steps = (trajectory.duration() / joint.period()) as u64;
     for n in 0..steps {
         let demand = demand(joint, trajectory, n);
-        let telemetry = *joint.step(&demand, 0.0);
+        let telemetry = joint.step(&demand, 0.0);
         if telemetry.state != State::OperationEnabled {
             return Err(telemetry.state);
         }

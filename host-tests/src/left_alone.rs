@@ -57,7 +57,7 @@ pub fn run(seed: u64, alone: Alone, variant: Option<&Variant>, steps: u32) -> Re
     let request = if variant.is_some() { Request::Physical } else { Request::Off };
     let mut setup = Setup::of(&parameters).compensating(request);
     measured(&mut setup.configuration);
-    let model = FrictionModel::new(&informed(&parameters, &wrong), setup.bridge.friction_rate());
+    let model = FrictionModel::new(&informed(&parameters, &wrong), setup.bridge.motion_rate());
     let variant = variant.unwrap_or(&DEFAULT);
     let mut joint = variant.enabled(&parameters, &setup, Some(model), 0.0, seed).map_err(|error| error.to_string())?;
 
@@ -82,7 +82,7 @@ pub fn run(seed: u64, alone: Alone, variant: Option<&Variant>, steps: u32) -> Re
         let state = joint.actuator().state().joint;
         pushing = (n == 6_000 || pushing) && n < 8_000 && state.velocity < 0.25 * speed;
         let external = if pushing { strength } else { 0.0 };
-        let telemetry = *joint.step(&demand, external);
+        let telemetry = joint.step(&demand, external);
         if telemetry.state != State::OperationEnabled {
             return Err(format!("{:?} {:?}", telemetry.state, telemetry.faults));
         }

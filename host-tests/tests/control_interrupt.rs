@@ -76,7 +76,7 @@ fn calibrates(name: &str) -> bool {
 }
 
 /// Whether a function runs only with the bridge on, in operation ([`Joint::control_step`] asks for the state before) or in braking, or only at the start:
-/// the friction model and what adds it, the brake, the measurement of the offsets.
+/// the friction model and what adds it, the approach of a position, the brake, the measurement of the offsets.
 ///
 /// [`Joint::control_step`]: joint_firmware::joint::Joint::control_step
 fn seldom_or_operating(name: &str) -> bool {
@@ -84,6 +84,7 @@ fn seldom_or_operating(name: &str) -> bool {
         "14joint_firmware8friction",
         "14joint_firmware12compensation",
         "19FrictionFeedforward5guard",
+        "10motion_law9MotionLaw6follow",
         "10motion_law9MotionLaw5brake",
         "7offsets7Offsets3add",
     ]

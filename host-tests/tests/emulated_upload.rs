@@ -192,8 +192,8 @@ fn upload(python: Option<&Path>) -> Result<(), Failed> {
             return Err(format!("a control step is late or missing: {seen:?}").into());
         }
     }
-    // The change of the models is one of the compensation's slew limit, once an evaluation of friction.
-    let slew = f64::from(configuration.compensation.slew) / f64::from(MoteusR4::CONFIGURATION.bridge.friction_rate());
+    // The change of the models is one of the compensation's slew limit, once a round of the motion loop.
+    let slew = f64::from(configuration.compensation.slew) / f64::from(MoteusR4::CONFIGURATION.bridge.motion_rate());
     match during.change <= before.change + slew {
         true => Ok(()),
         false => Err(format!("the torque jumps by {} Nm", during.change).into()),

@@ -1,10 +1,10 @@
-//! Friction in motion, step by step: an evaluation takes three, and where the model is replaced meanwhile the torque stays within its slew limit.
+//! Friction in motion, step by step: it changes once a round of the motion loop, and where the model is replaced meanwhile the torque stays within its slew limit.
 
 use host_tests::driving::{demand, enabled};
 use host_tests::informed::informed;
 use joint_firmware::compensation::Request;
 use joint_firmware::friction::FrictionModel;
-use joint_firmware::joint::configuration::FRICTION_STEPS;
+use joint_firmware::joint::motion_loop::MOTION_STEPS;
 use joint_firmware::joint::state_machine::State;
 use plant::actuator::ActuatorParameters;
 use plant::excitation::{Segment, Trajectory};
@@ -15,7 +15,7 @@ use plant::virtual_joint::Setup;
 fn the_torque_moves_by_no_more_than_the_slew_limit_when_models_are_swapped_in_motion() {
     let parameters = ActuatorParameters::reference().aligned();
     let setup = Setup::of(&parameters).compensating(Request::Physical);
-    let rate = setup.bridge.friction_rate();
+    let rate = setup.bridge.motion_rate();
     let model = |factor: f64| {
         let friction = parameters.joint.friction.scaled(&FrictionFactors::uniform(factor)).unwrap();
         FrictionModel::new(&informed(&parameters, &friction), rate)
@@ -24,13 +24,13 @@ fn the_torque_moves_by_no_more_than_the_slew_limit_when_models_are_swapped_in_mo
     let models = [Some(model(0.5)), Some(model(1.3)), None];
     let mut joint = enabled(&parameters, &setup, 0.0, 1).unwrap();
     let trajectory = Trajectory::new(vec![Segment::Move { to: 1.2, speed: 1.0, acceleration: 20.0 }]).unwrap();
-    // The torque moves once an evaluation of friction.
+    // The torque moves once a round of the motion loop.
     let slew = f64::from(setup.configuration.compensation.slew) / f64::from(rate);
     let steps = (trajectory.duration() / joint.period()) as u64;
     let (mut before, mut largest, mut swaps) = (0.0, 0.0f64, 0);
     let mut at_swap = 0.0f64;
     for n in 0..steps {
-        // Between all stages of an evaluation.
+        // Between all stages of a round.
         if n % 4_001 == 2_000 {
             joint.set_friction(models[swaps % 3].clone());
             swaps += 1;
@@ -46,15 +46,15 @@ fn the_torque_moves_by_no_more_than_the_slew_limit_when_models_are_swapped_in_mo
         before = torque;
     }
     assert!(swaps >= 6 && at_swap > 2.0, "{swaps} swaps, compensation up to {at_swap} Nm");
-    println!("{swaps} swaps, largest step {largest:.4} Nm, slew limit {slew:.4} Nm an evaluation");
+    println!("{swaps} swaps, largest step {largest:.4} Nm, slew limit {slew:.4} Nm a round");
     assert!(largest <= slew * 1.001, "{largest} Nm in a step, slew limit {slew} Nm");
 }
 
 #[test]
-fn the_torque_of_an_evaluation_is_held_until_the_next_one_is_done() {
+fn the_torque_of_a_round_is_held_until_the_next_one_is_done() {
     let parameters = ActuatorParameters::reference().aligned();
     let setup = Setup::of(&parameters).compensating(Request::Physical);
-    let model = FrictionModel::new(&informed(&parameters, &parameters.joint.friction), setup.bridge.friction_rate());
+    let model = FrictionModel::new(&informed(&parameters, &parameters.joint.friction), setup.bridge.motion_rate());
     let mut joint = enabled(&parameters, &setup, 0.0, 1).unwrap();
     joint.set_friction(Some(model));
     let trajectory = Trajectory::new(vec![Segment::Move { to: 1.2, speed: 1.0, acceleration: 20.0 }]).unwrap();
@@ -67,8 +67,8 @@ fn the_torque_of_an_evaluation_is_held_until_the_next_one_is_done() {
         .collect();
     let changes: Vec<usize> = (1..outputs.len()).filter(|n| outputs[*n] != outputs[n - 1]).collect();
     let gaps: Vec<usize> = changes.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    assert!(gaps.iter().all(|gap| gap % FRICTION_STEPS as usize == 0), "{gaps:?}");
+    assert!(gaps.iter().all(|gap| gap % MOTION_STEPS as usize == 0), "{gaps:?}");
     // While the velocity changes, so does friction.
-    let at_once = gaps.iter().filter(|gap| **gap == FRICTION_STEPS as usize).count();
-    assert!(at_once > 1000, "{at_once} of {} evaluations gave another torque than the one before", gaps.len());
+    let at_once = gaps.iter().filter(|gap| **gap == MOTION_STEPS as usize).count();
+    assert!(at_once > 1000, "{at_once} of {} rounds gave another torque than the one before", gaps.len());
 }

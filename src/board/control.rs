@@ -370,7 +370,7 @@ extern "C" fn ADC1_2() {
     super::apply(&bridge);
 
     control.ends.report.publish_in_place(|report| {
-        report.telemetry = *control.joint.telemetry();
+        control.joint.report(&mut report.telemetry);
         report.latched = control.joint.latched_faults();
         report.phase_currents = measurements.phase_currents;
     });

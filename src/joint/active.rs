@@ -3,6 +3,7 @@
 use super::configuration::{
     BridgeConfiguration, Configuration, ConfigurationError, GearConfiguration, Limits, VelocitySource,
 };
+use super::motion_loop::MOTION_STEPS;
 use crate::compensation::Settings;
 use crate::friction::FrictionModel;
 use crate::motor::angle::{Direction, EncoderAlignment, STEPS, TAU};
@@ -47,8 +48,11 @@ const BACK_OFF: f32 = 0.005;
 const RECOVERY: f32 = 0.1;
 /// Time over which the energy guard compares the speed, s.
 const MEMORY: f32 = 0.01;
-/// Part of a step's unexplained voltage that goes into its filter: a time constant of 8 steps.
-pub(super) const VOLTAGE_FILTER: f32 = 0.125;
+/// What is left of a voltage in its filter from one control step to the next: a time constant of 8 steps.
+const LEFT: f32 = 0.875;
+/// Part of the voltage of a round of the motion loop that goes into the filter.
+pub(super) const VOLTAGE_FILTER: f32 = 1.0 - LEFT * LEFT * LEFT * LEFT * LEFT;
+const _: () = assert!(MOTION_STEPS == 5, "as many factors as a round has steps");
 
 /// Scales between rotor and joint.
 #[derive(Clone, Copy, Debug)]
@@ -106,9 +110,11 @@ impl Scales {
     }
 }
 
-/// How the joint follows commands, per control step.
+/// How the joint follows commands, per round of the motion loop.
 #[derive(Clone, Copy, Debug)]
 pub struct MotionGains {
+    /// Rounds a second, Hz.
+    pub rate: f32,
     /// s.
     pub period: f32,
     /// Nm/rad.
@@ -119,32 +125,31 @@ pub struct MotionGains {
     pub velocity_integral: f32,
     /// Nm/(rad s), times the period.
     pub position_integral: f32,
-    /// Change of a ramp in a step, rad/s.
+    /// Change of a ramp in a round, rad/s.
     pub velocity_step: f32,
     /// rad/s².
     pub acceleration: f32,
-    /// Change of the quick stop's ramp in a step, rad/s.
+    /// Change of the quick stop's ramp in a round, rad/s.
     pub quick_stop_step: f32,
-    /// Steps that braking may take.
+    /// Control steps that braking may take.
     pub braking_steps: u32,
 }
 
-/// The energy guard's time constants as parts of a control step: what would be divisions in every step.
+/// The energy guard's time constants as parts of a round of the motion loop: what would be divisions in every round.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GuardGains {
-    /// Part of a step's speed that goes into its mean.
+    /// Part of a round's speed that goes into its mean.
     pub mean: f32,
-    /// What is taken away in a step.
+    /// What is taken away in a round.
     pub back_off: f32,
-    /// What comes back in a step.
+    /// What comes back in a round.
     pub recovery: f32,
 }
 
 impl GuardGains {
-    /// For a control loop of `rate` Hz.
-    fn new(rate: f32) -> Self {
-        let per_step = 1.0 / rate;
-        Self { mean: within(per_step / MEMORY, 0.0, 1.0), back_off: per_step / BACK_OFF, recovery: per_step / RECOVERY }
+    /// For a motion loop with rounds of `period` s.
+    fn new(period: f32) -> Self {
+        Self { mean: within(period / MEMORY, 0.0, 1.0), back_off: period / BACK_OFF, recovery: period / RECOVERY }
     }
 }
 
@@ -159,9 +164,9 @@ pub struct CompensationGains {
     pub inverse_standstill: f32,
     /// rad/s.
     pub standstill: f32,
-    /// Time from one control step to the next, s.
+    /// Time from one round of the motion loop to the next, s.
     pub period: f32,
-    /// The energy guard, per control step.
+    /// The energy guard, per round.
     pub guard: GuardGains,
 }
 
@@ -301,7 +306,7 @@ impl Checked {
                 (compensation.gain * 65536.0) as u32,
                 torque(compensation.clamp),
                 torque(compensation.slew),
-                bridge.friction_rate(),
+                bridge.motion_rate(),
             )?,
             thermal: heat,
             flux_linkage,
@@ -313,11 +318,11 @@ impl Checked {
     #[inline(always)]
     fn active(self, configuration: &Configuration, bridge: &BridgeConfiguration) -> Active {
         let Configuration { motor, gear, limits, gains, compensation, .. } = configuration;
-        let rate = bridge.rate;
-        let period = 1.0 / rate;
+        let (rate, motion_rate) = (bridge.rate, bridge.motion_rate() as f32);
+        let period = 1.0 / motion_rate;
         let pole_pairs = motor.alignment.pole_pairs as f32;
         let (_, highest_voltage) = limits.bus_voltage;
-        let current_slope = CURRENT_NOISE * motor.current_limit * VOLTAGE_FILTER * rate;
+        let current_slope = CURRENT_NOISE * motor.current_limit * VOLTAGE_FILTER * motion_rate;
         let dead_time = DEAD_TIME * bridge.dead_time * rate;
         let part = |uncompensated: f32| greater(UNEXPLAINED, BESIDES_DEAD_TIME + uncompensated * dead_time);
         let (large, small) = (part(UNCOMPENSATED), part(1.0));
@@ -342,6 +347,7 @@ impl Checked {
             bridged_steps: (0.25 * TAU / self.rotor_velocity * rate) as u32,
             deadline_steps: (limits.command_deadline * rate) as u32,
             motion: MotionGains {
+                rate: motion_rate,
                 period,
                 stiffness: gains.stiffness,
                 damping: gains.damping,
@@ -358,7 +364,7 @@ impl Checked {
                 inverse_standstill: 1.0 / compensation.standstill_velocity,
                 standstill: compensation.standstill_velocity,
                 period,
-                guard: GuardGains::new(rate),
+                guard: GuardGains::new(period),
             },
             bridge: *bridge,
             friction: None,

@@ -3,13 +3,10 @@
 //! It is separate from the friction image: it changes when the joint is built or its limits are set, the image whenever the
 //! friction is learned anew.
 
+use super::motion_loop::MOTION_STEPS;
 use crate::compensation::SettingsError;
 use crate::motor::angle::EncoderAlignment;
 use crate::motor::setting::{SettingError, check};
-
-/// Control steps of an evaluation of friction, each of which does a stage of it: its torque is held for as many, and belongs to a state that is
-/// up to twice as old.
-pub const FRICTION_STEPS: u32 = 3;
 
 /// Motor and encoder on its shaft.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -129,9 +126,9 @@ pub struct BridgeConfiguration {
 }
 
 impl BridgeConfiguration {
-    /// Evaluations of friction a second, Hz: the rate that a friction model and its settings are prepared for.
-    pub const fn friction_rate(&self) -> u32 {
-        self.rate as u32 / FRICTION_STEPS
+    /// Rounds of the motion loop a second, Hz: the rate that the motion law, a friction model and compensation are prepared for.
+    pub const fn motion_rate(&self) -> u32 {
+        self.rate as u32 / MOTION_STEPS
     }
 }
 

@@ -20,7 +20,7 @@ const DERIVATIVE: f32 = 0.004;
 /// Growth of the speed against its mean, as a fraction, from which the joint counts as speeding up.
 const GROWTH: f32 = 0.01;
 
-/// What compensation did in a step.
+/// What compensation does until the next round.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Compensated {
     /// Torque to add, Nm.
@@ -36,6 +36,12 @@ impl Compensated {
     pub const NOTHING: Self = Self { torque: 0.0, output: Output::NOTHING, permitted: 0.0 };
 }
 
+impl Default for Compensated {
+    fn default() -> Self {
+        Self::NOTHING
+    }
+}
+
 /// What friction depends on besides this joint's motion and torque.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surroundings {
@@ -45,7 +51,7 @@ pub struct Surroundings {
     pub coupled_velocity: f32,
 }
 
-/// Compensation, from one control step to the next.
+/// Compensation, from one round of the motion loop to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FrictionFeedforward {
     compensation: Compensation,
@@ -55,20 +61,15 @@ pub struct FrictionFeedforward {
     speed: f32,
     /// Reference velocity, rad/s, as a first-order lag follows it; what it lacks is its acceleration.
     reference: Option<f32>,
-    /// What of an evaluation is due.
-    stage: Stage,
-    /// What the last evaluation came to.
-    output: Output,
 }
 
-/// The stages of an evaluation of friction, of which every control step does one: friction changes slowly, and a step has to be short.
-/// There are [`FRICTION_STEPS`](super::configuration::FRICTION_STEPS) of them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum Stage {
-    #[default]
-    Network,
-    Physical,
-    Torque,
+/// The command's velocity, where friction is computed for that, rad/s.
+#[inline(always)]
+fn reference(active: &Active, wanted: &Wanted) -> Option<f32> {
+    match active.compensation.source {
+        VelocitySource::Reference => wanted.velocity,
+        VelocitySource::Measured => None,
+    }
 }
 
 /// To Q16.16; held at the ends of the range, zero for what is not a number.
@@ -82,51 +83,53 @@ impl FrictionFeedforward {
     pub fn reset(&mut self) {
         self.compensation.reset();
         (self.withheld, self.speed, self.reference) = (0.0, 0.0, None);
-        (self.stage, self.output) = (Stage::default(), Output::NOTHING);
     }
 
-    /// One control step. `measured_torque` is the torque of the measured current, Nm.
+    /// First stage of a round: the state that friction is computed for, and its regime. `measured_torque` is the torque of the measured current, Nm.
     #[inline(always)]
-    pub fn step(
+    pub fn begin(
         &mut self,
         active: &Active,
         motion: &JointMotion,
         wanted: &Wanted,
         measured_torque: f32,
         surroundings: &Surroundings,
-    ) -> Compensated {
+    ) {
         let gains = &active.compensation;
-        let reference = match gains.source {
-            VelocitySource::Reference => wanted.velocity,
-            VelocitySource::Measured => None,
-        };
+        let reference = reference(active, wanted);
         let velocity = reference.unwrap_or(motion.velocity);
         let acceleration = self.acceleration(gains.period, reference, motion);
-        let model = active.friction.as_ref();
-        self.stage = match self.stage {
-            Stage::Network => {
-                let state = JointState {
-                    position: Position::from_bits(q16(motion.position)),
-                    velocity: Velocity::from_bits(q16(velocity)),
-                    acceleration: Acceleration::from_bits(q16(acceleration)),
-                    theoretical_torque: Torque::from_bits(q16(wanted.torque)),
-                    measured_torque: Torque::from_bits(q16(measured_torque)),
-                    temperature: Temperature::from_bits(q16(surroundings.temperature)),
-                    coupled_velocity: Velocity::from_bits(q16(surroundings.coupled_velocity)),
-                };
-                self.compensation.begin(model, &gains.settings, &state);
-                Stage::Physical
-            }
-            Stage::Physical => {
-                self.compensation.go_on(model);
-                Stage::Torque
-            }
-            Stage::Torque => {
-                self.output = self.compensation.finish(model, &gains.settings);
-                Stage::Network
-            }
+        let state = JointState {
+            position: Position::from_bits(q16(motion.position)),
+            velocity: Velocity::from_bits(q16(velocity)),
+            acceleration: Acceleration::from_bits(q16(acceleration)),
+            theoretical_torque: Torque::from_bits(q16(wanted.torque)),
+            measured_torque: Torque::from_bits(q16(measured_torque)),
+            temperature: Temperature::from_bits(q16(surroundings.temperature)),
+            coupled_velocity: Velocity::from_bits(q16(surroundings.coupled_velocity)),
         };
-        let output = self.output;
+        self.compensation.begin(active.friction.as_ref(), &gains.settings, &state);
+    }
+
+    /// Second stage: friction by the network.
+    #[inline(always)]
+    pub fn network(&mut self, active: &Active) {
+        self.compensation.network(active.friction.as_ref());
+    }
+
+    /// Third stage: friction by the physical model.
+    #[inline(always)]
+    pub fn physical_model(&mut self, active: &Active) {
+        self.compensation.physical_model(active.friction.as_ref());
+    }
+
+    /// Last stage: the torque to add until the next round's.
+    #[inline(always)]
+    pub fn compensate(&mut self, active: &Active, motion: &JointMotion, wanted: &Wanted) -> Compensated {
+        let gains = &active.compensation;
+        let output = self.compensation.finish(active.friction.as_ref(), &gains.settings);
+        let reference = reference(active, wanted);
+        let velocity = reference.unwrap_or(motion.velocity);
         let speed = if velocity < 0.0 { -velocity } else { velocity };
         let standstill = within(speed * gains.inverse_standstill, 0.0, 1.0);
         let guarded = match reference {

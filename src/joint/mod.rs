@@ -7,8 +7,8 @@
 //!  - `offsets`: the current sensors' offsets, from the first steps;
 //!  - [`monitor`]: faults, and [`fault`]: what they lead to;
 //!  - [`state_machine`]: whether the joint may move;
-//!  - [`command`], [`motion_law`]: from a set-point to a torque within every limit;
-//!  - [`friction_feedforward`]: what friction will take of it;
+//!  - [`motion_loop`], slower than the rest, a stage a step: [`command`] and [`motion_law`], from a set-point to a torque within every limit, and
+//!    [`friction_feedforward`], what friction will take of it;
 //!  - `calibrating`: measuring the motor instead of moving it, while the joint is off;
 //!  - [`history`]: the last steps before a fault.
 //!
@@ -25,6 +25,7 @@ pub mod friction_feedforward;
 pub mod history;
 pub mod monitor;
 pub mod motion_law;
+pub mod motion_loop;
 mod offsets;
 pub mod shadow;
 mod signals;
@@ -35,7 +36,6 @@ pub use command::{Command, Coupled, Demand, Mode};
 pub use offsets::OFFSET_STEPS;
 pub use signals::{Bridge, BridgeState, Measurements};
 
-use crate::motor::angle::{STEPS, TAU};
 use crate::motor::calibration::{CalibrationSettings, Progress};
 use crate::motor::field_oriented::{FieldOriented, FieldOrientedInput};
 use crate::motor::number::{limited, or_zero, within};
@@ -46,10 +46,11 @@ use crate::motor::thermal::MeanSquareCurrent;
 use crate::motor::transform::Dq;
 use calibrating::Calibrating;
 use fault::{Fault, Faults, Reaction};
-use friction_feedforward::{Compensated, FrictionFeedforward, Surroundings};
+use friction_feedforward::{Compensated, Surroundings};
 use history::{History, Snapshot};
-use monitor::{Loop, Monitor};
-use motion_law::{MotionLaw, Wanted};
+use monitor::Monitor;
+use motion_law::Wanted;
+use motion_loop::{MotionLoop, Seen, Stage};
 use offsets::Offsets;
 use state_machine::{Events, State, StateMachine};
 
@@ -136,10 +137,8 @@ pub struct Joint {
     observer: Observer,
     monitor: Monitor,
     machine: StateMachine,
-    law: MotionLaw,
-    friction: FrictionFeedforward,
+    motion_loop: MotionLoop,
     field_oriented: FieldOriented,
-    last: Option<Loop>,
     /// The last valid reading of the encoder.
     encoder: u32,
     /// The encoder's zero is known.
@@ -155,7 +154,19 @@ pub struct Joint {
     latched: Faults,
     mean_square: MeanSquareCurrent,
     history: History,
-    telemetry: Telemetry,
+    found: Found,
+}
+
+/// What the last step found and did, besides what other parts remember.
+#[derive(Clone, Copy, Debug, Default)]
+struct Found {
+    faults: Faults,
+    motion: JointMotion,
+    measured_torque: f32,
+    gear_temperature: f32,
+    reference: f32,
+    current: Dq,
+    bus_voltage: f32,
 }
 
 /// How long a joint has been braking and standing.
@@ -209,75 +220,72 @@ impl Joint {
         let faults = self.watch(active, demand, derating, measured, currents, &observation, &motion);
         let state = self.decide(active, demand, faults, &motion);
 
-        let wanted = match state {
-            State::OperationEnabled => self.law.step(active, &demand.command, &motion, derating),
-            State::QuickStopActive | State::FaultReactionActive => self.law.brake(active, &motion),
-            _ => Wanted::default(),
-        };
-        let measured_torque = or_zero(self.telemetry.current.q * active.scales.torque_per_current);
-        let surroundings =
-            Surroundings { temperature: slow.gear_temperature, coupled_velocity: self.coupled(active, demand) };
-        let compensated = if COMPENSATION && state == State::OperationEnabled {
-            self.friction.step(active, &motion, &wanted, measured_torque, &surroundings)
-        } else {
-            self.friction.reset();
-            Compensated::NOTHING
-        };
-        let torque = match compensated.torque {
-            0.0 => wanted.torque,
-            compensation => limited(wanted.torque + compensation, active.limits.torque),
-        };
+        let measured_torque = or_zero(self.found.current.q * active.scales.torque_per_current);
+        let coupled_velocity = self.coupled(active, demand);
+        let surroundings = Surroundings { temperature: slow.gear_temperature, coupled_velocity };
+        let seen = Seen { motion: &motion, derating, measured_torque, surroundings };
+        let torque = self.motion_loop.step::<COMPENSATION>(active, state, &demand.command, &seen);
 
-        let speed = active.alignment.electrical_speed(observation.motion.velocity);
-        // A hot winding bears the current of braking for as long as braking may take; a joint that coasts into somebody is worse.
-        let limit = match state {
-            State::OperationEnabled => active.current_limit * derating,
-            _ => active.current_limit,
-        };
-        let reference = Dq { d: 0.0, q: limited(torque * active.scales.current_per_torque, limit) };
-        let switching = matches!(state, State::OperationEnabled | State::QuickStopActive | State::FaultReactionActive);
-        let (bridge, current) = if switching {
+        let (bridge, reference, current) = if state.switches() {
+            // A hot winding bears the current of braking for as long as braking may take; a joint that coasts into somebody is worse.
+            let limit = match state {
+                State::OperationEnabled => active.current_limit * derating,
+                _ => active.current_limit,
+            };
+            let reference = limited(torque * active.scales.current_per_torque, limit);
             let input = FieldOrientedInput {
                 phase_currents: currents,
                 angle: active.alignment.electrical(observation.motion.angle()),
-                speed,
+                speed: active.alignment.electrical_speed(observation.motion.velocity),
                 bus_voltage: measured.bus_voltage,
-                reference,
+                reference: Dq { d: 0.0, q: reference },
             };
             let output = self.field_oriented.step(&active.field_oriented, &input);
-            let speed = active.alignment.electrical_speed(way * (TAU / STEPS) * active.bridge.rate);
-            self.last = Some(Loop { reference, output, speed });
+            self.monitor.current_loop(reference, &output, way);
             self.mean_square.add(output.current);
-            (Bridge { state: BridgeState::Switching, duties: output.duties }, output.current)
+            (Bridge { state: BridgeState::Switching, duties: output.duties }, reference, output.current)
         } else {
             self.field_oriented.reset();
-            self.law.reset();
             self.monitor.loop_is_off();
-            self.last = None;
             let (bridge, flowing) = self.calibrating.step(state, active, measured, currents);
             self.mean_square.add(flowing);
-            (bridge, Dq::default())
+            (bridge, 0.0, Dq::default())
         };
 
-        self.telemetry = Telemetry {
-            state,
+        self.found = Found {
             faults,
             motion,
-            wanted,
-            compensated,
             measured_torque,
             gear_temperature: slow.gear_temperature,
-            reference: if switching { reference } else { Dq::default() },
+            reference,
             current,
             bus_voltage: measured.bus_voltage,
         };
-        self.note();
+        self.note(state);
         bridge
     }
 
     /// What the last step found and did.
-    pub fn telemetry(&self) -> &Telemetry {
-        &self.telemetry
+    pub fn telemetry(&self) -> Telemetry {
+        let mut telemetry = Telemetry::NOTHING;
+        self.report(&mut telemetry);
+        telemetry
+    }
+
+    /// The same in its place: field by field, because all at once is made elsewhere and copied.
+    #[inline(always)]
+    pub fn report(&self, telemetry: &mut Telemetry) {
+        let found = &self.found;
+        telemetry.state = self.machine.state();
+        telemetry.faults = found.faults;
+        telemetry.motion = found.motion;
+        telemetry.wanted = *self.motion_loop.wanted();
+        telemetry.compensated = *self.motion_loop.compensated();
+        telemetry.measured_torque = found.measured_torque;
+        telemetry.gear_temperature = found.gear_temperature;
+        telemetry.reference = Dq { d: 0.0, q: found.reference };
+        telemetry.current = found.current;
+        telemetry.bus_voltage = found.bus_voltage;
     }
 
     /// Faults since the last acknowledgement.
@@ -290,7 +298,7 @@ impl Joint {
     /// # Errors
     /// A setting out of its range; what ran goes on.
     pub fn calibrate(&mut self, settings: &CalibrationSettings) -> Result<(), SettingError> {
-        self.calibrating.begin(self.telemetry.state, settings)
+        self.calibrating.begin(self.machine.state(), settings)
     }
 
     /// Gives the calibration up, where one runs: the bridge is off from the next control step on.
@@ -375,10 +383,10 @@ impl Joint {
                 _ => Faults::NONE,
             });
         }
-        if let Some(last) = &self.last {
-            faults = faults.union(self.monitor.current_loop(active, last));
+        if self.motion_loop.due() == Stage::Regime {
+            self.monitor.check_current_loop(active);
         }
-        faults
+        faults.union(self.monitor.found())
     }
 
     /// Counts the steps without a new set-point from "ready to switch on" on. In "fault" a count that has led there stays until one comes.
@@ -432,24 +440,24 @@ impl Joint {
             return false;
         }
         let standing = STANDING * active.limits.velocity;
-        let stands = motion.velocity <= standing && motion.velocity >= -standing && self.law.ramp_is_over();
+        let stands = motion.velocity <= standing && motion.velocity >= -standing && self.motion_loop.ramp_is_over();
         self.braking.standing = if stands { self.braking.standing.saturating_add(1) } else { 0 };
         self.braking.steps = self.braking.steps.saturating_add(1);
         self.braking.standing >= STANDING_STEPS || self.braking.steps > active.motion.braking_steps
     }
 
     #[inline(always)]
-    fn note(&mut self) {
-        let t = &self.telemetry;
+    fn note(&mut self, state: State) {
+        let found = &self.found;
         self.history.note(Snapshot {
-            state: t.state,
-            faults: t.faults,
-            position: t.motion.position,
-            velocity: t.motion.velocity,
-            commanded_torque: t.wanted.torque,
-            compensation_torque: t.compensated.torque,
-            current: t.current,
-            bus_voltage: t.bus_voltage,
+            state,
+            faults: found.faults,
+            position: found.motion.position,
+            velocity: found.motion.velocity,
+            commanded_torque: self.motion_loop.wanted().torque,
+            compensation_torque: self.motion_loop.compensated().torque,
+            current: found.current,
+            bus_voltage: found.bus_voltage,
         });
     }
 }
@@ -457,6 +465,7 @@ impl Joint {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::motor::angle::TAU;
 
     fn at_rest(encoder: u32, encoder_referenced: bool) -> Measurements {
         Measurements {

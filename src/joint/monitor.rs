@@ -4,15 +4,17 @@
 //! transient in one step; for them the number of steps is a constant here. What each check takes until the bridge is off
 //! stands in docs/faults.md, measured.
 //!
-//! The current loop is watched by the motor's own equations (see [`crate::motor::current`]): of the voltage that the bridge applied,
-//! resistance, inductance and induced voltage explain all but the errors of the constants. What is left shows an encoder that
+//! The current loop is watched by the motor's own equations (see [`crate::motor::current`]), on its means over a round of the motion loop: of the
+//! voltage that the bridge applied, resistance, inductance and induced voltage explain all but the errors of the constants. What is left shows an encoder that
 //! no longer tells where the rotor is, because the voltage that the rotor really induces is missing in the equations, and a phase
 //! without current, because the loop raises the voltage and nothing follows. In the second case the current misses its reference.
 
 use super::JointMotion;
 use super::active::{Active, VOLTAGE_FILTER};
 use super::fault::{Fault, Faults};
+use super::motion_loop::MOTION_STEPS;
 use super::signals::Measurements;
+use crate::motor::angle::{STEPS, TAU};
 use crate::motor::field_oriented::FieldOrientedOutput;
 use crate::motor::number::{exceeds, greater, magnitude, or_zero};
 use crate::motor::observer::Observation;
@@ -25,6 +27,8 @@ pub const ENCODER_STEPS: u32 = 5;
 pub const CURRENT_SUM_STEPS: u32 = 3;
 /// Steps for which the voltage must be unexplained: longer than the current loop takes for a step of its reference.
 pub const UNEXPLAINED_STEPS: u32 = 30;
+/// The same in rounds of the motion loop, in each of which it is looked at once.
+const UNEXPLAINED_ROUNDS: u32 = UNEXPLAINED_STEPS / MOTION_STEPS;
 /// Error of the resistance that counts as explained: copper 100 K above the temperature that the constants hold for has 39 % more.
 const RESISTANCE_ERROR: f32 = 0.5;
 /// Error of what the rotor's turning induces that counts as explained: a saturated or hot magnet, and an electrical angle that is a
@@ -78,33 +82,42 @@ pub struct Monitor {
     voltage: Voltage,
 }
 
+/// What the current loop did since it was checked: sums over control steps.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Sums {
+    /// Control steps.
+    steps: f32,
+    /// q reference, A; that of d is zero.
+    reference: f32,
+    /// A.
+    current: Dq,
+    /// V.
+    voltage: Dq,
+    /// Way of the encoder, 2^32 a turn.
+    way: f32,
+}
+
 /// Filtered signals of the current loop.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Voltage {
+    /// Since the last check.
+    sums: Sums,
+    /// The last step's current, A.
+    last: Dq,
     /// Voltage less what resistance and the rotor's turning explain, V.
     unexplained: Dq,
     /// What the rotor's turning explains, V.
     induced: Dq,
-    /// A.
+    /// Current of the rounds' last steps, A.
     current: Dq,
     /// Reference less current, A.
     error: Dq,
     /// Too much is unexplained.
-    steps: Bucket,
-    /// Of these steps, those in which the current missed its reference less the others.
+    rounds: Bucket,
+    /// Of these rounds, those in which the current missed its reference less the others.
     missed: i32,
-}
-
-/// What the current loop did in the last step in which the bridge switched.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Loop {
-    /// Reference, A.
-    pub reference: Dq,
-    /// Result.
-    pub output: FieldOrientedOutput,
-    /// Electrical speed by the encoder's last two readings, rad/s. The observer's takes some milliseconds to see a rotor stopped by
-    /// an obstacle, and what its estimate then induces would look like a fault.
-    pub speed: f32,
+    /// What the last check found.
+    found: Faults,
 }
 
 /// Whether a value lies within bounds. What is not a number does not.
@@ -113,7 +126,7 @@ fn within(value: f32, low: f32, high: f32) -> bool {
     value >= low && value <= high
 }
 
-/// One step of a first-order filter. What is not a number stays, and is a fault: nothing explains it.
+/// One round of a first-order filter. What is not a number stays, and is a fault: nothing explains it.
 #[inline(always)]
 fn filter(state: &mut Dq, value: Dq) {
     let step = |state: f32, value: f32| state + VOLTAGE_FILTER * (value - state);
@@ -184,25 +197,52 @@ impl Monitor {
         faults
     }
 
-    /// Faults that the current loop's last step shows.
-    #[inline(never)]
-    pub fn current_loop(&mut self, active: &Active, last: &Loop) -> Faults {
-        let Loop { reference, output, speed } = last;
-        let (current, voltage) = (output.current, output.voltage);
-        let (resistance, inductance) = (active.resistance, active.inductance);
-        let induced = Dq { d: -inductance.q * current.q, q: inductance.d * current.d + active.flux_linkage } * *speed;
+    /// What the current loop did in a step in which the bridge switched. `reference` is that of the q current, A; `way` the encoder's since the step
+    /// before, 2^32 a turn: the observer's speed takes some milliseconds to see a rotor stopped by an obstacle, and what its estimate then
+    /// induces would look like a fault.
+    #[inline(always)]
+    pub fn current_loop(&mut self, reference: f32, output: &FieldOrientedOutput, way: f32) {
+        let Voltage { sums, last, .. } = &mut self.voltage;
+        sums.steps += 1.0;
+        sums.reference += reference;
+        sums.current = sums.current + output.current;
+        sums.voltage = sums.voltage + output.voltage;
+        sums.way += way;
+        *last = output.current;
+    }
 
+    /// Faults that the current loop showed at its last check.
+    #[inline(always)]
+    pub fn found(&self) -> Faults {
+        self.voltage.found
+    }
+
+    /// Checks the current loop by what it did since the last time: once a round of the motion loop. A bridge that has not switched shows nothing.
+    #[inline(never)]
+    pub fn check_current_loop(&mut self, active: &Active) {
         let memory = &mut self.voltage;
+        let Sums { steps, reference, current, voltage, way } = core::mem::take(&mut memory.sums);
+        if steps == 0.0 {
+            return;
+        }
+        let share = 1.0 / steps;
+        let (current, voltage) = (current * share, voltage * share);
+        let reference = reference * share;
+        let speed = active.alignment.electrical_speed(way * share * (TAU / STEPS) * active.bridge.rate);
+        let (resistance, inductance) = (active.resistance, active.inductance);
+        let induced = Dq { d: -inductance.q * current.q, q: inductance.d * current.d + active.flux_linkage } * speed;
+
         filter(&mut memory.unexplained, voltage - current * resistance - induced);
         filter(&mut memory.induced, induced);
-        filter(&mut memory.current, current);
-        filter(&mut memory.error, *reference - current);
+        filter(&mut memory.error, Dq { d: -current.d, q: reference - current.q });
 
-        // The filtered slope of the current is its distance from the filtered current over the filter's time constant.
-        let slope = VOLTAGE_FILTER * active.bridge.rate;
+        // The filtered slope of the current is that of the filtered current.
+        let before = memory.current;
+        filter(&mut memory.current, Dq { d: or_zero(memory.last.d), q: or_zero(memory.last.q) });
+        let change = memory.current - before;
         let left = Dq {
-            d: memory.unexplained.d - inductance.d * slope * (or_zero(current.d) - memory.current.d),
-            q: memory.unexplained.q - inductance.q * slope * (or_zero(current.q) - memory.current.q),
+            d: memory.unexplained.d - inductance.d * active.motion.rate * change.d,
+            q: memory.unexplained.q - inductance.q * active.motion.rate * change.q,
         };
         // A wrong resistance shows along the current only: across it the bound is close.
         let turning = INDUCED_ERROR * (magnitude(memory.induced.d) + magnitude(memory.induced.q));
@@ -212,20 +252,19 @@ impl Monitor {
         let explained = |current: f32| rest + RESISTANCE_ERROR * resistance * magnitude(current);
         let contradicts = exceeds(left.d, active.implausible_voltage.d + explained(memory.current.d))
             || exceeds(left.q, active.implausible_voltage.q + explained(memory.current.q));
-        let found = memory.steps.step(contradicts, UNEXPLAINED_STEPS);
+        let found = memory.rounds.step(contradicts, UNEXPLAINED_ROUNDS);
 
-        let permitted = MISSED_LIMIT * active.current_limit + MISSED_REFERENCE * magnitude(reference.q);
+        let permitted = MISSED_LIMIT * active.current_limit + MISSED_REFERENCE * magnitude(reference);
         let missed = memory.error.norm_squared() > permitted * permitted;
         memory.missed = match (contradicts, missed) {
             (true, true) => memory.missed.saturating_add(1),
             (true, false) => memory.missed.saturating_sub(1),
-            (false, _) if memory.steps.level == 0 => 0,
+            (false, _) if memory.rounds.level == 0 => 0,
             (false, _) => memory.missed,
         };
-        let mut faults = Faults::NONE;
-        faults.set(Fault::CurrentNotFollowed, found && memory.missed > 0);
-        faults.set(Fault::EncoderImplausible, found && memory.missed <= 0);
-        faults
+        memory.found = Faults::NONE;
+        memory.found.set(Fault::CurrentNotFollowed, found && memory.missed > 0);
+        memory.found.set(Fault::EncoderImplausible, found && memory.missed <= 0);
     }
 
     /// The bridge is off: the current loop's checks start anew.

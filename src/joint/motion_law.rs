@@ -1,10 +1,11 @@
-//! From a command to a torque: ramps, stiffness and damping, and the limits of torque, velocity and position; control step.
+//! From a command to a torque: ramps, stiffness and damping, and the limits of torque, velocity and position; control step, once a round of the
+//! motion loop.
 
 use super::active::{Active, JointMotion};
 use super::command::{Command, Mode};
 use crate::motor::number::{greater, lesser, limited, or_zero, square_root};
 
-/// What a command wants in this step.
+/// What a command wants in this round.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Wanted {
     /// Torque before friction compensation, within every limit, Nm.
@@ -13,7 +14,7 @@ pub struct Wanted {
     pub velocity: Option<f32>,
 }
 
-/// Ramps and integrals, from one control step to the next.
+/// Ramps and integrals, from one round of the motion loop to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MotionLaw {
     mode: Option<Mode>,
@@ -31,7 +32,7 @@ impl MotionLaw {
         *self = Self::default();
     }
 
-    /// One step towards a command. `derating` is the part of the torque limit that is permitted, 0 to 1. What is not a number counts
+    /// One round towards a command. `derating` is the part of the torque limit that is permitted, 0 to 1. What is not a number counts
     /// as zero; the torque is always within the limit.
     #[inline(always)]
     pub fn step(&mut self, active: &Active, command: &Command, motion: &JointMotion, derating: f32) -> Wanted {
@@ -69,7 +70,7 @@ impl MotionLaw {
         Wanted { torque: bounded(torque, limit, active, motion), velocity }
     }
 
-    /// One step of braking: the velocity comes down along the quick stop's ramp.
+    /// One round of braking: the velocity comes down along the quick stop's ramp.
     #[inline(never)]
     pub fn brake(&mut self, active: &Active, motion: &JointMotion) -> Wanted {
         if self.mode.is_some() {
@@ -105,9 +106,9 @@ impl MotionLaw {
         };
         let way = or_zero(target - self.position);
         let distance = if way < 0.0 { -way } else { way };
-        // Of the way that the next step needs anyway, nothing is left to brake on.
+        // Of the way that the next round needs anyway, nothing is left to brake on.
         let speed = square_root(2.0 * gains.acceleration * distance);
-        let arrival = distance * active.bridge.rate;
+        let arrival = distance * gains.rate;
         let speed = lesser(lesser(speed, arrival), active.limits.velocity);
         let wanted = if way < 0.0 { -speed } else { speed };
         self.ramp(wanted, gains.velocity_step);

@@ -145,6 +145,11 @@ impl State {
         }
     }
 
+    /// Whether the bridge switches.
+    pub const fn switches(self) -> bool {
+        matches!(self, Self::OperationEnabled | Self::QuickStopActive | Self::FaultReactionActive)
+    }
+
     /// The statusword's bits that tell the state (object 6041h, mask 006Fh), quick stop bit included.
     pub const fn statusword(self) -> u16 {
         match self {

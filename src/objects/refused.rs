@@ -32,7 +32,7 @@ impl Refused {
                     SettingsError::Slew { slew, least } => {
                         of("compensation slew limit", torque(slew), torque(least), f32::INFINITY)
                     }
-                    SettingsError::Rate(rate) => of("control rate", rate as f32, 1.0, f32::INFINITY),
+                    SettingsError::Rate(rate) => of("rate of evaluations", rate as f32, 1.0, f32::INFINITY),
                 }
             }
             ConfigurationError::NodeId(id) => of("node id", id.into(), 1.0, 127.0),

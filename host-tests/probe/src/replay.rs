@@ -75,7 +75,7 @@ pub fn prepare(scenario: &Scenario, image: &[u8]) -> Option<Active> {
     let (configuration, bridge) = configuration(scenario);
     let image = Image::decode(image).ok()?;
     let active = configuration.prepare(&bridge).ok()?;
-    Some(active.with_friction(Some(FrictionModel::new(&image.friction, bridge.friction_rate()))))
+    Some(active.with_friction(Some(FrictionModel::new(&image.friction, bridge.motion_rate()))))
 }
 
 /// What is asked for in step `n` of the start.

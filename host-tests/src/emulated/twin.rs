@@ -172,7 +172,7 @@ impl<'v> Twin<'v> {
         if switching != (bridge.state == BridgeState::Switching) {
             return Err(format!("the bridge switches on the board: {switching}, on the host: {bridge:?}").into());
         }
-        let telemetry = *self.joint.telemetry();
+        let telemetry = self.joint.telemetry();
         let numbers = numbers(&telemetry);
         for (variable, (name, expected)) in self.variables.numbers.iter().zip(numbers) {
             let bits = memory.bits(variable)?;
@@ -211,22 +211,21 @@ impl<'v> Twin<'v> {
 /// Clock of the boards' timers, Hz.
 const TIMER_HZ: f32 = 170e6;
 
-/// Numbers of the telemetry that are compared, by their paths, as bits.
-fn numbers(telemetry: &Telemetry) -> [(&'static str, u32); 12] {
+/// Numbers of the telemetry that are compared, by their paths in the joint, as bits.
+fn numbers(telemetry: &Telemetry) -> [(&'static str, u32); 11] {
     let Telemetry { motion, wanted, compensated, reference, current, .. } = telemetry;
     [
-        ("motion.position", motion.position.to_bits()),
-        ("motion.velocity", motion.velocity.to_bits()),
-        ("motion.acceleration", motion.acceleration.to_bits()),
-        ("wanted.torque", wanted.torque.to_bits()),
-        ("compensated.torque", compensated.torque.to_bits()),
-        ("compensated.permitted", compensated.permitted.to_bits()),
-        ("compensated.output.shadow", compensated.output.shadow.to_bits() as u32),
-        ("reference.d", reference.d.to_bits()),
-        ("reference.q", reference.q.to_bits()),
-        ("current.d", current.d.to_bits()),
-        ("current.q", current.q.to_bits()),
-        ("measured_torque", telemetry.measured_torque.to_bits()),
+        ("found.motion.position", motion.position.to_bits()),
+        ("found.motion.velocity", motion.velocity.to_bits()),
+        ("found.motion.acceleration", motion.acceleration.to_bits()),
+        ("motion_loop.wanted.torque", wanted.torque.to_bits()),
+        ("motion_loop.compensated.torque", compensated.torque.to_bits()),
+        ("motion_loop.compensated.permitted", compensated.permitted.to_bits()),
+        ("motion_loop.compensated.output.shadow", compensated.output.shadow.to_bits() as u32),
+        ("found.reference", reference.q.to_bits()),
+        ("found.current.d", current.d.to_bits()),
+        ("found.current.q", current.q.to_bits()),
+        ("found.measured_torque", telemetry.measured_torque.to_bits()),
     ]
 }
 
@@ -318,7 +317,7 @@ impl<'v> Fields<'v> {
         let control = |name: &str| variables.get(&format!("control::CONTROL.{name}"));
         let held = |phase: usize| variables.get(&format!("pwm::HELD.{phase}"));
         let telemetry = numbers(&Telemetry::default());
-        let telemetry = telemetry.iter().map(|(name, _)| control(&format!("joint.telemetry.{name}")));
+        let telemetry = telemetry.iter().map(|(name, _)| control(&format!("joint.{name}")));
         Ok(Self {
             stopped: word("stopped")?,
             overrun: control("overrun")?,
@@ -335,8 +334,8 @@ impl<'v> Fields<'v> {
             between: variables.get("control::DEMAND.sides.between")?,
             demands: [Demanded::of(variables, 0)?, Demanded::of(variables, 1)?, Demanded::of(variables, 2)?],
             place: control("ends.active.user.own")?,
-            state: control("joint.telemetry.state")?,
-            bus_voltage: control("joint.telemetry.bus_voltage")?,
+            state: control("joint.machine.state")?,
+            bus_voltage: control("joint.found.bus_voltage")?,
             numbers: telemetry.collect::<Result<_, _>>()?,
         })
     }

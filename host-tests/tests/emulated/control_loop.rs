@@ -198,7 +198,7 @@ fn drive<W: Observed>(
 fn prepared<W: Observed>(configuration: &Configuration, image: &[u8]) -> Result<Active, Failed> {
     let bridge = W::CONFIGURATION.bridge;
     let mut active = configuration.prepare(&bridge).map_err(|error| error.to_string())?;
-    Image::prepare(image, bridge.friction_rate(), &mut active.friction);
+    Image::prepare(image, bridge.motion_rate(), &mut active.friction);
     if active.friction.is_none() {
         return Err("the image is none".into());
     }

@@ -102,7 +102,7 @@ fn prepare<'a>(
     shadow::withdraw();
     active.prepare(
         |place| configuration.prepare_in(&board::CONFIGURATION.bridge, place),
-        |place, _| Image::prepare(image, board::CONFIGURATION.bridge.friction_rate(), &mut place.friction),
+        |place, _| Image::prepare(image, board::CONFIGURATION.bridge.motion_rate(), &mut place.friction),
     )
 }
 

@@ -73,8 +73,8 @@ pub struct VirtualNode {
     setup: Setup,
     requirements: Requirements,
     rate: u32,
-    /// Evaluations of friction a second, Hz.
-    friction_rate: u32,
+    /// Rounds of the motion loop a second, Hz.
+    motion_rate: u32,
     bus: &'static canopen::Shared,
     receiver: Receiver<'static>,
     server: Server<'static>,
@@ -126,12 +126,12 @@ impl VirtualNode {
         if !matches!(options.node_id, 1..=127 | NO_NODE_ID) {
             return Err(NodeError::NodeId(options.node_id));
         }
-        let (rate, friction_rate) = (setup.bridge.rate as u32, setup.bridge.friction_rate());
+        let (rate, motion_rate) = (setup.bridge.rate as u32, setup.bridge.motion_rate());
         let mut program = VirtualProgram::new(setup.bridge, storage);
         let (stored, configuration) = program.power_on(&setup.configuration);
         let started = Setup { configuration, ..*setup };
         let mut joint = VirtualJoint::new(parameters, &started, parameters.joint.thermal.ambient, options.seed)?;
-        joint.set_friction(program.storage.images.model(friction_rate));
+        joint.set_friction(program.storage.images.model(motion_rate));
 
         // The firmware keeps these in statics.
         let bus: &canopen::Shared = Box::leak(Box::new(canopen::Shared::new()));
@@ -166,7 +166,7 @@ impl VirtualNode {
             setup: *setup,
             requirements,
             rate,
-            friction_rate,
+            motion_rate,
             bus,
             receiver: Receiver::new(bus),
             server: Server::new(bus, identity, SdoSettings::default(), node_id),
@@ -260,7 +260,7 @@ impl VirtualNode {
     /// A frame from the bus: what acts in the receive interrupt acts now.
     pub fn receive(&mut self, frame: &Frame) {
         // TPDOs tell of the last control step, not of what the task last looked at.
-        self.observed.telemetry = *self.joint.joint().telemetry();
+        self.observed.telemetry = self.joint.joint().telemetry();
         self.image.observe(&self.observed);
         let now = self.now();
         let sent = &mut self.sent;
@@ -341,7 +341,7 @@ impl VirtualNode {
         program.last_reset = LastReset::REQUESTED;
         let (stored, configuration) = program.power_on(&defaults);
         let (life, stored_images) = life(self.requirements, &mut program.storage, now);
-        let model = program.storage.images.model(self.friction_rate);
+        let model = program.storage.images.model(self.motion_rate);
         // Refused only where even the defaults are, with which the joint began.
         program.next = configuration.prepare(&self.setup.bridge).ok();
         self.objects.restart(life, stored_images, &Start { configuration, stored, single_bank: true });
@@ -380,7 +380,7 @@ impl VirtualNode {
         let per_work = u64::from(self.rate / 1_000).max(1);
         for _ in 0..steps {
             let demand = self.image.demand();
-            let telemetry = *self.joint.step(&demand, 0.0);
+            let telemetry = self.joint.step(&demand, 0.0);
             self.steps += 1;
             if self.steps.is_multiple_of(per_work) {
                 self.observe(&telemetry, demand.command.torque);
@@ -424,7 +424,7 @@ impl VirtualNode {
                 Action::Run { mode, length } => self.run(mode, length),
                 Action::Revert | Action::Activate => {
                     self.shadow = None;
-                    let model = self.objects.program().storage.images.model(self.friction_rate);
+                    let model = self.objects.program().storage.images.model(self.motion_rate);
                     self.joint.set_friction(model);
                     Ok(())
                 }
@@ -449,11 +449,11 @@ impl VirtualNode {
             Mode::Shadow => {
                 self.shadow = model(image, SHADOW_RATE).map(Shadow::new);
                 // A trial may have been before: the stored model acts again.
-                let stored = self.objects.program().storage.images.model(self.friction_rate);
+                let stored = self.objects.program().storage.images.model(self.motion_rate);
                 self.joint.set_friction(stored);
             }
             Mode::Trial => {
-                let model = model(image, self.friction_rate);
+                let model = model(image, self.motion_rate);
                 self.shadow = None;
                 self.joint.set_friction(model);
             }

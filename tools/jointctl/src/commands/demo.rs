@@ -49,7 +49,7 @@ impl Demo {
         let mut prepared = prepare(&self.out.join("dataset.toml"))?;
         let fitted = fit(&mut prepared, &options, &progress)?;
         progress.stage("move without and with the image");
-        let model = FrictionModel::new(&fitted.image.friction, setup.bridge.friction_rate());
+        let model = FrictionModel::new(&fitted.image.friction, setup.bridge.motion_rate());
         let moved = moved(&plant, &setup, &model, options.seed)?;
         let lines: Vec<Line> = moved.iter().map(|moved| moved.line.clone()).collect();
         progress.stage("write");

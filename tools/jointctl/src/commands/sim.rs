@@ -174,7 +174,7 @@ impl Sim {
             let reason = format!("its effort is in {}, compensation needs Nm at the joint", image.effort.symbol());
             return Err(CommandError::Image { path: path.clone(), reason });
         }
-        Ok(Some(FrictionModel::new(&image.friction, setup.bridge.friction_rate())))
+        Ok(Some(FrictionModel::new(&image.friction, setup.bridge.motion_rate())))
     }
 }
 

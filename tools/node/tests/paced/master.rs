@@ -105,7 +105,7 @@ impl Line {
         }
     }
 
-    pub fn telemetry(&self, joint: usize) -> &Telemetry {
+    pub fn telemetry(&self, joint: usize) -> Telemetry {
         self.nodes.node(joint).unwrap().joint().joint().telemetry()
     }
 

@@ -150,7 +150,7 @@ impl VirtualJoint {
     }
 
     /// One control step, then one PWM period of physics with an external torque (Nm at the link).
-    pub fn step(&mut self, demand: &Demand, external_torque: f64) -> &Telemetry {
+    pub fn step(&mut self, demand: &Demand, external_torque: f64) -> Telemetry {
         self.measured = signals::measurements(&self.actuator.measure(), self.overrun);
         self.overrun = false;
         let (active, slow, measured) = (&self.active, &self.slow, &self.measured);

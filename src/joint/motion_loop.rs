@@ -1,0 +1,155 @@
+//! The motion loop: from a command to the torque that the current loop is to make, a round of it in [`MOTION_STEPS`] control steps;
+//! control step.
+//!
+//! A position, a velocity and friction change in milliseconds, and a control step has to be short: each does one stage of a round, and torques are
+//! held until the next round comes by. A new state of the joint begins a round: a quick stop waits for nothing.
+
+use super::active::{Active, JointMotion};
+use super::command::Command;
+use super::friction_feedforward::{Compensated, FrictionFeedforward, Surroundings};
+use super::motion_law::{MotionLaw, Wanted};
+use super::state_machine::State;
+use crate::motor::number::limited;
+
+/// Control steps of a round, each of which does a stage of it.
+pub const MOTION_STEPS: u32 = 5;
+
+/// The stages of a round, in their order.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Stage {
+    /// From the command to a torque.
+    #[default]
+    Law,
+    /// The regime of friction; and what the current loop did since the round before is checked (see [`super::monitor`]).
+    Regime,
+    /// Friction by the network.
+    Network,
+    /// Friction by the physical model.
+    PhysicalModel,
+    /// The torque against friction, for the round to come.
+    Compensation,
+}
+
+/// Command, motion law and friction, from one control step to the next.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MotionLoop {
+    state: State,
+    stage: Stage,
+    law: MotionLaw,
+    friction: FrictionFeedforward,
+    wanted: Wanted,
+    compensated: Compensated,
+}
+
+/// What a round sees of the joint.
+pub struct Seen<'a> {
+    /// The joint's motion.
+    pub motion: &'a JointMotion,
+    /// Part of the torque limit that is permitted, 0 to 1.
+    pub derating: f32,
+    /// Torque of the measured current, Nm.
+    pub measured_torque: f32,
+    /// What else friction depends on.
+    pub surroundings: Surroundings,
+}
+
+impl MotionLoop {
+    /// One control step: the torque that the joint is to make from here on, Nm; zero where the bridge is off.
+    #[inline(always)]
+    pub fn step<const COMPENSATION: bool>(
+        &mut self,
+        active: &Active,
+        state: State,
+        command: &Command,
+        seen: &Seen,
+    ) -> f32 {
+        if state != self.state {
+            self.begin(state);
+        }
+        if !state.switches() {
+            return 0.0;
+        }
+        let enabled = state == State::OperationEnabled;
+        self.stage::<COMPENSATION>(active, enabled, command, seen);
+        match self.compensated.torque {
+            0.0 => self.wanted.torque,
+            compensation => limited(self.wanted.torque + compensation, active.limits.torque),
+        }
+    }
+
+    /// A round begins in a new state: compensation only while operation is enabled, torque only while the bridge switches.
+    #[inline(never)]
+    fn begin(&mut self, state: State) {
+        (self.state, self.stage) = (state, Stage::default());
+        self.friction.reset();
+        self.compensated = Compensated::NOTHING;
+        if !state.switches() {
+            self.law.reset();
+            self.wanted = Wanted::default();
+        }
+    }
+
+    /// One stage, and which one is next.
+    #[inline(always)]
+    fn stage<const COMPENSATION: bool>(&mut self, active: &Active, enabled: bool, command: &Command, seen: &Seen) {
+        let Seen { motion, derating, measured_torque, surroundings } = seen;
+        let compensates = COMPENSATION && enabled;
+        self.stage = match self.stage {
+            Stage::Law => {
+                self.wanted = match enabled {
+                    true => self.law.step(active, command, motion, *derating),
+                    false => self.law.brake(active, motion),
+                };
+                Stage::Regime
+            }
+            Stage::Regime => {
+                if compensates {
+                    self.friction.begin(active, motion, &self.wanted, *measured_torque, surroundings);
+                }
+                Stage::Network
+            }
+            Stage::Network => {
+                if compensates {
+                    self.friction.network(active);
+                }
+                Stage::PhysicalModel
+            }
+            Stage::PhysicalModel => {
+                if compensates {
+                    self.friction.physical_model(active);
+                }
+                Stage::Compensation
+            }
+            Stage::Compensation => {
+                if compensates {
+                    self.compensated = self.friction.compensate(active, motion, &self.wanted);
+                }
+                Stage::Law
+            }
+        };
+    }
+
+    /// The stage that the next control step does, unless it begins a round.
+    #[inline(always)]
+    pub fn due(&self) -> Stage {
+        self.stage
+    }
+
+    /// What the command wants.
+    #[inline(always)]
+    pub fn wanted(&self) -> &Wanted {
+        &self.wanted
+    }
+
+    /// What compensation adds.
+    #[inline(always)]
+    pub fn compensated(&self) -> &Compensated {
+        &self.compensated
+    }
+
+    /// Whether braking's ramp has come to its end.
+    #[inline(always)]
+    pub fn ramp_is_over(&self) -> bool {
+        self.law.ramp_is_over()
+    }
+}
