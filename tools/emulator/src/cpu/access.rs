@@ -64,6 +64,7 @@ impl<B: Bus> Cpu<B> {
 
     #[inline(never)]
     fn load_elsewhere(&mut self, address: u32, width: Width) -> Result<u32, Trap> {
+        self.settle();
         if address.wrapping_sub(PRIVATE) < PRIVATE_LENGTH {
             return self.read_private(address, width);
         }
@@ -82,6 +83,7 @@ impl<B: Bus> Cpu<B> {
 
     #[inline(never)]
     fn store_elsewhere(&mut self, address: u32, width: Width, value: u32) -> Result<(), Trap> {
+        self.settle();
         if address.wrapping_sub(PRIVATE) < PRIVATE_LENGTH {
             return self.write_private(address, width, value);
         }
@@ -117,6 +119,7 @@ impl<B: Bus> Cpu<B> {
     }
 
     fn check_unaligned(&mut self, address: u32) -> Result<(), Trap> {
+        self.settle();
         // Devices, and what lies where the map has devices (B3.1).
         let device = matches!(address >> 28, 4 | 5 | 0xa..=0xf);
         self.now += 1;

@@ -1,13 +1,15 @@
 //! Code, kept decoded: for each half-word where an instruction may begin, the operation that begins there.
 
 use super::operation::{Operands, Operation, Trap};
+use super::stretch::{SPAN, Stretches};
 use super::{Cpu, End, decode};
 use crate::bus::{Bus, Refusal};
 use std::ops::Range;
 
 #[derive(Clone)]
 pub(super) struct Code<B: Bus> {
-    operations: Vec<Operation<B>>,
+    pub(super) operations: Vec<Operation<B>>,
+    pub(super) stretches: Stretches<B>,
     regions: Vec<Region>,
     /// The region that the program is in.
     current: Region,
@@ -42,20 +44,21 @@ impl<B: Bus> Code<B> {
         }
         let nowhere = Region { start: 0, length: 0, offset: 0, wait_states: 0 };
         let operations = vec![Self::unknown(); offset];
-        let mut code = Self { operations, current: nowhere, regions, changeable: 0..0 };
+        let stretches = Stretches::new(offset);
+        let mut code = Self { operations, stretches, current: nowhere, regions, changeable: 0..0 };
         code.set_wait_states(bus);
         code
     }
 
     fn unknown() -> Operation<B> {
-        let never = |_: &mut Cpu<B>, _: Operands| Err(Trap::End.into());
+        let never = |_: &mut Cpu<B>, _: Operands, _: u32| Err(Trap::End.into());
         Operation::new(never).cycles(0)
     }
 
     /// The operation at an address of the current region, None elsewhere and where nothing is decoded yet.
     #[inline(always)]
     pub fn at(&self, address: u32) -> Option<Operation<B>> {
-        self.kept(self.place(address)?)
+        Self::kept(&self.operations, self.place(address)?)
     }
 
     /// Where the operation for an address of the current region is kept. That of the next instruction is kept behind it, by its half-words.
@@ -67,8 +70,8 @@ impl<B: Bus> Code<B> {
 
     /// What is kept at a place; None where nothing is decoded yet, and behind the region's end.
     #[inline(always)]
-    pub fn kept(&self, place: usize) -> Option<Operation<B>> {
-        let operation = *self.operations.get(place)?;
+    pub fn kept(operations: &[Operation<B>], place: usize) -> Option<Operation<B>> {
+        let operation = *operations.get(place)?;
         (operation.timing.length != 0).then_some(operation)
     }
 
@@ -120,6 +123,7 @@ impl<B: Bus> Code<B> {
             let index = |address: u32| region.offset + ((address - region.start) / 2) as usize;
             if start < end {
                 self.operations[index(start)..index(end + 1)].fill(Self::unknown());
+                self.stretches.forget(index(start).saturating_sub(SPAN)..index(end + 1));
             }
         }
     }
@@ -136,6 +140,7 @@ impl<B: Bus> Code<B> {
         if let Some(kept) = self.operations.get_mut(place) {
             *kept = operation;
         }
+        self.stretches.decoded(place);
     }
 }
 

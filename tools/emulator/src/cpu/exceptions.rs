@@ -128,6 +128,7 @@ impl<B: Bus> Cpu<B> {
     /// stored, and the context marked as used.
     #[cold]
     pub(super) fn check_floating_point(&mut self) -> Result<(), Trap> {
+        self.settle();
         if !self.system.floating_point_allowed(self.privileged()) {
             return Err(Trap::NoCoprocessor);
         }
@@ -153,6 +154,7 @@ impl<B: Bus> Cpu<B> {
     /// A return by one of the addresses that mean that (ExceptionReturn).
     #[inline(never)]
     pub(super) fn exception_return(&mut self, value: u32) -> Result<(), Trap> {
+        self.settle();
         let nested = self.interrupts.active_count();
         let consistent = value >> 5 & 0x7f_ffff == 0x7f_ffff
             && self.interrupts.is_active(self.exception)

@@ -4,7 +4,7 @@
 //! core itself chooses is from its Technical Reference Manual (Arm 100166). An encoding that is not implemented, or whose outcome the
 //! architecture leaves open, ends the run and says where.
 //!
-//! - `run`: from one instruction to the next
+//! - `run`, `stretch`: from one instruction to the next
 //! - `registers`, `reset`: what a debugger sees; special registers; how it all begins
 //! - `code`, `decode`, `operation`: half-words of code become calls, once
 //! - `execute`, `arithmetic`, `float`: what the calls do
@@ -31,6 +31,7 @@ mod operation;
 mod registers;
 mod reset;
 mod run;
+mod stretch;
 mod system;
 mod system_timer;
 mod timing;
@@ -52,6 +53,7 @@ use exceptions::Activation;
 use interrupts::Interrupts;
 use operation::Trap;
 use std::collections::BTreeMap;
+use stretch::Within;
 use system::System;
 use system_timer::SystemTimer;
 
@@ -106,6 +108,7 @@ pub struct Cpu<B: Bus> {
     end: Option<End>,
     trapped_address: u32,
     code: Code<B>,
+    within: Within,
     /// Makes operations. A pointer: whoever calls the decoder by name has all operations compiled, and programs that only run a core need not.
     decode: Decode<B>,
     /// Memory that does not answer before a cycle.

@@ -63,8 +63,8 @@ pub(super) struct Operands {
     pub x: u8,
 }
 
-/// Executes an instruction.
-pub(super) type Execute<B> = fn(&mut Cpu<B>, Operands) -> Done;
+/// Executes an instruction, and what follows it in its stretch: the number is that of its step (see `stretch`).
+pub(super) type Execute<B> = fn(&mut Cpu<B>, Operands, u32) -> Done;
 
 /// A decoded instruction.
 pub(super) struct Operation<B: Bus> {
@@ -83,6 +83,20 @@ pub(super) struct Timing {
     /// Whether it loads or stores one register, and the cycles that it saves behind another that does (see `timing`).
     pub single: bool,
     pub overlaps: u8,
+    pub flow: Flow,
+}
+
+/// What comes behind an instruction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Flow {
+    /// The one behind it.
+    On,
+    /// A branch may be taken.
+    Perhaps,
+    /// Something else.
+    Elsewhere,
+    /// An IT block, whose state is `x`.
+    Block,
 }
 
 // Not derived: that would ask the same of the bus.
@@ -97,7 +111,7 @@ impl<B: Bus> Copy for Operation<B> {}
 impl<B: Bus> Operation<B> {
     /// One cycle, no operands; the length is filled in by `decode`.
     pub fn new(execute: Execute<B>) -> Self {
-        let timing = Timing { length: 0, cycles: 1, single: false, overlaps: 0 };
+        let timing = Timing { length: 0, cycles: 1, single: false, overlaps: 0, flow: Flow::On };
         Self { execute, operands: Operands::default(), timing }
     }
 
@@ -129,6 +143,16 @@ impl<B: Bus> Operation<B> {
     pub fn length(mut self, bytes: u8) -> Self {
         self.timing.length = bytes;
         self
+    }
+
+    pub fn flow(mut self, flow: Flow) -> Self {
+        self.timing.flow = flow;
+        self
+    }
+
+    /// Goes elsewhere if register 15 is in a list.
+    pub fn flow_by(self, list: u32) -> Self {
+        if list >> 15 & 1 != 0 { self.flow(Flow::Elsewhere) } else { self }
     }
 
     pub fn cycles(mut self, cycles: u32) -> Self {

@@ -46,6 +46,7 @@ impl<B: Bus> Cpu<B> {
             end: None,
             trapped_address: 0,
             code,
+            within: Default::default(),
             decode: decode::decode,
             stall: None,
             interrupts: Interrupts::new(),

@@ -1,11 +1,17 @@
 //! From one instruction to the next: the loop that everything else waits in.
 //!
-//! A run without a watch flows: as long as nothing is due, instructions are taken from where they are kept decoded, one behind the other.
+//! A run without a watch flows: as long as nothing is due, one stretch follows the other (see `stretch`).
 
 use super::decode::Refused;
 use super::operation::{Done, Leave, Operation};
+use super::stretch::ALONE;
 use super::{Cpu, End};
 use crate::bus::Bus;
+
+/// The state of an IT block behind an instruction (ITAdvance).
+pub(super) const fn behind(block: u8) -> u8 {
+    if block & 7 == 0 { 0 } else { block & 0xe0 | block << 1 & 0x1f }
+}
 
 impl<B: Bus> Cpu<B> {
     /// Runs until the cycle `until` is reached or something else ends the run. The instruction that reaches it completes.
@@ -49,49 +55,14 @@ impl<B: Bus> Cpu<B> {
     /// Runs instructions, one at least, until something is due or one is not decoded yet.
     fn flow(&mut self) {
         loop {
-            while self.it != 0 {
-                self.instruct::<false>();
-                if self.now >= self.attention {
-                    return;
-                }
-            }
-            let Some(mut place) = self.code.place(self.pc) else { return self.elsewhere(self.pc) };
-            // What the loop counts it also keeps in the core, where others look; its own copies need no load that waits for the
-            // last store. Wrapping, because checks here cost a tenth of the speed; no counter comes near its end.
-            let (mut now, mut instructions, mut single) = (self.now, self.instructions, self.single);
-            let mut pc = self.pc;
-            loop {
-                let Some(Operation { execute, operands, timing }) = self.code.kept(place) else {
-                    return self.elsewhere(pc);
-                };
-                let next = pc.wrapping_add(u32::from(timing.length));
-                instructions = instructions.wrapping_add(1);
-                now = now.wrapping_add(u64::from(timing.cycles.wrapping_sub(timing.overlaps & u8::from(single))));
-                single = timing.single;
-                (self.pc, self.instructions, self.now, self.single) = (next, instructions, now, single);
-                match execute(self, operands) {
-                    // It took longer: wait states, unaligned addresses.
-                    Ok(()) if self.now != now => now = self.later(),
-                    Ok(()) => {}
-                    Err(Leave::Jumped) => break,
-                    Err(Leave::Trapped(trap)) => return self.trapped(trap, pc),
-                }
-                if now >= self.attention {
-                    return;
-                }
-                place = place.wrapping_add(usize::from(timing.length / 2));
-                pc = next;
+            match self.it {
+                0 => self.run_stretch(),
+                _ => self.instruct::<false>(),
             }
             if self.now >= self.attention {
                 return;
             }
         }
-    }
-
-    /// The time, where it is not what the loop takes it for. Not inlined: there it would replace the copy that needs no load.
-    #[inline(never)]
-    fn later(&self) -> u64 {
-        self.now
     }
 
     /// Runs one instruction, or decodes it.
@@ -108,7 +79,7 @@ impl<B: Bus> Cpu<B> {
         self.now = self.now.wrapping_add(u64::from(cycles));
         self.single = operation.timing.single;
         let done = match self.it {
-            0 => (operation.execute)(self, operation.operands),
+            0 => (operation.execute)(self, operation.operands, ALONE),
             _ => self.in_block(operation, pc),
         };
         if let Err(Leave::Trapped(trap)) = done {
@@ -122,7 +93,7 @@ impl<B: Bus> Cpu<B> {
     /// An instruction of an IT block: runs if its condition holds (A7.3.2).
     fn in_block(&mut self, operation: Operation<B>, pc: u32) -> Done {
         let block = self.it;
-        self.it = if block & 7 == 0 { 0 } else { block & 0xe0 | block << 1 & 0x1f };
+        self.it = behind(block);
         if !self.holds(block >> 4) {
             self.now -= u64::from(operation.timing.cycles) - 1;
             self.single = false;
@@ -130,7 +101,7 @@ impl<B: Bus> Cpu<B> {
         }
         self.in_it = true;
         let (next, rest, handler) = (self.pc, self.it, self.exception);
-        let done = (operation.execute)(self, operation.operands);
+        let done = (operation.execute)(self, operation.operands, ALONE);
         self.in_it = false;
         if let Err(Leave::Trapped(_)) = done {
             self.it = block;

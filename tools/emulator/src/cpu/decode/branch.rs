@@ -5,7 +5,7 @@ use crate::bus::Bus;
 use crate::cpu::arithmetic::sign_extend;
 use crate::cpu::execute::load_store::clear_exclusive;
 use crate::cpu::execute::{branch, system};
-use crate::cpu::operation::Operation;
+use crate::cpu::operation::{Flow, Operation};
 
 pub(super) fn decode<B: Bus>(address: u32, first: u32, second: u32) -> Decoded<B> {
     let pc = address.wrapping_add(4);
@@ -18,12 +18,12 @@ pub(super) fn decode<B: Bus>(address: u32, first: u32, second: u32) -> Decoded<B
             let offset = sign << 24 | i1 << 23 | i2 << 22 | bits(first, 9, 0) << 12 | low << 1;
             let target = pc.wrapping_add(sign_extend(offset, 25));
             let execute = if link == 1 { branch::call } else { branch::branch };
-            Ok(op(execute).immediate(target))
+            Ok(op(execute).immediate(target).flow(Flow::Elsewhere))
         }
         (0, _) if bits(first, 9, 7) != 7 => {
             let offset = sign << 20 | j2 << 19 | j1 << 18 | bits(first, 5, 0) << 12 | low << 1;
             let target = pc.wrapping_add(sign_extend(offset, 21));
-            Ok(op(branch::branch_if_of(bits(first, 9, 6))).immediate(target))
+            Ok(op(branch::branch_if_of(bits(first, 9, 6))).immediate(target).flow(Flow::Perhaps))
         }
         (0, _) => special(first, second),
         // udf

@@ -8,7 +8,7 @@ use crate::cpu::execute::load_store::{
     store_several, strd,
 };
 use crate::cpu::execute::{branch, system};
-use crate::cpu::operation::Operation;
+use crate::cpu::operation::{Flow, Operation};
 use crate::cpu::timing;
 
 /// LDM, STM.
@@ -22,7 +22,8 @@ pub(super) fn several_registers<B: Bus>(first: u32, list: u32, below: bool) -> D
         || change && list >> n & 1 != 0;
     let x = if change { CHANGES } else { 0 } | if below { BELOW } else { 0 };
     let execute = if load { load_several } else { store_several };
-    unless(open, Operation::new(execute).n(n).immediate(list).x(x).cycles(timing::several(list.count_ones())))
+    let operation = Operation::new(execute).n(n).immediate(list).x(x).cycles(timing::several(list.count_ones()));
+    unless(open, operation.flow_by(list))
 }
 
 pub(super) fn several<B: Bus>(first: u32, second: u32) -> Decoded<B> {
@@ -80,7 +81,7 @@ pub(super) fn pair<B: Bus>(address: u32, first: u32, second: u32) -> Decoded<B> 
             match kind {
                 0 | 1 => {
                     let open = n == 13 || bad(low) || t != 15 || t2 != 0;
-                    unless(open, op(branch::table).n(n).m(low).x(kind).immediate(pc).cycles(2))
+                    unless(open, op(branch::table).n(n).m(low).x(kind).immediate(pc).cycles(2).flow(Flow::Elsewhere))
                 }
                 4 => unless(open, op(load_exclusive::<B, 1>).d(t).n(n).cycles(2)),
                 5 => unless(open, op(load_exclusive::<B, 2>).d(t).n(n).cycles(2)),
@@ -143,7 +144,7 @@ pub(super) fn single<B: Bus>(address: u32, first: u32, second: u32) -> Decoded<B
         return unless(open, Operation::new(system::nothing));
     }
     if t == 15 && load {
-        let decoded = Operation::new(load_branch_of(mode)).n(n).m(m).immediate(offset).cycles(2);
+        let decoded = Operation::new(load_branch_of(mode)).n(n).m(m).immediate(offset).cycles(2).flow(Flow::Elsewhere);
         return unless(open, decoded);
     }
     let word = what == LDR || what == STR;

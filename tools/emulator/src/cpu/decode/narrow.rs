@@ -12,7 +12,7 @@ use crate::cpu::execute::load_store::{
     store_several,
 };
 use crate::cpu::execute::{branch, system};
-use crate::cpu::operation::Operation;
+use crate::cpu::operation::{Flow, Operation};
 use crate::cpu::timing::several;
 
 pub(super) fn decode<B: Bus>(address: u32, word: u32) -> Decoded<B> {
@@ -68,7 +68,7 @@ pub(super) fn decode<B: Bus>(address: u32, word: u32) -> Decoded<B> {
             15 => Ok(op(system::supervisor_call).immediate(byte)),
             condition => {
                 let target = pc.wrapping_add(sign_extend(byte << 1, 9));
-                Ok(op(branch::branch_if_of(condition)).immediate(target))
+                Ok(op(branch::branch_if_of(condition)).immediate(target).flow(Flow::Perhaps))
             }
         },
         28 => Ok(op(branch::branch).immediate(pc.wrapping_add(sign_extend(bits(word, 10, 0) << 1, 12)))),
@@ -106,17 +106,17 @@ fn high_registers<B: Bus>(word: u32, pc: u32) -> Decoded<B> {
     let (d, m) = (bits(word, 7, 7) << 3 | bits(word, 2, 0), bits(word, 6, 3));
     let op = Operation::<B>::new;
     match bits(word, 9, 8) {
-        0 if d == 15 => unless(m == 15, op(branch::add_to_pc).m(m).immediate(pc)),
+        0 if d == 15 => unless(m == 15, op(branch::add_to_pc).m(m).immediate(pc).flow(Flow::Elsewhere)),
         // The program counter as an operand is a constant.
         0 if m == 15 => Ok(op(add_immediate).d(d).n(d).immediate(pc)),
         0 => Ok(op(data_of(ADD, REGISTER, NEVER)).d(d).n(d).m(m)),
         1 => unless(d < 8 && m < 8 || d == 15 || m == 15, op(data_of(SUB, REGISTER, TEST)).n(d).m(m)),
-        2 if d == 15 => unless(m == 15, op(branch::move_to_pc).m(m)),
+        2 if d == 15 => unless(m == 15, op(branch::move_to_pc).m(m).flow(Flow::Elsewhere)),
         2 if m == 15 => Ok(op(constant).d(d).immediate(pc)),
         2 => Ok(op(data_of(MOV, REGISTER, NEVER)).d(d).m(m)),
         _ if bits(word, 2, 0) != 0 || m == 15 => Err(Refused::Unpredictable),
-        _ if bits(word, 7, 7) != 0 => Ok(op(branch::call_register).m(m)),
-        _ => Ok(op(branch::branch_register).m(m)),
+        _ if bits(word, 7, 7) != 0 => Ok(op(branch::call_register).m(m).flow(Flow::Elsewhere)),
+        _ => Ok(op(branch::branch_register).m(m).flow(Flow::Elsewhere)),
     }
 }
 
@@ -129,7 +129,7 @@ fn miscellaneous<B: Bus>(word: u32, pc: u32) -> Decoded<B> {
         0 => Ok(op(add_immediate).d(13).n(13).immediate((4 * (word & 0x7f)).wrapping_neg())),
         1 | 3 | 9 | 11 => {
             let target = pc.wrapping_add(bits(word, 9, 9) << 6 | bits(word, 7, 3) << 1);
-            Ok(op(branch::branch_if_zero).n(low).x(bits(word, 11, 11)).immediate(target))
+            Ok(op(branch::branch_if_zero).n(low).x(bits(word, 11, 11)).immediate(target).flow(Flow::Perhaps))
         }
         // sxth, sxtb, uxth, uxtb: the wide ones without rotation and addition.
         2 => {
@@ -159,14 +159,14 @@ fn miscellaneous<B: Bus>(word: u32, pc: u32) -> Decoded<B> {
         12 | 13 => {
             let list = word & 0xff | bits(word, 8, 8) << 15;
             let cycles = several(list.count_ones());
-            unless(list == 0, op(load_several).n(13).immediate(list).x(CHANGES).cycles(cycles))
+            unless(list == 0, op(load_several).n(13).immediate(list).x(CHANGES).cycles(cycles).flow_by(list))
         }
         14 => Ok(op(system::breakpoint).x(word & 0xff)),
         15 if word & 0xf != 0 => {
             let condition = bits(word, 7, 4);
             // "Always" has no opposite.
             let open = condition == 15 || condition == 14 && (word & 0xf).count_ones() != 1;
-            unless(open, op(branch::it).x(word & 0xff))
+            unless(open, op(branch::it).x(word & 0xff).flow(Flow::Block))
         }
         15 => hint(bits(word, 7, 4)),
         _ => Err(Refused::Unknown),

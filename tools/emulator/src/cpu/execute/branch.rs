@@ -5,15 +5,15 @@ use crate::cpu::Cpu;
 use crate::cpu::operation::{Done, Execute, Leave, Operands};
 
 /// To `immediate`.
-pub(in crate::cpu) fn branch<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+pub(in crate::cpu) fn branch<B: Bus>(cpu: &mut Cpu<B>, o: Operands, _: u32) -> Done {
     cpu.branch(o.immediate);
     Err(Leave::Jumped)
 }
 
 /// To `immediate` if a condition holds.
-fn branch_if<B: Bus, const CONDITION: u8>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+fn branch_if<B: Bus, const CONDITION: u8>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
     if !cpu.holds(CONDITION) {
-        return Ok(());
+        return cpu.next(step);
     }
     cpu.branch(o.immediate);
     Err(Leave::Jumped)
@@ -41,23 +41,25 @@ pub(in crate::cpu) fn branch_if_of<B: Bus>(condition: u32) -> Execute<B> {
 }
 
 /// CBZ; CBNZ with x = 1.
-pub(in crate::cpu) fn branch_if_zero<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+pub(in crate::cpu) fn branch_if_zero<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
     if (cpu.get(o.n) == 0) != (o.x == 0) {
-        return Ok(());
+        return cpu.next(step);
     }
     cpu.branch(o.immediate);
     Err(Leave::Jumped)
 }
 
 /// BL.
-pub(in crate::cpu) fn call<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+pub(in crate::cpu) fn call<B: Bus>(cpu: &mut Cpu<B>, o: Operands, _: u32) -> Done {
+    cpu.settle();
     cpu.r[14] = cpu.pc | 1;
     cpu.branch(o.immediate);
     Err(Leave::Jumped)
 }
 
 /// BLX.
-pub(in crate::cpu) fn call_register<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+pub(in crate::cpu) fn call_register<B: Bus>(cpu: &mut Cpu<B>, o: Operands, _: u32) -> Done {
+    cpu.settle();
     let target = cpu.get(o.m);
     cpu.r[14] = cpu.pc | 1;
     if target & 1 == 0 {
@@ -69,25 +71,25 @@ pub(in crate::cpu) fn call_register<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Do
 }
 
 /// BX.
-pub(in crate::cpu) fn branch_register<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+pub(in crate::cpu) fn branch_register<B: Bus>(cpu: &mut Cpu<B>, o: Operands, _: u32) -> Done {
     cpu.branch_exchange(cpu.get(o.m))?;
     Err(Leave::Jumped)
 }
 
 /// MOV to the program counter: no change of state.
-pub(in crate::cpu) fn move_to_pc<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+pub(in crate::cpu) fn move_to_pc<B: Bus>(cpu: &mut Cpu<B>, o: Operands, _: u32) -> Done {
     cpu.branch(cpu.get(o.m) & !1);
     Err(Leave::Jumped)
 }
 
 /// ADD to the program counter, which is `immediate`.
-pub(in crate::cpu) fn add_to_pc<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+pub(in crate::cpu) fn add_to_pc<B: Bus>(cpu: &mut Cpu<B>, o: Operands, _: u32) -> Done {
     cpu.branch(o.immediate.wrapping_add(cpu.get(o.m)) & !1);
     Err(Leave::Jumped)
 }
 
 /// TBB; TBH with x = 1. From `immediate`, a table at n or, with 15, behind the instruction.
-pub(in crate::cpu) fn table<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+pub(in crate::cpu) fn table<B: Bus>(cpu: &mut Cpu<B>, o: Operands, _: u32) -> Done {
     let start = if o.n == 15 { o.immediate } else { cpu.get(o.n) };
     let entry = match o.x {
         0 => cpu.load::<1>(start.wrapping_add(cpu.get(o.m)))?,
@@ -98,7 +100,8 @@ pub(in crate::cpu) fn table<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
 }
 
 /// IT.
-pub(in crate::cpu) fn it<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+pub(in crate::cpu) fn it<B: Bus>(cpu: &mut Cpu<B>, o: Operands, _: u32) -> Done {
+    cpu.settle();
     cpu.it = o.x;
     Err(Leave::Jumped)
 }

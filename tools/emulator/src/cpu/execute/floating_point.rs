@@ -39,7 +39,7 @@ pub(in crate::cpu) const VFNMA: u8 = 11;
 pub(in crate::cpu) const VFMA: u8 = 12;
 pub(in crate::cpu) const VFMS: u8 = 13;
 
-fn three<B: Bus, const OPERATION: u8>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+fn three<B: Bus, const OPERATION: u8>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
     cpu.use_floating_point()?;
     let (d, n, m) = (cpu.float(o.d), cpu.float(o.n), cpu.float(o.m));
     let status = &mut cpu.floating;
@@ -62,7 +62,7 @@ fn three<B: Bus, const OPERATION: u8>(cpu: &mut Cpu<B>, o: Operands) -> Done {
         _ => float::multiply_add(float::negate(d), float::negate(n), m, status),
     };
     cpu.set_float(o.d, result);
-    Ok(())
+    cpu.next(step)
 }
 
 pub(in crate::cpu) fn three_of<B: Bus>(operation: u8) -> Option<Execute<B>> {
@@ -85,33 +85,33 @@ pub(in crate::cpu) fn three_of<B: Bus>(operation: u8) -> Option<Execute<B>> {
 }
 
 /// VMOV of a constant.
-pub(in crate::cpu) fn vmov_constant<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+pub(in crate::cpu) fn vmov_constant<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
     cpu.use_floating_point()?;
     cpu.set_float(o.d, o.immediate);
-    Ok(())
+    cpu.next(step)
 }
 
 /// VMOV, VABS, VNEG: bits of m, of which `immediate` are cleared and x of the sign exchanged.
-pub(in crate::cpu) fn vmov<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+pub(in crate::cpu) fn vmov<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
     cpu.use_floating_point()?;
     let bits = cpu.float(o.m) & !o.immediate ^ u32::from(o.x) << 31;
     cpu.set_float(o.d, bits);
-    Ok(())
+    cpu.next(step)
 }
 
-pub(in crate::cpu) fn vsqrt<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+pub(in crate::cpu) fn vsqrt<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
     cpu.use_floating_point()?;
     let root = float::square_root(cpu.float(o.m), &mut cpu.floating);
     cpu.set_float(o.d, root);
-    Ok(())
+    cpu.next(step)
 }
 
 /// VCMP, with zero where `immediate` says so; VCMPE with x.
-pub(in crate::cpu) fn vcmp<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+pub(in crate::cpu) fn vcmp<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
     cpu.use_floating_point()?;
     let second = if o.immediate != 0 { 0 } else { cpu.float(o.m) };
     float::compare(cpu.float(o.d), second, o.x != 0, &mut cpu.floating);
-    Ok(())
+    cpu.next(step)
 }
 
 /// x of the conversions: without sign; 16 bits; towards zero; the upper half-word; from single precision.
@@ -122,7 +122,7 @@ pub(in crate::cpu) const TOP: u32 = 1;
 pub(in crate::cpu) const TO_HALF: u32 = 2;
 
 /// VCVT, VCVTR to integers and fixed point of `immediate` bits behind the point.
-pub(in crate::cpu) fn vcvt_to_fixed<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+pub(in crate::cpu) fn vcvt_to_fixed<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
     cpu.use_floating_point()?;
     let x = u32::from(o.x);
     let bits = if x & NARROW != 0 { 16 } else { 32 };
@@ -130,11 +130,11 @@ pub(in crate::cpu) fn vcvt_to_fixed<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Do
     let value = cpu.float(o.m);
     let result = float::to_fixed(value, bits, o.immediate, x & UNSIGNED != 0, rounding, &mut cpu.floating);
     cpu.set_float(o.d, result);
-    Ok(())
+    cpu.next(step)
 }
 
 /// VCVT from integers, by the mode, and from fixed point, to nearest.
-pub(in crate::cpu) fn vcvt_from_fixed<B: Bus, const INTEGER: bool>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+pub(in crate::cpu) fn vcvt_from_fixed<B: Bus, const INTEGER: bool>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
     cpu.use_floating_point()?;
     let x = u32::from(o.x);
     let bits = if x & NARROW != 0 { 16 } else { 32 };
@@ -142,11 +142,11 @@ pub(in crate::cpu) fn vcvt_from_fixed<B: Bus, const INTEGER: bool>(cpu: &mut Cpu
     let value = cpu.float(o.m);
     let result = float::from_fixed(value, bits, o.immediate, x & UNSIGNED != 0, rounding, &mut cpu.floating);
     cpu.set_float(o.d, result);
-    Ok(())
+    cpu.next(step)
 }
 
 /// VCVTB, VCVTT.
-pub(in crate::cpu) fn vcvt_half<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+pub(in crate::cpu) fn vcvt_half<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
     cpu.use_floating_point()?;
     let x = u32::from(o.x);
     let at = if x & TOP != 0 { 16 } else { 0 };
@@ -159,45 +159,45 @@ pub(in crate::cpu) fn vcvt_half<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
         }
     };
     cpu.set_float(o.d, result);
-    Ok(())
+    cpu.next(step)
 }
 
 /// VMOV to core register d from n.
-pub(in crate::cpu) fn to_core<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+pub(in crate::cpu) fn to_core<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
     cpu.use_floating_point()?;
     let bits = cpu.float(o.n);
     cpu.set(o.d, bits);
-    Ok(())
+    cpu.next(step)
 }
 
 /// VMOV to n from core register d.
-pub(in crate::cpu) fn from_core<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+pub(in crate::cpu) fn from_core<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
     cpu.use_floating_point()?;
     let bits = cpu.get(o.d);
     cpu.set_float(o.n, bits);
-    Ok(())
+    cpu.next(step)
 }
 
 /// VMOV to core registers d and x from m and the next.
-pub(in crate::cpu) fn two_to_core<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+pub(in crate::cpu) fn two_to_core<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
     cpu.use_floating_point()?;
     let (low, high) = (cpu.float(o.m), cpu.float(o.m + 1));
     cpu.set(o.d, low);
     cpu.set(o.x, high);
-    Ok(())
+    cpu.next(step)
 }
 
 /// VMOV to m and the next from core registers d and x.
-pub(in crate::cpu) fn two_from_core<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+pub(in crate::cpu) fn two_from_core<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
     cpu.use_floating_point()?;
     let (low, high) = (cpu.get(o.d), cpu.get(o.x));
     cpu.set_float(o.m, low);
     cpu.set_float(o.m + 1, high);
-    Ok(())
+    cpu.next(step)
 }
 
 /// VMRS; with 15 only the flags, to the core's.
-pub(in crate::cpu) fn vmrs<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+pub(in crate::cpu) fn vmrs<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
     cpu.use_floating_point()?;
     let bits = cpu.floating.bits();
     if o.d == 15 {
@@ -206,13 +206,13 @@ pub(in crate::cpu) fn vmrs<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     } else {
         cpu.set(o.d, bits);
     }
-    Ok(())
+    cpu.next(step)
 }
 
-pub(in crate::cpu) fn vmsr<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+pub(in crate::cpu) fn vmsr<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
     cpu.use_floating_point()?;
     cpu.floating = float::Status::from_bits(cpu.get(o.d));
-    Ok(())
+    cpu.next(step)
 }
 
 /// Address of VLDR and VSTR: n and `immediate`; with 15 the latter alone.
@@ -221,7 +221,7 @@ fn address<B: Bus>(cpu: &Cpu<B>, o: Operands) -> u32 {
 }
 
 /// VLDR of x registers.
-pub(in crate::cpu) fn vldr<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+pub(in crate::cpu) fn vldr<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
     cpu.use_floating_point()?;
     let at = address(cpu, o);
     if o.x == 2 {
@@ -229,25 +229,25 @@ pub(in crate::cpu) fn vldr<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
         let high = cpu.load_aligned::<4>(at.wrapping_add(4))?;
         cpu.set_float(o.d, low);
         cpu.set_float(o.d + 1, high);
-        return Ok(());
+        return cpu.next(step);
     }
     let bits = cpu.load_aligned::<4>(at)?;
     cpu.set_float(o.d, bits);
-    Ok(())
+    cpu.next(step)
 }
 
 /// VSTR of x registers.
-pub(in crate::cpu) fn vstr<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+pub(in crate::cpu) fn vstr<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
     cpu.use_floating_point()?;
     let at = address(cpu, o);
     for i in 0..o.x {
         cpu.store_aligned::<4>(at.wrapping_add(4 * u32::from(i)), cpu.float(o.d + i))?;
     }
-    Ok(())
+    cpu.next(step)
 }
 
 /// VLDM, VPOP: m registers from d on; x as for LDM.
-pub(in crate::cpu) fn vldm<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+pub(in crate::cpu) fn vldm<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
     cpu.use_floating_point()?;
     let (start, changed) = block(cpu.get(o.n), o.immediate, u32::from(o.x) & BELOW != 0);
     for i in 0..o.m {
@@ -257,11 +257,11 @@ pub(in crate::cpu) fn vldm<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     if u32::from(o.x) & CHANGES != 0 {
         cpu.set_any(o.n, changed);
     }
-    Ok(())
+    cpu.next(step)
 }
 
 /// VSTM, VPUSH.
-pub(in crate::cpu) fn vstm<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+pub(in crate::cpu) fn vstm<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
     cpu.use_floating_point()?;
     let (start, changed) = block(cpu.get(o.n), o.immediate, u32::from(o.x) & BELOW != 0);
     for i in 0..o.m {
@@ -270,5 +270,5 @@ pub(in crate::cpu) fn vstm<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     if u32::from(o.x) & CHANGES != 0 {
         cpu.set_any(o.n, changed);
     }
-    Ok(())
+    cpu.next(step)
 }

@@ -27,7 +27,7 @@ pub(in crate::cpu) const AFTER: u8 = 4;
 
 /// Loads d, or stores it.
 #[inline(always)]
-fn access<B: Bus, const WHAT: u8, const ADDRESS: u8>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+fn access<B: Bus, const WHAT: u8, const ADDRESS: u8>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
     let (address, changed) = match ADDRESS {
         OFFSET => (cpu.get(o.n).wrapping_add(o.immediate), 0),
         INDEXED => (cpu.get(o.n).wrapping_add(cpu.get(o.m) << (o.immediate & 3)), 0),
@@ -47,7 +47,7 @@ fn access<B: Bus, const WHAT: u8, const ADDRESS: u8>(cpu: &mut Cpu<B>, o: Operan
                 _ => cpu.store::<1>(address, value & 0xff)?,
             }
             write_back::<B, ADDRESS>(cpu, o.n, changed);
-            return Ok(());
+            return cpu.next(step);
         }
         LDR => cpu.load::<4>(address)?,
         LDRH => cpu.load::<2>(address)?,
@@ -61,7 +61,7 @@ fn access<B: Bus, const WHAT: u8, const ADDRESS: u8>(cpu: &mut Cpu<B>, o: Operan
     } else {
         cpu.set(o.d, value);
     }
-    Ok(())
+    cpu.next(step)
 }
 
 #[inline(always)]
@@ -72,7 +72,7 @@ fn write_back<B: Bus, const ADDRESS: u8>(cpu: &mut Cpu<B>, base: u8, value: u32)
 }
 
 /// Loads the program counter.
-pub(in crate::cpu) fn load_branch<B: Bus, const ADDRESS: u8>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+pub(in crate::cpu) fn load_branch<B: Bus, const ADDRESS: u8>(cpu: &mut Cpu<B>, o: Operands, _: u32) -> Done {
     let base = if ADDRESS == ABSOLUTE { 0 } else { cpu.get(o.n) };
     let offset = if ADDRESS == INDEXED { cpu.get(o.m) << (o.immediate & 3) } else { o.immediate };
     let changed = base.wrapping_add(offset);
@@ -129,7 +129,7 @@ pub(super) fn block(base: u32, bytes: u32, below: bool) -> (u32, u32) {
 }
 
 /// LDM, POP. Registers are loaded as they come; the base keeps its value where a load faults.
-pub(in crate::cpu) fn load_several<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+pub(in crate::cpu) fn load_several<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
     let base = cpu.get(o.n);
     let (mut address, changed) = block(base, 4 * o.immediate.count_ones(), u32::from(o.x) & BELOW != 0);
     let mut list = o.immediate & 0x7fff;
@@ -151,13 +151,13 @@ pub(in crate::cpu) fn load_several<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Don
     } else if u32::from(o.x) & CHANGES != 0 {
         cpu.set_any(o.n, changed);
     }
-    let Some(target) = target else { return Ok(()) };
+    let Some(target) = target else { return cpu.next(step) };
     cpu.branch_exchange(target)?;
     Err(Leave::Jumped)
 }
 
 /// STM, PUSH.
-pub(in crate::cpu) fn store_several<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+pub(in crate::cpu) fn store_several<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
     let (mut address, changed) = block(cpu.get(o.n), 4 * o.immediate.count_ones(), u32::from(o.x) & BELOW != 0);
     let mut list = o.immediate;
     while list != 0 {
@@ -169,7 +169,7 @@ pub(in crate::cpu) fn store_several<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Do
     if u32::from(o.x) & CHANGES != 0 {
         cpu.set_any(o.n, changed);
     }
-    Ok(())
+    cpu.next(step)
 }
 
 /// x of the functions for two registers: the base changes; the offset counts before.
@@ -182,7 +182,7 @@ fn pair_address<B: Bus>(cpu: &Cpu<B>, o: Operands) -> (u32, u32) {
 }
 
 /// LDRD to d and m.
-pub(in crate::cpu) fn ldrd<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+pub(in crate::cpu) fn ldrd<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
     let (address, changed) = pair_address(cpu, o);
     let first = cpu.load_aligned::<4>(address)?;
     let second = cpu.load_aligned::<4>(address.wrapping_add(4))?;
@@ -191,40 +191,40 @@ pub(in crate::cpu) fn ldrd<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
     }
     cpu.set(o.d, first);
     cpu.set(o.m, second);
-    Ok(())
+    cpu.next(step)
 }
 
 /// LDRD from an address that decoding knows.
-pub(in crate::cpu) fn ldrd_absolute<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+pub(in crate::cpu) fn ldrd_absolute<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
     let first = cpu.load_aligned::<4>(o.immediate)?;
     let second = cpu.load_aligned::<4>(o.immediate.wrapping_add(4))?;
     cpu.set(o.d, first);
     cpu.set(o.m, second);
-    Ok(())
+    cpu.next(step)
 }
 
 /// STRD from d and m.
-pub(in crate::cpu) fn strd<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+pub(in crate::cpu) fn strd<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
     let (address, changed) = pair_address(cpu, o);
     cpu.store_aligned::<4>(address, cpu.get(o.d))?;
     cpu.store_aligned::<4>(address.wrapping_add(4), cpu.get(o.m))?;
     if u32::from(o.x) & CHANGES != 0 {
         cpu.set_any(o.n, changed);
     }
-    Ok(())
+    cpu.next(step)
 }
 
 /// LDREX: loads, and marks the address as its own. With a single core the monitor has no address (B.3.4.5 leaves its size open).
-pub(in crate::cpu) fn load_exclusive<B: Bus, const BYTES: u32>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+pub(in crate::cpu) fn load_exclusive<B: Bus, const BYTES: u32>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
     let address = cpu.get(o.n).wrapping_add(o.immediate);
     let value = cpu.load_aligned::<BYTES>(address)?;
     cpu.exclusive = true;
     cpu.set(o.d, value);
-    Ok(())
+    cpu.next(step)
 }
 
 /// STREX: stores m if the mark is still there; d becomes 0 then, 1 otherwise.
-pub(in crate::cpu) fn store_exclusive<B: Bus, const BYTES: u32>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+pub(in crate::cpu) fn store_exclusive<B: Bus, const BYTES: u32>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
     let address = cpu.get(o.n).wrapping_add(o.immediate);
     if address & (BYTES - 1) != 0 {
         return Err(Trap::Unaligned.into());
@@ -235,10 +235,10 @@ pub(in crate::cpu) fn store_exclusive<B: Bus, const BYTES: u32>(cpu: &mut Cpu<B>
         cpu.store_aligned::<BYTES>(address, value)?;
     }
     cpu.set(o.d, u32::from(!own));
-    Ok(())
+    cpu.next(step)
 }
 
-pub(in crate::cpu) fn clear_exclusive<B: Bus>(cpu: &mut Cpu<B>, _: Operands) -> Done {
+pub(in crate::cpu) fn clear_exclusive<B: Bus>(cpu: &mut Cpu<B>, _: Operands, step: u32) -> Done {
     cpu.exclusive = false;
-    Ok(())
+    cpu.next(step)
 }
