@@ -23,13 +23,17 @@ impl<B: Bus> Cpu<B> {
     /// A load of 1, 2 or 4 bytes from any address (MemU).
     #[inline(always)]
     pub(super) fn load<const BYTES: u32>(&mut self, address: u32) -> Result<u32, Trap> {
-        if address & (BYTES - 1) != 0 {
-            return self.load_unaligned::<BYTES>(address);
-        }
-        match self.bus.load(address, width(BYTES)) {
+        match self.load_at_once::<BYTES>(address) {
             Some(value) => Ok(value),
+            None if address & (BYTES - 1) != 0 => self.load_unaligned::<BYTES>(address),
             None => self.load_elsewhere(address, width(BYTES)),
         }
+    }
+
+    /// The same where memory answers at once.
+    #[inline(always)]
+    pub(super) fn load_at_once<const BYTES: u32>(&self, address: u32) -> Option<u32> {
+        if address & (BYTES - 1) != 0 { None } else { self.bus.load(address, width(BYTES)) }
     }
 
     /// A load whose address has to be a multiple of the width (MemA).
@@ -44,13 +48,19 @@ impl<B: Bus> Cpu<B> {
     /// A store of 1, 2 or 4 bytes to any address (MemU).
     #[inline(always)]
     pub(super) fn store<const BYTES: u32>(&mut self, address: u32, value: u32) -> Result<(), Trap> {
-        if address & (BYTES - 1) != 0 {
-            return self.store_unaligned::<BYTES>(address, value);
-        }
-        if !self.code.changes(address) && self.bus.store(address, width(BYTES), value) {
+        if self.store_at_once::<BYTES>(address, value) {
             return Ok(());
         }
-        self.store_elsewhere(address, width(BYTES), value)
+        match address & (BYTES - 1) {
+            0 => self.store_elsewhere(address, width(BYTES), value),
+            _ => self.store_unaligned::<BYTES>(address, value),
+        }
+    }
+
+    /// The same where memory takes it at once; false where it does not.
+    #[inline(always)]
+    pub(super) fn store_at_once<const BYTES: u32>(&mut self, address: u32, value: u32) -> bool {
+        address & (BYTES - 1) == 0 && !self.code.changes(address) && self.bus.store(address, width(BYTES), value)
     }
 
     /// A store whose address has to be a multiple of the width (MemA).

@@ -14,7 +14,10 @@ pub(super) struct Code<B: Bus> {
     /// The region that the program is in.
     current: Region,
     /// From the first to behind the last address in SRAM at which something was ever decoded: a store there may change it.
+    /// A word that begins up to three bytes before reaches into it: the start is that of such a word.
     changeable: Range<u32>,
+    /// Its length.
+    changeable_length: u32,
 }
 
 #[derive(Clone, Copy)]
@@ -45,7 +48,8 @@ impl<B: Bus> Code<B> {
         let nowhere = Region { start: 0, length: 0, offset: 0, wait_states: 0 };
         let operations = vec![Self::unknown(); offset];
         let stretches = Stretches::new(offset);
-        let mut code = Self { operations, stretches, current: nowhere, regions, changeable: 0..0 };
+        let mut code =
+            Self { operations, stretches, current: nowhere, regions, changeable: 0..0, changeable_length: 0 };
         code.set_wait_states(bus);
         code
     }
@@ -78,9 +82,7 @@ impl<B: Bus> Code<B> {
     /// Whether a store to an address may change what is decoded; always outside of SRAM, where programs seldom store.
     #[inline(always)]
     pub fn changes(&self, address: u32) -> bool {
-        // A word that begins up to three bytes before reaches into it.
-        let Range { start, end } = self.changeable;
-        address < SRAM.start || address.wrapping_sub(start).wrapping_add(3) < end.wrapping_sub(start).wrapping_add(3)
+        address < SRAM.start || address.wrapping_sub(self.changeable.start) < self.changeable_length
     }
 
     /// Whether an address lies in the current region.
@@ -131,11 +133,12 @@ impl<B: Bus> Code<B> {
     fn keep(&mut self, address: u32, operation: Operation<B>) {
         let Some(place) = self.place(address) else { return };
         if SRAM.contains(&address) {
-            let end = address + u32::from(operation.timing.length);
+            let (start, end) = (address - 3, address + u32::from(operation.timing.length));
             self.changeable = match self.changeable.is_empty() {
-                true => address..end,
-                false => self.changeable.start.min(address)..self.changeable.end.max(end),
+                true => start..end,
+                false => self.changeable.start.min(start)..self.changeable.end.max(end),
             };
+            self.changeable_length = self.changeable.end - self.changeable.start;
         }
         if let Some(kept) = self.operations.get_mut(place) {
             *kept = operation;

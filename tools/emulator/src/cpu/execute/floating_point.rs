@@ -40,6 +40,28 @@ pub(in crate::cpu) const VFMA: u8 = 12;
 pub(in crate::cpu) const VFMS: u8 = 13;
 
 fn three<B: Bus, const OPERATION: u8>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+    let (d, n, m, status) = (cpu.float(o.d), cpu.float(o.n), cpu.float(o.m), cpu.floating);
+    let result = match OPERATION {
+        VMUL => float::multiply_at_once(n, m, status),
+        VNMUL => float::multiply_at_once(n, m, status).map(float::negate),
+        VADD => float::add_at_once(n, m, status),
+        VSUB => float::subtract_at_once(n, m, status),
+        VDIV => float::divide_at_once(n, m, status),
+        VMLA => float::multiply_at_once(n, m, status).and_then(|product| float::add_at_once(d, product, status)),
+        _ => None,
+    };
+    if let Some(result) = result
+        && cpu.floating_ready
+    {
+        cpu.set_float(o.d, result);
+        return cpu.next(step);
+    }
+    three_exactly::<B, OPERATION>(cpu, o, step)
+}
+
+/// The same in general; by itself, so that the usual way saves no registers.
+#[inline(never)]
+fn three_exactly<B: Bus, const OPERATION: u8>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
     cpu.use_floating_point()?;
     let (d, n, m) = (cpu.float(o.d), cpu.float(o.n), cpu.float(o.m));
     let status = &mut cpu.floating;
@@ -222,6 +244,19 @@ fn address<B: Bus>(cpu: &Cpu<B>, o: Operands) -> u32 {
 
 /// VLDR of x registers.
 pub(in crate::cpu) fn vldr<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+    if o.x == 1
+        && cpu.floating_ready
+        && let Some(bits) = cpu.load_at_once::<4>(address(cpu, o))
+    {
+        cpu.set_float(o.d, bits);
+        return cpu.next(step);
+    }
+    vldr_elsewhere(cpu, o, step)
+}
+
+/// The same in general; by itself, so that the usual way saves no registers.
+#[inline(never)]
+fn vldr_elsewhere<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
     cpu.use_floating_point()?;
     let at = address(cpu, o);
     if o.x == 2 {
@@ -238,6 +273,15 @@ pub(in crate::cpu) fn vldr<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> 
 
 /// VSTR of x registers.
 pub(in crate::cpu) fn vstr<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+    if o.x == 1 && cpu.floating_ready && cpu.store_at_once::<4>(address(cpu, o), cpu.float(o.d)) {
+        return cpu.next(step);
+    }
+    vstr_elsewhere(cpu, o, step)
+}
+
+/// The same in general; by itself, so that the usual way saves no registers.
+#[inline(never)]
+fn vstr_elsewhere<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
     cpu.use_floating_point()?;
     let at = address(cpu, o);
     for i in 0..o.x {

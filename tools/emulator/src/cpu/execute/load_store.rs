@@ -25,10 +25,10 @@ pub(in crate::cpu) const ABSOLUTE: u8 = 2;
 pub(in crate::cpu) const BEFORE: u8 = 3;
 pub(in crate::cpu) const AFTER: u8 = 4;
 
-/// Loads d, or stores it.
+/// The address, and what n becomes where it changes.
 #[inline(always)]
-fn access<B: Bus, const WHAT: u8, const ADDRESS: u8>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
-    let (address, changed) = match ADDRESS {
+fn addressed<B: Bus, const ADDRESS: u8>(cpu: &Cpu<B>, o: Operands) -> (u32, u32) {
+    match ADDRESS {
         OFFSET => (cpu.get(o.n).wrapping_add(o.immediate), 0),
         INDEXED => (cpu.get(o.n).wrapping_add(cpu.get(o.m) << (o.immediate & 3)), 0),
         ABSOLUTE => (o.immediate, 0),
@@ -37,31 +37,66 @@ fn access<B: Bus, const WHAT: u8, const ADDRESS: u8>(cpu: &mut Cpu<B>, o: Operan
             (address, address)
         }
         _ => (cpu.get(o.n), cpu.get(o.n).wrapping_add(o.immediate)),
-    };
-    let value = match WHAT {
-        STR | STRH | STRB => {
-            let value = cpu.get(o.d);
-            match WHAT {
-                STR => cpu.store::<4>(address, value)?,
-                STRH => cpu.store::<2>(address, value & 0xffff)?,
-                _ => cpu.store::<1>(address, value & 0xff)?,
-            }
-            write_back::<B, ADDRESS>(cpu, o.n, changed);
-            return cpu.next(step);
-        }
-        LDR => cpu.load::<4>(address)?,
-        LDRH => cpu.load::<2>(address)?,
-        LDRB => cpu.load::<1>(address)?,
-        LDRSH => cpu.load::<2>(address)? as u16 as i16 as u32,
-        _ => cpu.load::<1>(address)? as u8 as i8 as u32,
-    };
-    write_back::<B, ADDRESS>(cpu, o.n, changed);
-    if WHAT == LDR {
-        cpu.set_any(o.d, value);
-    } else {
-        cpu.set(o.d, value);
     }
+}
+
+/// Loads d, or stores it.
+#[inline(always)]
+fn access<B: Bus, const WHAT: u8, const ADDRESS: u8>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+    let (address, changed) = addressed::<B, ADDRESS>(cpu, o);
+    if loads(WHAT) {
+        let loaded = match WHAT {
+            LDR => cpu.load_at_once::<4>(address),
+            LDRH | LDRSH => cpu.load_at_once::<2>(address),
+            _ => cpu.load_at_once::<1>(address),
+        };
+        let Some(value) = loaded else { return access_elsewhere::<B, WHAT, ADDRESS>(cpu, o) };
+        set_loaded::<B, WHAT>(cpu, o.d, value);
+    } else {
+        let value = cpu.get(o.d);
+        let stored = match WHAT {
+            STR => cpu.store_at_once::<4>(address, value),
+            STRH => cpu.store_at_once::<2>(address, value & 0xffff),
+            _ => cpu.store_at_once::<1>(address, value & 0xff),
+        };
+        if !stored {
+            return access_elsewhere::<B, WHAT, ADDRESS>(cpu, o);
+        }
+    }
+    write_back::<B, ADDRESS>(cpu, o.n, changed);
     cpu.next(step)
+}
+
+/// The same of memory that does not answer at once, and unaligned; by itself, so that the usual way saves no registers.
+#[inline(never)]
+fn access_elsewhere<B: Bus, const WHAT: u8, const ADDRESS: u8>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+    let (address, changed) = addressed::<B, ADDRESS>(cpu, o);
+    let value = cpu.get(o.d);
+    match WHAT {
+        STR => cpu.store::<4>(address, value)?,
+        STRH => cpu.store::<2>(address, value & 0xffff)?,
+        STRB => cpu.store::<1>(address, value & 0xff)?,
+        _ => {
+            let value = match WHAT {
+                LDR => cpu.load::<4>(address)?,
+                LDRH | LDRSH => cpu.load::<2>(address)?,
+                _ => cpu.load::<1>(address)?,
+            };
+            set_loaded::<B, WHAT>(cpu, o.d, value);
+        }
+    }
+    write_back::<B, ADDRESS>(cpu, o.n, changed);
+    Ok(())
+}
+
+#[inline(always)]
+fn set_loaded<B: Bus, const WHAT: u8>(cpu: &mut Cpu<B>, register: u8, value: u32) {
+    match WHAT {
+        LDR => cpu.set_any(register, value),
+        LDRSH => cpu.set(register, value as u16 as i16 as u32),
+        LDRSB => cpu.set(register, value as u8 as i8 as u32),
+        _ => cpu.set(register, value),
+    }
 }
 
 #[inline(always)]

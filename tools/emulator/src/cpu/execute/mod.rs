@@ -11,6 +11,13 @@ pub(super) mod system;
 use super::Cpu;
 use crate::bus::Bus;
 
+/// What general registers keep of what is written.
+const KEPT: [u32; 16] = {
+    let mut kept = [u32::MAX; 16];
+    kept[13] = !3;
+    kept
+};
+
 impl<B: Bus> Cpu<B> {
     /// Value of a general register; never asked for the program counter.
     #[inline(always)]
@@ -27,7 +34,8 @@ impl<B: Bus> Cpu<B> {
     /// Sets a general register that may be the stack pointer, whose lowest two bits are always 0.
     #[inline(always)]
     pub(super) fn set_any(&mut self, register: u8, value: u32) {
-        self.r[usize::from(register & 15)] = if register == 13 { value & !3 } else { value };
+        let place = usize::from(register & 15);
+        self.r[place] = value & KEPT[place];
     }
 
     #[inline(always)]

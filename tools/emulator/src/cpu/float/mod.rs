@@ -1,7 +1,7 @@
 //! Single-precision arithmetic as the floating-point unit does it, to the bit: rounding modes, NaNs, flush to zero, exception flags.
 //!
 //! ARM DDI 0403, A2.5 and its pseudo-code. The host's arithmetic is the same where the mode is the usual one, the result is
-//! a normal number and nothing is left to flag: that is nearly always, because the inexact flag is sticky. Everything else takes the
+//! a normal number (or exact) and nothing is left to flag: that is nearly always, because the inexact flag is sticky. Everything else takes the
 //! way of `exact`, which computes with integers.
 
 mod convert;
@@ -81,48 +81,71 @@ impl Status {
     /// smallest exponent may have been rounded up to it, which is an underflow.
     #[inline(always)]
     fn trusts(self, result: u32) -> bool {
-        self.0 & (MODES | INEXACT) == INEXACT && (result & 0x7f80_0000).wrapping_sub(0x0100_0000) < 0x7e80_0000
+        self.is_usual() && (result & 0x7f80_0000).wrapping_sub(0x0100_0000) < 0x7e80_0000
+    }
+
+    /// The same of a sum, and of a product with zero: those are exact where they are small, so that no finite one is an underflow.
+    #[inline(always)]
+    fn trusts_finite(self, result: u32) -> bool {
+        self.is_usual() && result & 0x7f80_0000 != 0x7f80_0000
+    }
+
+    /// The usual mode, with the sticky inexact flag set.
+    #[inline(always)]
+    fn is_usual(self) -> bool {
+        self.0 & (MODES | INEXACT) == INEXACT
     }
 }
 
-/// The host's result if it can be trusted, the exact way otherwise.
+/// The host's result if it can be trusted, the exact way otherwise; and the host's alone.
 macro_rules! operation {
-    ($(#[$doc:meta])* $name:ident($($operand:ident),+) = $host:expr) => {
+    ($(#[$doc:meta])* $name:ident, $at_once:ident($($operand:ident),+) = $host:expr, $trust:expr) => {
         $(#[$doc])*
         #[inline(always)]
         pub fn $name($($operand: u32,)+ status: &mut Status) -> u32 {
+            match $at_once($($operand,)+ *status) {
+                Some(result) => result,
+                None => exact::$name($($operand,)+ status),
+            }
+        }
+
+        /// The same if the host's result can be trusted; none otherwise.
+        #[inline(always)]
+        pub(super) fn $at_once($($operand: u32,)+ status: Status) -> Option<u32> {
             let result = {
                 $(let $operand = f32::from_bits($operand);)+
                 $host.to_bits()
             };
-            if status.trusts(result) { result } else { exact::$name($($operand,)+ status) }
+            let trust: fn(Status, u32, bool) -> bool = $trust;
+            let zero = [$($operand),+].contains(&0) || [$($operand),+].contains(&0x8000_0000);
+            trust(status, result, zero).then_some(result)
         }
     };
 }
 
 operation! {
     /// FPAdd.
-    add(a, b) = (a + b)
+    add, add_at_once(a, b) = (a + b), |status, result, _| status.trusts_finite(result)
 }
 operation! {
     /// FPSub.
-    subtract(a, b) = (a - b)
+    subtract, subtract_at_once(a, b) = (a - b), |status, result, _| status.trusts_finite(result)
 }
 operation! {
     /// FPMul.
-    multiply(a, b) = (a * b)
+    multiply, multiply_at_once(a, b) = (a * b), |status, result, zero| status.trusts(result) || zero && status.trusts_finite(result)
 }
 operation! {
     /// FPDiv.
-    divide(a, b) = (a / b)
+    divide, divide_at_once(a, b) = (a / b), |status, result, _| status.trusts(result)
 }
 operation! {
     /// FPSqrt.
-    square_root(a) = a.sqrt()
+    square_root, square_root_at_once(a) = a.sqrt(), |status, result, _| status.trusts(result)
 }
 operation! {
     /// FPMulAdd: `addend` + `a` `b`, rounded once.
-    multiply_add(addend, a, b) = a.mul_add(b, addend)
+    multiply_add, multiply_add_at_once(addend, a, b) = a.mul_add(b, addend), |status, result, _| status.trusts(result)
 }
 
 /// FPNeg: also of a NaN.
