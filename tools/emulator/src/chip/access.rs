@@ -340,6 +340,7 @@ impl<W: Wiring> Chip<W> {
                 self.tell_driven(port, now);
             }
         }
+        self.connect();
         for index in 0..self.timers.len() {
             self.tell(index, now);
         }

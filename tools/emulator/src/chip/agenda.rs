@@ -59,21 +59,16 @@ impl Agenda {
         }
     }
 
-    /// Those of some places in which something is due at a cycle, or that may have changed: from the first to the last, as they are now.
+    /// Bits of the places in which something is due at a cycle.
     #[inline]
-    pub fn due(&self, cycle: u64, places: std::ops::Range<usize>) -> impl Iterator<Item = usize> + use<> {
-        let mut due = places
-            .clone()
-            .zip(self.next.get(places.clone()).unwrap_or_default())
-            .fold(self.changed & ((1 << places.end) - (1 << places.start)), |due, (place, next)| {
-                due | u32::from(*next <= cycle) << place
-            });
-        std::iter::from_fn(move || {
-            let place = due.trailing_zeros() as usize;
-            // The lowest bit goes.
-            due &= due.wrapping_sub(1);
-            (place < PLACES).then_some(place)
-        })
+    pub fn due(&self, cycle: u64) -> u32 {
+        self.next.iter().enumerate().fold(0, |due, (place, next)| due | u32::from(*next <= cycle) << place)
+    }
+
+    /// Bits of the places that may have changed.
+    #[inline]
+    pub const fn changed(&self) -> u32 {
+        self.changed
     }
 
     /// The earliest cycle of all.
@@ -87,6 +82,18 @@ impl Agenda {
     pub const fn lines(&self) -> u128 {
         self.all_lines
     }
+}
+
+/// The numbers of the bits that are set among some of them, from the lowest on.
+#[inline]
+pub fn numbers(bits: u32, among: std::ops::Range<usize>) -> impl Iterator<Item = usize> {
+    let mut left = bits & ((1u32 << among.end) - (1 << among.start));
+    std::iter::from_fn(move || {
+        let number = left.trailing_zeros() as usize;
+        // The lowest bit goes.
+        left &= left.wrapping_sub(1);
+        (number < 32).then_some(number)
+    })
 }
 
 #[cfg(test)]
@@ -108,11 +115,10 @@ mod tests {
         let mut agenda = Agenda::new(PLACES);
         agenda.note(0, 100, 0);
         agenda.note(1, 90, 0);
-        let due = |agenda: &Agenda, cycle| agenda.due(cycle, 0..2).collect::<Vec<_>>();
-        assert_eq!([due(&agenda, 89), due(&agenda, 99), due(&agenda, 100)], [vec![], vec![1], vec![0, 1]]);
+        assert_eq!([agenda.due(89), agenda.due(99), agenda.due(100)], [0, 2, 3]);
         agenda.touch(0);
-        assert_eq!((due(&agenda, 0), agenda.first_touched()), (vec![0], Some(0)));
+        assert_eq!((agenda.changed() & 3, agenda.first_touched()), (1, Some(0)));
         agenda.note(0, 100, 0);
-        assert!(due(&agenda, 0).is_empty());
+        assert_eq!(agenda.changed() & 3, 0);
     }
 }

@@ -1,6 +1,7 @@
 //! What happens by itself, in the order of time, and what peripherals tell each other.
 
 use super::adc::{Due, Trigger};
+use super::agenda::numbers;
 use super::memory::SRAM;
 use super::rcc::Cause;
 use super::time::Instant;
@@ -20,22 +21,25 @@ impl<W: Wiring> Chip<W> {
 
     /// Does what is due at a cycle: timers first, as they start conversions.
     fn step(&mut self, cycle: u64) {
-        for index in self.agenda.due(cycle, 0..self.timers.len()) {
-            if self.timers[index].next() <= cycle {
+        let due = self.agenda.due(cycle);
+        // Of those that may have changed it is not known whether they are due.
+        let before = self.agenda.changed();
+        for index in numbers(due | before, 0..self.timers.len()) {
+            if before >> index & 1 == 0 || self.timers[index].next() <= cycle {
                 self.agenda.touch(index);
                 self.timers[index].advance(cycle);
                 self.tell(index, cycle);
             }
         }
         let first = self.converter_place(0);
-        for place in self.agenda.due(cycle, first..first + self.converters.len()) {
+        for place in numbers(due | self.agenda.changed(), first..first + self.converters.len()) {
             if self.converters[place - first].next() <= cycle {
                 self.agenda.touch(place);
                 self.convert(place - first, cycle);
             }
         }
         let first = self.spi_place(0);
-        for place in self.agenda.due(cycle, first..first + self.spis.len()) {
+        for place in numbers(due | self.agenda.changed(), first..first + self.spis.len()) {
             let index = place - first;
             if let Some((mut frame, began)) = self.spis[index].ended(cycle, self.clock.frequency()) {
                 self.agenda.touch(place);
@@ -138,17 +142,16 @@ impl<W: Wiring> Chip<W> {
 
     /// Releases what no pin carries.
     fn connected(&self, mut pwm: Pwm) -> Pwm {
-        let carries = |output: &&variant::TimerOutput| {
-            output.timer == pwm.timer && self.gpio.mode(output.pin) == super::gpio::Mode::Alternate(output.function)
-        };
         let (mut high, mut low) = ([Gate::Released; 3], [Gate::Released; 3]);
-        for output in OUTPUTS.iter().filter(carries) {
+        for output in numbers(self.carried, 0..OUTPUTS.len()).filter_map(|number| OUTPUTS.get(number)) {
             let leg = usize::from(output.channel).wrapping_sub(1);
             let (gates, gate): (&mut [Gate; 3], fn(&Leg) -> Gate) = match output.complementary {
                 false => (&mut high, |leg| leg.high),
                 true => (&mut low, |leg| leg.low),
             };
-            if let (Some(place), Some(leg)) = (gates.get_mut(leg), pwm.legs.get(leg)) {
+            if output.timer == pwm.timer
+                && let (Some(place), Some(leg)) = (gates.get_mut(leg), pwm.legs.get(leg))
+            {
                 *place = gate(leg);
             }
         }
@@ -158,8 +161,17 @@ impl<W: Wiring> Chip<W> {
         pwm
     }
 
+    /// Looks which timers' outputs the pins carry: to be called when a pin's function may have changed.
+    pub(super) fn connect(&mut self) {
+        let carries =
+            |output: &variant::TimerOutput| self.gpio.mode(output.pin) == super::gpio::Mode::Alternate(output.function);
+        let bits = OUTPUTS.iter().enumerate().map(|(number, output)| u32::from(carries(output)) << number);
+        self.carried = bits.sum();
+    }
+
     /// Tells the board of all timers' outputs anew: a pin was connected or disconnected.
     pub(super) fn tell_outputs(&mut self, cycle: u64) {
+        self.connect();
         for index in 0..self.timers.len() {
             self.agenda.touch(index);
             self.timers[index].advance(cycle);
@@ -178,6 +190,10 @@ impl<W: Wiring> Chip<W> {
             }
             false => u64::MAX,
         };
+        self.slow_lines = u128::from(self.flash.interrupts()) << variant::FLASH_LINE;
+        for (line, level) in variant::FDCAN_LINES.into_iter().zip(self.fdcan.interrupts()) {
+            self.slow_lines |= u128::from(level) << line;
+        }
         // The flash's state, its latency, a reset.
         self.news = true;
         self.refresh();
@@ -219,12 +235,7 @@ impl<W: Wiring> Chip<W> {
             self.agenda.note(place, next, lines);
         }
         self.next = self.agenda.next().min(self.next_slow);
-
-        let mut lines = self.agenda.lines();
-        for (line, level) in variant::FDCAN_LINES.into_iter().zip(self.fdcan.interrupts()) {
-            lines |= u128::from(level) << line;
-        }
-        lines |= u128::from(self.flash.interrupts()) << variant::FLASH_LINE;
+        let lines = self.agenda.lines() | self.slow_lines;
         self.news |= lines != self.lines;
         self.lines = lines;
     }

@@ -93,6 +93,10 @@ pub struct Chip<W> {
     /// Earliest event of what counts time.
     next_slow: u64,
     lines: u128,
+    /// Those of what counts time.
+    slow_lines: u128,
+    /// Bit of each of `OUTPUTS` that its pin carries.
+    carried: u32,
     reset: bool,
     /// There may be signals that the core has not been told.
     news: bool,
@@ -128,6 +132,8 @@ impl<W: Wiring> Chip<W> {
             next: u64::MAX,
             next_slow: u64::MAX,
             lines: 0,
+            slow_lines: 0,
+            carried: 0,
             reset: false,
         };
         assert!(chip.spi_place(variant.spis.len()) <= agenda::PLACES, "{} has too many peripherals", variant.name);
@@ -258,6 +264,7 @@ impl<W: Wiring> Chip<W> {
         for port in 0..PORTS {
             self.gpio.reset(port);
         }
+        self.connect();
         self.agenda.touch_all();
         self.timers.iter_mut().for_each(Timer::reset);
         self.converters.iter_mut().for_each(Converter::reset);
