@@ -68,6 +68,16 @@ pub trait Bus {
     fn store(&mut self, _address: u32, _width: Width, _value: u32) -> bool {
         false
     }
+    /// Memory that answers such loads, all bytes of a block.
+    #[inline(always)]
+    fn block(&self, _address: u32, _bytes: u32) -> Option<&[u8]> {
+        None
+    }
+    /// Memory that takes such stores, all bytes of a block.
+    #[inline(always)]
+    fn block_mut(&mut self, _address: u32, _bytes: u32) -> Option<&mut [u8]> {
+        None
+    }
     /// Half a word of code.
     fn fetch(&mut self, now: u64, address: u32) -> Result<u16, Refusal>;
     /// Where code may lie; what the core keeps decoded.

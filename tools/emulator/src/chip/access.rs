@@ -38,6 +38,16 @@ impl<W: Wiring> Bus for Chip<W> {
         self.memory.write(address, width, value).is_some()
     }
 
+    #[inline(always)]
+    fn block(&self, address: u32, bytes: u32) -> Option<&[u8]> {
+        self.memory.block(address, bytes)
+    }
+
+    #[inline(always)]
+    fn block_mut(&mut self, address: u32, bytes: u32) -> Option<&mut [u8]> {
+        self.memory.block_mut(address, bytes)
+    }
+
     fn fetch(&mut self, now: u64, address: u32) -> Result<u16, Refusal> {
         self.read(now, address, Width::Half).map(|value| value as u16)
     }

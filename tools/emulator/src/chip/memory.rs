@@ -111,6 +111,20 @@ impl Memory {
         store(&mut self.bytes, place, width, value)
     }
 
+    /// Bytes of SRAM; none where they do not all lie there.
+    #[inline(always)]
+    pub fn block(&self, address: u32, bytes: u32) -> Option<&[u8]> {
+        let place = self.place(address);
+        self.bytes.get(place..place.checked_add(bytes as usize)?)
+    }
+
+    /// The same, to change.
+    #[inline(always)]
+    pub fn block_mut(&mut self, address: u32, bytes: u32) -> Option<&mut [u8]> {
+        let place = self.place(address);
+        self.bytes.get_mut(place..place.checked_add(bytes as usize)?)
+    }
+
     /// A load from the signature at the end of system memory; what else lies there is ST's.
     pub fn read_signature(&self, address: u32, width: Width) -> Result<u32, Refusal> {
         let size = self.flash_kib.to_le_bytes();

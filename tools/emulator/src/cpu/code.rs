@@ -85,6 +85,12 @@ impl<B: Bus> Code<B> {
         address < SRAM.start || address.wrapping_sub(self.changeable.start) < self.changeable_length
     }
 
+    /// The same of a store of several bytes.
+    #[inline(always)]
+    pub fn changes_block(&self, address: u32, bytes: u32) -> bool {
+        self.changes(address) || self.changeable.start.wrapping_sub(address) < bytes && self.changeable_length != 0
+    }
+
     /// Whether an address lies in the current region.
     #[inline(always)]
     pub fn holds(&self, address: u32) -> bool {

@@ -163,8 +163,36 @@ pub(super) fn block(base: u32, bytes: u32, below: bool) -> (u32, u32) {
     if below { (end, end) } else { (base, base.wrapping_add(bytes)) }
 }
 
-/// LDM, POP. Registers are loaded as they come; the base keeps its value where a load faults.
+/// LDM, POP.
 pub(in crate::cpu) fn load_several<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+    let bytes = 4 * o.immediate.count_ones();
+    let (address, changed) = block(cpu.get(o.n), bytes, u32::from(o.x) & BELOW != 0);
+    let at_once = if address & 3 == 0 { cpu.bus.block(address, bytes) } else { None };
+    let Some(memory) = at_once else { return load_several_elsewhere(cpu, o, step) };
+    let mut words = memory.chunks_exact(4).filter_map(|word| word.first_chunk()).map(|word| u32::from_le_bytes(*word));
+    // A multiple of 4, whichever register it is. Where the base is loaded as well, that is what it becomes.
+    if u32::from(o.x) & CHANGES != 0 {
+        cpu.r[usize::from(o.n & 15)] = changed;
+    }
+    let mut list = o.immediate & 0x7fff;
+    while list != 0
+        && let Some(word) = words.next()
+    {
+        cpu.r[(list.trailing_zeros() & 15) as usize] = word;
+        list &= list - 1;
+    }
+    match words.next() {
+        Some(target) => {
+            cpu.branch_exchange(target)?;
+            Err(Leave::Jumped)
+        }
+        None => cpu.next(step),
+    }
+}
+
+/// The same of other memory. Registers are loaded as they come; the base keeps its value where a load faults.
+#[inline(never)]
+fn load_several_elsewhere<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
     let base = cpu.get(o.n);
     let (mut address, changed) = block(base, 4 * o.immediate.count_ones(), u32::from(o.x) & BELOW != 0);
     let mut list = o.immediate & 0x7fff;
@@ -193,6 +221,25 @@ pub(in crate::cpu) fn load_several<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: 
 
 /// STM, PUSH.
 pub(in crate::cpu) fn store_several<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+    let bytes = 4 * o.immediate.count_ones();
+    let (address, changed) = block(cpu.get(o.n), bytes, u32::from(o.x) & BELOW != 0);
+    let unusual = address & 3 != 0 || cpu.code.changes_block(address, bytes);
+    let at_once = if unusual { None } else { cpu.bus.block_mut(address, bytes) };
+    let Some(memory) = at_once else { return store_several_elsewhere(cpu, o, step) };
+    let mut list = o.immediate;
+    for word in memory.chunks_exact_mut(4) {
+        word.copy_from_slice(&cpu.r[(list.trailing_zeros() & 15) as usize].to_le_bytes());
+        list &= list.wrapping_sub(1);
+    }
+    if u32::from(o.x) & CHANGES != 0 {
+        cpu.set_any(o.n, changed);
+    }
+    cpu.next(step)
+}
+
+/// The same of other memory.
+#[inline(never)]
+fn store_several_elsewhere<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
     let (mut address, changed) = block(cpu.get(o.n), 4 * o.immediate.count_ones(), u32::from(o.x) & BELOW != 0);
     let mut list = o.immediate;
     while list != 0 {
