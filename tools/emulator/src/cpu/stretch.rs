@@ -17,8 +17,8 @@ use crate::bus::Bus;
 const LONGEST: usize = 32;
 /// Half-words that those take, at most.
 pub(super) const SPAN: usize = 2 * LONGEST;
-/// So many steps are kept; behind them all stretches are formed anew.
-const KEPT: usize = 1 << 20;
+/// So many steps are kept, 6 MB; behind them all stretches are formed anew.
+const KEPT: usize = 1 << 18;
 
 /// An instruction of a stretch.
 pub(super) struct Step<B: Bus> {

@@ -7,6 +7,7 @@ mod faults;
 mod floating_point;
 mod load_store;
 mod priorities;
+mod stretches;
 mod watching;
 
 use super::{Cpu, End};

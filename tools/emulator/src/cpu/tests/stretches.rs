@@ -1,0 +1,81 @@
+//! Stretches against single steps: the same registers, flags, memory, cycles and counts, wherever a run ends.
+
+use super::{DATA, machine};
+use crate::cpu::{Cpu, End};
+use crate::memory::Memory;
+use proptest::prelude::*;
+
+/// Instructions that stretches are made of, and that end them; r7 is the address of the data.
+const PIECES: &[&[u16]] = &[
+    // movs r0, #1; adds r0, #1; adds r0, r0, r1; cmp r0, #2; cmp r0, r1; lsls r2, r0, #3
+    &[0x2001],
+    &[0x3001],
+    &[0x1840],
+    &[0x2802],
+    &[0x4288],
+    &[0x00c2],
+    // ldr r0, [r7]; str r1, [r7, #4]; ldr r1, [r7, #4]; ldr.w r3, [r7, #1], which is not aligned; ldr r2, [pc, #4], from flash
+    &[0x6838],
+    &[0x6079],
+    &[0x6879],
+    &[0xf8d7, 0x3001],
+    &[0x4a01],
+    // push {r0, r1}; pop {r1, r2}; bl to the next instruction
+    &[0xb403],
+    &[0xbc06],
+    &[0xf000, 0xf800],
+    // beq over a nop; it eq, moveq r1, #5; ite ne, ldrne r0, [r7], moveq r2, #2; it cs, cmpcs r1, #1
+    &[0xd000, 0xbf00],
+    &[0xbf08, 0x2105],
+    &[0xbf14, 0x6838, 0x2202],
+    &[0xbf28, 0x2901],
+    // itt eq, streq.w r0, [r7, #3], which is not aligned, addeq r0, #1; mrs r3, apsr; cpsid i; cpsie i
+    &[0xbf04, 0xf8c7, 0x0003, 0x3001],
+    &[0xf3ef, 0x8300],
+    &[0xb672],
+    &[0xb662],
+];
+
+/// All pieces three times around; a breakpoint follows.
+fn looped(pieces: &[usize], wait_states: u32) -> Cpu<Memory> {
+    let mut code: Vec<u16> =
+        pieces.iter().filter_map(|piece| PIECES.get(*piece)).flat_map(|piece| piece.to_vec()).collect();
+    // subs r6, #1; bne to the beginning.
+    code.push(0x3e01);
+    let back = -(code.len() as i32) - 2;
+    code.push(0xd100 | (back & 0xff) as u16);
+    let mut cpu = machine(&code);
+    cpu.bus.wait_states = wait_states;
+    cpu.set_register(6, 3);
+    cpu.set_register(7, DATA);
+    cpu
+}
+
+fn state(cpu: &Cpu<Memory>) -> (Vec<u32>, u32, u64, u64, Vec<u8>) {
+    let registers = (0..16).map(|number| cpu.register(number)).collect();
+    let memory = cpu.bus.bytes(DATA, 16).expect("data").to_vec();
+    (registers, cpu.xpsr(), cpu.now(), cpu.instructions(), memory)
+}
+
+proptest! {
+    #[test]
+    fn a_run_is_its_steps(
+        pieces in prop::collection::vec(0..PIECES.len(), 1..28), wait_states in 0u32..5, parts in prop::collection::vec(1u64..60, 1..40)
+    ) {
+        let (mut runs, mut steps) = (looped(&pieces, wait_states), looped(&pieces, wait_states));
+        for part in parts.iter().cycle() {
+            let until = runs.now() + part;
+            let end = runs.run(until);
+            let mut stepped = None;
+            while stepped.is_none() && steps.now() < until {
+                stepped = steps.step();
+            }
+            prop_assert_eq!(state(&runs), state(&steps));
+            prop_assert_eq!(stepped, if end == End::Time { None } else { Some(end.clone()) });
+            if end != End::Time {
+                prop_assert!(matches!(end, End::Breakpoint { number: 0, .. }), "{}", end);
+                break;
+            }
+        }
+    }
+}
