@@ -88,7 +88,7 @@ impl Interrupts {
     /// The most urgent of the exceptions whose bits are set, the lowest number of several, with its priority.
     fn most_urgent(&self, system: u32, external: [u32; 4]) -> Option<(i16, u16)> {
         let mut best: Option<(i16, u16)> = None;
-        for (mut word, base) in [system].into_iter().chain(external).zip([0, 16, 48, 80, 112]) {
+        let mut look = |mut word: u32, base: u16| {
             while word != 0 {
                 let number = base + word.trailing_zeros() as u16;
                 word &= word - 1;
@@ -97,6 +97,10 @@ impl Interrupts {
                     best = Some((priority, number));
                 }
             }
+        };
+        look(system, 0);
+        if external != [0; 4] {
+            (0..).zip(external).for_each(|(place, word)| look(word, EXTERNAL + 32 * place));
         }
         best
     }
