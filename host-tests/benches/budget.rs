@@ -31,8 +31,8 @@ const TEMPORARY: &str = env!("CARGO_TARGET_TMPDIR");
 const CONTROL: u16 = 16 + 18;
 /// Inputs that each network evaluates; as many as the program `networks` has room for.
 const INPUTS: usize = 200;
-/// Control interrupts of a board's program that are taken apart.
-const INTERRUPTS: usize = 100;
+/// Control interrupts of a board's program that are taken apart: more than come between two that do what a task asks for.
+const INTERRUPTS: usize = 1000;
 /// How long the boards' programs run, s.
 const RUN: f64 = 1.2;
 
@@ -282,6 +282,12 @@ fn around<W: Wired>(emulation: &mut Emulation<W>, path: &Path) -> Outcome<[u64; 
     let cpu = &mut emulation.cpu;
     cpu.set_watch(None);
     let mut board = Vec::new();
+    // One that is under way would be taken apart from its middle on.
+    while cpu.exception() == CONTROL {
+        if let Some(end) = cpu.step() {
+            return Err(end.to_string().into());
+        }
+    }
     for _ in 0..INTERRUPTS {
         cpu.clear_exception_times();
         let (mut in_joint, mut joint) = (false, 0);
