@@ -34,7 +34,7 @@ struct Control {
 
 /// What tasks command the joint with; each of the two has one owner.
 pub struct Commands {
-    /// Set-points and the controlword: the newest counts, from the next control step on.
+    /// Set-points and the controlword: the newest counts, from the next control step on; a set-point in the next round of the motion loop.
     pub demand: Publisher<Demand>,
     /// Configuration and friction model, prepared: swapped between two control steps.
     pub active: Offering<Active>,

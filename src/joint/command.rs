@@ -33,7 +33,7 @@ pub struct Command {
     pub damping: f32,
 }
 
-/// Everything that is asked of the joint in a control step.
+/// Everything that is asked of the joint in a control step. The set-point is looked at once a round of the motion loop.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Demand {
     /// For the state machine.
