@@ -14,7 +14,7 @@ use host_tests::counted_steps::{PARTS, Step, counted, spread};
 use host_tests::peer_networks::{Exact, scaled};
 use host_tests::states::within;
 use joint_firmware::friction::state::SIGNALS;
-use joint_firmware::joint::motion_loop::MOTION_STEPS;
+use joint_firmware::joint::configuration::MOTION_STEPS;
 use object::read::elf::{FileHeader, ProgramHeader};
 use plant::ActuatorParameters;
 use rand_chacha::ChaCha8Rng;

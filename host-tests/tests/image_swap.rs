@@ -4,7 +4,7 @@ use host_tests::driving::{demand, enabled};
 use host_tests::informed::informed;
 use joint_firmware::compensation::Request;
 use joint_firmware::friction::FrictionModel;
-use joint_firmware::joint::motion_loop::MOTION_STEPS;
+use joint_firmware::joint::configuration::MOTION_STEPS;
 use joint_firmware::joint::state_machine::State;
 use plant::actuator::ActuatorParameters;
 use plant::excitation::{Segment, Trajectory};

@@ -1,9 +1,8 @@
 //! A configuration as the control step uses it: gains, limits and scales prepared, nothing left to divide; task, host.
 
 use super::configuration::{
-    BridgeConfiguration, Configuration, ConfigurationError, GearConfiguration, Limits, VelocitySource,
+    BridgeConfiguration, Configuration, ConfigurationError, GearConfiguration, Limits, MOTION_STEPS, VelocitySource,
 };
-use super::motion_loop::MOTION_STEPS;
 use crate::compensation::Settings;
 use crate::friction::FrictionModel;
 use crate::motor::angle::{Direction, EncoderAlignment, STEPS, TAU};

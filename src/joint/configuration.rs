@@ -3,10 +3,12 @@
 //! It is separate from the friction image: it changes when the joint is built or its limits are set, the image whenever the
 //! friction is learned anew.
 
-use super::motion_loop::MOTION_STEPS;
 use crate::compensation::SettingsError;
 use crate::motor::angle::EncoderAlignment;
 use crate::motor::setting::{SettingError, check};
+
+/// Control steps of a round of the motion loop, each of which does a [stage](super::motion_loop::Stage) of it.
+pub const MOTION_STEPS: u32 = 5;
 
 /// Motor and encoder on its shaft.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -11,8 +11,8 @@
 
 use super::JointMotion;
 use super::active::{Active, VOLTAGE_FILTER};
+use super::configuration::MOTION_STEPS;
 use super::fault::{Fault, Faults};
-use super::motion_loop::MOTION_STEPS;
 use super::signals::Measurements;
 use crate::motor::angle::{STEPS, TAU};
 use crate::motor::field_oriented::FieldOrientedOutput;

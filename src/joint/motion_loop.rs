@@ -1,4 +1,4 @@
-//! The motion loop: from a command to the torque that the current loop is to make, a round of it in [`MOTION_STEPS`] control steps;
+//! The motion loop: from a command to the torque that the current loop is to make, a round of it in [`MOTION_STEPS`](super::configuration::MOTION_STEPS) control steps;
 //! control step.
 //!
 //! A position, a velocity and friction change in milliseconds, and a control step has to be short: each does one stage of a round, and torques are
@@ -10,9 +10,6 @@ use super::friction_feedforward::{Compensated, FrictionFeedforward, Surroundings
 use super::motion_law::{MotionLaw, Wanted};
 use super::state_machine::State;
 use crate::motor::number::limited;
-
-/// Control steps of a round, each of which does a stage of it.
-pub const MOTION_STEPS: u32 = 5;
 
 /// The stages of a round, in their order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -8,7 +8,7 @@ use std::ops::Range;
 
 #[derive(Clone)]
 pub(super) struct Code<B: Bus> {
-    pub(super) operations: Vec<Operation<B>>,
+    operations: Vec<Operation<B>>,
     pub(super) stretches: Stretches<B>,
     regions: Vec<Region>,
     /// The region that the program is in.
@@ -77,6 +77,14 @@ impl<B: Bus> Code<B> {
     pub fn kept(operations: &[Operation<B>], place: usize) -> Option<Operation<B>> {
         let operation = *operations.get(place)?;
         (operation.timing.length != 0).then_some(operation)
+    }
+
+    /// The number of the stretch that begins at an address of the current region; none where nothing is decoded yet.
+    #[inline(always)]
+    pub fn stretch(&mut self, address: u32) -> Option<u32> {
+        let place = self.place(address)?;
+        let operations = &self.operations;
+        self.stretches.begins_at(place).or_else(|| self.stretches.form(place, |place| Self::kept(operations, place)))
     }
 
     /// Whether a store to an address may change what is decoded; always outside of SRAM, where programs seldom store.

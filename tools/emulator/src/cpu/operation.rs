@@ -66,6 +66,14 @@ pub(super) struct Operands {
 /// Executes an instruction, and what follows it in its stretch: the number is that of its step (see `stretch`).
 pub(super) type Execute<B> = fn(&mut Cpu<B>, Operands, u32) -> Done;
 
+/// The step of an instruction that nothing follows at once.
+pub(super) const ALONE: u32 = u32::MAX - 1;
+
+/// The state of an IT block behind an instruction (ITAdvance).
+pub(super) const fn behind(block: u8) -> u8 {
+    if block & 7 == 0 { 0 } else { block & 0xe0 | block << 1 & 0x1f }
+}
+
 /// A decoded instruction.
 pub(super) struct Operation<B: Bus> {
     pub execute: Execute<B>,

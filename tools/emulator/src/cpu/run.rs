@@ -3,15 +3,9 @@
 //! A run without a watch flows: as long as nothing is due, one stretch follows the other (see `stretch`).
 
 use super::decode::Refused;
-use super::operation::{Done, Leave, Operation};
-use super::stretch::ALONE;
+use super::operation::{ALONE, Done, Leave, Operation, behind};
 use super::{Cpu, End};
 use crate::bus::Bus;
-
-/// The state of an IT block behind an instruction (ITAdvance).
-pub(super) const fn behind(block: u8) -> u8 {
-    if block & 7 == 0 { 0 } else { block & 0xe0 | block << 1 & 0x1f }
-}
 
 impl<B: Bus> Cpu<B> {
     /// Runs until the cycle `until` is reached or something else ends the run. The instruction that reaches it completes.

@@ -7,10 +7,8 @@
 //! IT blocks are parts of stretches, up to an instruction of theirs that may branch.
 
 use super::Cpu;
-use super::code::Code;
 use super::execute::system::nothing;
-use super::operation::{Done, Execute, Flow, Leave, Operands, Operation, Trap};
-use super::run::behind;
+use super::operation::{ALONE, Done, Execute, Flow, Leave, Operands, Operation, Trap, behind};
 use crate::bus::Bus;
 
 /// Instructions of a stretch, at most.
@@ -76,8 +74,6 @@ pub(super) struct Stretches<B: Bus> {
 }
 
 const NONE: u32 = u32::MAX;
-/// The step of an instruction that nothing follows at once.
-pub(super) const ALONE: u32 = u32::MAX - 1;
 
 impl<B: Bus> Stretches<B> {
     /// None yet, of so many places.
@@ -104,9 +100,15 @@ impl<B: Bus> Stretches<B> {
         }
     }
 
+    /// The number of the stretch that begins at a place; none where none was formed.
+    #[inline(always)]
+    pub fn begins_at(&self, place: usize) -> Option<u32> {
+        self.begins.get(place).copied().filter(|number| *number != NONE)
+    }
+
     /// Forms the stretch that begins at a place. None where nothing is decoded.
     #[cold]
-    fn form(&mut self, place: usize, kept: impl Fn(usize) -> Option<Operation<B>>) -> Option<u32> {
+    pub fn form(&mut self, place: usize, kept: impl Fn(usize) -> Option<Operation<B>>) -> Option<u32> {
         let begin = kept(place)?;
         if self.steps.len() >= KEPT {
             *self = Self::new(self.begins.len());
@@ -162,21 +164,6 @@ impl<B: Bus> Stretches<B> {
         let marks = self.marks.get(stretch.first as usize..stretch.end as usize).unwrap_or_default();
         let before = marks.iter().take_while(|mark| u64::from(mark.cycles) < left).count();
         (stretch.first + before as u32 + 1).min(stretch.end)
-    }
-}
-
-impl<B: Bus> Code<B> {
-    /// The number of the stretch that begins at an address of the current region; none where nothing is decoded yet.
-    #[inline(always)]
-    fn stretch(&mut self, address: u32) -> Option<u32> {
-        let place = self.place(address)?;
-        match self.stretches.begins.get(place) {
-            Some(&number) if number != NONE => Some(number),
-            _ => {
-                let operations = &self.operations;
-                self.stretches.form(place, |place| Self::kept(operations, place))
-            }
-        }
     }
 }
 
