@@ -1,8 +1,8 @@
 //! Watches measurements and loop for faults; control step.
 //!
-//! Every check answers in the step in which its signal shows the fault. Three signals cannot be told from noise or from an ordinary
-//! transient in one step; for them the number of steps is a constant here. What each check takes until the bridge is off
-//! stands in docs/faults.md, measured.
+//! Every check answers in the step in which its signal shows the fault; that of the current loop at the end of a round
+//! of the motion loop. Three signals cannot be told from noise or from an ordinary transient in one step; for them the
+//! number of steps is a constant here. What each check takes until the bridge is off stands in docs/faults.md, measured.
 //!
 //! The current loop is watched by the motor's own equations (see [`crate::motor::current`]), on its means over a round of the motion loop: of the
 //! voltage that the bridge applied, resistance, inductance and induced voltage explain all but the errors of the constants. What is left shows an encoder that

@@ -150,3 +150,46 @@ impl MotionLoop {
         self.law.ramp_is_over()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::configuration::MOTION_STEPS;
+    use super::*;
+
+    fn active() -> Active {
+        let board = crate::default_configuration::B_G431B_ESC1;
+        board.joint.prepare(&board.bridge).unwrap()
+    }
+
+    fn step(motion_loop: &mut MotionLoop, active: &Active, state: State, torque: f32) -> f32 {
+        let surroundings = Surroundings { temperature: 25.0, coupled_velocity: 0.0 };
+        let motion = JointMotion::default();
+        let seen = Seen { motion: &motion, derating: 1.0, measured_torque: 0.0, surroundings };
+        motion_loop.step::<false>(active, state, &Command { torque, ..Command::default() }, &seen)
+    }
+
+    #[test]
+    fn a_new_state_waits_for_no_round_to_end() {
+        let active = active();
+        for before in 0..2 * MOTION_STEPS {
+            for state in [State::QuickStopActive, State::FaultReactionActive, State::SwitchedOn, State::Fault] {
+                let mut motion_loop = MotionLoop::default();
+                (0..=before).for_each(|_| {
+                    assert_eq!(step(&mut motion_loop, &active, State::OperationEnabled, 0.02), 0.02);
+                });
+                assert_eq!(step(&mut motion_loop, &active, state, 0.02), 0.0, "{state:?} after {before} steps");
+                assert_eq!(step(&mut motion_loop, &active, State::OperationEnabled, 0.01), 0.01);
+            }
+        }
+    }
+
+    #[test]
+    fn a_set_point_counts_from_the_next_round_on() {
+        let active = active();
+        let mut motion_loop = MotionLoop::default();
+        let mut torque = |wanted| step(&mut motion_loop, &active, State::OperationEnabled, wanted);
+        assert_eq!(torque(0.02), 0.02);
+        (1..MOTION_STEPS).for_each(|n| assert_eq!(torque(0.01), 0.02, "step {n}"));
+        assert_eq!(torque(0.01), 0.01);
+    }
+}
