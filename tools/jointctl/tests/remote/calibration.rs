@@ -18,8 +18,7 @@ fn forget(joint: &RemoteJoint) {
     set(joint, &pairs).unwrap();
 }
 
-#[test]
-fn a_joint_finds_the_motor_that_it_has() {
+pub fn a_joint_finds_the_motor_that_it_has() {
     let served = Served::joints(&[NODE]);
     let joint = served.joint();
     forget(&joint);
@@ -33,8 +32,7 @@ fn a_joint_finds_the_motor_that_it_has() {
     assert!(stages.contains(&"alignment".into()) && stages.last().is_some_and(|stage| stage == "done"), "{stages:?}");
 }
 
-#[test]
-fn a_calibration_ends_with_its_client_and_with_the_network_and_changes_nothing_then() {
+pub fn a_calibration_ends_with_its_client_and_with_the_network_and_changes_nothing_then() {
     let served = Served::joints(&[NODE]);
     let joint = served.joint();
     forget(&joint);

@@ -58,8 +58,7 @@ fn refused(output: &Output, arguments: &[&str], expected: &[&str]) {
     }
 }
 
-#[test]
-fn a_joint_is_looked_at_set_moved_and_fed_from_the_command_line() {
+pub fn a_joint_is_looked_at_set_moved_and_fed_from_the_command_line() {
     let desk = Desk::new();
     desk.write("first.img", &image(1, 0.25, 0));
     desk.write("second.img", &image(2, 0.5, 0));
@@ -85,8 +84,7 @@ fn a_joint_is_looked_at_set_moved_and_fed_from_the_command_line() {
     desk.prints(&["disable"], &["node 5: disabled"]);
 }
 
-#[test]
-fn what_goes_wrong_ends_in_one_line_and_exit_code_1() {
+pub fn what_goes_wrong_ends_in_one_line_and_exit_code_1() {
     let desk = Desk::new();
     desk.write("first.img", &image(1, 0.25, 0));
     desk.write("other.img", &image(1, 0.25, 99));
@@ -144,9 +142,8 @@ fn finished(child: &mut Child) -> (Option<i32>, String) {
     (code, text)
 }
 
-#[test]
 #[cfg(unix)]
-fn ctrl_c_and_termination_leave_the_joint_disabled() {
+pub fn ctrl_c_and_termination_leave_the_joint_disabled() {
     let desk = Desk::new();
     for signal in ["-INT", "-TERM"] {
         let mut child = enabled(&desk);
@@ -157,8 +154,7 @@ fn ctrl_c_and_termination_leave_the_joint_disabled() {
     }
 }
 
-#[test]
-fn an_adapter_that_goes_away_while_the_joint_is_enabled_is_reported() {
+pub fn an_adapter_that_goes_away_while_the_joint_is_enabled_is_reported() {
     let desk = Desk::new();
     let mut child = enabled(&desk);
     // The adapter hangs up. What the joint does then by itself: see the master that dies.

@@ -20,8 +20,7 @@ fn shown(joint: &RemoteJoint, name: &str) -> String {
     info::show_entry(joint, Entry::one(name).unwrap()).unwrap()
 }
 
-#[test]
-fn settings_are_taken_together_or_not_at_all() {
+pub fn settings_are_taken_together_or_not_at_all() {
     let served = Served::joints(&[NODE]);
     let joint = served.joint();
     let before = shown(&joint, "lowest-position");
@@ -56,8 +55,7 @@ fn settings_are_taken_together_or_not_at_all() {
     assert!(message.contains("staged") && message.contains("configuration.command 2"), "{message}");
 }
 
-#[test]
-fn what_is_stored_outlasts_a_reset_and_what_is_restored_does_not() {
+pub fn what_is_stored_outlasts_a_reset_and_what_is_restored_does_not() {
     let served = Served::joints(&[NODE]);
     let joint = served.joint();
     let period = || shown(&joint, "producer-heartbeat-time");
@@ -80,8 +78,7 @@ fn what_is_stored_outlasts_a_reset_and_what_is_restored_does_not() {
     stream.end().unwrap();
 }
 
-#[test]
-fn new_joints_get_the_node_ids_that_are_free() {
+pub fn new_joints_get_the_node_ids_that_are_free() {
     let served = Served::joints(&[NODE, NO_NODE_ID, NO_NODE_ID]);
     let network = Network::new(bus::open(served.bus()).unwrap());
     let mut told = Vec::new();
@@ -103,8 +100,7 @@ fn new_joints_get_the_node_ids_that_are_free() {
     assert!(address::assign(&network, 0, true, Duration::from_millis(10), &mut |_| {}).is_err());
 }
 
-#[test]
-fn the_page_says_what_an_engineer_looks_for_first() {
+pub fn the_page_says_what_an_engineer_looks_for_first() {
     let served = Served::joints(&[NODE]);
     let page = info::page(&served.joint()).unwrap();
     for expected in [

@@ -27,8 +27,7 @@ impl Stages {
     }
 }
 
-#[test]
-fn an_image_is_verified_shadowed_tried_committed_and_rolled_back() {
+pub fn an_image_is_verified_shadowed_tried_committed_and_rolled_back() {
     let served = Served::joints(&[NODE]);
     let joint = served.joint();
     let (first, second) = (image(1, 0.25, 0), image(2, 0.5, 12));
@@ -66,8 +65,7 @@ fn an_image_is_verified_shadowed_tried_committed_and_rolled_back() {
     assert_eq!(joint.discard_image().unwrap().state, State::Active);
 }
 
-#[test]
-fn a_roll_back_without_an_image_before_and_a_trial_of_no_time_are_refused() {
+pub fn a_roll_back_without_an_image_before_and_a_trial_of_no_time_are_refused() {
     let served = Served::joints(&[NODE]);
     let joint = served.joint();
     let message = joint.roll_back_image().unwrap_err().to_string();

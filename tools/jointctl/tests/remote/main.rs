@@ -1,5 +1,7 @@
 //! A joint over a bus: the virtual joint served in real time on buses within this process, driven through the library as the commands
 //! do it. What goes wrong goes wrong in one line, and leaves nothing half done.
+//!
+//! Most of their time these wait: more of them run at once than there are cores.
 
 mod calibration;
 mod commands;
@@ -10,3 +12,77 @@ mod refused;
 mod retrain;
 mod served;
 mod telemetry;
+
+use libtest_mimic::{Arguments, Trial};
+
+/// Tests at once, where the command line does not say how many. They hardly compute, but a dozen of them keep each other from answering in time.
+const AT_ONCE: usize = 6;
+
+/// The tests of each module. One that is missing is a function that nobody uses, which the compiler tells.
+macro_rules! trials {
+    ($($module:ident { $($(#[$where:meta])? $test:ident,)+ })+) => {
+        Vec::from([$($($(#[$where])? Trial::test(concat!(stringify!($module), "::", stringify!($test)), || {
+            $module::$test();
+            Ok(())
+        }),)+)+])
+    };
+}
+
+fn main() {
+    let mut arguments = Arguments::from_args();
+    arguments.test_threads.get_or_insert(AT_ONCE);
+    let trials = trials! {
+        calibration {
+            a_joint_finds_the_motor_that_it_has,
+            a_calibration_ends_with_its_client_and_with_the_network_and_changes_nothing_then,
+        }
+        commands {
+            a_joint_is_looked_at_set_moved_and_fed_from_the_command_line,
+            what_goes_wrong_ends_in_one_line_and_exit_code_1,
+            #[cfg(unix)] ctrl_c_and_termination_leave_the_joint_disabled,
+            an_adapter_that_goes_away_while_the_joint_is_enabled_is_reported,
+        }
+        configuration {
+            settings_are_taken_together_or_not_at_all,
+            what_is_stored_outlasts_a_reset_and_what_is_restored_does_not,
+            new_joints_get_the_node_ids_that_are_free,
+            the_page_says_what_an_engineer_looks_for_first,
+        }
+        images {
+            an_image_is_verified_shadowed_tried_committed_and_rolled_back,
+            a_roll_back_without_an_image_before_and_a_trial_of_no_time_are_refused,
+        }
+        motion {
+            each_mode_moves_the_joint_and_leaves_it_disabled,
+            a_motion_beyond_a_limit_is_refused_by_name_before_the_joint_is_enabled,
+            an_interrupt_in_motion_leaves_the_joint_disabled_and_without_a_fault,
+            braking_may_take_longer_than_the_command_deadline,
+            a_master_that_dies_leaves_a_fault_that_is_named_and_acknowledged_only_when_asked,
+            disable_stops_a_joint_that_somebody_else_moves,
+        }
+        refused {
+            a_wrong_node_id_is_told_from_a_bus_where_nobody_is,
+            no_answer_says_for_how_long_and_what_to_look_at,
+            a_node_that_is_no_joint_is_left_alone,
+            a_damaged_image_is_refused_and_the_one_in_use_stays,
+            an_image_for_another_joint_or_of_the_past_is_refused_with_both_numbers,
+            a_wrong_key_is_refused_counted_and_locks_out,
+            a_signed_image_of_the_right_key_is_taken,
+            a_bus_that_is_unplugged_at_any_frame_of_an_upload_leaves_the_old_image_or_the_new_one,
+            two_clients_at_once_are_told_of_each_other_and_the_image_stays,
+            two_masters_of_one_joint_end_in_a_joint_that_is_disabled,
+            a_string_that_is_no_bus_is_answered_with_those_that_are,
+        }
+        retrain {
+            a_round_lowers_what_is_unexplained_and_commits_a_newer_version,
+            an_interrupted_round_leaves_the_joint_disabled_with_the_image_that_it_had,
+            a_recording_of_a_motion_is_a_data_set,
+            two_producers_of_sync_are_told_of,
+        }
+        telemetry {
+            samples_come_with_every_sync_in_si_units_and_the_pdos_are_put_back,
+            the_pdos_of_a_new_joint_are_read_as_the_firmware_declares_them,
+        }
+    };
+    libtest_mimic::run(&arguments, trials).exit();
+}

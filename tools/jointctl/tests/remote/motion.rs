@@ -18,8 +18,7 @@ fn run(joint: &RemoteJoint, motion: &Motion) -> Result<(Outcome, Vec<Observation
     Ok((outcome, seen))
 }
 
-#[test]
-fn each_mode_moves_the_joint_and_leaves_it_disabled() {
+pub fn each_mode_moves_the_joint_and_leaves_it_disabled() {
     let served = Served::joints(&[NODE]);
     let joint = served.joint();
     let velocity = Command { mode: Mode::Velocity, velocity: -0.5, ..Command::default() };
@@ -47,8 +46,7 @@ fn each_mode_moves_the_joint_and_leaves_it_disabled() {
     assert_eq!(joint.faults().unwrap(), []);
 }
 
-#[test]
-fn a_motion_beyond_a_limit_is_refused_by_name_before_the_joint_is_enabled() {
+pub fn a_motion_beyond_a_limit_is_refused_by_name_before_the_joint_is_enabled() {
     let served = Served::joints(&[NODE]);
     let joint = served.joint();
     for (command, expected) in [
@@ -69,8 +67,7 @@ fn a_motion_beyond_a_limit_is_refused_by_name_before_the_joint_is_enabled() {
     assert_eq!(joint.state().unwrap(), State::SwitchOnDisabled);
 }
 
-#[test]
-fn an_interrupt_in_motion_leaves_the_joint_disabled_and_without_a_fault() {
+pub fn an_interrupt_in_motion_leaves_the_joint_disabled_and_without_a_fault() {
     let served = Served::joints(&[NODE]);
     let joint = served.joint();
     let looks = AtomicU32::new(0);
@@ -81,8 +78,7 @@ fn an_interrupt_in_motion_leaves_the_joint_disabled_and_without_a_fault() {
     assert_eq!((outcome.state, joint.faults().unwrap()), (State::SwitchOnDisabled, vec![]));
 }
 
-#[test]
-fn braking_may_take_longer_than_the_command_deadline() {
+pub fn braking_may_take_longer_than_the_command_deadline() {
     let served = Served::joints(&[NODE]);
     let joint = served.joint();
     let wanted = [("command-deadline", "0.3"), ("quick-stop-deceleration", "1.5")].map(|(name, text)| {
@@ -96,8 +92,7 @@ fn braking_may_take_longer_than_the_command_deadline() {
     assert_eq!((outcome.state, joint.faults().unwrap()), (State::SwitchOnDisabled, vec![]));
 }
 
-#[test]
-fn a_master_that_dies_leaves_a_fault_that_is_named_and_acknowledged_only_when_asked() {
+pub fn a_master_that_dies_leaves_a_fault_that_is_named_and_acknowledged_only_when_asked() {
     let served = Served::joints(&[NODE]);
     let joint = served.joint();
     let stream = Stream::begin(&joint, Mode::Torque, 100.0, false).unwrap();
@@ -123,8 +118,7 @@ fn a_master_that_dies_leaves_a_fault_that_is_named_and_acknowledged_only_when_as
     assert_eq!(run(&again, &acknowledged).unwrap().0.state, State::SwitchOnDisabled);
 }
 
-#[test]
-fn disable_stops_a_joint_that_somebody_else_moves() {
+pub fn disable_stops_a_joint_that_somebody_else_moves() {
     let served = Served::joints(&[NODE]);
     let (joint, other) = (served.joint(), served.joint());
     let stream = Stream::begin(&joint, Mode::Velocity, 100.0, false).unwrap();

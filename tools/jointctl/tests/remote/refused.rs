@@ -50,8 +50,7 @@ impl InService {
     }
 }
 
-#[test]
-fn a_wrong_node_id_is_told_from_a_bus_where_nobody_is() {
+pub fn a_wrong_node_id_is_told_from_a_bus_where_nobody_is() {
     let served = Served::joints(&[NODE]);
     for id in [0, 128, 255] {
         let message = RemoteJoint::open(served.bus(), id).unwrap_err().to_string();
@@ -67,16 +66,14 @@ fn a_wrong_node_id_is_told_from_a_bus_where_nobody_is() {
     );
 }
 
-#[test]
-fn no_answer_says_for_how_long_and_what_to_look_at() {
+pub fn no_answer_says_for_how_long_and_what_to_look_at() {
     let began = Instant::now();
     let message = RemoteJoint::open("virtual:nobody-is-here", NODE).unwrap_err().to_string();
     assert!(message.contains("1000h:0 of node 5: no answer within 1000 ms. Nothing at all was heard"), "{message}");
     assert!(began.elapsed() < Duration::from_secs(3));
 }
 
-#[test]
-fn a_node_that_is_no_joint_is_left_alone() {
+pub fn a_node_that_is_no_joint_is_left_alone() {
     use bus::client::Object;
     // Answers every SDO read with the device type of an I/O module, CiA 401.
     let (host, other) = (bus::open("virtual:not-a-joint").unwrap(), bus::open("virtual:not-a-joint").unwrap());
@@ -91,8 +88,7 @@ fn a_node_that_is_no_joint_is_left_alone() {
     answering.join().unwrap();
 }
 
-#[test]
-fn a_damaged_image_is_refused_and_the_one_in_use_stays() {
+pub fn a_damaged_image_is_refused_and_the_one_in_use_stays() {
     let joint = InService::new();
     let mut damaged = image(4, 0.5, 0);
     damaged[60] ^= 4;
@@ -103,15 +99,13 @@ fn a_damaged_image_is_refused_and_the_one_in_use_stays() {
     joint.refused(&[], &["has 0 bytes"]);
 }
 
-#[test]
-fn an_image_for_another_joint_or_of_the_past_is_refused_with_both_numbers() {
+pub fn an_image_for_another_joint_or_of_the_past_is_refused_with_both_numbers() {
     let joint = InService::new();
     joint.refused(&image(4, 0.5, 99), &["image for serial number 99, this joint has 12", "0502h"]);
     joint.refused(&image(2, 0.5, 0), &["image version 2, must be at least 3", "0401h"]);
 }
 
-#[test]
-fn a_wrong_key_is_refused_counted_and_locks_out() {
+pub fn a_wrong_key_is_refused_counted_and_locks_out() {
     let joint = InService::new();
     let key = Key::new(std::array::from_fn(|i| i as u8)).unwrap();
     let other = Key::new(std::array::from_fn(|i| 31 - i as u8)).unwrap();
@@ -131,8 +125,7 @@ fn a_wrong_key_is_refused_counted_and_locks_out() {
     joint.unchanged();
 }
 
-#[test]
-fn a_signed_image_of_the_right_key_is_taken() {
+pub fn a_signed_image_of_the_right_key_is_taken() {
     let joint = InService::new();
     let key = Key::new(std::array::from_fn(|i| i as u8)).unwrap();
     joint.joint.give_key(&key).unwrap();
@@ -198,8 +191,7 @@ fn unplugged_after(joint: &InService, next: &[u8], frames: u32) -> u32 {
     version
 }
 
-#[test]
-fn a_bus_that_is_unplugged_at_any_frame_of_an_upload_leaves_the_old_image_or_the_new_one() {
+pub fn a_bus_that_is_unplugged_at_any_frame_of_an_upload_leaves_the_old_image_or_the_new_one() {
     let next = &image(4, 0.5, 0);
     let versions = std::thread::scope(|scope| {
         let workers = (1..=JOINTS as u32).map(|first| {
@@ -220,8 +212,7 @@ fn a_bus_that_is_unplugged_at_any_frame_of_an_upload_leaves_the_old_image_or_the
     assert!(old > 20 && new > 20 && old + new == FRAMES as usize, "{old} {new}");
 }
 
-#[test]
-fn two_clients_at_once_are_told_of_each_other_and_the_image_stays() {
+pub fn two_clients_at_once_are_told_of_each_other_and_the_image_stays() {
     let joint = InService::new();
     let other = joint.served.joint();
     let stop = std::sync::atomic::AtomicBool::new(false);
@@ -247,8 +238,7 @@ fn two_clients_at_once_are_told_of_each_other_and_the_image_stays() {
     joint.unchanged();
 }
 
-#[test]
-fn two_masters_of_one_joint_end_in_a_joint_that_is_disabled() {
+pub fn two_masters_of_one_joint_end_in_a_joint_that_is_disabled() {
     let served = Served::joints(&[NODE]);
     let (joint, other) = (served.joint(), served.joint());
     let stream = Stream::begin(&joint, Mode::Torque, 100.0, false).unwrap();
@@ -262,8 +252,7 @@ fn two_masters_of_one_joint_end_in_a_joint_that_is_disabled() {
     assert_eq!(joint.state().unwrap(), Drive::SwitchOnDisabled);
 }
 
-#[test]
-fn a_string_that_is_no_bus_is_answered_with_those_that_are() {
+pub fn a_string_that_is_no_bus_is_answered_with_those_that_are() {
     let message = RemoteJoint::open("can0", NODE).unwrap_err().to_string();
     assert!(message.starts_with("bus 'can0': a kind and a colon are missing. Buses are socketcan:can0, "), "{message}");
 }

