@@ -78,7 +78,7 @@ fn main() -> Outcome<()> {
     for (board, program) in BOARDS.iter().zip(&boards) {
         let (_, runs) = counted(&board.probe("step", Some(("PROBE_RUNS", &steps)), &[], TEMPORARY)?)?;
         let steps: Vec<Step> = runs.concat();
-        println!("\n### {}, optimised for \"{}\"\n", board.name, board.level);
+        println!("\n### {}\n", board.name);
         println!("| | instructions | cycles | target | |\n|---|---|---|---|---|");
         let evaluations = || runs.iter().flat_map(|run| run.chunks_exact(MOTION_STEPS as usize));
         let evaluation = |steps: &[Step]| {
@@ -188,7 +188,7 @@ fn networks(image: &[u8], missed: &mut Vec<String>) -> Outcome<()> {
         core.write("BYTE_ROWS", &rounded)?;
         core.write("FLOATS", &exact.floats())?;
         core.write("BYTES", &bytes)?;
-        println!("\n{}, optimised for \"{}\":\n", board.name, board.level);
+        println!("\n{}:\n", board.name);
         println!("| | instructions | cycles | largest error, % |\n|---|---|---|---|");
         let single = |word: i32| f64::from(f32::from_bits(word as u32));
         let own = |word: i32| f64::from(word) / 65536.0 / exact.scale;

@@ -16,16 +16,14 @@ pub fn target_installed() -> bool {
     })
 }
 
-/// How a board's program is compiled.
+/// A board, and how its program is compiled: as `.cargo/config.toml` says, and the board's own file beside it where it has one.
 pub struct Board {
     /// Its feature.
     pub name: &'static str,
-    /// Optimisation, as in `.cargo/config.toml` and the board's own file beside it.
-    pub level: &'static str,
 }
 
 /// The boards.
-pub const BOARDS: [Board; 2] = [Board { name: "b-g431b-esc1", level: "s" }, Board { name: "moteus-r4", level: "2" }];
+pub const BOARDS: [Board; 2] = [Board { name: "b-g431b-esc1" }, Board { name: "moteus-r4" }];
 
 impl Board {
     /// Builds a program of `probe/src/bin` as this board's is, below a test's temporary folder; its path. `input` is a variable of the program's
@@ -41,27 +39,39 @@ impl Board {
         features: &[&str],
         temporary: &str,
     ) -> Result<PathBuf, String> {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("probe");
         let own = Path::new(temporary).join("probe-as").join(self.name);
         std::fs::create_dir_all(&own).map_err(|error| error.to_string())?;
-        let flags =
-            "-C linker=rust-lld -C link-arg=--nmagic -C target-cpu=cortex-m4 -C linker-plugin-lto -C codegen-units=1";
-        let flags = format!("{flags} -C opt-level={} -C link-arg=-T{}", self.level, folder.join("link.x").display());
-        let mut command = cargo();
-        command.args(["build", "--profile", "board", "--bin", program, "--target", TARGET]);
+        let mut command = cargo(self.name);
+        command.args(["build", "--release", "--bin", program, "--target", TARGET]);
         command.args(["--features", &features.join(",")]);
-        command.current_dir(&folder).env("RUSTFLAGS", flags);
+        command.current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("probe"));
         if let Some((variable, bytes)) = input {
             let file = own.join(format!("{program}.bin"));
             std::fs::write(&file, bytes).map_err(|error| error.to_string())?;
             command.env(variable, file);
         }
-        built(command, &format!("board/{program}"), temporary, own.join(program))
+        built(command, program, temporary, own.join(program))
     }
 }
 
-fn cargo() -> Command {
-    Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+/// The checkout.
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+/// Cargo as it compiles a program: with its own settings beside those of all, where it has any.
+fn cargo(program: &str) -> Command {
+    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    let own = root().join(format!(".cargo/{program}.toml"));
+    if own.exists() {
+        command.arg("--config").arg(own);
+    }
+    // The cargo that runs the tests has set some of these as for the default program, and what is set cargo leaves; flags for the
+    // host would take the place of the target's.
+    for variable in ["DEFMT_LOG", "DEFMT_RTT_BUFFER_SIZE", "RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS"] {
+        command.env_remove(variable);
+    }
+    command
 }
 
 /// Has cargo build a program in the folder that all programs share, so that none compiles what another has, and keeps it at `place`. One at a time: programs of
@@ -76,7 +86,7 @@ fn built(mut command: Command, program: &str, temporary: &str, place: PathBuf) -
         if !output.status.success() {
             return Ok(Err(String::from_utf8_lossy(&output.stderr).into_owned()));
         }
-        let program = std::fs::read(shared.join(TARGET).join(program))?;
+        let program = std::fs::read(shared.join(TARGET).join("release").join(program))?;
         // Somebody may be reading it.
         if std::fs::read(&place).ok().as_ref() != Some(&program) {
             let new = place.with_extension("new");
@@ -95,18 +105,12 @@ fn built(mut command: Command, program: &str, temporary: &str, place: PathBuf) -
 /// # Errors
 /// What the compiler says.
 pub fn build(program: &str, temporary: &str) -> Result<PathBuf, String> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let folder = Path::new(temporary).join("flashed");
     std::fs::create_dir_all(&folder).map_err(|error| error.to_string())?;
-    let own = format!(".cargo/{program}.toml");
-    let own = root.join(&own).exists().then_some(["--config".to_owned(), own]);
     let features = program.strip_suffix("-bus").map_or(program.to_owned(), |board| format!("{board},bus"));
-    let mut command = cargo();
-    command.args(own.into_iter().flatten());
+    let mut command = cargo(program);
     command.args(["build", "--release", "-p", "joint-firmware", "--target", TARGET]);
     command.args(["--no-default-features", "--features", &features]);
-    command.current_dir(root);
-    // The cargo that runs the tests has set these as for the default program, and what is set cargo leaves.
-    command.env_remove("DEFMT_LOG").env_remove("DEFMT_RTT_BUFFER_SIZE");
-    built(command, "release/joint-firmware", temporary, folder.join(program))
+    command.current_dir(root());
+    built(command, "joint-firmware", temporary, folder.join(program))
 }

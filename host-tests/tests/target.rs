@@ -76,17 +76,15 @@ fn build_probe() -> Result<PathBuf, Failed> {
     }
     let images = target.join("images.bin");
     std::fs::write(&images, bytes)?;
-    let flags = "-C linker=rust-lld -C link-arg=--nmagic -C target-cpu=cortex-m4";
-    let flags = format!("{flags} -C link-arg=-T{}", folder.join("link.x").display());
     let output = Command::new(env!("CARGO"))
-        .args(["build", "--release", "--bin", "probe", "--target", TARGET])
+        .args(["build", "--profile", "smallest", "--bin", "probe", "--target", TARGET])
         .current_dir(&folder)
         .env("CARGO_TARGET_DIR", &target)
         .env("PROBE_IMAGES", &images)
-        .env("RUSTFLAGS", flags)
+        .env("RUSTFLAGS", "-C linker=rust-lld -C link-arg=--nmagic -C target-cpu=cortex-m4")
         .output()?;
     match output.status.success() {
-        true => Ok(target.join(TARGET).join("release/probe")),
+        true => Ok(target.join(TARGET).join("smallest/probe")),
         false => Err(String::from_utf8_lossy(&output.stderr).into_owned().into()),
     }
 }
