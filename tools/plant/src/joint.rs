@@ -133,8 +133,11 @@ impl Joint {
 
     /// Moves on by `duration` (s, above zero) while a motor with windings of its own gives `motor_torque` (Nm at the
     /// link, before friction) and loses `copper_loss` (W) in them; nothing is limited here.
+    ///
+    /// # Panics
+    /// With a duration of zero or less.
     pub fn drive(&mut self, motor_torque: f64, copper_loss: f64, external_torque: f64, duration: f64) {
-        debug_assert!(duration > 0.0, "a joint advances by {duration} s");
+        assert!(duration > 0.0, "a joint advances by {duration} s");
         let steps = (duration / MAXIMUM_STEP - 1e-9).ceil().max(1.0);
         let step = duration / steps;
         for _ in 0..steps as u64 {

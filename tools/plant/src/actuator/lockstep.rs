@@ -220,8 +220,11 @@ impl Actuator {
     /// Moves on by one PWM `period` (1e-6 to 1e-3 s). While the bridge is switching, the duties of as many calls ago as
     /// the timer's delay act; switching on and off acts at once. `external_torque` in Nm at the link, positive pushes
     /// forward.
+    ///
+    /// # Panics
+    /// With another period.
     pub fn advance(&mut self, bridge_switching: bool, duties: [f64; 3], external_torque: f64, period: f64) {
-        debug_assert!((1e-6..=1e-3).contains(&period), "a PWM period of {period} s");
+        assert!((1e-6..=1e-3).contains(&period), "a PWM period of {period} s");
         let duties = self.inverter.load(duties);
         let (torque, powers, rail_current) = self.advance_windings(bridge_switching, duties, period);
 
