@@ -7,13 +7,10 @@
 //! interrupt wait while the flash erases. An address that is computed otherwise is not found out. The calibration may lie in flash: it
 //! runs while the joint is off, and nothing is written to flash meanwhile. So may, in the program of the B-G431B-ESC1 with the bus, what runs only while
 //! operation is enabled, or in braking, or at the start: there flash is written only while the joint is held off.
-//! Needs the target; where it is missing the tests are reported as ignored, by name; with `CI` set they run and fail.
 
-#[allow(dead_code, reason = "each test uses its part")]
-mod thumb;
-
-use host_tests::bare_metal::{self, target_installed};
-use libtest_mimic::{Arguments, Failed, Trial};
+use crate::thumb;
+use host_tests::bare_metal;
+use libtest_mimic::{Failed, Trial};
 use std::path::{Path, PathBuf};
 
 /// A program, its handlers of the highest priority, and which functions of the control step may lie in flash.
@@ -27,16 +24,13 @@ const PROGRAMS: [Checked; 3] = [
 /// Flash of the larger chip; the smaller one's begins at the same address.
 const FLASH: std::ops::Range<u32> = 0x0800_0000..0x0808_0000;
 
-fn main() {
-    let arguments = Arguments::from_args();
-    let ignored = std::env::var_os("CI").is_none() && !target_installed();
-    let mut trials =
-        vec![Trial::test("a_function_that_can_panic_is_found_out", finds_panics).with_ignored_flag(ignored)];
+pub fn trials() -> Vec<Trial> {
+    let mut trials = vec![Trial::test("a_function_that_can_panic_is_found_out", finds_panics)];
     for (board, handlers, may_lie_in_flash) in PROGRAMS {
         let name = format!("the_control_interrupt_of_{board}_reaches_no_panic_and_nothing_in_flash");
-        trials.push(Trial::test(name, move || check(board, handlers, may_lie_in_flash)).with_ignored_flag(ignored));
+        trials.push(Trial::test(name, move || check(board, handlers, may_lie_in_flash)));
     }
-    libtest_mimic::run(&arguments, trials).exit();
+    trials
 }
 
 /// The board's program; its path.

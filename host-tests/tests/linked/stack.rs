@@ -1,18 +1,14 @@
 //! The stack of the program of the B-G431B-ESC1 with the bus suffices: the deepest path of calls in thread mode and every interrupt's on top of it, all at their deepest at
 //! once, are within the region that the linker leaves for it.
 //!
-//! By the frames of the linked functions ([`thumb::stack`]). Of the priorities, each has one interrupt at a time on the stack; the entries are those of
+//! By the frames of the linked functions ([`crate::thumb::stack`]). Of the priorities, each has one interrupt at a time on the stack; the entries are those of
 //! the vector table, at the priorities that the program gives them. While the program starts, only time and the torn words of the flash interrupt it; the
 //! others are enabled one after another when what is deep has returned. What is called by way of a table of functions is said below.
-//! Needs the target; where it is missing the tests are reported as ignored, by name; with `CI` set they run and fail.
 
-#[allow(dead_code, reason = "each test uses its part")]
-mod thumb;
-
-use host_tests::bare_metal::{self, target_installed};
-use libtest_mimic::{Arguments, Failed, Trial};
-use thumb::Program;
-use thumb::stack::{Depth, Stack};
+use crate::thumb::Program;
+use crate::thumb::stack::{Depth, Stack};
+use host_tests::bare_metal;
+use libtest_mimic::{Failed, Trial};
 
 /// What an exception pushes before its first instruction: 8 core registers, 18 of the floating-point unit's, and a word to align them (ARM DDI 0403, B1.5.6).
 const EXCEPTION: u32 = 108;
@@ -41,15 +37,11 @@ const CALLS: [(&str, &[&str]); 9] = [
     ("13PreparedTerms3new28_", &["3ops8function6FnOnce9call_once"]),
 ];
 
-fn main() {
-    let arguments = Arguments::from_args();
-    let ignored = std::env::var_os("CI").is_none() && !target_installed();
-    let trials = vec![
+pub fn trials() -> Vec<Trial> {
+    vec![
         Trial::test("a_call_that_nobody_knows_of_is_found_out", finds_unknown_calls),
         Trial::test("the_stack_of_b_g431b_esc1_with_the_bus_suffices", suffices),
-    ];
-    let trials = trials.into_iter().map(|trial| trial.with_ignored_flag(ignored)).collect();
-    libtest_mimic::run(&arguments, trials).exit();
+    ]
 }
 
 fn program() -> Result<Program, Failed> {
