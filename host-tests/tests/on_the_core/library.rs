@@ -1,19 +1,17 @@
 //! The library on the board's core: it links no panic and no floating-point library, and gives the host's bits.
-//!
-//! Needs the target `thumbv7em-none-eabihf`, and for the bits `qemu-system-arm`. Where they are missing the tests are reported
-//! as ignored, by name; with `CI` set they run and fail.
 
-#[path = "../probe/src/sequence.rs"]
+#[path = "../../probe/src/sequence.rs"]
 mod sequence;
 
+use crate::Missing;
 use emulator::cpu::End;
 use emulator::memory::Memory;
 use emulator::program::Program;
-use host_tests::bare_metal::{TARGET, target_installed};
+use host_tests::bare_metal::TARGET;
 use host_tests::image_bytes::encoded;
 use host_tests::parameters::{image, tame};
 use joint_firmware::parameters::certificate::{Limits, prove};
-use libtest_mimic::{Arguments, Failed, Trial};
+use libtest_mimic::{Failed, Trial};
 use object::{Object, ObjectSection, ObjectSymbol};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
@@ -26,21 +24,16 @@ const IMAGES: usize = 12;
 /// Flash that friction, compensation, parameters and their tables may take, bytes.
 const LARGEST_PROGRAM: u64 = 48 * 1024;
 
-fn main() {
-    let arguments = Arguments::from_args();
-    let required = std::env::var_os("CI").is_some();
-    let target = required || target_installed();
-    let emulator = target && (required || Command::new("qemu-system-arm").arg("--version").output().is_ok());
-    let trials = vec![
+pub fn trials(missing: &Missing) -> Vec<Trial> {
+    vec![
         Trial::test("friction_compensation_and_parameters_link_no_panic_and_no_float_library", links_little)
-            .with_ignored_flag(!target),
-        Trial::test("the_emulated_core_gives_the_same_bits_as_the_host", same_bits).with_ignored_flag(!emulator),
+            .with_ignored_flag(missing.target),
+        Trial::test("the_emulated_core_gives_the_same_bits_as_the_host", same_bits).with_ignored_flag(missing.qemu),
         Trial::test("the_project_s_own_core_gives_the_same_bits_as_the_host", own_core_same_bits)
-            .with_ignored_flag(!target),
+            .with_ignored_flag(missing.target),
         Trial::test("an_image_is_verified_within_its_instruction_budget_on_the_emulated_core", verification_cost)
-            .with_ignored_flag(!emulator),
-    ];
-    libtest_mimic::run(&arguments, trials).exit();
+            .with_ignored_flag(missing.qemu),
+    ]
 }
 
 /// Images like trained ones, that certify within their own limits.

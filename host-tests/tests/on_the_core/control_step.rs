@@ -4,34 +4,28 @@
 //! The code is built as each board's program is and runs on the core of `tools/emulator`; the board's own part of the interrupt (converters, timer,
 //! report) is not among it. Most instructions of every part are held to `.ci/instructions`; `cargo bench -p host-tests --bench
 //! budget` prints the same in full, with cycles. The bits are also those of `qemu-system-arm`.
-//!
-//! Needs the target, and for the latter qemu. Where they are missing the tests are reported as ignored, by name; with `CI` set they run
-//! and fail.
 
-use host_tests::bare_metal::{BOARDS, Board, target_installed};
+use crate::Missing;
+use host_tests::bare_metal::{BOARDS, Board};
 use host_tests::control_steps::{image_bytes, input, record, replayed_here};
 use host_tests::counted_steps::{PARTS, counted};
 use host_tests::limits::{Most, hold};
-use libtest_mimic::{Arguments, Failed, Trial};
+use libtest_mimic::{Failed, Trial};
 use std::path::PathBuf;
 use std::process::Command;
 use std::sync::OnceLock;
 
-fn main() {
-    let arguments = Arguments::from_args();
-    let required = std::env::var_os("CI").is_some();
-    let target = required || target_installed();
-    let qemu = required || target && Command::new("qemu-system-arm").arg("--version").output().is_ok();
+pub fn trials(missing: &Missing) -> Vec<Trial> {
     let trials = BOARDS.iter().flat_map(|board| {
         let costs =
             format!("a_control_step_of_{}_takes_the_instructions_that_it_may_and_gives_the_host_s_bits", board.name);
         let bits = format!("a_control_step_of_{}_gives_the_host_s_bits_on_qemu", board.name);
         [
-            Trial::test(costs, move || costs_what_it_may(board)).with_ignored_flag(!target),
-            Trial::test(bits, move || same_bits_on_qemu(board)).with_ignored_flag(!qemu),
+            Trial::test(costs, move || costs_what_it_may(board)).with_ignored_flag(missing.target),
+            Trial::test(bits, move || same_bits_on_qemu(board)).with_ignored_flag(missing.qemu),
         ]
     });
-    libtest_mimic::run(&arguments, trials.collect()).exit();
+    trials.collect()
 }
 
 /// What the program is built around, and the hashes of the runs on this machine.

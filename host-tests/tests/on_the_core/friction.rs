@@ -3,15 +3,14 @@
 //!
 //! The program `states` of the probe is compiled as each board's is and runs on the core of `tools/emulator`. Images, states and evaluations
 //! are exchanged in the emulated memory. A state that differs is told with its image's seed; the same seeds are drawn in every run.
-//!
-//! Needs the target; where it is missing the tests are reported as ignored, by name; with `CI` set they run and fail.
 
-#[path = "../probe/src/evaluation.rs"]
+#[path = "../../probe/src/evaluation.rs"]
 mod evaluation;
 
+use crate::Missing;
 use evaluation::{BATCH, Evaluator, INPUTS, NAMES, OUTPUTS, RATE, SETTINGS, settings};
 use host_tests::bare_core::Core;
-use host_tests::bare_metal::{BOARDS, Board, target_installed};
+use host_tests::bare_metal::{BOARDS, Board};
 use host_tests::certified::{drawn, random};
 use host_tests::image_bytes::encoded;
 use host_tests::parameters::q16;
@@ -21,7 +20,7 @@ use joint_firmware::friction::physical::Terms;
 use joint_firmware::friction::state::Signal;
 use joint_firmware::friction::{FrictionModel, FrictionParameters};
 use joint_firmware::parameters::image::Image;
-use libtest_mimic::{Arguments, Failed, Trial};
+use libtest_mimic::{Failed, Trial};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeSet;
@@ -32,15 +31,13 @@ const IMAGES: usize = 160;
 /// Batches of states for each of them: 1,024,000 states in all, for each board's way of compiling.
 const BATCHES: usize = 25;
 
-fn main() {
-    let arguments = Arguments::from_args();
-    let ignored = std::env::var_os("CI").is_none() && !target_installed();
+pub fn trials(missing: &Missing) -> Vec<Trial> {
     let mut trials = vec![Trial::test("a_wrong_bit_is_told_with_image_and_state", wrong_bit)];
     for (number, board) in BOARDS.iter().enumerate() {
         let name = format!("friction_on_the_core_of_{}_has_the_host_s_bits", board.name);
-        trials.push(Trial::test(name, move || same_bits(board, 1 + number as u64)).with_ignored_flag(ignored));
+        trials.push(Trial::test(name, move || same_bits(board, 1 + number as u64)).with_ignored_flag(missing.target));
     }
-    libtest_mimic::run(&arguments, trials).exit();
+    trials
 }
 
 /// Certified images with their seeds, and how many were drawn for them.

@@ -1,0 +1,29 @@
+//! What the board's core makes of the library, in the programs of the probe: bits, instructions, and what is linked. A file a promise.
+//!
+//! Needs the target `thumbv7em-none-eabihf`, and some tests `qemu-system-arm`. Where they are missing the tests are reported as
+//! ignored, by name; with `CI` set they run and fail.
+
+mod control_step;
+mod friction;
+mod library;
+
+use host_tests::bare_metal::target_installed;
+use libtest_mimic::Arguments;
+use std::process::Command;
+
+/// What is not on this machine and not demanded of it either: the tests that need it are ignored.
+struct Missing {
+    target: bool,
+    /// That, or the target.
+    qemu: bool,
+}
+
+fn main() {
+    let arguments = Arguments::from_args();
+    let required = std::env::var_os("CI").is_some();
+    let target = required || target_installed();
+    let qemu = target && (required || Command::new("qemu-system-arm").arg("--version").output().is_ok());
+    let missing = Missing { target: !target, qemu: !qemu };
+    let rooms = [library::trials(&missing), control_step::trials(&missing), friction::trials(&missing)];
+    libtest_mimic::run(&arguments, rooms.into_iter().flatten().collect()).exit();
+}
