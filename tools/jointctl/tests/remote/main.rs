@@ -16,7 +16,7 @@ mod telemetry;
 use libtest_mimic::{Arguments, Trial};
 
 /// Tests at once, where the command line does not say how many. They hardly compute, but a dozen of them keep each other from answering in time.
-const AT_ONCE: usize = 6;
+const AT_ONCE: usize = 4;
 
 /// The tests of each module. One that is missing is a function that nobody uses, which the compiler tells.
 macro_rules! trials {
