@@ -138,8 +138,14 @@ impl<W: Wiring> Chip<W> {
         let at = self.moment(now);
         match device {
             Device::Timer(index) => {
-                self.attend_timer(index, now);
-                self.timers[index].read(offset)
+                if self.timers[index].shows_count(offset) {
+                    self.attend_timer(index, now);
+                }
+                let timer = &mut self.timers[index];
+                if timer.changes_when_read(offset) {
+                    self.agenda.touch(index);
+                }
+                timer.read(offset)
             }
             Device::Iwdg => self.iwdg.read(offset, at),
             Device::Pwr => self.pwr.read(offset),
@@ -182,6 +188,11 @@ impl<W: Wiring> Chip<W> {
             let text = format!("a write of {} bytes to {device:?} at {offset:#05x} is not modelled", width.bytes());
             return Err(Refusal::Unmodelled(text));
         }
+        if let (Device::Timer(index), Width::Word) = (device, width)
+            && self.timers[index].prepare(offset, value)
+        {
+            return Ok(());
+        }
         self.write_register(device, offset, width, value, now)?;
         match device {
             Device::Rcc | Device::Flash | Device::Iwdg | Device::Pwr | Device::Fdcan => self.refresh_slow(),
@@ -213,6 +224,7 @@ impl<W: Wiring> Chip<W> {
         let at = self.moment(now);
         match device {
             Device::Timer(index) => {
+                self.agenda.touch(index);
                 self.attend_timer(index, now);
                 self.timers[index].write(offset, value, now)?;
                 self.tell(index, now);
@@ -281,9 +293,8 @@ impl<W: Wiring> Chip<W> {
         })
     }
 
-    /// Brings a timer up to a cycle.
+    /// Brings a timer up to a cycle. What others see of it is an event, of which none is due: the agenda stays as it is.
     fn attend_timer(&mut self, index: usize, now: u64) {
-        self.agenda.touch(index);
         let timer = &mut self.timers[index];
         if timer.follows_encoder() {
             let quadrature = self.wiring.quadrature(self.clock.instant(now), timer.name());

@@ -36,11 +36,17 @@ impl Agenda {
         self.changed = u32::MAX;
     }
 
+    /// The first of the places whose bits are set.
+    #[inline]
+    pub const fn first_of(&self, places: u32) -> Option<usize> {
+        let place = places.trailing_zeros() as usize;
+        if place < self.used { Some(place) } else { None }
+    }
+
     /// The first of those that may have changed.
     #[inline]
     pub const fn first_touched(&self) -> Option<usize> {
-        let place = self.changed.trailing_zeros() as usize;
-        if place < self.used { Some(place) } else { None }
+        self.first_of(self.changed)
     }
 
     /// What is true of a peripheral now: its next cycle, and the levels of its lines.
@@ -50,7 +56,7 @@ impl Agenda {
         if next <= self.earliest {
             self.earliest = next;
         } else if before == self.earliest {
-            self.earliest = self.next.iter().fold(u64::MAX, |earliest, next| earliest.min(*next));
+            self.earliest = self.next.iter().take(self.used).fold(u64::MAX, |earliest, next| earliest.min(*next));
         }
         self.changed &= !(1 << (place % PLACES));
         if self.lines[place % PLACES] != lines {
@@ -62,7 +68,11 @@ impl Agenda {
     /// Bits of the places in which something is due at a cycle.
     #[inline]
     pub fn due(&self, cycle: u64) -> u32 {
-        self.next.iter().enumerate().fold(0, |due, (place, next)| due | u32::from(*next <= cycle) << place)
+        self.next
+            .iter()
+            .take(self.used)
+            .enumerate()
+            .fold(0, |due, (place, next)| due | u32::from(*next <= cycle) << place)
     }
 
     /// Bits of the places that may have changed.
@@ -82,18 +92,6 @@ impl Agenda {
     pub const fn lines(&self) -> u128 {
         self.all_lines
     }
-}
-
-/// The numbers of the bits that are set among some of them, from the lowest on.
-#[inline]
-pub fn numbers(bits: u32, among: std::ops::Range<usize>) -> impl Iterator<Item = usize> {
-    let mut left = bits & ((1u32 << among.end) - (1 << among.start));
-    std::iter::from_fn(move || {
-        let number = left.trailing_zeros() as usize;
-        // The lowest bit goes.
-        left &= left.wrapping_sub(1);
-        (number < 32).then_some(number)
-    })
 }
 
 #[cfg(test)]

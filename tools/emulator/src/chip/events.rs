@@ -1,12 +1,13 @@
 //! What happens by itself, in the order of time, and what peripherals tell each other.
 
 use super::adc::{Due, Trigger};
-use super::agenda::numbers;
+use super::gpio::Mode;
 use super::memory::SRAM;
 use super::rcc::Cause;
 use super::time::Instant;
+use super::timer::Events;
 use super::variant::{self, Input, OUTPUTS};
-use super::wiring::{Gate, Leg, Pwm, TimerName, Wiring};
+use super::wiring::{TimerName, Wiring};
 use super::{Chip, syscfg::Alarm};
 use crate::bus::Signals;
 
@@ -19,37 +20,38 @@ impl<W: Wiring> Chip<W> {
         }
     }
 
-    /// Does what is due at a cycle: timers first, as they start conversions.
+    /// Does what is due at a cycle, in the order of the agenda: timers first, as they start conversions.
     fn step(&mut self, cycle: u64) {
-        let due = self.agenda.due(cycle);
         // Of those that may have changed it is not known whether they are due.
-        let before = self.agenda.changed();
-        for index in numbers(due | before, 0..self.timers.len()) {
-            if before >> index & 1 == 0 || self.timers[index].next() <= cycle {
-                self.agenda.touch(index);
-                self.timers[index].advance(cycle);
-                self.tell(index, cycle);
-            }
-        }
-        let first = self.converter_place(0);
-        for place in numbers(due | self.agenda.changed(), first..first + self.converters.len()) {
-            if self.converters[place - first].next() <= cycle {
+        let changed = self.agenda.changed();
+        let mut left = self.agenda.due(cycle) | changed;
+        while let Some(place) = self.agenda.first_of(left) {
+            if let Some(converter) = place.checked_sub(self.timers.len()) {
+                match converter.checked_sub(self.converters.len()) {
+                    None if self.converters[converter].next() <= cycle => self.convert(converter, cycle),
+                    Some(spi) if self.spis[spi].next() <= cycle => self.end_frame(spi, cycle),
+                    _ => {}
+                }
+            } else if changed >> place & 1 == 0 || self.timers[place].next() <= cycle {
                 self.agenda.touch(place);
-                self.convert(place - first, cycle);
+                self.timers[place].advance(cycle);
+                self.tell(place, cycle);
             }
-        }
-        let first = self.spi_place(0);
-        for place in numbers(due | self.agenda.changed(), first..first + self.spis.len()) {
-            let index = place - first;
-            if let Some((mut frame, began)) = self.spis[index].ended(cycle, self.clock.frequency()) {
-                self.agenda.touch(place);
-                frame.began = self.clock.instant(began);
-                let answer = self.wiring.spi(self.clock.instant(cycle), &frame);
-                self.spis[index].answer(answer, cycle);
-            }
+            // What it has started may be due as well.
+            left = (left | self.agenda.changed()) & !((2 << place) - 1);
         }
         if self.next_slow <= cycle {
             self.step_slow(cycle);
+        }
+    }
+
+    /// A frame on SPI has ended: what the board makes of it.
+    fn end_frame(&mut self, index: usize, cycle: u64) {
+        self.agenda.touch(self.spi_place(index));
+        if let Some((mut frame, began)) = self.spis[index].ended(cycle, self.clock.frequency()) {
+            frame.began = self.clock.instant(began);
+            let answer = self.wiring.spi(self.clock.instant(cycle), &frame);
+            self.spis[index].answer(answer, cycle);
         }
     }
 
@@ -91,7 +93,9 @@ impl<W: Wiring> Chip<W> {
         }
     }
 
+    /// Does what is due in a converter.
     fn convert(&mut self, index: usize, cycle: u64) {
+        self.agenda.touch(self.converter_place(index));
         let group = self.converters[index].description().group;
         let Some(divider) = self.common[group].divider() else { return };
         while let Some(due) = self.converters[index].advance(cycle, divider) {
@@ -120,8 +124,11 @@ impl<W: Wiring> Chip<W> {
     /// Passes on what a timer has to tell others.
     pub(super) fn tell(&mut self, index: usize, cycle: u64) {
         let events = self.timers[index].take_events();
+        if events == Events::default() {
+            return;
+        }
         if events.outputs {
-            let pwm = self.connected(self.timers[index].pwm());
+            let pwm = self.timers[index].pwm();
             self.wiring.pwm(self.clock.instant(cycle), &pwm);
         }
         let (first, second) = match self.timers[index].name() {
@@ -140,33 +147,14 @@ impl<W: Wiring> Chip<W> {
         }
     }
 
-    /// Releases what no pin carries.
-    fn connected(&self, mut pwm: Pwm) -> Pwm {
-        let (mut high, mut low) = ([Gate::Released; 3], [Gate::Released; 3]);
-        for output in numbers(self.carried, 0..OUTPUTS.len()).filter_map(|number| OUTPUTS.get(number)) {
-            let leg = usize::from(output.channel).wrapping_sub(1);
-            let (gates, gate): (&mut [Gate; 3], fn(&Leg) -> Gate) = match output.complementary {
-                false => (&mut high, |leg| leg.high),
-                true => (&mut low, |leg| leg.low),
-            };
-            if output.timer == pwm.timer
-                && let (Some(place), Some(leg)) = (gates.get_mut(leg), pwm.legs.get(leg))
-            {
-                *place = gate(leg);
-            }
-        }
-        for (leg, (high, low)) in pwm.legs.iter_mut().zip(high.into_iter().zip(low)) {
-            (leg.high, leg.low) = (high, low);
-        }
-        pwm
-    }
-
-    /// Looks which timers' outputs the pins carry: to be called when a pin's function may have changed.
+    /// Tells the timers which of their outputs a pin carries: to be called when a pin's function may have changed.
     pub(super) fn connect(&mut self) {
-        let carries =
-            |output: &variant::TimerOutput| self.gpio.mode(output.pin) == super::gpio::Mode::Alternate(output.function);
-        let bits = OUTPUTS.iter().enumerate().map(|(number, output)| u32::from(carries(output)) << number);
-        self.carried = bits.sum();
+        let gpio = &self.gpio;
+        let carried = |output: &variant::TimerOutput| gpio.mode(output.pin) == Mode::Alternate(output.function);
+        for timer in &mut self.timers {
+            let name = timer.name();
+            timer.connect(OUTPUTS.iter().filter(|output| output.timer == name && carried(output)));
+        }
     }
 
     /// Tells the board of all timers' outputs anew: a pin was connected or disconnected.

@@ -95,8 +95,6 @@ pub struct Chip<W> {
     lines: u128,
     /// Those of what counts time.
     slow_lines: u128,
-    /// Bit of each of `OUTPUTS` that its pin carries.
-    carried: u32,
     reset: bool,
     /// There may be signals that the core has not been told.
     news: bool,
@@ -133,7 +131,6 @@ impl<W: Wiring> Chip<W> {
             next_slow: u64::MAX,
             lines: 0,
             slow_lines: 0,
-            carried: 0,
             reset: false,
         };
         assert!(chip.spi_place(variant.spis.len()) <= agenda::PLACES, "{} has too many peripherals", variant.name);

@@ -49,7 +49,7 @@ pub enum TimerName {
 }
 
 /// What a pin for a transistor's gate does until told otherwise.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Gate {
     /// High while the leg's reference is active, and low otherwise; the other way round where inverted.
     Switching {
@@ -64,11 +64,12 @@ pub enum Gate {
     /// Driven to a level.
     Held(bool),
     /// Not driven by the timer.
+    #[default]
     Released,
 }
 
 /// A PWM channel with its pins.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Leg {
     /// The compare value in force, in counts.
     pub compare: u32,

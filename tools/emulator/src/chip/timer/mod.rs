@@ -21,6 +21,7 @@ use super::wiring::{Quadrature, TimerName};
 use crate::bus::Refusal;
 use counter::Counter;
 use encoder::Encoder;
+use output::Outputs;
 
 mod registers;
 use registers::*;
@@ -57,6 +58,7 @@ pub struct Timer {
     repetitions: u32,
     /// Level of OC4REF.
     reference4: bool,
+    outputs: Outputs,
     events: Events,
 }
 
@@ -67,15 +69,15 @@ impl Timer {
         let block = Block::new(description.text, chapter, table);
         let counter = Counter::new(block.get(ARR));
         let compare = [0; 4];
-        let events = Events::default();
-        Self { description, block, counter, encoder: None, compare, repetitions: 0, reference4: false, events }
+        let (outputs, events) = (Outputs::default(), Events::default());
+        Self { description, block, counter, encoder: None, compare, repetitions: 0, reference4: false, outputs, events }
     }
 
-    /// Back to reset.
+    /// Back to reset. The pins are not its own.
     pub fn reset(&mut self) {
-        let outputs = self.has_outputs();
+        let (changes, carried) = (self.has_outputs(), self.outputs.carried);
         *self = Self::new(self.description);
-        self.events.outputs = outputs;
+        (self.events.outputs, self.outputs.carried) = (changes, carried);
     }
 
     /// Its description.
@@ -252,7 +254,19 @@ impl Timer {
         self.events.outputs |= before & MOE != 0;
     }
 
-    /// A load by the core, after [`advance`](Self::advance).
+    /// Whether a register shows what the counter has done since it last turned.
+    #[inline]
+    pub const fn shows_count(&self, offset: u32) -> bool {
+        matches!(offset, CNT | SR) || self.encoder.is_some()
+    }
+
+    /// Whether a load changes what others see: that of a captured index clears its flag.
+    #[inline]
+    pub fn changes_when_read(&self, offset: u32) -> bool {
+        offset == CCR3 && registers::captures_index(&self.block)
+    }
+
+    /// A load by the core, after [`advance`](Self::advance) where the register [shows](Self::shows_count) it.
     pub fn read(&mut self, offset: u32) -> Result<u32, Refusal> {
         let value = self.block.read(offset)?;
         Ok(match offset {
@@ -266,6 +280,23 @@ impl Timer {
             }
             _ => value,
         })
+    }
+
+    /// A store by the core of what is kept for the next update and changes nothing before it: most of what a program writes to a timer that runs.
+    /// False where it is something else, and has to be a [`write`](Self::write).
+    #[inline]
+    pub fn prepare(&mut self, offset: u32, value: u32) -> bool {
+        let prepares = match offset {
+            _ if self.encoder.is_some() => false,
+            CCR1..=CCR4 => self.is_preloaded(((offset - CCR1) / 4) as usize),
+            // The direction only shows where the counter goes.
+            CR1 => {
+                let shown = if self.counter.centred { DIR } else { 0 };
+                (value ^ self.block.get(CR1)) & !(UDIS | URS | ARPE | shown) == 0
+            }
+            _ => false,
+        };
+        prepares && self.block.write(offset, value).is_ok()
     }
 
     /// A store by the core, after [`advance`](Self::advance).

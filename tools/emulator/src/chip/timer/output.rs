@@ -1,9 +1,24 @@
 //! A timer's outputs: RM0440, 28.3.11 to 28.3.18 "PWM edge-aligned and centre-aligned", "Complementary outputs and dead-time insertion",
 //! "Using the break function", "Output control bits" (table of 28.6.11).
 
+use super::super::variant::TimerOutput;
 use super::super::wiring::{Gate, Leg, Pwm};
 use super::registers::*;
 use super::{Refusal, Timer, TimerKind};
+
+/// Registers that choose what the outputs do, the compare values apart; of the first only the clock of the dead time.
+const CHOOSE_OUTPUTS: [u32; 6] = [CR1, CR2, CCMR1, CCMR2, CCER, BDTR];
+
+/// What the outputs were found to do: it is the same in most periods.
+#[derive(Clone, Debug, Default)]
+pub struct Outputs {
+    /// Whether a pin carries each channel's output, and its complementary one.
+    pub carried: [[bool; 2]; 3],
+    /// What the registers held when the rest was found; none where it was not yet.
+    chosen: Option<[u32; CHOOSE_OUTPUTS.len()]>,
+    legs: [Leg; 3],
+    dead_time: u64,
+}
 
 impl Timer {
     /// Whether a channel from 1 to 3 is enabled as an output.
@@ -28,14 +43,28 @@ impl Timer {
         }
     }
 
+    /// Which of its outputs a pin carries; the others are released.
+    pub fn connect<'a>(&mut self, carried: impl Iterator<Item = &'a TimerOutput>) {
+        self.outputs = Outputs::default();
+        for output in carried {
+            if let Some(leg) = self.outputs.carried.get_mut(usize::from(output.channel).wrapping_sub(1)) {
+                leg[usize::from(output.complementary)] = true;
+            }
+        }
+    }
+
     /// What the outputs do from now on.
-    pub fn pwm(&self) -> Pwm {
-        let leg = |channel: usize| Leg {
-            compare: self.compare[channel],
-            active_below: self.mode(channel) >> 4 & 7 == 6,
-            high: self.gate(channel, false),
-            low: self.gate(channel, true),
-        };
+    pub fn pwm(&mut self) -> Pwm {
+        let mut chosen = CHOOSE_OUTPUTS.map(|register| self.block.get_or_zero(register));
+        chosen[0] &= CKD;
+        if self.outputs.chosen != Some(chosen) {
+            self.outputs.legs = [0, 1, 2].map(|channel| self.leg(channel));
+            (self.outputs.dead_time, self.outputs.chosen) = (self.dead_time(), Some(chosen));
+        }
+        let mut legs = self.outputs.legs;
+        for (leg, compare) in legs.iter_mut().zip(self.compare) {
+            leg.compare = compare;
+        }
         Pwm {
             timer: self.description.name,
             running: self.counter.running,
@@ -43,9 +72,19 @@ impl Timer {
             up: self.counter.up,
             top: self.counter.top,
             tick: self.counter.tick,
-            dead_time: self.dead_time(),
-            legs: [leg(0), leg(1), leg(2)],
+            dead_time: self.outputs.dead_time,
+            legs,
         }
+    }
+
+    /// A channel's pins, by the registers; its compare value changes every period, and is filled in by `pwm`.
+    fn leg(&self, channel: usize) -> Leg {
+        let [high, low] =
+            [false, true].map(|complementary| match self.outputs.carried[channel][usize::from(complementary)] {
+                true => self.gate(channel, complementary),
+                false => Gate::Released,
+            });
+        Leg { compare: 0, active_below: self.mode(channel) >> 4 & 7 == 6, high, low }
     }
 
     /// A channel's pin, or its complementary one.
@@ -93,7 +132,7 @@ impl Timer {
             6 => (32 + (code & 0x1f)) * 8,
             _ => (32 + (code & 0x1f)) * 16,
         };
-        periods << (self.block.get(CR1) >> 8 & 3)
+        periods << ((self.block.get(CR1) & CKD) >> 8)
     }
 
     /// BDTR. While a break is active the outputs cannot be switched on (28.3.17).

@@ -29,6 +29,7 @@ pub const URS: u32 = 1 << 2;
 pub const DIR: u32 = 1 << 4;
 pub const CMS: u32 = 3 << 5;
 pub const ARPE: u32 = 1 << 7;
+pub const CKD: u32 = 3 << 8;
 
 /// SMS, without its upper bit, which is refused.
 pub const SMS: u32 = 7;
