@@ -63,6 +63,43 @@ impl<B: Bus> Cpu<B> {
         address & (BYTES - 1) == 0 && !self.code.changes(address) && self.bus.store(address, width(BYTES), value)
     }
 
+    /// Loads of several words, one behind the other (MemA): at once where memory answers all of them so.
+    #[inline(always)]
+    pub(super) fn load_words(&mut self, address: u32, words: &mut [u32]) -> Result<(), Trap> {
+        let bytes = 4 * words.len() as u32;
+        if address & 3 == 0
+            && let Some(memory) = self.bus.block(address, bytes)
+        {
+            for (word, bytes) in words.iter_mut().zip(memory.as_chunks().0) {
+                *word = u32::from_le_bytes(*bytes);
+            }
+            return Ok(());
+        }
+        for (at, word) in (address..).step_by(4).zip(words) {
+            *word = self.load_aligned::<4>(at)?;
+        }
+        Ok(())
+    }
+
+    /// Stores of several words, one behind the other (MemA).
+    #[inline(always)]
+    pub(super) fn store_words(&mut self, address: u32, words: &[u32]) -> Result<(), Trap> {
+        let bytes = 4 * words.len() as u32;
+        if address & 3 == 0
+            && !self.code.changes_block(address, bytes)
+            && let Some(memory) = self.bus.block_mut(address, bytes)
+        {
+            for (bytes, word) in memory.as_chunks_mut().0.iter_mut().zip(words) {
+                *bytes = word.to_le_bytes();
+            }
+            return Ok(());
+        }
+        for (at, word) in (address..).step_by(4).zip(words) {
+            self.store_aligned::<4>(at, *word)?;
+        }
+        Ok(())
+    }
+
     /// A store whose address has to be a multiple of the width (MemA).
     #[inline(always)]
     pub(super) fn store_aligned<const BYTES: u32>(&mut self, address: u32, value: u32) -> Result<(), Trap> {

@@ -1,6 +1,6 @@
 //! Code, kept decoded: for each half-word where an instruction may begin, the operation that begins there.
 
-use super::operation::{Operands, Operation, Trap};
+use super::operation::{Operands, Operation, Rest, Trap};
 use super::stretch::{SPAN, Stretches};
 use super::{Cpu, End, decode};
 use crate::bus::{Bus, Refusal};
@@ -55,7 +55,7 @@ impl<B: Bus> Code<B> {
     }
 
     fn unknown() -> Operation<B> {
-        let never = |_: &mut Cpu<B>, _: Operands, _: u32| Err(Trap::End.into());
+        let never = |_: &mut Cpu<B>, _: Operands, _: Rest<B>| Err(Trap::End.into());
         Operation::new(never).cycles(0)
     }
 
@@ -79,12 +79,11 @@ impl<B: Bus> Code<B> {
         (operation.timing.length != 0).then_some(operation)
     }
 
-    /// The number of the stretch that begins at an address of the current region; none where nothing is decoded yet.
-    #[inline(always)]
-    pub fn stretch(&mut self, address: u32) -> Option<u32> {
-        let place = self.place(address)?;
+    /// Forms the stretch that begins at an address of the current region; false where nothing is decoded yet.
+    #[cold]
+    pub fn form(&mut self, address: u32) -> bool {
         let operations = &self.operations;
-        self.stretches.begins_at(place).or_else(|| self.stretches.form(place, |place| Self::kept(operations, place)))
+        self.place(address).is_some_and(|place| self.stretches.form(place, |place| Self::kept(operations, place)))
     }
 
     /// Whether a store to an address may change what is decoded; always outside of SRAM, where programs seldom store.

@@ -100,9 +100,7 @@ impl<B: Bus> Cpu<B> {
         let status = self.xpsr() & !(1 << 9) | u32::from(padded) << 9;
         let words = [self.r[0], self.r[1], self.r[2], self.r[3], self.r[12], self.r[14], back, status];
         self.r[13] = frame;
-        for (at, word) in (frame..).step_by(4).zip(words) {
-            self.store_aligned::<4>(at, word)?;
-        }
+        self.store_words(frame, &words)?;
         if floating {
             let place = frame.wrapping_add(BASIC_FRAME);
             if self.system.lazy() {
@@ -118,9 +116,8 @@ impl<B: Bus> Cpu<B> {
     }
 
     fn store_floating_point(&mut self, place: u32) -> Result<(), Trap> {
-        for i in 0..16 {
-            self.store_aligned::<4>(place.wrapping_add(4 * i as u32), self.s[i])?;
-        }
+        let registers: [u32; 16] = std::array::from_fn(|i| self.s[i]);
+        self.store_words(place, &registers)?;
         self.store_aligned::<4>(place.wrapping_add(0x40), self.floating.bits())
     }
 
@@ -208,18 +205,16 @@ impl<B: Bus> Cpu<B> {
         let floating = value & 0x10 == 0;
         let frame = self.r[13];
         let mut words = [0; 8];
-        for (at, word) in (frame..).step_by(4).zip(&mut words) {
-            *word = self.load_aligned::<4>(at)?;
-        }
+        self.load_words(frame, &mut words)?;
         let mut size = BASIC_FRAME;
         if floating {
             size += FLOATING_FRAME;
             // Registers that were never stored are still there.
             if self.system.take_deferred().is_none() {
                 let place = frame.wrapping_add(BASIC_FRAME);
-                for i in 0..16 {
-                    self.s[i] = self.load_aligned::<4>(place.wrapping_add(4 * i as u32))?;
-                }
+                let mut registers = [0; 16];
+                self.load_words(place, &mut registers)?;
+                self.s[..16].copy_from_slice(&registers);
                 let status = self.load_aligned::<4>(place.wrapping_add(0x40))?;
                 self.floating = super::float::Status::from_bits(status);
                 self.now += timing::FLOATING_POINT_FRAME;

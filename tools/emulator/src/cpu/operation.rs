@@ -63,11 +63,24 @@ pub(super) struct Operands {
     pub x: u8,
 }
 
-/// Executes an instruction, and what follows it in its stretch: the number is that of its step (see `stretch`).
-pub(super) type Execute<B> = fn(&mut Cpu<B>, Operands, u32) -> Done;
+/// Executes an instruction, and what follows it in its stretch.
+pub(super) type Execute<B> = fn(&mut Cpu<B>, Operands, Rest<B>) -> Done;
 
-/// The step of an instruction that nothing follows at once.
-pub(super) const ALONE: u32 = u32::MAX - 1;
+/// What follows an instruction in its stretch (see `stretch`); nothing where it is executed by itself.
+pub(super) type Rest<'a, B> = &'a [Step<B>];
+
+/// An instruction of a stretch.
+pub(super) struct Step<B: Bus> {
+    pub execute: Execute<B>,
+    pub operands: Operands,
+}
+
+// Not derived: that would ask the same of the bus.
+impl<B: Bus> Clone for Step<B> {
+    fn clone(&self) -> Self {
+        Self { execute: self.execute, operands: self.operands }
+    }
+}
 
 /// The state of an IT block behind an instruction (ITAdvance).
 pub(super) const fn behind(block: u8) -> u8 {

@@ -3,7 +3,7 @@
 //! A run without a watch flows: as long as nothing is due, one stretch follows the other (see `stretch`).
 
 use super::decode::Refused;
-use super::operation::{ALONE, Done, Leave, Operation, behind};
+use super::operation::{Done, Leave, Operation, behind};
 use super::{Cpu, End};
 use crate::bus::Bus;
 
@@ -50,7 +50,7 @@ impl<B: Bus> Cpu<B> {
     fn flow(&mut self) {
         loop {
             match self.it {
-                0 => self.run_stretch(),
+                0 => self.run_stretches(),
                 _ => self.instruct::<false>(),
             }
             if self.now >= self.attention {
@@ -73,7 +73,7 @@ impl<B: Bus> Cpu<B> {
         self.now = self.now.wrapping_add(u64::from(cycles));
         self.single = operation.timing.single;
         let done = match self.it {
-            0 => (operation.execute)(self, operation.operands, ALONE),
+            0 => (operation.execute)(self, operation.operands, &[]),
             _ => self.in_block(operation, pc),
         };
         if let Err(Leave::Trapped(trap)) = done {
@@ -95,7 +95,7 @@ impl<B: Bus> Cpu<B> {
         }
         self.in_it = true;
         let (next, rest, handler) = (self.pc, self.it, self.exception);
-        let done = (operation.execute)(self, operation.operands, ALONE);
+        let done = (operation.execute)(self, operation.operands, &[]);
         self.in_it = false;
         if let Err(Leave::Trapped(_)) = done {
             self.it = block;

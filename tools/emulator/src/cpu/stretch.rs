@@ -1,14 +1,18 @@
 //! Stretches: instructions that are decoded one behind the other, as a list of calls with nothing to look up or to count in between.
 //!
 //! What an instruction takes without wait states is known beforehand, so a stretch is counted where it is left: at its end, by a branch, or by
-//! an instruction that needs the core as it is, which settles the count first (`Cpu::settle`) and leaves the stretch. What takes longer than
+//! an instruction that needs the core as it is, which settles the count first (`Cpu::settle_at`) and leaves the stretch. What takes longer than
 //! was known beforehand (wait states, refilled pipelines) is added to the time as it happens.
 //!
-//! IT blocks are parts of stretches, up to an instruction of theirs that may branch.
+//! An instruction goes on with what is behind it (`Cpu::next`). One that may jump, trap or settle says before where it is (`Cpu::at`); one that
+//! may have settled goes on only if it has not (`Cpu::go_on`).
+//!
+//! IT blocks are parts of stretches, up to an instruction of theirs that may branch: before each of their instructions there is a step that
+//! passes it over if its condition does not hold, and behind the block one that ends it.
 
 use super::Cpu;
 use super::execute::system::nothing;
-use super::operation::{ALONE, Done, Execute, Flow, Leave, Operands, Operation, Trap, behind};
+use super::operation::{Done, Execute, Flow, Leave, Operands, Operation, Rest, Step, Trap, behind};
 use crate::bus::Bus;
 
 /// Instructions of a stretch, at most.
@@ -18,19 +22,6 @@ pub(super) const SPAN: usize = 2 * LONGEST;
 /// So many steps are kept, 6 MB; behind them all stretches are formed anew.
 const KEPT: usize = 1 << 18;
 
-/// An instruction of a stretch.
-pub(super) struct Step<B: Bus> {
-    execute: Execute<B>,
-    operands: Operands,
-}
-
-// Not derived: that would ask the same of the bus.
-impl<B: Bus> Clone for Step<B> {
-    fn clone(&self) -> Self {
-        Self { execute: self.execute, operands: self.operands }
-    }
-}
-
 /// What counts if a stretch is left behind a step.
 #[derive(Clone, Copy, Default)]
 struct Mark {
@@ -38,8 +29,6 @@ struct Mark {
     cycles: u16,
     bytes: u8,
     instructions: u8,
-    /// Bytes of the instruction.
-    length: u8,
     /// As in `Timing`.
     single: bool,
     /// As in `Cpu`.
@@ -66,8 +55,6 @@ pub(super) struct Stretches<B: Bus> {
     steps: Vec<Step<B>>,
     /// Of the steps.
     marks: Vec<Mark>,
-    /// Instructions of IT blocks.
-    conditional: Vec<Operation<B>>,
     stretches: Vec<Stretch>,
     /// Which of them begins at each place of the code; `NONE` where none does.
     begins: Vec<u32>,
@@ -78,8 +65,7 @@ const NONE: u32 = u32::MAX;
 impl<B: Bus> Stretches<B> {
     /// None yet, of so many places.
     pub fn new(places: usize) -> Self {
-        let begins = vec![NONE; places];
-        Self { steps: Vec::new(), marks: Vec::new(), conditional: Vec::new(), stretches: Vec::new(), begins }
+        Self { steps: Vec::new(), marks: Vec::new(), stretches: Vec::new(), begins: vec![NONE; places] }
     }
 
     /// Forgets those that begin at some places.
@@ -100,46 +86,40 @@ impl<B: Bus> Stretches<B> {
         }
     }
 
-    /// The number of the stretch that begins at a place; none where none was formed.
-    #[inline(always)]
-    pub fn begins_at(&self, place: usize) -> Option<u32> {
-        self.begins.get(place).copied().filter(|number| *number != NONE)
-    }
-
-    /// Forms the stretch that begins at a place. None where nothing is decoded.
-    #[cold]
-    pub fn form(&mut self, place: usize, kept: impl Fn(usize) -> Option<Operation<B>>) -> Option<u32> {
-        let begin = kept(place)?;
+    /// Forms the stretch that begins at a place; false where nothing is decoded.
+    pub fn form(&mut self, place: usize, kept: impl Fn(usize) -> Option<Operation<B>>) -> bool {
+        let Some(begin) = kept(place) else { return false };
         if self.steps.len() >= KEPT {
             *self = Self::new(self.begins.len());
         }
         let first = self.steps.len();
         let (mut next, mut before_last, mut mark) = (place, 0, Mark::default());
         while let Some(operation) = kept(next)
-            && self.steps.len() < first + LONGEST
+            && usize::from(mark.instructions) < LONGEST
             && (mark.it == 0 || operation.timing.flow == Flow::On)
         {
-            let Operation { operands, timing, .. } = operation;
+            let Operation { execute, operands, timing } = operation;
             let block = mark.it;
             before_last = mark.cycles;
+            if block != 0 {
+                let rest =
+                    Operands { immediate: u32::from(timing.cycles), x: block, m: timing.single.into(), ..operands };
+                self.push(unless, rest, mark);
+            }
             mark = Mark {
                 cycles: mark.cycles + u16::from(timing.cycles - if mark.single { timing.overlaps } else { 0 }),
                 bytes: mark.bytes + timing.length,
                 instructions: mark.instructions + 1,
-                length: timing.length,
                 single: timing.single,
                 it: if timing.flow == Flow::Block { operands.x } else { behind(block) },
             };
-            self.marks.push(mark);
-            self.steps.push(match (block, timing.flow) {
-                (0, Flow::Block) => Step { execute: nothing, operands },
-                (0, _) => Step { execute: operation.execute, operands },
-                _ => {
-                    self.conditional.push(operation);
-                    let operands = Operands { immediate: self.conditional.len() as u32 - 1, x: block, ..operands };
-                    Step { execute: conditional, operands }
-                }
-            });
+            match timing.flow {
+                Flow::Block => self.push(begin_block, operands, mark),
+                _ => self.push(execute, operands, mark),
+            }
+            if block != 0 && mark.it == 0 {
+                self.push(end_block, operands, mark);
+            }
             if timing.flow == Flow::Elsewhere {
                 break;
             }
@@ -152,10 +132,21 @@ impl<B: Bus> Stretches<B> {
             bytes: mark.bytes,
             overlaps: begin.timing.overlaps,
         };
-        let number = self.stretches.len() as u32;
-        *self.begins.get_mut(place)? = number;
+        let Some(begins) = self.begins.get_mut(place) else { return false };
+        *begins = self.stretches.len() as u32;
         self.stretches.push(stretch);
-        Some(number)
+        true
+    }
+
+    fn push(&mut self, execute: Execute<B>, operands: Operands, mark: Mark) {
+        self.steps.push(Step { execute, operands });
+        self.marks.push(mark);
+    }
+
+    /// The stretch that begins at a place; none where none does yet.
+    #[inline(always)]
+    fn begins_at(&self, place: usize) -> Option<&Stretch> {
+        self.stretches.get(*self.begins.get(place)? as usize)
     }
 
     /// The end of a stretch for whom so many cycles are left: the instruction that reaches them completes.
@@ -170,50 +161,100 @@ impl<B: Bus> Stretches<B> {
 /// Where the core is in a stretch.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Within {
-    /// The step that runs.
-    step: u32,
     /// The step behind the last; 0 where the core is in no stretch, or has left it.
     end: u32,
+    /// Steps behind the one that runs: said by those that may jump, trap or settle.
+    behind: u32,
+    /// The step behind which the last stretch was left.
+    left: u32,
+    /// Where the last stretch began, as a step.
+    first: u32,
 }
 
 impl<B: Bus> Cpu<B> {
-    /// Runs the stretch that begins here, as far as nothing is due, or decodes what begins here.
-    #[inline(always)]
-    pub(super) fn run_stretch(&mut self) {
-        let begin = self.pc;
-        let Some(number) = self.code.stretch(begin) else { return self.elsewhere(begin) };
-        let Some(stretch) = self.code.stretches.stretches.get(number as usize) else { return };
-        self.now = self.now.wrapping_sub(u64::from(stretch.overlaps & u8::from(self.single)));
-        let left = self.attention.saturating_sub(self.now);
-        let first = stretch.first;
-        self.within.end = match u64::from(stretch.before_last) < left {
-            true => stretch.end,
-            false => self.code.stretches.end_within(*stretch, left),
-        };
-        match self.take(first) {
-            Ok(()) => self.settle(),
-            Err(Leave::Jumped) => {
-                self.count();
-            }
-            Err(Leave::Trapped(trap)) => self.trapped_within(trap, begin),
+    /// Runs one stretch after the other, as far as nothing is due and all is decoded; then decodes what is not.
+    pub(super) fn run_stretches(&mut self) {
+        // Not part of the core while they run, which changes the core.
+        let steps = std::mem::take(&mut self.code.stretches.steps);
+        let complete = self.run_formed(&steps);
+        self.code.stretches.steps = steps;
+        if !complete && !self.code.form(self.pc) {
+            self.elsewhere(self.pc);
         }
     }
 
-    /// What is behind a step: the next one, unless the stretch ends here or was left. Every instruction that completes ends with this.
+    /// Runs stretches until something is due, or in an IT block; false where none begins yet.
     #[inline(always)]
-    pub(super) fn next(&mut self, step: u32) -> Done {
-        let next = step.wrapping_add(1);
-        if next < self.within.end { self.take(next) } else { Ok(()) }
+    fn run_formed(&mut self, steps: &[Step<B>]) -> bool {
+        loop {
+            let begin = self.pc;
+            let place = self.code.place(begin);
+            let Some(&stretch) = place.and_then(|place| self.code.stretches.begins_at(place)) else { return false };
+            self.now = self.now.wrapping_sub(u64::from(stretch.overlaps & u8::from(self.single)));
+            let left = self.attention.saturating_sub(self.now);
+            let end = match u64::from(stretch.before_last) < left {
+                true => stretch.end,
+                false => self.code.stretches.end_within(stretch, left),
+            };
+            self.within.end = end;
+            self.within.first = stretch.first;
+            let Some(steps) = steps.get(stretch.first as usize..end as usize) else { return false };
+            match self.next(steps) {
+                Ok(()) => self.settle_at(&[]),
+                Err(Leave::Jumped) => {
+                    self.count();
+                }
+                Err(Leave::Trapped(trap)) => self.trapped_within(trap, begin),
+            }
+            if self.now >= self.attention || self.it != 0 {
+                return true;
+            }
+        }
     }
 
+    /// Goes on with what is behind an instruction. Every instruction that completes ends with this, unless it jumps or settles.
     #[inline(always)]
-    fn take(&mut self, step: u32) -> Done {
-        let Some(&Step { execute, operands }) = self.code.stretches.steps.get(step as usize) else { return Ok(()) };
-        self.within.step = step;
-        execute(self, operands, step)
+    pub(super) fn next(&mut self, rest: Rest<B>) -> Done {
+        match rest.split_first() {
+            Some((step, rest)) => (step.execute)(self, step.operands, rest),
+            None => Ok(()),
+        }
     }
 
-    /// Counts what has run of a stretch, and leaves it: to be called by every instruction that looks at time, counts, IT state or its own
+    /// The same of an instruction that may have settled: then nothing follows at once.
+    #[inline(always)]
+    pub(super) fn go_on(&mut self, rest: Rest<B>) -> Done {
+        if self.within.end == 0 { Ok(()) } else { self.next(rest) }
+    }
+
+    /// An instruction says where it is: before it may jump, trap or settle.
+    #[inline(always)]
+    pub(super) fn at(&mut self, rest: Rest<B>) {
+        self.within.behind = rest.len() as u32;
+    }
+
+    /// The end of an instruction that has gone elsewhere.
+    #[inline(always)]
+    pub(super) fn jumped(&mut self, rest: Rest<B>) -> Done {
+        self.at(rest);
+        Err(Leave::Jumped)
+    }
+
+    /// The end of an instruction that does not complete.
+    #[cold]
+    pub(super) fn trap(&mut self, rest: Rest<B>, trap: Trap) -> Done {
+        self.at(rest);
+        Err(Leave::Trapped(trap))
+    }
+
+    /// Leaves the stretch behind an instruction.
+    #[inline(always)]
+    pub(super) fn settle_at(&mut self, rest: Rest<B>) {
+        self.at(rest);
+        self.settle();
+    }
+
+    /// Counts what has run of a stretch, and leaves it: for everything that looks at time, counts, IT state or an instruction's own
     /// address, or changes what has to be attended to. Where the core is in no stretch, everything is counted already.
     #[inline]
     pub(super) fn settle(&mut self) {
@@ -229,46 +270,56 @@ impl<B: Bus> Cpu<B> {
         if self.within.end == 0 {
             return None;
         }
+        self.within.left = self.within.end.wrapping_sub(self.within.behind).wrapping_sub(1);
         self.within.end = 0;
-        let mark = *self.code.stretches.marks.get(self.within.step as usize)?;
+        self.in_it = false;
+        let mark = *self.code.stretches.marks.get(self.within.left as usize)?;
         self.now = self.now.wrapping_add(u64::from(mark.cycles));
         self.instructions = self.instructions.wrapping_add(u64::from(mark.instructions));
         self.single = mark.single;
         Some(mark)
     }
 
-    /// An instruction of the stretch from `begin` on did not complete.
+    /// An instruction of the stretch from `begin` on did not complete: it is left where it began.
     #[cold]
     fn trapped_within(&mut self, trap: Trap, begin: u32) {
         self.settle();
-        let mark = self.code.stretches.marks.get(self.within.step as usize);
-        let before = mark.map_or(0, |mark| u32::from(mark.bytes - mark.length));
-        self.trapped(trap, begin.wrapping_add(before));
+        let before = match self.within.left > self.within.first {
+            true => self.code.stretches.marks.get(self.within.left as usize - 1).copied().unwrap_or_default(),
+            false => Mark::default(),
+        };
+        if before.it != 0 {
+            self.it = before.it;
+        }
+        self.trapped(trap, begin.wrapping_add(u32::from(before.bytes)));
     }
 }
 
-/// An instruction of an IT block, `x` being the block's state before it: runs if its condition holds (A7.3.2).
-fn conditional<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
-    let Some(&Operation { execute, operands, timing }) = cpu.code.stretches.conditional.get(o.immediate as usize)
-    else {
-        return Ok(());
-    };
+/// IT: what follows sets no flags where it would outside.
+fn begin_block<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    cpu.in_it = true;
+    nothing(cpu, o, rest)
+}
+
+/// Behind the last instruction of an IT block.
+fn end_block<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    cpu.in_it = false;
+    nothing(cpu, o, rest)
+}
+
+/// Before an instruction of an IT block, whose state is `x`: passes it over if its condition does not hold (A7.3.2). It takes `immediate`
+/// cycles otherwise, and m says whether it loads or stores one register.
+fn unless<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     if cpu.holds(o.x >> 4) {
-        cpu.in_it = true;
-        let done = execute(cpu, operands, ALONE);
-        cpu.in_it = false;
-        if done.is_err() {
-            cpu.settle();
-            cpu.it = o.x;
-            return done;
-        }
-        return cpu.next(step);
+        return cpu.next(rest);
     }
-    if timing.single {
+    let behind = rest.get(1..).unwrap_or_default();
+    cpu.now = cpu.now.wrapping_sub(u64::from(o.immediate) - 1);
+    if o.m != 0 {
         // The next instruction does not overlap, other than the stretch takes it.
-        cpu.settle();
+        cpu.settle_at(behind);
         cpu.single = false;
+        return Ok(());
     }
-    cpu.now = cpu.now.wrapping_sub(u64::from(timing.cycles) - 1);
-    cpu.next(step)
+    cpu.next(behind)
 }

@@ -2,21 +2,21 @@
 
 use crate::bus::Bus;
 use crate::cpu::Cpu;
-use crate::cpu::operation::{Done, Execute, Leave, Operands};
+use crate::cpu::operation::{Done, Execute, Operands, Rest};
 
 /// To `immediate`.
-pub(in crate::cpu) fn branch<B: Bus>(cpu: &mut Cpu<B>, o: Operands, _: u32) -> Done {
+pub(in crate::cpu) fn branch<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     cpu.branch(o.immediate);
-    Err(Leave::Jumped)
+    cpu.jumped(rest)
 }
 
 /// To `immediate` if a condition holds.
-fn branch_if<B: Bus, const CONDITION: u8>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+fn branch_if<B: Bus, const CONDITION: u8>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     if !cpu.holds(CONDITION) {
-        return cpu.next(step);
+        return cpu.next(rest);
     }
     cpu.branch(o.immediate);
-    Err(Leave::Jumped)
+    cpu.jumped(rest)
 }
 
 /// The branch of a condition; 14, which is no condition of a branch, and more always hold.
@@ -41,25 +41,25 @@ pub(in crate::cpu) fn branch_if_of<B: Bus>(condition: u32) -> Execute<B> {
 }
 
 /// CBZ; CBNZ with x = 1.
-pub(in crate::cpu) fn branch_if_zero<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn branch_if_zero<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     if (cpu.get(o.n) == 0) != (o.x == 0) {
-        return cpu.next(step);
+        return cpu.next(rest);
     }
     cpu.branch(o.immediate);
-    Err(Leave::Jumped)
+    cpu.jumped(rest)
 }
 
 /// BL.
-pub(in crate::cpu) fn call<B: Bus>(cpu: &mut Cpu<B>, o: Operands, _: u32) -> Done {
-    cpu.settle();
+pub(in crate::cpu) fn call<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    cpu.settle_at(rest);
     cpu.r[14] = cpu.pc | 1;
     cpu.branch(o.immediate);
-    Err(Leave::Jumped)
+    cpu.jumped(rest)
 }
 
 /// BLX.
-pub(in crate::cpu) fn call_register<B: Bus>(cpu: &mut Cpu<B>, o: Operands, _: u32) -> Done {
-    cpu.settle();
+pub(in crate::cpu) fn call_register<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    cpu.settle_at(rest);
     let target = cpu.get(o.m);
     cpu.r[14] = cpu.pc | 1;
     if target & 1 == 0 {
@@ -67,41 +67,43 @@ pub(in crate::cpu) fn call_register<B: Bus>(cpu: &mut Cpu<B>, o: Operands, _: u3
         cpu.attention = 0;
     }
     cpu.branch(target & !1);
-    Err(Leave::Jumped)
+    cpu.jumped(rest)
 }
 
 /// BX.
-pub(in crate::cpu) fn branch_register<B: Bus>(cpu: &mut Cpu<B>, o: Operands, _: u32) -> Done {
+pub(in crate::cpu) fn branch_register<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    cpu.at(rest);
     cpu.branch_exchange(cpu.get(o.m))?;
-    Err(Leave::Jumped)
+    cpu.jumped(rest)
 }
 
 /// MOV to the program counter: no change of state.
-pub(in crate::cpu) fn move_to_pc<B: Bus>(cpu: &mut Cpu<B>, o: Operands, _: u32) -> Done {
+pub(in crate::cpu) fn move_to_pc<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     cpu.branch(cpu.get(o.m) & !1);
-    Err(Leave::Jumped)
+    cpu.jumped(rest)
 }
 
 /// ADD to the program counter, which is `immediate`.
-pub(in crate::cpu) fn add_to_pc<B: Bus>(cpu: &mut Cpu<B>, o: Operands, _: u32) -> Done {
+pub(in crate::cpu) fn add_to_pc<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     cpu.branch(o.immediate.wrapping_add(cpu.get(o.m)) & !1);
-    Err(Leave::Jumped)
+    cpu.jumped(rest)
 }
 
 /// TBB; TBH with x = 1. From `immediate`, a table at n or, with 15, behind the instruction.
-pub(in crate::cpu) fn table<B: Bus>(cpu: &mut Cpu<B>, o: Operands, _: u32) -> Done {
+pub(in crate::cpu) fn table<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    cpu.at(rest);
     let start = if o.n == 15 { o.immediate } else { cpu.get(o.n) };
     let entry = match o.x {
         0 => cpu.load::<1>(start.wrapping_add(cpu.get(o.m)))?,
         _ => cpu.load::<2>(start.wrapping_add(cpu.get(o.m) << 1))?,
     };
     cpu.branch(o.immediate.wrapping_add(2 * entry));
-    Err(Leave::Jumped)
+    cpu.jumped(rest)
 }
 
 /// IT.
-pub(in crate::cpu) fn it<B: Bus>(cpu: &mut Cpu<B>, o: Operands, _: u32) -> Done {
-    cpu.settle();
+pub(in crate::cpu) fn it<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    cpu.settle_at(rest);
     cpu.it = o.x;
-    Err(Leave::Jumped)
+    cpu.jumped(rest)
 }

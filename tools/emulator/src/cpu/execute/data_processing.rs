@@ -5,7 +5,7 @@ use crate::cpu::Cpu;
 use crate::cpu::arithmetic::{
     ARITHMETIC, CARRY_CLEARED, CARRY_KEPT, EXTEND, LEFT, RIGHT, ROTATE, add_with_carry, shift, sign_extend,
 };
-use crate::cpu::operation::{Done, Execute, Operands};
+use crate::cpu::operation::{Done, Execute, Operands, Rest};
 
 /// Operations, as wide encodings number them.
 pub(in crate::cpu) const AND: u8 = 0;
@@ -40,7 +40,7 @@ pub(in crate::cpu) const SHIFTED: u8 = 2;
 pub(in crate::cpu) fn data<B: Bus, const OPERATION: u8, const SECOND: u8, const FLAGS: u8>(
     cpu: &mut Cpu<B>,
     o: Operands,
-    step: u32,
+    rest: Rest<B>,
 ) -> Done {
     let (second, carry) = match SECOND {
         CONSTANT => match u32::from(o.x) {
@@ -74,14 +74,14 @@ pub(in crate::cpu) fn data<B: Bus, const OPERATION: u8, const SECOND: u8, const 
     if FLAGS != TEST {
         cpu.set_any(o.d, result);
     }
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 /// Shifts n by the lowest byte of m.
 pub(in crate::cpu) fn shift_register<B: Bus, const KIND: u8, const FLAGS: u8>(
     cpu: &mut Cpu<B>,
     o: Operands,
-    step: u32,
+    rest: Rest<B>,
 ) -> Done {
     let (result, carry) = shift(KIND, cpu.get(o.n), cpu.get(o.m) & 0xff, cpu.carry);
     if FLAGS == ALWAYS || FLAGS == OUTSIDE_IT && !cpu.in_it {
@@ -89,14 +89,14 @@ pub(in crate::cpu) fn shift_register<B: Bus, const KIND: u8, const FLAGS: u8>(
         cpu.carry = carry;
     }
     cpu.set(o.d, result);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 /// Shifts m by a constant: `SHIFTED` MOV with the kind known.
 pub(in crate::cpu) fn shift_immediate<B: Bus, const KIND: u8, const FLAGS: u8>(
     cpu: &mut Cpu<B>,
     o: Operands,
-    step: u32,
+    rest: Rest<B>,
 ) -> Done {
     let (result, carry) = shift(KIND, cpu.get(o.m), o.immediate, cpu.carry);
     if FLAGS == ALWAYS || FLAGS == OUTSIDE_IT && !cpu.in_it {
@@ -104,26 +104,26 @@ pub(in crate::cpu) fn shift_immediate<B: Bus, const KIND: u8, const FLAGS: u8>(
         cpu.carry = carry;
     }
     cpu.set(o.d, result);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 /// ADDW, SUBW, ADR, ADD to the stack pointer: no flags.
-pub(in crate::cpu) fn add_immediate<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn add_immediate<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let sum = cpu.get(o.n).wrapping_add(o.immediate);
     cpu.set_any(o.d, sum);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 /// MOVW, and what the program counter adds to.
-pub(in crate::cpu) fn constant<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn constant<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     cpu.set_any(o.d, o.immediate);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
-pub(in crate::cpu) fn movt<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn movt<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let value = cpu.get(o.d) & 0xffff | o.immediate << 16;
     cpu.set(o.d, value);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 /// Lowest `width` bits.
@@ -132,24 +132,24 @@ fn mask(width: u8) -> u32 {
 }
 
 /// BFI; BFC has 15 as n. The lowest bit is m, the width x.
-pub(in crate::cpu) fn bfi<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn bfi<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let field = mask(o.x) << (o.m & 31);
     let inserted = if o.n == 15 { 0 } else { cpu.get(o.n) << (o.m & 31) };
     let value = cpu.get(o.d) & !field | inserted & field;
     cpu.set(o.d, value);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
-pub(in crate::cpu) fn ubfx<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn ubfx<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let value = cpu.get(o.n) >> (o.m & 31) & mask(o.x);
     cpu.set(o.d, value);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
-pub(in crate::cpu) fn sbfx<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn sbfx<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let value = sign_extend(cpu.get(o.n) >> (o.m & 31), u32::from(o.x.clamp(1, 32)));
     cpu.set(o.d, value);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 /// What is extended: the numbers of the wide encodings.
@@ -160,7 +160,7 @@ pub(in crate::cpu) const BYTES_UNSIGNED: u8 = 3;
 pub(in crate::cpu) const BYTE_SIGNED: u8 = 4;
 
 /// SXTH and its like, with rotation by `immediate`; n is added where it is not 15.
-pub(in crate::cpu) fn extend<B: Bus, const KIND: u8>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn extend<B: Bus, const KIND: u8>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let value = cpu.get(o.m).rotate_right(o.immediate);
     let base = if o.n == 15 { 0 } else { cpu.get(o.n) };
     let halves =
@@ -174,11 +174,11 @@ pub(in crate::cpu) fn extend<B: Bus, const KIND: u8>(cpu: &mut Cpu<B>, o: Operan
         _ => base.wrapping_add(value & 0xff),
     };
     cpu.set(o.d, result);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 /// REV, REV16, RBIT, REVSH: as wide encodings number them.
-pub(in crate::cpu) fn reverse<B: Bus, const KIND: u8>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn reverse<B: Bus, const KIND: u8>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let value = cpu.get(o.m);
     let result = match KIND {
         0 => value.swap_bytes(),
@@ -187,23 +187,23 @@ pub(in crate::cpu) fn reverse<B: Bus, const KIND: u8>(cpu: &mut Cpu<B>, o: Opera
         _ => sign_extend(u32::from((value as u16).swap_bytes()), 16),
     };
     cpu.set(o.d, result);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
-pub(in crate::cpu) fn clz<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn clz<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let zeros = cpu.get(o.m).leading_zeros();
     cpu.set(o.d, zeros);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 /// PKHBT, PKHTB (x = 1); the kind of the shift follows.
-pub(in crate::cpu) fn pkh<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn pkh<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let kind = if o.x == 0 { LEFT } else { ARITHMETIC };
     let (shifted, _) = shift(kind, cpu.get(o.m), o.immediate, false);
     let first = cpu.get(o.n);
     let result = if o.x == 0 { shifted & 0xffff_0000 | first & 0xffff } else { first & 0xffff_0000 | shifted & 0xffff };
     cpu.set(o.d, result);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 /// The shift of a kind that only decoding knows.

@@ -4,10 +4,10 @@ use super::load_store::{BELOW, CHANGES, block};
 use crate::bus::Bus;
 use crate::cpu::Cpu;
 use crate::cpu::float::{self, Rounding};
-use crate::cpu::operation::{Done, Execute, Operands, Trap};
+use crate::cpu::operation::{Done, Execute, Operands, Rest, Trap};
 
 impl<B: Bus> Cpu<B> {
-    /// Every instruction of the unit begins with this.
+    /// Every instruction of the unit begins with this, or with `ready_first`.
     #[inline(always)]
     fn use_floating_point(&mut self) -> Result<(), Trap> {
         if self.floating_ready { Ok(()) } else { self.check_floating_point() }
@@ -22,6 +22,15 @@ impl<B: Bus> Cpu<B> {
     fn set_float(&mut self, register: u8, bits: u32) {
         self.s[usize::from(register & 31)] = bits;
     }
+}
+
+/// An instruction that found the unit not ready: prepares it, and executes it by itself.
+#[cold]
+#[inline(never)]
+fn ready_first<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>, execute: Execute<B>) -> Done {
+    cpu.at(rest);
+    cpu.check_floating_point()?;
+    execute(cpu, o, &[])
 }
 
 /// Operations of three registers: the numbers that decoding and execution agree on.
@@ -39,7 +48,7 @@ pub(in crate::cpu) const VFNMA: u8 = 11;
 pub(in crate::cpu) const VFMA: u8 = 12;
 pub(in crate::cpu) const VFMS: u8 = 13;
 
-fn three<B: Bus, const OPERATION: u8>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+fn three<B: Bus, const OPERATION: u8>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let (d, n, m, status) = (cpu.float(o.d), cpu.float(o.n), cpu.float(o.m), cpu.floating);
     let result = match OPERATION {
         VMUL => float::multiply_at_once(n, m, status),
@@ -54,15 +63,17 @@ fn three<B: Bus, const OPERATION: u8>(cpu: &mut Cpu<B>, o: Operands, step: u32) 
         && cpu.floating_ready
     {
         cpu.set_float(o.d, result);
-        return cpu.next(step);
+        return cpu.next(rest);
     }
-    three_exactly::<B, OPERATION>(cpu, o, step)
+    three_exactly::<B, OPERATION>(cpu, o, rest)
 }
 
 /// The same in general; by itself, so that the usual way saves no registers.
 #[inline(never)]
-fn three_exactly<B: Bus, const OPERATION: u8>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
-    cpu.use_floating_point()?;
+fn three_exactly<B: Bus, const OPERATION: u8>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    if !cpu.floating_ready {
+        return ready_first(cpu, o, rest, three_exactly::<B, OPERATION>);
+    }
     let (d, n, m) = (cpu.float(o.d), cpu.float(o.n), cpu.float(o.m));
     let status = &mut cpu.floating;
     let result = match OPERATION {
@@ -84,7 +95,7 @@ fn three_exactly<B: Bus, const OPERATION: u8>(cpu: &mut Cpu<B>, o: Operands, ste
         _ => float::multiply_add(float::negate(d), float::negate(n), m, status),
     };
     cpu.set_float(o.d, result);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 pub(in crate::cpu) fn three_of<B: Bus>(operation: u8) -> Option<Execute<B>> {
@@ -107,33 +118,41 @@ pub(in crate::cpu) fn three_of<B: Bus>(operation: u8) -> Option<Execute<B>> {
 }
 
 /// VMOV of a constant.
-pub(in crate::cpu) fn vmov_constant<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
-    cpu.use_floating_point()?;
+pub(in crate::cpu) fn vmov_constant<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    if !cpu.floating_ready {
+        return ready_first(cpu, o, rest, vmov_constant);
+    }
     cpu.set_float(o.d, o.immediate);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 /// VMOV, VABS, VNEG: bits of m, of which `immediate` are cleared and x of the sign exchanged.
-pub(in crate::cpu) fn vmov<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
-    cpu.use_floating_point()?;
+pub(in crate::cpu) fn vmov<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    if !cpu.floating_ready {
+        return ready_first(cpu, o, rest, vmov);
+    }
     let bits = cpu.float(o.m) & !o.immediate ^ u32::from(o.x) << 31;
     cpu.set_float(o.d, bits);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
-pub(in crate::cpu) fn vsqrt<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
-    cpu.use_floating_point()?;
+pub(in crate::cpu) fn vsqrt<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    if !cpu.floating_ready {
+        return ready_first(cpu, o, rest, vsqrt);
+    }
     let root = float::square_root(cpu.float(o.m), &mut cpu.floating);
     cpu.set_float(o.d, root);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 /// VCMP, with zero where `immediate` says so; VCMPE with x.
-pub(in crate::cpu) fn vcmp<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
-    cpu.use_floating_point()?;
+pub(in crate::cpu) fn vcmp<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    if !cpu.floating_ready {
+        return ready_first(cpu, o, rest, vcmp);
+    }
     let second = if o.immediate != 0 { 0 } else { cpu.float(o.m) };
     float::compare(cpu.float(o.d), second, o.x != 0, &mut cpu.floating);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 /// x of the conversions: without sign; 16 bits; towards zero; the upper half-word; from single precision.
@@ -144,32 +163,42 @@ pub(in crate::cpu) const TOP: u32 = 1;
 pub(in crate::cpu) const TO_HALF: u32 = 2;
 
 /// VCVT, VCVTR to integers and fixed point of `immediate` bits behind the point.
-pub(in crate::cpu) fn vcvt_to_fixed<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
-    cpu.use_floating_point()?;
+pub(in crate::cpu) fn vcvt_to_fixed<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    if !cpu.floating_ready {
+        return ready_first(cpu, o, rest, vcvt_to_fixed);
+    }
     let x = u32::from(o.x);
     let bits = if x & NARROW != 0 { 16 } else { 32 };
     let rounding = (x & TOWARDS_ZERO != 0).then_some(Rounding::Zero);
     let value = cpu.float(o.m);
     let result = float::to_fixed(value, bits, o.immediate, x & UNSIGNED != 0, rounding, &mut cpu.floating);
     cpu.set_float(o.d, result);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 /// VCVT from integers, by the mode, and from fixed point, to nearest.
-pub(in crate::cpu) fn vcvt_from_fixed<B: Bus, const INTEGER: bool>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
-    cpu.use_floating_point()?;
+pub(in crate::cpu) fn vcvt_from_fixed<B: Bus, const INTEGER: bool>(
+    cpu: &mut Cpu<B>,
+    o: Operands,
+    rest: Rest<B>,
+) -> Done {
+    if !cpu.floating_ready {
+        return ready_first(cpu, o, rest, vcvt_from_fixed::<B, INTEGER>);
+    }
     let x = u32::from(o.x);
     let bits = if x & NARROW != 0 { 16 } else { 32 };
     let rounding = (!INTEGER).then_some(Rounding::Nearest);
     let value = cpu.float(o.m);
     let result = float::from_fixed(value, bits, o.immediate, x & UNSIGNED != 0, rounding, &mut cpu.floating);
     cpu.set_float(o.d, result);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 /// VCVTB, VCVTT.
-pub(in crate::cpu) fn vcvt_half<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
-    cpu.use_floating_point()?;
+pub(in crate::cpu) fn vcvt_half<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    if !cpu.floating_ready {
+        return ready_first(cpu, o, rest, vcvt_half);
+    }
     let x = u32::from(o.x);
     let at = if x & TOP != 0 { 16 } else { 0 };
     let value = cpu.float(o.m);
@@ -181,46 +210,56 @@ pub(in crate::cpu) fn vcvt_half<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32
         }
     };
     cpu.set_float(o.d, result);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 /// VMOV to core register d from n.
-pub(in crate::cpu) fn to_core<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
-    cpu.use_floating_point()?;
+pub(in crate::cpu) fn to_core<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    if !cpu.floating_ready {
+        return ready_first(cpu, o, rest, to_core);
+    }
     let bits = cpu.float(o.n);
     cpu.set(o.d, bits);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 /// VMOV to n from core register d.
-pub(in crate::cpu) fn from_core<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
-    cpu.use_floating_point()?;
+pub(in crate::cpu) fn from_core<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    if !cpu.floating_ready {
+        return ready_first(cpu, o, rest, from_core);
+    }
     let bits = cpu.get(o.d);
     cpu.set_float(o.n, bits);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 /// VMOV to core registers d and x from m and the next.
-pub(in crate::cpu) fn two_to_core<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
-    cpu.use_floating_point()?;
+pub(in crate::cpu) fn two_to_core<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    if !cpu.floating_ready {
+        return ready_first(cpu, o, rest, two_to_core);
+    }
     let (low, high) = (cpu.float(o.m), cpu.float(o.m + 1));
     cpu.set(o.d, low);
     cpu.set(o.x, high);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 /// VMOV to m and the next from core registers d and x.
-pub(in crate::cpu) fn two_from_core<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
-    cpu.use_floating_point()?;
+pub(in crate::cpu) fn two_from_core<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    if !cpu.floating_ready {
+        return ready_first(cpu, o, rest, two_from_core);
+    }
     let (low, high) = (cpu.get(o.d), cpu.get(o.x));
     cpu.set_float(o.m, low);
     cpu.set_float(o.m + 1, high);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 /// VMRS; with 15 only the flags, to the core's.
-pub(in crate::cpu) fn vmrs<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
-    cpu.use_floating_point()?;
+pub(in crate::cpu) fn vmrs<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    if !cpu.floating_ready {
+        return ready_first(cpu, o, rest, vmrs);
+    }
     let bits = cpu.floating.bits();
     if o.d == 15 {
         (cpu.negative, cpu.zero) = (bits >> 31 & 1 != 0, bits >> 30 & 1 != 0);
@@ -228,13 +267,15 @@ pub(in crate::cpu) fn vmrs<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> 
     } else {
         cpu.set(o.d, bits);
     }
-    cpu.next(step)
+    cpu.next(rest)
 }
 
-pub(in crate::cpu) fn vmsr<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
-    cpu.use_floating_point()?;
+pub(in crate::cpu) fn vmsr<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    if !cpu.floating_ready {
+        return ready_first(cpu, o, rest, vmsr);
+    }
     cpu.floating = float::Status::from_bits(cpu.get(o.d));
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 /// Address of VLDR and VSTR: n and `immediate`; with 15 the latter alone.
@@ -243,20 +284,21 @@ fn address<B: Bus>(cpu: &Cpu<B>, o: Operands) -> u32 {
 }
 
 /// VLDR of x registers.
-pub(in crate::cpu) fn vldr<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn vldr<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     if o.x == 1
         && cpu.floating_ready
         && let Some(bits) = cpu.load_at_once::<4>(address(cpu, o))
     {
         cpu.set_float(o.d, bits);
-        return cpu.next(step);
+        return cpu.next(rest);
     }
-    vldr_elsewhere(cpu, o, step)
+    vldr_elsewhere(cpu, o, rest)
 }
 
 /// The same in general; by itself, so that the usual way saves no registers.
 #[inline(never)]
-fn vldr_elsewhere<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+fn vldr_elsewhere<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    cpu.at(rest);
     cpu.use_floating_point()?;
     let at = address(cpu, o);
     if o.x == 2 {
@@ -264,34 +306,36 @@ fn vldr_elsewhere<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
         let high = cpu.load_aligned::<4>(at.wrapping_add(4))?;
         cpu.set_float(o.d, low);
         cpu.set_float(o.d + 1, high);
-        return cpu.next(step);
+        return cpu.go_on(rest);
     }
     let bits = cpu.load_aligned::<4>(at)?;
     cpu.set_float(o.d, bits);
-    cpu.next(step)
+    cpu.go_on(rest)
 }
 
 /// VSTR of x registers.
-pub(in crate::cpu) fn vstr<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn vstr<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     if o.x == 1 && cpu.floating_ready && cpu.store_at_once::<4>(address(cpu, o), cpu.float(o.d)) {
-        return cpu.next(step);
+        return cpu.next(rest);
     }
-    vstr_elsewhere(cpu, o, step)
+    vstr_elsewhere(cpu, o, rest)
 }
 
 /// The same in general; by itself, so that the usual way saves no registers.
 #[inline(never)]
-fn vstr_elsewhere<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+fn vstr_elsewhere<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    cpu.at(rest);
     cpu.use_floating_point()?;
     let at = address(cpu, o);
     for i in 0..o.x {
         cpu.store_aligned::<4>(at.wrapping_add(4 * u32::from(i)), cpu.float(o.d + i))?;
     }
-    cpu.next(step)
+    cpu.go_on(rest)
 }
 
 /// VLDM, VPOP: m registers from d on; x as for LDM.
-pub(in crate::cpu) fn vldm<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn vldm<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    cpu.at(rest);
     cpu.use_floating_point()?;
     let (start, changed) = block(cpu.get(o.n), o.immediate, u32::from(o.x) & BELOW != 0);
     for i in 0..o.m {
@@ -301,11 +345,12 @@ pub(in crate::cpu) fn vldm<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> 
     if u32::from(o.x) & CHANGES != 0 {
         cpu.set_any(o.n, changed);
     }
-    cpu.next(step)
+    cpu.go_on(rest)
 }
 
 /// VSTM, VPUSH.
-pub(in crate::cpu) fn vstm<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn vstm<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    cpu.at(rest);
     cpu.use_floating_point()?;
     let (start, changed) = block(cpu.get(o.n), o.immediate, u32::from(o.x) & BELOW != 0);
     for i in 0..o.m {
@@ -314,5 +359,5 @@ pub(in crate::cpu) fn vstm<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> 
     if u32::from(o.x) & CHANGES != 0 {
         cpu.set_any(o.n, changed);
     }
-    cpu.next(step)
+    cpu.go_on(rest)
 }

@@ -2,7 +2,7 @@
 
 use crate::bus::Bus;
 use crate::cpu::Cpu;
-use crate::cpu::operation::{Done, Execute, Leave, Operands, Trap};
+use crate::cpu::operation::{Done, Execute, Operands, Rest, Trap};
 
 /// What is moved: the numbers of the narrow encodings with a register offset.
 pub(in crate::cpu) const STR: u8 = 0;
@@ -42,7 +42,7 @@ fn addressed<B: Bus, const ADDRESS: u8>(cpu: &Cpu<B>, o: Operands) -> (u32, u32)
 
 /// Loads d, or stores it.
 #[inline(always)]
-fn access<B: Bus, const WHAT: u8, const ADDRESS: u8>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+fn access<B: Bus, const WHAT: u8, const ADDRESS: u8>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let (address, changed) = addressed::<B, ADDRESS>(cpu, o);
     if loads(WHAT) {
         let loaded = match WHAT {
@@ -50,7 +50,7 @@ fn access<B: Bus, const WHAT: u8, const ADDRESS: u8>(cpu: &mut Cpu<B>, o: Operan
             LDRH | LDRSH => cpu.load_at_once::<2>(address),
             _ => cpu.load_at_once::<1>(address),
         };
-        let Some(value) = loaded else { return access_elsewhere::<B, WHAT, ADDRESS>(cpu, o) };
+        let Some(value) = loaded else { return access_elsewhere::<B, WHAT, ADDRESS>(cpu, o, rest) };
         set_loaded::<B, WHAT>(cpu, o.d, value);
     } else {
         let value = cpu.get(o.d);
@@ -60,16 +60,17 @@ fn access<B: Bus, const WHAT: u8, const ADDRESS: u8>(cpu: &mut Cpu<B>, o: Operan
             _ => cpu.store_at_once::<1>(address, value & 0xff),
         };
         if !stored {
-            return access_elsewhere::<B, WHAT, ADDRESS>(cpu, o);
+            return access_elsewhere::<B, WHAT, ADDRESS>(cpu, o, rest);
         }
     }
     write_back::<B, ADDRESS>(cpu, o.n, changed);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 /// The same of memory that does not answer at once, and unaligned; by itself, so that the usual way saves no registers.
 #[inline(never)]
-fn access_elsewhere<B: Bus, const WHAT: u8, const ADDRESS: u8>(cpu: &mut Cpu<B>, o: Operands) -> Done {
+fn access_elsewhere<B: Bus, const WHAT: u8, const ADDRESS: u8>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    cpu.at(rest);
     let (address, changed) = addressed::<B, ADDRESS>(cpu, o);
     let value = cpu.get(o.d);
     match WHAT {
@@ -86,7 +87,7 @@ fn access_elsewhere<B: Bus, const WHAT: u8, const ADDRESS: u8>(cpu: &mut Cpu<B>,
         }
     }
     write_back::<B, ADDRESS>(cpu, o.n, changed);
-    Ok(())
+    cpu.go_on(rest)
 }
 
 #[inline(always)]
@@ -107,14 +108,15 @@ fn write_back<B: Bus, const ADDRESS: u8>(cpu: &mut Cpu<B>, base: u8, value: u32)
 }
 
 /// Loads the program counter.
-pub(in crate::cpu) fn load_branch<B: Bus, const ADDRESS: u8>(cpu: &mut Cpu<B>, o: Operands, _: u32) -> Done {
+pub(in crate::cpu) fn load_branch<B: Bus, const ADDRESS: u8>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    cpu.at(rest);
     let base = if ADDRESS == ABSOLUTE { 0 } else { cpu.get(o.n) };
     let offset = if ADDRESS == INDEXED { cpu.get(o.m) << (o.immediate & 3) } else { o.immediate };
     let changed = base.wrapping_add(offset);
     let target = cpu.load_aligned::<4>(if ADDRESS == AFTER { base } else { changed })?;
     write_back::<B, ADDRESS>(cpu, o.n, changed);
     cpu.branch_exchange(target)?;
-    Err(Leave::Jumped)
+    cpu.jumped(rest)
 }
 
 pub(in crate::cpu) fn load_branch_of<B: Bus>(address: u8) -> Execute<B> {
@@ -164,11 +166,11 @@ pub(super) fn block(base: u32, bytes: u32, below: bool) -> (u32, u32) {
 }
 
 /// LDM, POP.
-pub(in crate::cpu) fn load_several<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn load_several<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let bytes = 4 * o.immediate.count_ones();
     let (address, changed) = block(cpu.get(o.n), bytes, u32::from(o.x) & BELOW != 0);
     let at_once = if address & 3 == 0 { cpu.bus.block(address, bytes) } else { None };
-    let Some(memory) = at_once else { return load_several_elsewhere(cpu, o, step) };
+    let Some(memory) = at_once else { return load_several_elsewhere(cpu, o, rest) };
     let mut words = memory.chunks_exact(4).filter_map(|word| word.first_chunk()).map(|word| u32::from_le_bytes(*word));
     // A multiple of 4, whichever register it is. Where the base is loaded as well, that is what it becomes.
     if u32::from(o.x) & CHANGES != 0 {
@@ -183,16 +185,18 @@ pub(in crate::cpu) fn load_several<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: 
     }
     match words.next() {
         Some(target) => {
+            cpu.at(rest);
             cpu.branch_exchange(target)?;
-            Err(Leave::Jumped)
+            cpu.jumped(rest)
         }
-        None => cpu.next(step),
+        None => cpu.next(rest),
     }
 }
 
 /// The same of other memory. Registers are loaded as they come; the base keeps its value where a load faults.
 #[inline(never)]
-fn load_several_elsewhere<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+fn load_several_elsewhere<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    cpu.at(rest);
     let base = cpu.get(o.n);
     let (mut address, changed) = block(base, 4 * o.immediate.count_ones(), u32::from(o.x) & BELOW != 0);
     let mut list = o.immediate & 0x7fff;
@@ -214,18 +218,18 @@ fn load_several_elsewhere<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> D
     } else if u32::from(o.x) & CHANGES != 0 {
         cpu.set_any(o.n, changed);
     }
-    let Some(target) = target else { return cpu.next(step) };
+    let Some(target) = target else { return cpu.go_on(rest) };
     cpu.branch_exchange(target)?;
-    Err(Leave::Jumped)
+    cpu.jumped(rest)
 }
 
 /// STM, PUSH.
-pub(in crate::cpu) fn store_several<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn store_several<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let bytes = 4 * o.immediate.count_ones();
     let (address, changed) = block(cpu.get(o.n), bytes, u32::from(o.x) & BELOW != 0);
     let unusual = address & 3 != 0 || cpu.code.changes_block(address, bytes);
     let at_once = if unusual { None } else { cpu.bus.block_mut(address, bytes) };
-    let Some(memory) = at_once else { return store_several_elsewhere(cpu, o, step) };
+    let Some(memory) = at_once else { return store_several_elsewhere(cpu, o, rest) };
     let mut list = o.immediate;
     for word in memory.chunks_exact_mut(4) {
         word.copy_from_slice(&cpu.r[(list.trailing_zeros() & 15) as usize].to_le_bytes());
@@ -234,12 +238,13 @@ pub(in crate::cpu) fn store_several<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step:
     if u32::from(o.x) & CHANGES != 0 {
         cpu.set_any(o.n, changed);
     }
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 /// The same of other memory.
 #[inline(never)]
-fn store_several_elsewhere<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+fn store_several_elsewhere<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    cpu.at(rest);
     let (mut address, changed) = block(cpu.get(o.n), 4 * o.immediate.count_ones(), u32::from(o.x) & BELOW != 0);
     let mut list = o.immediate;
     while list != 0 {
@@ -251,7 +256,7 @@ fn store_several_elsewhere<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> 
     if u32::from(o.x) & CHANGES != 0 {
         cpu.set_any(o.n, changed);
     }
-    cpu.next(step)
+    cpu.go_on(rest)
 }
 
 /// x of the functions for two registers: the base changes; the offset counts before.
@@ -264,7 +269,8 @@ fn pair_address<B: Bus>(cpu: &Cpu<B>, o: Operands) -> (u32, u32) {
 }
 
 /// LDRD to d and m.
-pub(in crate::cpu) fn ldrd<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn ldrd<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    cpu.at(rest);
     let (address, changed) = pair_address(cpu, o);
     let first = cpu.load_aligned::<4>(address)?;
     let second = cpu.load_aligned::<4>(address.wrapping_add(4))?;
@@ -273,43 +279,47 @@ pub(in crate::cpu) fn ldrd<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> 
     }
     cpu.set(o.d, first);
     cpu.set(o.m, second);
-    cpu.next(step)
+    cpu.go_on(rest)
 }
 
 /// LDRD from an address that decoding knows.
-pub(in crate::cpu) fn ldrd_absolute<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn ldrd_absolute<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    cpu.at(rest);
     let first = cpu.load_aligned::<4>(o.immediate)?;
     let second = cpu.load_aligned::<4>(o.immediate.wrapping_add(4))?;
     cpu.set(o.d, first);
     cpu.set(o.m, second);
-    cpu.next(step)
+    cpu.go_on(rest)
 }
 
 /// STRD from d and m.
-pub(in crate::cpu) fn strd<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn strd<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    cpu.at(rest);
     let (address, changed) = pair_address(cpu, o);
     cpu.store_aligned::<4>(address, cpu.get(o.d))?;
     cpu.store_aligned::<4>(address.wrapping_add(4), cpu.get(o.m))?;
     if u32::from(o.x) & CHANGES != 0 {
         cpu.set_any(o.n, changed);
     }
-    cpu.next(step)
+    cpu.go_on(rest)
 }
 
 /// LDREX: loads, and marks the address as its own. With a single core the monitor has no address (B.3.4.5 leaves its size open).
-pub(in crate::cpu) fn load_exclusive<B: Bus, const BYTES: u32>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn load_exclusive<B: Bus, const BYTES: u32>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    cpu.at(rest);
     let address = cpu.get(o.n).wrapping_add(o.immediate);
     let value = cpu.load_aligned::<BYTES>(address)?;
     cpu.exclusive = true;
     cpu.set(o.d, value);
-    cpu.next(step)
+    cpu.go_on(rest)
 }
 
 /// STREX: stores m if the mark is still there; d becomes 0 then, 1 otherwise.
-pub(in crate::cpu) fn store_exclusive<B: Bus, const BYTES: u32>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn store_exclusive<B: Bus, const BYTES: u32>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    cpu.at(rest);
     let address = cpu.get(o.n).wrapping_add(o.immediate);
     if address & (BYTES - 1) != 0 {
-        return Err(Trap::Unaligned.into());
+        return cpu.trap(rest, Trap::Unaligned);
     }
     let own = std::mem::take(&mut cpu.exclusive);
     if own {
@@ -317,10 +327,10 @@ pub(in crate::cpu) fn store_exclusive<B: Bus, const BYTES: u32>(cpu: &mut Cpu<B>
         cpu.store_aligned::<BYTES>(address, value)?;
     }
     cpu.set(o.d, u32::from(!own));
-    cpu.next(step)
+    cpu.go_on(rest)
 }
 
-pub(in crate::cpu) fn clear_exclusive<B: Bus>(cpu: &mut Cpu<B>, _: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn clear_exclusive<B: Bus>(cpu: &mut Cpu<B>, _: Operands, rest: Rest<B>) -> Done {
     cpu.exclusive = false;
-    cpu.next(step)
+    cpu.next(rest)
 }

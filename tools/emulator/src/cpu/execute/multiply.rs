@@ -2,7 +2,7 @@
 
 use crate::bus::Bus;
 use crate::cpu::Cpu;
-use crate::cpu::operation::{Done, Operands, Trap};
+use crate::cpu::operation::{Done, Operands, Rest, Trap};
 
 /// What is added: register x, or 0 where that is 15.
 fn addend<B: Bus>(cpu: &Cpu<B>, o: Operands) -> u32 {
@@ -33,32 +33,32 @@ fn set_long<B: Bus>(cpu: &mut Cpu<B>, o: Operands, value: u64) {
 }
 
 /// MLA; MUL where x is 15.
-pub(in crate::cpu) fn mla<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn mla<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let value = addend(cpu, o).wrapping_add(cpu.get(o.n).wrapping_mul(cpu.get(o.m)));
     cpu.set(o.d, value);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
-pub(in crate::cpu) fn mls<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn mls<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let value = cpu.get(o.x).wrapping_sub(cpu.get(o.n).wrapping_mul(cpu.get(o.m)));
     cpu.set(o.d, value);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 /// SMLAxy, SMULxy: `immediate` has the upper half of n in bit 1, that of m in bit 0.
-pub(in crate::cpu) fn smla_halves<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn smla_halves<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let product = half(cpu.get(o.n), o.immediate & 2 != 0) * half(cpu.get(o.m), o.immediate & 1 != 0);
     let sum = i64::from(addend(cpu, o) as i32) + product;
     set_wrapping(cpu, o.d, sum);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 /// SMLAWy, SMULWy: the upper 32 of 48 bits; `immediate` chooses the upper half of m.
-pub(in crate::cpu) fn smlaw<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn smlaw<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let product = i64::from(cpu.get(o.n) as i32) * half(cpu.get(o.m), o.immediate & 1 != 0);
     let sum = i64::from(addend(cpu, o) as i32) + (product >> 16);
     set_wrapping(cpu, o.d, sum);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 /// Products of lower and upper half-words, those of m exchanged if bit 0 of `immediate` says so.
@@ -69,19 +69,19 @@ fn products<B: Bus>(cpu: &Cpu<B>, o: Operands) -> (i64, i64) {
 }
 
 /// SMLAD, SMUAD.
-pub(in crate::cpu) fn smlad<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn smlad<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let (low, high) = products(cpu, o);
     let sum = i64::from(addend(cpu, o) as i32) + low + high;
     set_wrapping(cpu, o.d, sum);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 /// SMLSD, SMUSD.
-pub(in crate::cpu) fn smlsd<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn smlsd<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let (low, high) = products(cpu, o);
     let sum = i64::from(addend(cpu, o) as i32) + low - high;
     set_wrapping(cpu, o.d, sum);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 /// Rounding of the SMM instructions: bit 0 of `immediate`.
@@ -90,102 +90,102 @@ fn rounding(o: Operands) -> i64 {
 }
 
 /// SMMLA, SMMUL, rounded or not.
-pub(in crate::cpu) fn smmla<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn smmla<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let product = i64::from(cpu.get(o.n) as i32) * i64::from(cpu.get(o.m) as i32);
     let sum = (i64::from(addend(cpu, o) as i32) << 32).wrapping_add(product).wrapping_add(rounding(o));
     cpu.set(o.d, (sum >> 32) as u32);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 /// SMMLS, rounded or not.
-pub(in crate::cpu) fn smmls<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn smmls<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let product = i64::from(cpu.get(o.n) as i32) * i64::from(cpu.get(o.m) as i32);
     let sum = (i64::from(cpu.get(o.x) as i32) << 32).wrapping_sub(product).wrapping_add(rounding(o));
     cpu.set(o.d, (sum >> 32) as u32);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 /// USADA8, USAD8.
-pub(in crate::cpu) fn usada8<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn usada8<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let bytes = cpu.get(o.n).to_le_bytes().into_iter().zip(cpu.get(o.m).to_le_bytes());
     let sum: u32 = bytes.map(|(a, b)| u32::from(a.abs_diff(b))).sum();
     let value = addend(cpu, o).wrapping_add(sum);
     cpu.set(o.d, value);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
-pub(in crate::cpu) fn smull<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn smull<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let product = i64::from(cpu.get(o.n) as i32) * i64::from(cpu.get(o.m) as i32);
     set_long(cpu, o, product as u64);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
-pub(in crate::cpu) fn umull<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn umull<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let product = u64::from(cpu.get(o.n)) * u64::from(cpu.get(o.m));
     set_long(cpu, o, product);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
-pub(in crate::cpu) fn smlal<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn smlal<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let product = i64::from(cpu.get(o.n) as i32) * i64::from(cpu.get(o.m) as i32);
     let sum = long(cpu, o).wrapping_add(product as u64);
     set_long(cpu, o, sum);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
-pub(in crate::cpu) fn umlal<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn umlal<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let sum = long(cpu, o).wrapping_add(u64::from(cpu.get(o.n)) * u64::from(cpu.get(o.m)));
     set_long(cpu, o, sum);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 /// UMAAL: product and both words of the accumulator; never overflows.
-pub(in crate::cpu) fn umaal<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn umaal<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let product = u64::from(cpu.get(o.n)) * u64::from(cpu.get(o.m));
     let sum = product + u64::from(cpu.get(o.d)) + u64::from(cpu.get(o.x));
     set_long(cpu, o, sum);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 /// SMLALxy: `immediate` as in `smla_halves`.
-pub(in crate::cpu) fn smlal_halves<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn smlal_halves<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let product = half(cpu.get(o.n), o.immediate & 2 != 0) * half(cpu.get(o.m), o.immediate & 1 != 0);
     let sum = long(cpu, o).wrapping_add(product as u64);
     set_long(cpu, o, sum);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
-pub(in crate::cpu) fn smlald<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn smlald<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let (low, high) = products(cpu, o);
     let sum = long(cpu, o).wrapping_add((low + high) as u64);
     set_long(cpu, o, sum);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
-pub(in crate::cpu) fn smlsld<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn smlsld<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let (low, high) = products(cpu, o);
     let sum = long(cpu, o).wrapping_add((low - high) as u64);
     set_long(cpu, o, sum);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 /// SDIV: rounds towards zero; the one quotient that does not fit wraps.
-pub(in crate::cpu) fn sdiv<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn sdiv<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let (n, m) = (cpu.get(o.n) as i32, cpu.get(o.m) as i32);
     if m == 0 && cpu.system.traps_division() {
-        return Err(Trap::DivisionByZero.into());
+        return cpu.trap(rest, Trap::DivisionByZero);
     }
     let quotient = if m == 0 { 0 } else { n.wrapping_div(m) };
     cpu.set(o.d, quotient as u32);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
-pub(in crate::cpu) fn udiv<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn udiv<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let m = cpu.get(o.m);
     if m == 0 && cpu.system.traps_division() {
-        return Err(Trap::DivisionByZero.into());
+        return cpu.trap(rest, Trap::DivisionByZero);
     }
     let quotient = cpu.get(o.n).checked_div(m).unwrap_or(0);
     cpu.set(o.d, quotient);
-    cpu.next(step)
+    cpu.next(rest)
 }

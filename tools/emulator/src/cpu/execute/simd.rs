@@ -3,7 +3,7 @@
 use crate::bus::Bus;
 use crate::cpu::Cpu;
 use crate::cpu::arithmetic::{ARITHMETIC, LEFT, saturate_signed, saturate_unsigned, shift};
-use crate::cpu::operation::{Done, Execute, Operands};
+use crate::cpu::operation::{Done, Execute, Operands, Rest};
 
 /// Operations, as the encodings number them.
 const ADD8: u8 = 0;
@@ -19,7 +19,7 @@ const HALVING: u8 = 2;
 const UNSIGNED: u8 = 4;
 
 /// SADD16 and its like: 36 instructions of one pattern.
-fn parallel<B: Bus, const OPERATION: u8, const KIND: u8>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+fn parallel<B: Bus, const OPERATION: u8, const KIND: u8>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let (n, m) = (cpu.get(o.n), cpu.get(o.m));
     let bytes = OPERATION == ADD8 || OPERATION == SUB8;
     let (lanes, bits) = if bytes { (4, 8) } else { (2, 16) };
@@ -59,7 +59,7 @@ fn parallel<B: Bus, const OPERATION: u8, const KIND: u8>(cpu: &mut Cpu<B>, o: Op
         cpu.greater = greater;
     }
     cpu.set(o.d, result);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 /// The function of a parallel instruction; None for numbers that there are not.
@@ -89,15 +89,15 @@ pub(in crate::cpu) fn parallel_of<B: Bus>(operation: u8, kind: u8) -> Option<Exe
 }
 
 /// SEL: each byte of n where its flag is set, of m where not.
-pub(in crate::cpu) fn sel<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn sel<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let mask = (0..4).filter(|lane| cpu.greater >> lane & 1 != 0).fold(0, |mask, lane| mask | 0xff << (8 * lane));
     let value = cpu.get(o.n) & mask | cpu.get(o.m) & !mask;
     cpu.set(o.d, value);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 /// QADD, QDADD, QSUB, QDSUB: x as the encoding numbers them. The first operand is m.
-pub(in crate::cpu) fn saturating<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn saturating<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let (n, m) = (i64::from(cpu.get(o.n) as i32), i64::from(cpu.get(o.m) as i32));
     let (n, doubled) = match o.x & 1 {
         0 => (n as i32, false),
@@ -107,25 +107,25 @@ pub(in crate::cpu) fn saturating<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u3
     let (value, saturated) = saturate_signed(exact, 32);
     cpu.saturated |= doubled | saturated;
     cpu.set(o.d, value as u32);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 /// SSAT: to x bits, n shifted by `immediate`, arithmetically right where m is not 0.
-pub(in crate::cpu) fn ssat<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn ssat<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let shifted = shifted(cpu, o);
     let (value, saturated) = saturate_signed(shifted, u32::from(o.x.clamp(1, 32)));
     cpu.saturated |= saturated;
     cpu.set(o.d, value as u32);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 /// USAT, like SSAT.
-pub(in crate::cpu) fn usat<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn usat<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let shifted = shifted(cpu, o);
     let (value, saturated) = saturate_unsigned(shifted, u32::from(o.x.min(31)));
     cpu.saturated |= saturated;
     cpu.set(o.d, value);
-    cpu.next(step)
+    cpu.next(rest)
 }
 
 fn shifted<B: Bus>(cpu: &Cpu<B>, o: Operands) -> i64 {
@@ -135,7 +135,7 @@ fn shifted<B: Bus>(cpu: &Cpu<B>, o: Operands) -> i64 {
 }
 
 /// SSAT16; USAT16 with m not 0. To x bits each.
-pub(in crate::cpu) fn saturate_halves<B: Bus>(cpu: &mut Cpu<B>, o: Operands, step: u32) -> Done {
+pub(in crate::cpu) fn saturate_halves<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     let n = cpu.get(o.n);
     let mut result = 0;
     for (at, half) in [(0, n as i16), (16, (n >> 16) as i16)] {
@@ -150,5 +150,5 @@ pub(in crate::cpu) fn saturate_halves<B: Bus>(cpu: &mut Cpu<B>, o: Operands, ste
         result |= (value & 0xffff) << at;
     }
     cpu.set(o.d, result);
-    cpu.next(step)
+    cpu.next(rest)
 }

@@ -1,6 +1,6 @@
 //! Stretches against single steps: the same registers, flags, memory, cycles and counts, wherever a run ends.
 
-use super::{DATA, machine};
+use super::{DATA, machine, with_floating_point};
 use crate::cpu::{Cpu, End};
 use crate::memory::Memory;
 use proptest::prelude::*;
@@ -34,6 +34,24 @@ const PIECES: &[&[u16]] = &[
     &[0xf3ef, 0x8300],
     &[0xb672],
     &[0xb662],
+    // ldrd r1, r2, [r7]; strd r0, r1, [r7, #8]; itt ne, ldrne.w r1, [r7, #5], which is not aligned, ldrne r2, [r7]
+    &[0xe9d7, 0x1200],
+    &[0xe9c7, 0x0102],
+    &[0xbf1c, 0xf8d7, 0x1005, 0x683a],
+    // ldrd r1, r2, [pc, #8], from flash; movs r4, #0, msr control, r4: the floating-point unit has to be prepared again
+    &[0xe9df, 0x1202],
+    &[0x2400, 0xf384, 0x8814],
+    // vmov s0, r0; vldr s1, [r7]; vadd.f32 s0, s0, s1; vcmp.f32 s0, #0; vmrs apsr_nzcv, fpscr; vpush {s0, s1}; vpop {s1, s2}; vstr s2, [r7, #12]
+    &[0xee00, 0x0a10],
+    &[0xedd7, 0x0a00],
+    &[0xee30, 0x0a20],
+    &[0xeeb5, 0x0a40],
+    &[0xeef1, 0xfa10],
+    &[0xed2d, 0x0a02],
+    &[0xecfd, 0x0a02],
+    &[0xed87, 0x1a03],
+    // ite ge, vmovge.f32 s0, s1, vaddlt.f32 s1, s1, s0
+    &[0xbfac, 0xeeb0, 0x0a60, 0xee70, 0x0a80],
 ];
 
 /// All pieces three times around; a breakpoint follows.
@@ -44,7 +62,7 @@ fn looped(pieces: &[usize], wait_states: u32) -> Cpu<Memory> {
     code.push(0x3e01);
     let back = -(code.len() as i32) - 2;
     code.push(0xd100 | (back & 0xff) as u16);
-    let mut cpu = machine(&code);
+    let mut cpu = with_floating_point(machine(&code));
     cpu.bus.wait_states = wait_states;
     cpu.set_register(6, 3);
     cpu.set_register(7, DATA);
@@ -52,7 +70,8 @@ fn looped(pieces: &[usize], wait_states: u32) -> Cpu<Memory> {
 }
 
 fn state(cpu: &Cpu<Memory>) -> (Vec<u32>, u32, u64, u64, Vec<u8>) {
-    let registers = (0..16).map(|number| cpu.register(number)).collect();
+    let mut registers: Vec<u32> = (0..16).map(|number| cpu.register(number)).collect();
+    registers.extend((0..3).map(|number| cpu.float_register(number)).chain([cpu.fpscr()]));
     let memory = cpu.bus.bytes(DATA, 16).expect("data").to_vec();
     (registers, cpu.xpsr(), cpu.now(), cpu.instructions(), memory)
 }
