@@ -13,8 +13,11 @@ pub struct Agenda {
     changed: u32,
     /// How many places are used, counted from the first.
     used: usize,
-    /// The earliest cycle of all.
+    /// The earliest cycle of all, and bits of the places that have it.
     earliest: u64,
+    first: u32,
+    /// Those two are right.
+    ordered: bool,
     /// The levels of all lines.
     all_lines: u128,
 }
@@ -22,7 +25,8 @@ pub struct Agenda {
 impl Agenda {
     /// Nothing is known yet of so many peripherals.
     pub const fn new(used: usize) -> Self {
-        Self { next: [u64::MAX; PLACES], lines: [0; PLACES], changed: u32::MAX, used, earliest: u64::MAX, all_lines: 0 }
+        let (next, lines) = ([u64::MAX; PLACES], [0; PLACES]);
+        Self { next, lines, changed: u32::MAX, used, earliest: u64::MAX, first: 0, ordered: false, all_lines: 0 }
     }
 
     /// Somebody may have changed a peripheral: to be called with every access that can.
@@ -49,15 +53,10 @@ impl Agenda {
         self.first_of(self.changed)
     }
 
-    /// What is true of a peripheral now: its next cycle, and the levels of its lines.
+    /// What is true of a peripheral now: its next cycle, and the levels of its lines. [`order`](Self::order) follows the last.
     #[inline]
     pub fn note(&mut self, place: usize, next: u64, lines: u128) {
-        let before = std::mem::replace(&mut self.next[place % PLACES], next);
-        if next <= self.earliest {
-            self.earliest = next;
-        } else if before == self.earliest {
-            self.earliest = self.next.iter().take(self.used).fold(u64::MAX, |earliest, next| earliest.min(*next));
-        }
+        self.ordered &= std::mem::replace(&mut self.next[place % PLACES], next) == next;
         self.changed &= !(1 << (place % PLACES));
         if self.lines[place % PLACES] != lines {
             self.lines[place % PLACES] = lines;
@@ -65,14 +64,26 @@ impl Agenda {
         }
     }
 
-    /// Bits of the places in which something is due at a cycle.
+    /// Finds which of them are due first.
     #[inline]
-    pub fn due(&self, cycle: u64) -> u32 {
-        self.next
-            .iter()
-            .take(self.used)
-            .enumerate()
-            .fold(0, |due, (place, next)| due | u32::from(*next <= cycle) << place)
+    pub fn order(&mut self) {
+        if std::mem::replace(&mut self.ordered, true) {
+            return;
+        }
+        let (mut earliest, mut first) = (u64::MAX, 0);
+        for (place, next) in self.next.iter().take(self.used).enumerate() {
+            if *next <= earliest {
+                first = if *next < earliest { 0 } else { first } | 1 << place;
+                earliest = *next;
+            }
+        }
+        (self.earliest, self.first) = (earliest, first);
+    }
+
+    /// Bits of the places that are due first, if that is not behind a cycle.
+    #[inline]
+    pub const fn due(&self, cycle: u64) -> u32 {
+        if self.earliest <= cycle { self.first } else { 0 }
     }
 
     /// Bits of the places that may have changed.
@@ -103,8 +114,10 @@ mod tests {
         let mut agenda = Agenda::new(PLACES);
         agenda.note(3, 700, 1 << 25);
         agenda.note(9, 500, 1 << 100);
+        agenda.order();
         assert_eq!((agenda.next(), agenda.lines()), (500, 1 << 25 | 1 << 100));
         agenda.note(9, u64::MAX, 0);
+        agenda.order();
         assert_eq!((agenda.next(), agenda.lines()), (700, 1 << 25));
     }
 
@@ -113,7 +126,11 @@ mod tests {
         let mut agenda = Agenda::new(PLACES);
         agenda.note(0, 100, 0);
         agenda.note(1, 90, 0);
-        assert_eq!([agenda.due(89), agenda.due(99), agenda.due(100)], [0, 2, 3]);
+        agenda.order();
+        assert_eq!([agenda.due(89), agenda.due(90)], [0, 2]);
+        agenda.note(0, 90, 0);
+        agenda.order();
+        assert_eq!(agenda.due(90), 3);
         agenda.touch(0);
         assert_eq!((agenda.changed() & 3, agenda.first_touched()), (1, Some(0)));
         agenda.note(0, 100, 0);

@@ -218,9 +218,12 @@ impl<W: Wiring> Chip<W> {
 
     /// Something has changed: the earliest event, and the levels of the interrupts.
     pub(super) fn refresh(&mut self) {
-        while let Some(place) = self.agenda.first_touched() {
-            let (next, lines) = self.look_at(place);
-            self.agenda.note(place, next, lines);
+        if self.agenda.first_touched().is_some() {
+            while let Some(place) = self.agenda.first_touched() {
+                let (next, lines) = self.look_at(place);
+                self.agenda.note(place, next, lines);
+            }
+            self.agenda.order();
         }
         self.next = self.agenda.next().min(self.next_slow);
         let lines = self.agenda.lines() | self.slow_lines;

@@ -70,17 +70,18 @@ pub struct Place {
 
 /// Places that were found lately, by the lower bits of their addresses: finding one takes longer than most accesses.
 #[derive(Clone, Debug)]
-pub struct Places([Option<Place>; 64]);
+pub struct Places([Option<Place>; 128]);
 
 impl Places {
     /// None yet.
     pub(super) const fn new() -> Self {
-        Self([None; 64])
+        Self([None; 128])
     }
 
     /// What is at an address; none where there is nothing that is modelled.
     pub fn find(&mut self, address: u32, variant: &Variant) -> Option<Place> {
-        let lately = &mut self.0[(address / 4 % 64) as usize];
+        // Peripherals' pages differ from bit 10 on.
+        let lately = &mut self.0[((address >> 2 ^ address >> 8) % 128) as usize];
         if let Some(place) = lately.filter(|place| place.address == address) {
             return Some(place);
         }
