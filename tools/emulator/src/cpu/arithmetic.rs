@@ -10,6 +10,20 @@ pub(super) fn add_with_carry(a: u32, b: u32, carry: bool) -> (u32, bool, bool) {
     (sum, first | second, ((a ^ sum) & (b ^ sum)) >> 31 != 0)
 }
 
+/// The same without carry in, in the host's own terms.
+#[inline(always)]
+pub(super) fn add(a: u32, b: u32) -> (u32, bool, bool) {
+    let (sum, carry) = a.overflowing_add(b);
+    (sum, carry, (a as i32).overflowing_add(b as i32).1)
+}
+
+/// `a` - `b`: the sum of `a`, the complement of `b` and 1. The carry is what was not borrowed.
+#[inline(always)]
+pub(super) fn subtract(a: u32, b: u32) -> (u32, bool, bool) {
+    let (difference, borrow) = a.overflowing_sub(b);
+    (difference, !borrow, (a as i32).overflowing_sub(b as i32).1)
+}
+
 /// How a register operand is shifted. As in the encodings, and one more for a rotation through the carry.
 pub(super) const LEFT: u8 = 0;
 pub(super) const RIGHT: u8 = 1;

@@ -79,9 +79,8 @@ pub struct Cpu<B: Bus> {
     saturated: bool,
     /// The four greater-or-equal flags.
     greater: u8,
-    /// ITSTATE, and whether the instruction that runs is in an IT block.
+    /// ITSTATE.
     it: u8,
-    in_it: bool,
     /// Cleared by a branch to an even address: the next instruction faults.
     thumb: bool,
     /// Number of the exception whose handler runs, 0 in thread mode.

@@ -53,7 +53,7 @@ pub(super) type Done = Result<(), Leave>;
 pub(super) struct Operands {
     /// Constant, offset, list of registers, absolute address.
     pub immediate: u32,
-    /// Destination.
+    /// Destination, in the lower bits.
     pub d: u8,
     /// First operand, or base address.
     pub n: u8,
@@ -61,6 +61,22 @@ pub(super) struct Operands {
     pub m: u8,
     /// What else there is: a fourth register, a condition, a position.
     pub x: u8,
+}
+
+/// Bit of `d`, whose lower bits number a register: the instruction is in an IT block.
+const IN_BLOCK: u8 = 0x80;
+
+impl Operands {
+    /// The same in an IT block, where some instructions set no flags.
+    pub fn in_block(mut self) -> Self {
+        self.d |= IN_BLOCK;
+        self
+    }
+
+    #[inline(always)]
+    pub fn is_in_block(self) -> bool {
+        self.d & IN_BLOCK != 0
+    }
 }
 
 /// Executes an instruction, and what follows it in its stretch.
@@ -105,6 +121,22 @@ pub(super) struct Timing {
     pub single: bool,
     pub overlaps: u8,
     pub flow: Flow,
+    pub part: Part,
+}
+
+/// Which part of a pair an instruction can be that is executed at once (see `execute::pairs`).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Part {
+    None,
+    /// First: a comparison of n with a constant, with register m.
+    CompareConstant,
+    CompareRegister,
+    /// First: a comparison of floating-point registers.
+    CompareFloats,
+    /// Second: its flags to the core.
+    TakeFlags,
+    /// Second: a branch by condition x.
+    Branch,
 }
 
 /// What comes behind an instruction.
@@ -132,7 +164,7 @@ impl<B: Bus> Copy for Operation<B> {}
 impl<B: Bus> Operation<B> {
     /// One cycle, no operands; the length is filled in by `decode`.
     pub fn new(execute: Execute<B>) -> Self {
-        let timing = Timing { length: 0, cycles: 1, single: false, overlaps: 0, flow: Flow::On };
+        let timing = Timing { length: 0, cycles: 1, single: false, overlaps: 0, flow: Flow::On, part: Part::None };
         Self { execute, operands: Operands::default(), timing }
     }
 
@@ -168,6 +200,11 @@ impl<B: Bus> Operation<B> {
 
     pub fn flow(mut self, flow: Flow) -> Self {
         self.timing.flow = flow;
+        self
+    }
+
+    pub fn part(mut self, part: Part) -> Self {
+        self.timing.part = part;
         self
     }
 

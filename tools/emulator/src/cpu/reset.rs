@@ -27,7 +27,6 @@ impl<B: Bus> Cpu<B> {
             saturated: false,
             greater: 0,
             it: 0,
-            in_it: false,
             thumb: true,
             exception: 0,
             unprivileged: false,

@@ -93,10 +93,8 @@ impl<B: Bus> Cpu<B> {
             self.single = false;
             return Ok(());
         }
-        self.in_it = true;
         let (next, rest, handler) = (self.pc, self.it, self.exception);
-        let done = (operation.execute)(self, operation.operands, &[]);
-        self.in_it = false;
+        let done = (operation.execute)(self, operation.operands.in_block(), &[]);
         if let Err(Leave::Trapped(_)) = done {
             self.it = block;
         } else if rest != 0 && self.pc != next && self.exception == handler {

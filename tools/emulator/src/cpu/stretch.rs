@@ -8,11 +8,13 @@
 //! may have settled goes on only if it has not (`Cpu::go_on`).
 //!
 //! IT blocks are parts of stretches, up to an instruction of theirs that may branch: before each of their instructions there is a step that
-//! passes it over if its condition does not hold, and behind the block one that ends it.
+//! passes it over if its condition does not hold. IT itself only counts.
 
 use super::Cpu;
+use super::execute::by_condition;
+use super::execute::pairs::pair_of;
 use super::execute::system::nothing;
-use super::operation::{Done, Execute, Flow, Leave, Operands, Operation, Rest, Step, Trap, behind};
+use super::operation::{Done, Execute, Flow, Leave, Operands, Operation, Part, Rest, Step, Trap, behind};
 use crate::bus::Bus;
 
 /// Instructions of a stretch, at most.
@@ -93,7 +95,7 @@ impl<B: Bus> Stretches<B> {
             *self = Self::new(self.begins.len());
         }
         let first = self.steps.len();
-        let (mut next, mut before_last, mut mark) = (place, 0, Mark::default());
+        let (mut next, mut before_last, mut mark, mut last) = (place, 0, Mark::default(), Part::None);
         while let Some(operation) = kept(next)
             && usize::from(mark.instructions) < LONGEST
             && (mark.it == 0 || operation.timing.flow == Flow::On)
@@ -102,9 +104,12 @@ impl<B: Bus> Stretches<B> {
             let block = mark.it;
             before_last = mark.cycles;
             if block != 0 {
-                let rest =
-                    Operands { immediate: u32::from(timing.cycles), x: block, m: timing.single.into(), ..operands };
-                self.push(unless, rest, mark);
+                let passed = Operands { immediate: u32::from(timing.cycles), m: timing.single.into(), ..operands };
+                self.push(by_condition!(unless, block >> 4), passed, mark);
+            } else if let Some(pair) = pair_of((last, timing.part), operands)
+                && let Some(first) = self.steps.last_mut()
+            {
+                first.execute = pair;
             }
             mark = Mark {
                 cycles: mark.cycles + u16::from(timing.cycles - if mark.single { timing.overlaps } else { 0 }),
@@ -113,17 +118,21 @@ impl<B: Bus> Stretches<B> {
                 single: timing.single,
                 it: if timing.flow == Flow::Block { operands.x } else { behind(block) },
             };
+            last = if block == 0 { timing.part } else { Part::None };
             match timing.flow {
-                Flow::Block => self.push(begin_block, operands, mark),
+                Flow::Block => {}
+                _ if block != 0 => self.push(execute, operands.in_block(), mark),
                 _ => self.push(execute, operands, mark),
-            }
-            if block != 0 && mark.it == 0 {
-                self.push(end_block, operands, mark);
             }
             if timing.flow == Flow::Elsewhere {
                 break;
             }
             next += usize::from(timing.length / 2);
+        }
+        if self.steps.len() == first || self.marks.last().is_some_and(|pushed| pushed.instructions != mark.instructions)
+        {
+            // IT at the end.
+            self.push(nothing, Operands::default(), mark);
         }
         let stretch = Stretch {
             first: first as u32,
@@ -167,8 +176,6 @@ pub(super) struct Within {
     behind: u32,
     /// The step behind which the last stretch was left.
     left: u32,
-    /// Where the last stretch began, as a step.
-    first: u32,
 }
 
 impl<B: Bus> Cpu<B> {
@@ -191,13 +198,11 @@ impl<B: Bus> Cpu<B> {
             let place = self.code.place(begin);
             let Some(&stretch) = place.and_then(|place| self.code.stretches.begins_at(place)) else { return false };
             self.now = self.now.wrapping_sub(u64::from(stretch.overlaps & u8::from(self.single)));
-            let left = self.attention.saturating_sub(self.now);
-            let end = match u64::from(stretch.before_last) < left {
+            let end = match self.now.wrapping_add(u64::from(stretch.before_last)) < self.attention {
                 true => stretch.end,
-                false => self.code.stretches.end_within(stretch, left),
+                false => self.code.stretches.end_within(stretch, self.attention.saturating_sub(self.now)),
             };
             self.within.end = end;
-            self.within.first = stretch.first;
             let Some(steps) = steps.get(stretch.first as usize..end as usize) else { return false };
             match self.next(steps) {
                 Ok(()) => self.settle_at(&[]),
@@ -272,7 +277,6 @@ impl<B: Bus> Cpu<B> {
         }
         self.within.left = self.within.end.wrapping_sub(self.within.behind).wrapping_sub(1);
         self.within.end = 0;
-        self.in_it = false;
         let mark = *self.code.stretches.marks.get(self.within.left as usize)?;
         self.now = self.now.wrapping_add(u64::from(mark.cycles));
         self.instructions = self.instructions.wrapping_add(u64::from(mark.instructions));
@@ -284,9 +288,10 @@ impl<B: Bus> Cpu<B> {
     #[cold]
     fn trapped_within(&mut self, trap: Trap, begin: u32) {
         self.settle();
-        let before = match self.within.left > self.within.first {
-            true => self.code.stretches.marks.get(self.within.left as usize - 1).copied().unwrap_or_default(),
-            false => Mark::default(),
+        let left = self.within.left as usize;
+        let before = match self.code.stretches.marks.get(left.saturating_sub(1)..=left) {
+            Some([before, mark]) if mark.instructions > 1 => *before,
+            _ => Mark::default(),
         };
         if before.it != 0 {
             self.it = before.it;
@@ -295,25 +300,13 @@ impl<B: Bus> Cpu<B> {
     }
 }
 
-/// IT: what follows sets no flags where it would outside.
-fn begin_block<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
-    cpu.in_it = true;
-    nothing(cpu, o, rest)
-}
-
-/// Behind the last instruction of an IT block.
-fn end_block<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
-    cpu.in_it = false;
-    nothing(cpu, o, rest)
-}
-
-/// Before an instruction of an IT block, whose state is `x`: passes it over if its condition does not hold (A7.3.2). It takes `immediate`
-/// cycles otherwise, and m says whether it loads or stores one register.
-fn unless<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
-    if cpu.holds(o.x >> 4) {
+/// Before an instruction of an IT block: passes it over if its condition does not hold (A7.3.2). It takes `immediate` cycles otherwise, and m
+/// says whether it loads or stores one register.
+fn unless<B: Bus, const CONDITION: u8>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    if cpu.holds(CONDITION) {
         return cpu.next(rest);
     }
-    let behind = rest.get(1..).unwrap_or_default();
+    let Some((_, behind)) = rest.split_first() else { return Ok(()) };
     cpu.now = cpu.now.wrapping_sub(u64::from(o.immediate) - 1);
     if o.m != 0 {
         // The next instruction does not overlap, other than the stretch takes it.

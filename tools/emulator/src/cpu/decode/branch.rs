@@ -5,7 +5,7 @@ use crate::bus::Bus;
 use crate::cpu::arithmetic::sign_extend;
 use crate::cpu::execute::load_store::clear_exclusive;
 use crate::cpu::execute::{branch, system};
-use crate::cpu::operation::{Flow, Operation};
+use crate::cpu::operation::{Flow, Operation, Part};
 
 pub(super) fn decode<B: Bus>(address: u32, first: u32, second: u32) -> Decoded<B> {
     let pc = address.wrapping_add(4);
@@ -23,7 +23,12 @@ pub(super) fn decode<B: Bus>(address: u32, first: u32, second: u32) -> Decoded<B
         (0, _) if bits(first, 9, 7) != 7 => {
             let offset = sign << 20 | j2 << 19 | j1 << 18 | bits(first, 5, 0) << 12 | low << 1;
             let target = pc.wrapping_add(sign_extend(offset, 21));
-            Ok(op(branch::branch_if_of(bits(first, 9, 6))).immediate(target).flow(Flow::Perhaps))
+            let condition = bits(first, 9, 6);
+            Ok(op(branch::branch_if_of(condition))
+                .x(condition)
+                .immediate(target)
+                .flow(Flow::Perhaps)
+                .part(Part::Branch))
         }
         (0, _) => special(first, second),
         // udf

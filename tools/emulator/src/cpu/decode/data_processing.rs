@@ -8,7 +8,7 @@ use crate::cpu::execute::data_processing::{
     add_immediate, bfi, constant, data_of, extend, movt, pkh, sbfx, shift_register_of, ubfx,
 };
 use crate::cpu::execute::simd::{saturate_halves, ssat, usat};
-use crate::cpu::operation::Operation;
+use crate::cpu::operation::{Operation, Part};
 
 /// What an operation of the table A5-10 or A5-22 is, with registers that mean something else: operation, flags, whether its outcome
 /// is open. `second` is the second operand's register, None for a constant; `plain` says that it is not shifted, or by at most 3 to the left.
@@ -54,7 +54,9 @@ pub(super) fn modified_immediate<B: Bus>(first: u32, second: u32) -> Decoded<B> 
     let (operation, flags, open) = choose(first, d, None, true, true)?;
     let field = bits(first, 10, 10) << 11 | bits(second, 14, 12) << 8 | second & 0xff;
     let (value, carry) = expanded(field).ok_or(Refused::Unpredictable)?;
-    let decoded = Operation::new(data_of(operation, CONSTANT, flags));
+    let compares = (operation, flags) == (SUB, TEST);
+    let part = if compares { Part::CompareConstant } else { Part::None };
+    let decoded = Operation::new(data_of(operation, CONSTANT, flags)).part(part);
     unless(open, decoded.d(d).n(bits(first, 3, 0)).immediate(value).x(carry))
 }
 

@@ -5,10 +5,10 @@ use crate::bus::Bus;
 use crate::cpu::execute::floating_point::{
     NARROW, TO_HALF, TOP, TOWARDS_ZERO, UNSIGNED, VDIV, VFMS, VFNMS, VMLA, VNMLA, from_core, three_of, to_core,
     two_from_core, two_to_core, vcmp, vcvt_from_fixed, vcvt_half, vcvt_to_fixed, vldm, vldr, vmov, vmov_constant, vmrs,
-    vmsr, vsqrt, vstm, vstr,
+    vmrs_flags, vmsr, vsqrt, vstm, vstr,
 };
 use crate::cpu::execute::load_store::{BELOW, CHANGES};
-use crate::cpu::operation::Operation;
+use crate::cpu::operation::{Operation, Part};
 use crate::cpu::timing::{FLOATING_POINT_DIVISION, FLOATING_POINT_MULTIPLY_ACCUMULATE, several};
 
 /// Single-precision register: four bits and the lowest one.
@@ -81,9 +81,9 @@ fn other<B: Bus>(first: u32, second: u32, d: u32, m: u32) -> Decoded<B> {
         (2 | 3, _) => {
             op(vcvt_half).d(d).m(m).x(if upper == 1 { TOP } else { 0 } | if opcode == 3 { TO_HALF } else { 0 })
         }
-        (4, _) => op(vcmp).d(d).m(m).x(upper),
+        (4, _) => op(vcmp).d(d).m(m).x(upper).part(Part::CompareFloats),
         (5, _) if second & 0x2f != 0 => return Err(Refused::Unpredictable),
-        (5, _) => op(vcmp).d(d).x(upper).immediate(1),
+        (5, _) => op(vcmp).d(d).x(upper).immediate(1).part(Part::CompareFloats),
         (8, _) => op(vcvt_from_fixed::<B, true>).d(d).m(m).x(if upper == 0 { UNSIGNED } else { 0 }),
         (12 | 13, _) => {
             let x = if opcode == 12 { UNSIGNED } else { 0 } | if upper == 1 { TOWARDS_ZERO } else { 0 };
@@ -105,7 +105,10 @@ fn transfer<B: Bus>(first: u32, second: u32) -> Decoded<B> {
         }
         (0, 7) if bits(first, 3, 0) == 1 => {
             let open = stray || second & 0x80 != 0 || t == 13 || t == 15 && !load;
-            unless(open, op(if load { vmrs } else { vmsr }).d(t))
+            match load && t == 15 {
+                true => unless(open, op(vmrs_flags).part(Part::TakeFlags)),
+                false => unless(open, op(if load { vmrs } else { vmsr }).d(t)),
+            }
         }
         // Half of a double-precision register.
         (1, half @ (0 | 1)) if second & 0x60 == 0 => {

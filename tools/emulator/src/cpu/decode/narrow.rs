@@ -12,7 +12,7 @@ use crate::cpu::execute::load_store::{
     store_several,
 };
 use crate::cpu::execute::{branch, system};
-use crate::cpu::operation::{Flow, Operation};
+use crate::cpu::operation::{Flow, Operation, Part};
 use crate::cpu::timing::several;
 
 pub(super) fn decode<B: Bus>(address: u32, word: u32) -> Decoded<B> {
@@ -32,7 +32,7 @@ pub(super) fn decode<B: Bus>(address: u32, word: u32) -> Decoded<B> {
             Ok(op(data_of(operation, second, OUTSIDE_IT)).d(low).n(middle).m(high).immediate(high))
         }
         4 => Ok(op(data_of(MOV, CONSTANT, OUTSIDE_IT)).d(of_byte).immediate(byte)),
-        5 => Ok(op(data_of(SUB, CONSTANT, TEST)).n(of_byte).immediate(byte)),
+        5 => Ok(op(data_of(SUB, CONSTANT, TEST)).n(of_byte).immediate(byte).part(Part::CompareConstant)),
         6 => Ok(op(data_of(ADD, CONSTANT, OUTSIDE_IT)).d(of_byte).n(of_byte).immediate(byte)),
         7 => Ok(op(data_of(SUB, CONSTANT, OUTSIDE_IT)).d(of_byte).n(of_byte).immediate(byte)),
         8 if bits(word, 10, 10) == 0 => Ok(data_register(word)),
@@ -68,7 +68,11 @@ pub(super) fn decode<B: Bus>(address: u32, word: u32) -> Decoded<B> {
             15 => Ok(op(system::supervisor_call).immediate(byte)),
             condition => {
                 let target = pc.wrapping_add(sign_extend(byte << 1, 9));
-                Ok(op(branch::branch_if_of(condition)).immediate(target).flow(Flow::Perhaps))
+                Ok(op(branch::branch_if_of(condition))
+                    .x(condition)
+                    .immediate(target)
+                    .flow(Flow::Perhaps)
+                    .part(Part::Branch))
             }
         },
         28 => Ok(op(branch::branch).immediate(pc.wrapping_add(sign_extend(bits(word, 10, 0) << 1, 12)))),
@@ -92,7 +96,7 @@ fn data_register<B: Bus>(word: u32) -> Operation<B> {
         7 => shift(ROTATE),
         8 => two(AND, TEST),
         9 => Operation::new(data_of(RSB, CONSTANT, OUTSIDE_IT)).d(d).n(m),
-        10 => two(SUB, TEST),
+        10 => two(SUB, TEST).part(Part::CompareRegister),
         11 => two(ADD, TEST),
         12 => two(ORR, OUTSIDE_IT),
         13 => two(MUL, OUTSIDE_IT),
@@ -110,7 +114,10 @@ fn high_registers<B: Bus>(word: u32, pc: u32) -> Decoded<B> {
         // The program counter as an operand is a constant.
         0 if m == 15 => Ok(op(add_immediate).d(d).n(d).immediate(pc)),
         0 => Ok(op(data_of(ADD, REGISTER, NEVER)).d(d).n(d).m(m)),
-        1 => unless(d < 8 && m < 8 || d == 15 || m == 15, op(data_of(SUB, REGISTER, TEST)).n(d).m(m)),
+        1 => unless(
+            d < 8 && m < 8 || d == 15 || m == 15,
+            op(data_of(SUB, REGISTER, TEST)).n(d).m(m).part(Part::CompareRegister),
+        ),
         2 if d == 15 => unless(m == 15, op(branch::move_to_pc).m(m).flow(Flow::Elsewhere)),
         2 if m == 15 => Ok(op(constant).d(d).immediate(pc)),
         2 => Ok(op(data_of(MOV, REGISTER, NEVER)).d(d).m(m)),

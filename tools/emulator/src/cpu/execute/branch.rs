@@ -19,25 +19,9 @@ fn branch_if<B: Bus, const CONDITION: u8>(cpu: &mut Cpu<B>, o: Operands, rest: R
     cpu.jumped(rest)
 }
 
-/// The branch of a condition; 14, which is no condition of a branch, and more always hold.
+/// The branch of a condition.
 pub(in crate::cpu) fn branch_if_of<B: Bus>(condition: u32) -> Execute<B> {
-    match condition {
-        0 => branch_if::<B, 0>,
-        1 => branch_if::<B, 1>,
-        2 => branch_if::<B, 2>,
-        3 => branch_if::<B, 3>,
-        4 => branch_if::<B, 4>,
-        5 => branch_if::<B, 5>,
-        6 => branch_if::<B, 6>,
-        7 => branch_if::<B, 7>,
-        8 => branch_if::<B, 8>,
-        9 => branch_if::<B, 9>,
-        10 => branch_if::<B, 10>,
-        11 => branch_if::<B, 11>,
-        12 => branch_if::<B, 12>,
-        13 => branch_if::<B, 13>,
-        _ => branch,
-    }
+    by_condition!(branch_if, condition)
 }
 
 /// CBZ; CBNZ with x = 1.

@@ -3,7 +3,8 @@
 use crate::bus::Bus;
 use crate::cpu::Cpu;
 use crate::cpu::arithmetic::{
-    ARITHMETIC, CARRY_CLEARED, CARRY_KEPT, EXTEND, LEFT, RIGHT, ROTATE, add_with_carry, shift, sign_extend,
+    ARITHMETIC, CARRY_CLEARED, CARRY_KEPT, EXTEND, LEFT, RIGHT, ROTATE, add, add_with_carry, shift, sign_extend,
+    subtract,
 };
 use crate::cpu::operation::{Done, Execute, Operands, Rest};
 
@@ -36,12 +37,18 @@ pub(in crate::cpu) const REGISTER: u8 = 1;
 pub(in crate::cpu) const SHIFTED: u8 = 2;
 
 /// d = n operation second operand.
-#[inline(always)]
 pub(in crate::cpu) fn data<B: Bus, const OPERATION: u8, const SECOND: u8, const FLAGS: u8>(
     cpu: &mut Cpu<B>,
     o: Operands,
     rest: Rest<B>,
 ) -> Done {
+    operate::<B, OPERATION, SECOND, FLAGS>(cpu, o);
+    cpu.next(rest)
+}
+
+/// The operation alone.
+#[inline(always)]
+pub(super) fn operate<B: Bus, const OPERATION: u8, const SECOND: u8, const FLAGS: u8>(cpu: &mut Cpu<B>, o: Operands) {
     let (second, carry) = match SECOND {
         CONSTANT => match u32::from(o.x) {
             CARRY_KEPT => (o.immediate, cpu.carry),
@@ -61,20 +68,19 @@ pub(in crate::cpu) fn data<B: Bus, const OPERATION: u8, const SECOND: u8, const 
         MOV => logical(second),
         MVN => logical(!second),
         MUL => logical(first.wrapping_mul(second)),
-        ADD => add_with_carry(first, second, false),
+        ADD => add(first, second),
         ADC => add_with_carry(first, second, cpu.carry),
         SBC => add_with_carry(first, !second, cpu.carry),
-        SUB => add_with_carry(first, !second, true),
-        _ => add_with_carry(!first, second, true),
+        SUB => subtract(first, second),
+        _ => subtract(second, first),
     };
-    if FLAGS == ALWAYS || FLAGS == TEST || FLAGS == OUTSIDE_IT && !cpu.in_it {
+    if FLAGS == ALWAYS || FLAGS == TEST || FLAGS == OUTSIDE_IT && !o.is_in_block() {
         cpu.set_negative_zero(result);
         (cpu.carry, cpu.overflow) = (carry, overflow);
     }
     if FLAGS != TEST {
         cpu.set_any(o.d, result);
     }
-    cpu.next(rest)
 }
 
 /// Shifts n by the lowest byte of m.
@@ -84,7 +90,7 @@ pub(in crate::cpu) fn shift_register<B: Bus, const KIND: u8, const FLAGS: u8>(
     rest: Rest<B>,
 ) -> Done {
     let (result, carry) = shift(KIND, cpu.get(o.n), cpu.get(o.m) & 0xff, cpu.carry);
-    if FLAGS == ALWAYS || FLAGS == OUTSIDE_IT && !cpu.in_it {
+    if FLAGS == ALWAYS || FLAGS == OUTSIDE_IT && !o.is_in_block() {
         cpu.set_negative_zero(result);
         cpu.carry = carry;
     }
@@ -99,7 +105,7 @@ pub(in crate::cpu) fn shift_immediate<B: Bus, const KIND: u8, const FLAGS: u8>(
     rest: Rest<B>,
 ) -> Done {
     let (result, carry) = shift(KIND, cpu.get(o.m), o.immediate, cpu.carry);
-    if FLAGS == ALWAYS || FLAGS == OUTSIDE_IT && !cpu.in_it {
+    if FLAGS == ALWAYS || FLAGS == OUTSIDE_IT && !o.is_in_block() {
         cpu.set_negative_zero(result);
         cpu.carry = carry;
     }

@@ -27,7 +27,7 @@ impl<B: Bus> Cpu<B> {
 /// An instruction that found the unit not ready: prepares it, and executes it by itself.
 #[cold]
 #[inline(never)]
-fn ready_first<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>, execute: Execute<B>) -> Done {
+pub(super) fn ready_first<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>, execute: Execute<B>) -> Done {
     cpu.at(rest);
     cpu.check_floating_point()?;
     execute(cpu, o, &[])
@@ -150,9 +150,15 @@ pub(in crate::cpu) fn vcmp<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>)
     if !cpu.floating_ready {
         return ready_first(cpu, o, rest, vcmp);
     }
+    compare(cpu, o);
+    cpu.next(rest)
+}
+
+/// The comparison alone.
+#[inline(always)]
+pub(super) fn compare<B: Bus>(cpu: &mut Cpu<B>, o: Operands) {
     let second = if o.immediate != 0 { 0 } else { cpu.float(o.m) };
     float::compare(cpu.float(o.d), second, o.x != 0, &mut cpu.floating);
-    cpu.next(rest)
 }
 
 /// x of the conversions: without sign; 16 bits; towards zero; the upper half-word; from single precision.
@@ -255,19 +261,31 @@ pub(in crate::cpu) fn two_from_core<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest:
     cpu.next(rest)
 }
 
-/// VMRS; with 15 only the flags, to the core's.
+/// VMRS.
 pub(in crate::cpu) fn vmrs<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     if !cpu.floating_ready {
         return ready_first(cpu, o, rest, vmrs);
     }
     let bits = cpu.floating.bits();
-    if o.d == 15 {
-        (cpu.negative, cpu.zero) = (bits >> 31 & 1 != 0, bits >> 30 & 1 != 0);
-        (cpu.carry, cpu.overflow) = (bits >> 29 & 1 != 0, bits >> 28 & 1 != 0);
-    } else {
-        cpu.set(o.d, bits);
-    }
+    cpu.set(o.d, bits);
     cpu.next(rest)
+}
+
+/// VMRS of the flags, to the core's.
+pub(in crate::cpu) fn vmrs_flags<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    if !cpu.floating_ready {
+        return ready_first(cpu, o, rest, vmrs_flags);
+    }
+    take_flags(cpu);
+    cpu.next(rest)
+}
+
+/// The flags alone.
+#[inline(always)]
+pub(super) fn take_flags<B: Bus>(cpu: &mut Cpu<B>) {
+    let bits = cpu.floating.bits();
+    (cpu.negative, cpu.zero) = (bits >> 31 & 1 != 0, bits >> 30 & 1 != 0);
+    (cpu.carry, cpu.overflow) = (bits >> 29 & 1 != 0, bits >> 28 & 1 != 0);
 }
 
 pub(in crate::cpu) fn vmsr<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
