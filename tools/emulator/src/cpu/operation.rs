@@ -124,19 +124,36 @@ pub(super) struct Timing {
     pub part: Part,
 }
 
-/// Which part of a pair an instruction can be that is executed at once (see `execute::pairs`).
+/// What an instruction can be in a pair that is executed at once (see `execute::pairs`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Part {
     None,
-    /// First: a comparison of n with a constant, with register m.
+    /// CMP of n with a constant, with register m; SUBS of a constant, outside of IT blocks.
     CompareConstant,
     CompareRegister,
-    /// First: a comparison of floating-point registers.
-    CompareFloats,
-    /// Second: its flags to the core.
-    TakeFlags,
-    /// Second: a branch by condition x.
+    SubtractConstant,
+    /// A branch by condition x; CBZ and CBNZ.
     Branch,
+    BranchIfZero,
+    /// MOVW, and MOV of a constant that sets no flags; MOVS, which sets none in an IT block; MOV of register m; MOVT.
+    Constant,
+    NarrowConstant,
+    Register,
+    UpperHalf,
+    /// ADD of a constant that sets no flags.
+    AddConstant,
+    /// A load and a store of a word at n and a constant; the same of the floating-point unit.
+    Load,
+    Store,
+    LoadFloat,
+    StoreFloat,
+    /// VMOV of registers; VMUL; VCMP; VMRS of the flags.
+    Float,
+    MultiplyFloats,
+    CompareFloats,
+    TakeFlags,
+    /// A barrier.
+    Nothing,
 }
 
 /// What comes behind an instruction.

@@ -12,7 +12,7 @@
 
 use super::Cpu;
 use super::execute::by_condition;
-use super::execute::pairs::pair_of;
+use super::execute::pairs::{conditional_of, pair_of};
 use super::execute::system::nothing;
 use super::operation::{Done, Execute, Flow, Leave, Operands, Operation, Part, Rest, Step, Trap, behind};
 use crate::bus::Bus;
@@ -57,17 +57,16 @@ pub(super) struct Stretches<B: Bus> {
     steps: Vec<Step<B>>,
     /// Of the steps.
     marks: Vec<Mark>,
-    stretches: Vec<Stretch>,
-    /// Which of them begins at each place of the code; `NONE` where none does.
-    begins: Vec<u32>,
+    /// What begins at each place of the code; `NONE` where nothing does.
+    begins: Vec<Stretch>,
 }
 
-const NONE: u32 = u32::MAX;
+const NONE: Stretch = Stretch { first: u32::MAX, end: 0, before_last: 0, bytes: 0, overlaps: 0 };
 
 impl<B: Bus> Stretches<B> {
     /// None yet, of so many places.
     pub fn new(places: usize) -> Self {
-        Self { steps: Vec::new(), marks: Vec::new(), stretches: Vec::new(), begins: vec![NONE; places] }
+        Self { steps: Vec::new(), marks: Vec::new(), begins: vec![NONE; places] }
     }
 
     /// Forgets those that begin at some places.
@@ -81,8 +80,7 @@ impl<B: Bus> Stretches<B> {
     /// An instruction was decoded: those that ended before it only because it was not are formed anew.
     pub fn decoded(&mut self, place: usize) {
         for before in place.saturating_sub(SPAN)..place {
-            let stretch = self.begins.get(before).and_then(|begin| self.stretches.get(*begin as usize));
-            if stretch.is_some_and(|stretch| before + usize::from(stretch.bytes / 2) == place) {
+            if self.begins.get(before).is_some_and(|stretch| before + usize::from(stretch.bytes / 2) == place) {
                 self.forget(before..before + 1);
             }
         }
@@ -105,7 +103,8 @@ impl<B: Bus> Stretches<B> {
             before_last = mark.cycles;
             if block != 0 {
                 let passed = Operands { immediate: u32::from(timing.cycles), m: timing.single.into(), ..operands };
-                self.push(by_condition!(unless, block >> 4), passed, mark);
+                let execute = conditional_of(block >> 4, timing.part);
+                self.push(execute.unwrap_or(by_condition!(unless, block >> 4)), passed, mark);
             } else if let Some(pair) = pair_of((last, timing.part), operands)
                 && let Some(first) = self.steps.last_mut()
             {
@@ -134,28 +133,20 @@ impl<B: Bus> Stretches<B> {
             // IT at the end.
             self.push(nothing, Operands::default(), mark);
         }
-        let stretch = Stretch {
+        let Some(begins) = self.begins.get_mut(place) else { return false };
+        *begins = Stretch {
             first: first as u32,
             end: self.steps.len() as u32,
             before_last,
             bytes: mark.bytes,
             overlaps: begin.timing.overlaps,
         };
-        let Some(begins) = self.begins.get_mut(place) else { return false };
-        *begins = self.stretches.len() as u32;
-        self.stretches.push(stretch);
         true
     }
 
     fn push(&mut self, execute: Execute<B>, operands: Operands, mark: Mark) {
         self.steps.push(Step { execute, operands });
         self.marks.push(mark);
-    }
-
-    /// The stretch that begins at a place; none where none does yet.
-    #[inline(always)]
-    fn begins_at(&self, place: usize) -> Option<&Stretch> {
-        self.stretches.get(*self.begins.get(place)? as usize)
     }
 
     /// The end of a stretch for whom so many cycles are left: the instruction that reaches them completes.
@@ -193,10 +184,15 @@ impl<B: Bus> Cpu<B> {
     /// Runs stretches until something is due, or in an IT block; false where none begins yet.
     #[inline(always)]
     fn run_formed(&mut self, steps: &[Step<B>]) -> bool {
+        let (mut begin, mut stretch) = (self.pc, NONE);
         loop {
-            let begin = self.pc;
-            let place = self.code.place(begin);
-            let Some(&stretch) = place.and_then(|place| self.code.stretches.begins_at(place)) else { return false };
+            // A loop whose body is one stretch needs no search; jumps change no code.
+            if self.pc != begin || stretch.end == 0 {
+                begin = self.pc;
+                let place = self.code.place(begin);
+                let Some(found) = place.and_then(|place| self.code.stretches.begins.get(place)) else { return false };
+                stretch = *found;
+            }
             self.now = self.now.wrapping_sub(u64::from(stretch.overlaps & u8::from(self.single)));
             let end = match self.now.wrapping_add(u64::from(stretch.before_last)) < self.attention {
                 true => stretch.end,
@@ -205,11 +201,17 @@ impl<B: Bus> Cpu<B> {
             self.within.end = end;
             let Some(steps) = steps.get(stretch.first as usize..end as usize) else { return false };
             match self.next(steps) {
-                Ok(()) => self.settle_at(&[]),
+                Ok(()) => {
+                    self.settle_at(&[]);
+                    stretch = NONE;
+                }
                 Err(Leave::Jumped) => {
                     self.count();
                 }
-                Err(Leave::Trapped(trap)) => self.trapped_within(trap, begin),
+                Err(Leave::Trapped(trap)) => {
+                    self.trapped_within(trap, begin);
+                    stretch = NONE;
+                }
             }
             if self.now >= self.attention || self.it != 0 {
                 return true;

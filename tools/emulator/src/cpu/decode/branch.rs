@@ -55,7 +55,9 @@ fn special<B: Bus>(first: u32, second: u32) -> Decoded<B> {
         (0xf3af, 0x8005..=0x80ff) => Ok(op(system::nothing)),
         (0xf3bf, 0x8f2f) => Ok(op(clear_exclusive)),
         // dsb, dmb, isb
-        (0xf3bf, _) if matches!(second & 0xfff0, 0x8f40 | 0x8f50 | 0x8f60) => Ok(op(system::nothing)),
+        (0xf3bf, _) if matches!(second & 0xfff0, 0x8f40 | 0x8f50 | 0x8f60) => {
+            Ok(op(system::nothing).part(Part::Nothing))
+        }
         _ => Err(Refused::Unknown),
     }
 }

@@ -54,8 +54,12 @@ pub(super) fn modified_immediate<B: Bus>(first: u32, second: u32) -> Decoded<B> 
     let (operation, flags, open) = choose(first, d, None, true, true)?;
     let field = bits(first, 10, 10) << 11 | bits(second, 14, 12) << 8 | second & 0xff;
     let (value, carry) = expanded(field).ok_or(Refused::Unpredictable)?;
-    let compares = (operation, flags) == (SUB, TEST);
-    let part = if compares { Part::CompareConstant } else { Part::None };
+    let part = match (operation, flags) {
+        (SUB, TEST) => Part::CompareConstant,
+        (MOV, NEVER) => Part::Constant,
+        (ADD, NEVER) => Part::AddConstant,
+        _ => Part::None,
+    };
     let decoded = Operation::new(data_of(operation, CONSTANT, flags)).part(part);
     unless(open, decoded.d(d).n(bits(first, 3, 0)).immediate(value).x(carry))
 }
@@ -98,10 +102,10 @@ pub(super) fn plain_immediate<B: Bus>(address: u32, first: u32, second: u32) -> 
     match bits(first, 8, 4) {
         0x00 if n == 15 => unless(bad(d), op(constant).d(d).immediate(pc.wrapping_add(value))),
         0x0a if n == 15 => unless(bad(d), op(constant).d(d).immediate(pc.wrapping_sub(value))),
-        0x00 => unless(stack, op(add_immediate).d(d).n(n).immediate(value)),
-        0x0a => unless(stack, op(add_immediate).d(d).n(n).immediate(value.wrapping_neg())),
-        0x04 => unless(bad(d), op(constant).d(d).immediate(n << 12 | value)),
-        0x0c => unless(bad(d), op(movt).d(d).immediate(n << 12 | value)),
+        0x00 => unless(stack, op(add_immediate).d(d).n(n).immediate(value).part(Part::AddConstant)),
+        0x0a => unless(stack, op(add_immediate).d(d).n(n).immediate(value.wrapping_neg()).part(Part::AddConstant)),
+        0x04 => unless(bad(d), op(constant).d(d).immediate(n << 12 | value).part(Part::Constant)),
+        0x0c => unless(bad(d), op(movt).d(d).immediate(n << 12 | value).part(Part::UpperHalf)),
         kind @ (0x10 | 0x12 | 0x18 | 0x1a) => {
             let (unsigned, shifts_right) = (kind & 8 != 0, kind & 2 != 0);
             let open = bad(d) || bad(n) || stray;

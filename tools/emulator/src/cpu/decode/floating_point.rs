@@ -3,7 +3,7 @@
 use super::{Decoded, Refused, bad, bits, unless};
 use crate::bus::Bus;
 use crate::cpu::execute::floating_point::{
-    NARROW, TO_HALF, TOP, TOWARDS_ZERO, UNSIGNED, VDIV, VFMS, VFNMS, VMLA, VNMLA, from_core, three_of, to_core,
+    NARROW, TO_HALF, TOP, TOWARDS_ZERO, UNSIGNED, VDIV, VFMS, VFNMS, VMLA, VMUL, VNMLA, from_core, three_of, to_core,
     two_from_core, two_to_core, vcmp, vcvt_from_fixed, vcvt_half, vcvt_to_fixed, vldm, vldr, vmov, vmov_constant, vmrs,
     vmrs_flags, vmsr, vsqrt, vstm, vstr,
 };
@@ -47,7 +47,8 @@ fn data_processing<B: Bus>(first: u32, second: u32) -> Decoded<B> {
         VDIV => FLOATING_POINT_DIVISION,
         _ => 1,
     };
-    Ok(Operation::new(execute).d(d).n(n).m(m).cycles(cycles))
+    let part = if operation == VMUL { Part::MultiplyFloats } else { Part::None };
+    Ok(Operation::new(execute).d(d).n(n).m(m).cycles(cycles).part(part))
 }
 
 /// Operations with one operand.
@@ -74,7 +75,7 @@ fn other<B: Bus>(first: u32, second: u32, d: u32, m: u32) -> Decoded<B> {
         return unless(behind > width, op(execute).d(d).m(d).x(x | TOWARDS_ZERO).immediate(fraction));
     }
     Ok(match (opcode, upper) {
-        (0, 0) => op(vmov).d(d).m(m),
+        (0, 0) => op(vmov).d(d).m(m).part(Part::Float),
         (0, _) => op(vmov).d(d).m(m).immediate(1 << 31),
         (1, 0) => op(vmov).d(d).m(m).x(1),
         (1, _) => op(vsqrt).d(d).m(m).cycles(FLOATING_POINT_DIVISION),
@@ -155,6 +156,7 @@ fn load_store<B: Bus>(address: u32, first: u32, second: u32) -> Decoded<B> {
         let pc = address.wrapping_add(4) & !3;
         let immediate = if n == 15 { pc.wrapping_add(offset) } else { offset };
         let decoded = op(if load { vldr } else { vstr }).d(d).n(n).immediate(immediate).x(count);
+        let decoded = decoded.part(if load { Part::LoadFloat } else { Part::StoreFloat });
         return unless(open, if double { decoded.cycles(several(2)) } else { decoded.single(load) });
     }
     let below = before && !up;

@@ -4,7 +4,7 @@ use super::{Decoded, Refused, bad, bits, unless};
 use crate::bus::Bus;
 use crate::cpu::execute::load_store::{
     ABSOLUTE, AFTER, BEFORE, BELOW, CHANGES, INDEXED, LDR, LDRB, LDRH, LDRSB, LDRSH, OFFSET, PRE, STR, STRB, STRH,
-    access_of, ldrd, ldrd_absolute, load_branch_of, load_exclusive, load_several, loads, store_exclusive,
+    access_of, access_part, ldrd, ldrd_absolute, load_branch_of, load_exclusive, load_several, loads, store_exclusive,
     store_several, strd,
 };
 use crate::cpu::execute::{branch, system};
@@ -149,5 +149,6 @@ pub(super) fn single<B: Bus>(address: u32, first: u32, second: u32) -> Decoded<B
     }
     let word = what == LDR || what == STR;
     let open = open || t == 15 || t == 13 && !word;
-    unless(open, Operation::new(access_of(what, mode)).d(t).n(n).m(m).immediate(offset).single(load))
+    let decoded = Operation::new(access_of(what, mode)).d(t).n(n).m(m).immediate(offset).single(load);
+    unless(open, decoded.part(access_part(what, mode)))
 }

@@ -8,8 +8,8 @@ use crate::cpu::execute::data_processing::{
     add_immediate, constant, data_of, extend, reverse, shift_immediate_of, shift_register_of,
 };
 use crate::cpu::execute::load_store::{
-    ABSOLUTE, BELOW, CHANGES, INDEXED, LDR, LDRB, LDRH, OFFSET, STR, STRB, STRH, access_of, load_several, loads,
-    store_several,
+    ABSOLUTE, BELOW, CHANGES, INDEXED, LDR, LDRB, LDRH, OFFSET, STR, STRB, STRH, access_of, access_part, load_several,
+    loads, store_several,
 };
 use crate::cpu::execute::{branch, system};
 use crate::cpu::operation::{Flow, Operation, Part};
@@ -31,10 +31,13 @@ pub(super) fn decode<B: Bus>(address: u32, word: u32) -> Decoded<B> {
             let second = if bits(word, 10, 10) == 0 { REGISTER } else { CONSTANT };
             Ok(op(data_of(operation, second, OUTSIDE_IT)).d(low).n(middle).m(high).immediate(high))
         }
-        4 => Ok(op(data_of(MOV, CONSTANT, OUTSIDE_IT)).d(of_byte).immediate(byte)),
+        4 => Ok(op(data_of(MOV, CONSTANT, OUTSIDE_IT)).d(of_byte).immediate(byte).part(Part::NarrowConstant)),
         5 => Ok(op(data_of(SUB, CONSTANT, TEST)).n(of_byte).immediate(byte).part(Part::CompareConstant)),
         6 => Ok(op(data_of(ADD, CONSTANT, OUTSIDE_IT)).d(of_byte).n(of_byte).immediate(byte)),
-        7 => Ok(op(data_of(SUB, CONSTANT, OUTSIDE_IT)).d(of_byte).n(of_byte).immediate(byte)),
+        7 => {
+            let decoded = op(data_of(SUB, CONSTANT, OUTSIDE_IT)).d(of_byte).n(of_byte).immediate(byte);
+            Ok(decoded.part(Part::SubtractConstant))
+        }
         8 if bits(word, 10, 10) == 0 => Ok(data_register(word)),
         8 => high_registers(word, pc),
         9 => Ok(op(access_of(LDR, ABSOLUTE)).d(of_byte).immediate((pc & !3).wrapping_add(4 * byte)).single(true)),
@@ -45,11 +48,13 @@ pub(super) fn decode<B: Bus>(address: u32, word: u32) -> Decoded<B> {
         kind @ 12..=17 => {
             let (what, scale) = [(STR, 4), (LDR, 4), (STRB, 1), (LDRB, 1), (STRH, 2), (LDRH, 2)][kind as usize - 12];
             let offset = scale * bits(word, 10, 6);
-            Ok(op(access_of(what, OFFSET)).d(low).n(middle).immediate(offset).single(loads(what)))
+            let decoded = op(access_of(what, OFFSET)).d(low).n(middle).immediate(offset).single(loads(what));
+            Ok(decoded.part(access_part(what, OFFSET)))
         }
         kind @ 18..=19 => {
             let what = if kind == 18 { STR } else { LDR };
-            Ok(op(access_of(what, OFFSET)).d(of_byte).n(13).immediate(4 * byte).single(loads(what)))
+            let decoded = op(access_of(what, OFFSET)).d(of_byte).n(13).immediate(4 * byte).single(loads(what));
+            Ok(decoded.part(access_part(what, OFFSET)))
         }
         20 => Ok(op(constant).d(of_byte).immediate((pc & !3).wrapping_add(4 * byte))),
         21 => Ok(op(add_immediate).d(of_byte).n(13).immediate(4 * byte)),
@@ -120,7 +125,7 @@ fn high_registers<B: Bus>(word: u32, pc: u32) -> Decoded<B> {
         ),
         2 if d == 15 => unless(m == 15, op(branch::move_to_pc).m(m).flow(Flow::Elsewhere)),
         2 if m == 15 => Ok(op(constant).d(d).immediate(pc)),
-        2 => Ok(op(data_of(MOV, REGISTER, NEVER)).d(d).m(m)),
+        2 => Ok(op(data_of(MOV, REGISTER, NEVER)).d(d).m(m).part(Part::Register)),
         _ if bits(word, 2, 0) != 0 || m == 15 => Err(Refused::Unpredictable),
         _ if bits(word, 7, 7) != 0 => Ok(op(branch::call_register).m(m).flow(Flow::Elsewhere)),
         _ => Ok(op(branch::branch_register).m(m).flow(Flow::Elsewhere)),
@@ -136,7 +141,8 @@ fn miscellaneous<B: Bus>(word: u32, pc: u32) -> Decoded<B> {
         0 => Ok(op(add_immediate).d(13).n(13).immediate((4 * (word & 0x7f)).wrapping_neg())),
         1 | 3 | 9 | 11 => {
             let target = pc.wrapping_add(bits(word, 9, 9) << 6 | bits(word, 7, 3) << 1);
-            Ok(op(branch::branch_if_zero).n(low).x(bits(word, 11, 11)).immediate(target).flow(Flow::Perhaps))
+            let decoded = op(branch::branch_if_zero).n(low).x(bits(word, 11, 11)).immediate(target);
+            Ok(decoded.flow(Flow::Perhaps).part(Part::BranchIfZero))
         }
         // sxth, sxtb, uxth, uxtb: the wide ones without rotation and addition.
         2 => {

@@ -127,9 +127,15 @@ pub(in crate::cpu) fn constant<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest
 }
 
 pub(in crate::cpu) fn movt<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    set_upper_half(cpu, o);
+    cpu.next(rest)
+}
+
+/// MOVT alone.
+#[inline(always)]
+pub(super) fn set_upper_half<B: Bus>(cpu: &mut Cpu<B>, o: Operands) {
     let value = cpu.get(o.d) & 0xffff | o.immediate << 16;
     cpu.set(o.d, value);
-    cpu.next(rest)
 }
 
 /// Lowest `width` bits.

@@ -49,6 +49,15 @@ pub(in crate::cpu) const VFMA: u8 = 12;
 pub(in crate::cpu) const VFMS: u8 = 13;
 
 fn three<B: Bus, const OPERATION: u8>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    match three_at_once::<B, OPERATION>(cpu, o) {
+        true => cpu.next(rest),
+        false => three_exactly::<B, OPERATION>(cpu, o, rest),
+    }
+}
+
+/// The same where the host's result is the unit's; false where it may not be, and nothing has changed.
+#[inline(always)]
+pub(super) fn three_at_once<B: Bus, const OPERATION: u8>(cpu: &mut Cpu<B>, o: Operands) -> bool {
     let (d, n, m, status) = (cpu.float(o.d), cpu.float(o.n), cpu.float(o.m), cpu.floating);
     let result = match OPERATION {
         VMUL => float::multiply_at_once(n, m, status),
@@ -59,18 +68,16 @@ fn three<B: Bus, const OPERATION: u8>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<
         VMLA => float::multiply_at_once(n, m, status).and_then(|product| float::add_at_once(d, product, status)),
         _ => None,
     };
-    if let Some(result) = result
-        && cpu.floating_ready
-    {
-        cpu.set_float(o.d, result);
-        return cpu.next(rest);
+    match result {
+        Some(result) if cpu.floating_ready => cpu.set_float(o.d, result),
+        _ => return false,
     }
-    three_exactly::<B, OPERATION>(cpu, o, rest)
+    true
 }
 
 /// The same in general; by itself, so that the usual way saves no registers.
 #[inline(never)]
-fn three_exactly<B: Bus, const OPERATION: u8>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+pub(super) fn three_exactly<B: Bus, const OPERATION: u8>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     if !cpu.floating_ready {
         return ready_first(cpu, o, rest, three_exactly::<B, OPERATION>);
     }
@@ -128,12 +135,20 @@ pub(in crate::cpu) fn vmov_constant<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest:
 
 /// VMOV, VABS, VNEG: bits of m, of which `immediate` are cleared and x of the sign exchanged.
 pub(in crate::cpu) fn vmov<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
-    if !cpu.floating_ready {
+    if !vmov_at_once(cpu, o) {
         return ready_first(cpu, o, rest, vmov);
     }
-    let bits = cpu.float(o.m) & !o.immediate ^ u32::from(o.x) << 31;
-    cpu.set_float(o.d, bits);
     cpu.next(rest)
+}
+
+/// The same if the unit is ready; false if it is not, and nothing has changed.
+#[inline(always)]
+pub(super) fn vmov_at_once<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> bool {
+    if cpu.floating_ready {
+        let bits = cpu.float(o.m) & !o.immediate ^ u32::from(o.x) << 31;
+        cpu.set_float(o.d, bits);
+    }
+    cpu.floating_ready
 }
 
 pub(in crate::cpu) fn vsqrt<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
@@ -303,19 +318,25 @@ fn address<B: Bus>(cpu: &Cpu<B>, o: Operands) -> u32 {
 
 /// VLDR of x registers.
 pub(in crate::cpu) fn vldr<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    if vldr_at_once(cpu, o) { cpu.next(rest) } else { vldr_elsewhere(cpu, o, rest) }
+}
+
+/// The same of one register where memory answers at once; false where it does not, and nothing has changed.
+#[inline(always)]
+pub(super) fn vldr_at_once<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> bool {
     if o.x == 1
         && cpu.floating_ready
         && let Some(bits) = cpu.load_at_once::<4>(address(cpu, o))
     {
         cpu.set_float(o.d, bits);
-        return cpu.next(rest);
+        return true;
     }
-    vldr_elsewhere(cpu, o, rest)
+    false
 }
 
 /// The same in general; by itself, so that the usual way saves no registers.
 #[inline(never)]
-fn vldr_elsewhere<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+pub(super) fn vldr_elsewhere<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     cpu.at(rest);
     cpu.use_floating_point()?;
     let at = address(cpu, o);
@@ -333,15 +354,18 @@ fn vldr_elsewhere<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done 
 
 /// VSTR of x registers.
 pub(in crate::cpu) fn vstr<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
-    if o.x == 1 && cpu.floating_ready && cpu.store_at_once::<4>(address(cpu, o), cpu.float(o.d)) {
-        return cpu.next(rest);
-    }
-    vstr_elsewhere(cpu, o, rest)
+    if vstr_at_once(cpu, o) { cpu.next(rest) } else { vstr_elsewhere(cpu, o, rest) }
+}
+
+/// The same of one register where memory takes it at once; false where it does not, and nothing has changed.
+#[inline(always)]
+pub(super) fn vstr_at_once<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> bool {
+    o.x == 1 && cpu.floating_ready && cpu.store_at_once::<4>(address(cpu, o), cpu.float(o.d))
 }
 
 /// The same in general; by itself, so that the usual way saves no registers.
 #[inline(never)]
-fn vstr_elsewhere<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+pub(super) fn vstr_elsewhere<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     cpu.at(rest);
     cpu.use_floating_point()?;
     let at = address(cpu, o);

@@ -2,7 +2,7 @@
 
 use crate::bus::Bus;
 use crate::cpu::Cpu;
-use crate::cpu::operation::{Done, Execute, Operands, Rest, Trap};
+use crate::cpu::operation::{Done, Execute, Operands, Part, Rest, Trap};
 
 /// What is moved: the numbers of the narrow encodings with a register offset.
 pub(in crate::cpu) const STR: u8 = 0;
@@ -41,8 +41,16 @@ fn addressed<B: Bus, const ADDRESS: u8>(cpu: &Cpu<B>, o: Operands) -> (u32, u32)
 }
 
 /// Loads d, or stores it.
-#[inline(always)]
 fn access<B: Bus, const WHAT: u8, const ADDRESS: u8>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    match access_at_once::<B, WHAT, ADDRESS>(cpu, o) {
+        true => cpu.next(rest),
+        false => access_elsewhere::<B, WHAT, ADDRESS>(cpu, o, rest),
+    }
+}
+
+/// The same where memory answers at once; false where it does not, and nothing has changed.
+#[inline(always)]
+pub(super) fn access_at_once<B: Bus, const WHAT: u8, const ADDRESS: u8>(cpu: &mut Cpu<B>, o: Operands) -> bool {
     let (address, changed) = addressed::<B, ADDRESS>(cpu, o);
     if loads(WHAT) {
         let loaded = match WHAT {
@@ -50,7 +58,7 @@ fn access<B: Bus, const WHAT: u8, const ADDRESS: u8>(cpu: &mut Cpu<B>, o: Operan
             LDRH | LDRSH => cpu.load_at_once::<2>(address),
             _ => cpu.load_at_once::<1>(address),
         };
-        let Some(value) = loaded else { return access_elsewhere::<B, WHAT, ADDRESS>(cpu, o, rest) };
+        let Some(value) = loaded else { return false };
         set_loaded::<B, WHAT>(cpu, o.d, value);
     } else {
         let value = cpu.get(o.d);
@@ -60,16 +68,20 @@ fn access<B: Bus, const WHAT: u8, const ADDRESS: u8>(cpu: &mut Cpu<B>, o: Operan
             _ => cpu.store_at_once::<1>(address, value & 0xff),
         };
         if !stored {
-            return access_elsewhere::<B, WHAT, ADDRESS>(cpu, o, rest);
+            return false;
         }
     }
     write_back::<B, ADDRESS>(cpu, o.n, changed);
-    cpu.next(rest)
+    true
 }
 
 /// The same of memory that does not answer at once, and unaligned; by itself, so that the usual way saves no registers.
 #[inline(never)]
-fn access_elsewhere<B: Bus, const WHAT: u8, const ADDRESS: u8>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+pub(super) fn access_elsewhere<B: Bus, const WHAT: u8, const ADDRESS: u8>(
+    cpu: &mut Cpu<B>,
+    o: Operands,
+    rest: Rest<B>,
+) -> Done {
     cpu.at(rest);
     let (address, changed) = addressed::<B, ADDRESS>(cpu, o);
     let value = cpu.get(o.d);
@@ -126,6 +138,15 @@ pub(in crate::cpu) fn load_branch_of<B: Bus>(address: u8) -> Execute<B> {
         ABSOLUTE => load_branch::<B, ABSOLUTE>,
         BEFORE => load_branch::<B, BEFORE>,
         _ => load_branch::<B, AFTER>,
+    }
+}
+
+/// What an access can be in a pair.
+pub(in crate::cpu) const fn access_part(what: u8, address: u8) -> Part {
+    match (what, address) {
+        (LDR, OFFSET) => Part::Load,
+        (STR, OFFSET) => Part::Store,
+        _ => Part::None,
     }
 }
 
