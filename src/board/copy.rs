@@ -78,26 +78,35 @@ unsafe extern "C" fn __aeabi_memmove8(to: *mut u8, from: *const u8, bytes: usize
     naked_asm!("b {copy}", copy = sym __aeabi_memmove4)
 }
 
-/// Zeros.
+/// Zeros, four words at a time.
 #[unsafe(no_mangle)]
 #[unsafe(naked)]
 #[unsafe(link_section = ".ccm.copy")]
 unsafe extern "C" fn __aeabi_memclr4(to: *mut u8, bytes: usize) {
     naked_asm!(
+        "movs r2, #0",
         "movs r3, #0",
         "b 2f",
         "1:",
-        "str r3, [r0], #4",
+        "stmia r0!, {{r2, r3}}",
+        "stmia r0!, {{r2, r3}}",
         "2:",
-        "subs r1, #4",
+        "subs r1, #16",
         "bhs 1b",
-        "adds r1, #4",
-        "beq 4f",
+        "adds r1, #12",
+        "bmi 4f",
         "3:",
+        "str r3, [r0], #4",
+        "subs r1, #4",
+        "bpl 3b",
+        "4:",
+        "adds r1, #4",
+        "beq 6f",
+        "5:",
         "strb r3, [r0], #1",
         "subs r1, #1",
-        "bne 3b",
-        "4:",
+        "bne 5b",
+        "6:",
         "bx lr",
     )
 }

@@ -1,9 +1,11 @@
-//! What the board's core makes of the library, in the programs of the probe: bits, instructions, and what is linked. A file a promise.
+//! What the board's core makes of the library, in the programs of the probe: bits, instructions, and what is linked; and of the boards' programs
+//! the routines that move memory. A file a promise.
 //!
 //! Needs the target `thumbv7em-none-eabihf`, and some tests `qemu-system-arm`. Where they are missing the tests are reported as
 //! ignored, by name; with `CI` set they run and fail.
 
 mod control_step;
+mod copies;
 mod friction;
 mod library;
 
@@ -24,6 +26,11 @@ fn main() {
     let target = required || target_installed();
     let qemu = target && (required || Command::new("qemu-system-arm").arg("--version").output().is_ok());
     let missing = Missing { target: !target, qemu: !qemu };
-    let rooms = [library::trials(&missing), control_step::trials(&missing), friction::trials(&missing)];
+    let rooms = [
+        library::trials(&missing),
+        control_step::trials(&missing),
+        friction::trials(&missing),
+        copies::trials(&missing),
+    ];
     libtest_mimic::run(&arguments, rooms.into_iter().flatten().collect()).exit();
 }
