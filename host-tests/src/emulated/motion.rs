@@ -1,9 +1,10 @@
-//! A joint in motion: the moteus r4's program, enabled over the bus and given a set-point every few milliseconds, until something goes wrong.
+//! A joint in motion: a board's program with the bus, enabled and given a set-point every few milliseconds, until something goes wrong.
 
 use super::Bench;
 use super::kept::{Kept, configuration};
 use super::master::{Heard, heard, send};
-use emulator::board::{MoteusR4, Wired};
+use super::observed::Observed;
+use emulator::board::{Drivetrain, MoteusR4, Wired};
 use emulator::chip::time::Instant;
 use emulator::program::Program;
 use joint_firmware::compensation::Request;
@@ -22,12 +23,14 @@ const HEARTBEAT: u16 = 10;
 const VELOCITY: u8 = 9;
 /// Controlwords of CiA 402: shutdown, switch on, enable operation.
 const ENABLING: [u16; 3] = [0x06, 0x07, 0x0F];
+/// Up to here the joint is enabled, s.
+const ENABLED: f64 = 0.3;
 
 /// A joint that somebody moves. A clone is a snapshot.
 #[derive(Clone)]
-pub struct Moving {
+pub struct Moving<W: Wired = MoteusR4> {
     /// The board.
-    pub bench: Bench<MoteusR4>,
+    pub bench: Bench<W>,
     /// Set-points so far.
     period: u32,
     /// Amplitude of the velocity at the link, rad/s.
@@ -40,22 +43,30 @@ pub struct Moving {
     heard: Vec<Heard>,
 }
 
-impl Moving {
+impl<W: Observed> Moving<W> {
     /// From power-up until it moves.
     ///
     /// # Errors
     /// It is not enabled.
-    pub fn start(actuator: &ActuatorParameters, program: &Program, image: &[u8]) -> Result<Self, Failed> {
-        let configuration = configuration::<MoteusR4>(actuator, NODE, Request::PhysicalAndNetwork);
-        let mut bench = Bench::with(MoteusR4::new, actuator, program)?;
+    pub fn start(
+        board: impl FnOnce(Drivetrain) -> W,
+        actuator: &ActuatorParameters,
+        program: &Program,
+        image: &[u8],
+    ) -> Result<Self, Failed> {
+        let configuration = configuration::<W>(actuator, NODE, Request::PhysicalAndNetwork);
+        let mut bench = Bench::with(board, actuator, program)?;
         Kept { configuration: &configuration, image }.write(&mut bench.emulation, program)?;
         bench.booted(NODE)?;
+        if W::INDEX {
+            bench.turn_by_hand(|_| Ok(()))?;
+        }
         let mut moving = Self { bench, period: 0, amplitude: 2.0, silent: false, configuration, heard: Vec::new() };
         // Operational.
         send(&mut moving.bench.emulation, 0x000, &[0x01, NODE])?;
         // A heartbeat, so that it always has something to send.
         moving.bench.download(NODE, 0x1017, 0, &HEARTBEAT.to_le_bytes())?;
-        moving.run(0.3)?;
+        moving.run(ENABLED)?;
         match moving.bench.board().drivetrain().is_switching() {
             true => Ok(moving),
             false => Err(format!("the bridge does not switch:\n{}", moving.bench.log()).into()),

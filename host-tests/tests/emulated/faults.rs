@@ -192,7 +192,7 @@ const MOTEUS: [Broken; 15] = [
 fn moteus() -> Result<(), Failed> {
     let program = program(MoteusR4::NAME, env!("CARGO_TARGET_TMPDIR"))?;
     let image = SampleImage::constant(1, 0.1);
-    let mut moving = Moving::start(&actuator(), &program, &image)?;
+    let mut moving = Moving::start(MoteusR4::new, &actuator(), &program, &image)?;
     let mut random = ChaCha8Rng::seed_from_u64(1);
     let mut moments = Vec::new();
     for _ in 0..20 * INSTANTS {
