@@ -13,6 +13,19 @@ pub fn to_fixed(
     rounding: Option<Rounding>,
     status: &mut Status,
 ) -> u32 {
+    let (least, most) = match unsigned {
+        true => (0, (1i64 << bits) - 1),
+        false => (-(1i64 << (bits - 1)), (1i64 << (bits - 1)) - 1),
+    };
+    // The host's own conversion, where nothing is left to flag: a double has room for every number of 24 bits, wherever its point is.
+    if status.is_usual() && rounding == Some(Rounding::Zero) && fraction <= 32 {
+        let scaled = f64::from(f32::from_bits(value)) * (1u64 << fraction) as f64;
+        // Saturated where it is too large, which is out of range then.
+        let kept = scaled as i64;
+        if !scaled.is_nan() && kept >= least && kept <= most {
+            return kept as u32;
+        }
+    }
     let value = flushed(value, status);
     if value & 0x7fff_ffff > 0x7f80_0000 {
         invalid(status);
@@ -32,11 +45,7 @@ pub fn to_fixed(
         }
     };
     let exact = if number.negative { -magnitude } else { magnitude };
-    let (least, most) = match unsigned {
-        true => (0, (1i128 << bits) - 1),
-        false => (-(1i128 << (bits - 1)), (1i128 << (bits - 1)) - 1),
-    };
-    let kept = exact.clamp(least, most);
+    let kept = exact.clamp(least.into(), most.into());
     if kept != exact {
         status.flag(INVALID);
     } else if inexact {
@@ -61,6 +70,10 @@ pub fn from_fixed(
     };
     if exact == 0 {
         return 0;
+    }
+    // In the usual mode the host's own conversion is the unit's; moving the point is exact.
+    if status.is_usual() && fraction <= 32 {
+        return (exact as f32 / (1u64 << fraction) as f32).to_bits();
     }
     let rounding = rounding.unwrap_or(status.rounding());
     let magnitude = u128::from(exact.unsigned_abs());

@@ -92,7 +92,7 @@ impl Status {
 
     /// The usual mode, with the sticky inexact flag set.
     #[inline(always)]
-    fn is_usual(self) -> bool {
+    pub(super) fn is_usual(self) -> bool {
         self.0 & (MODES | INEXACT) == INEXACT
     }
 }
@@ -156,27 +156,21 @@ pub fn negate(a: u32) -> u32 {
 /// FPCompare: the four flags as the register has them. A quiet NaN is invalid only if `signals`.
 #[inline]
 pub fn compare(a: u32, b: u32, signals: bool, status: &mut Status) {
-    let nan = |bits: u32| bits & 0x7fff_ffff > 0x7f80_0000;
-    let signalling = |bits: u32| nan(bits) && bits & 0x40_0000 == 0;
-    if status.flushes() {
-        // Denormal operands count as zero.
-        let (a, b) = (exact::flushed(a, status), exact::flushed(b, status));
-        status.0 = status.0 & 0x0fff_ffff | order(a, b);
-    } else {
-        status.0 = status.0 & 0x0fff_ffff | order(a, b);
-    }
-    if signalling(a) || signalling(b) || signals && (nan(a) || nan(b)) {
+    // Where denormal operands count as zero.
+    let (x, y) = if status.flushes() { (exact::flushed(a, status), exact::flushed(b, status)) } else { (a, b) };
+    let (first, second) = (f32::from_bits(x), f32::from_bits(y));
+    let flags = match (first < second, first == second, first > second) {
+        (true, _, _) => 0b1000,
+        (_, true, _) => 0b0110,
+        (_, _, true) => 0b0010,
+        _ => UNORDERED,
+    };
+    status.0 = status.0 & 0x0fff_ffff | flags << 28;
+    let signalling = |bits: u32| bits & 0x7fff_ffff > 0x7f80_0000 && bits & 0x40_0000 == 0;
+    if flags == UNORDERED && (signals || signalling(a) || signalling(b)) {
         status.flag(INVALID);
     }
 }
 
-fn order(a: u32, b: u32) -> u32 {
-    use std::cmp::Ordering;
-    let flags: u32 = match f32::from_bits(a).partial_cmp(&f32::from_bits(b)) {
-        Some(Ordering::Equal) => 0b0110,
-        Some(Ordering::Less) => 0b1000,
-        Some(Ordering::Greater) => 0b0010,
-        None => 0b0011,
-    };
-    flags << 28
-}
+/// The flags where one of both is a NaN.
+const UNORDERED: u32 = 0b0011;

@@ -196,6 +196,36 @@ proptest! {
     }
 
     #[test]
+    fn both_ways_convert_to_the_same_result_and_flags(
+        a in float(), i: u32, bits in prop::sample::select(vec![16u32, 32]), fraction in 0u32..=32, unsigned: bool
+    ) {
+        let both = |operation: &dyn Fn(&mut Status) -> u32| {
+            let (exact, flags) = with(0, operation);
+            (with(INEXACT, operation), (exact, flags | INEXACT))
+        };
+        for (fast, exact) in [
+            both(&|s| float::to_fixed(a, bits, fraction.min(bits), unsigned, Some(Rounding::Zero), s)),
+            both(&|s| float::from_fixed(i, bits, fraction.min(bits), unsigned, None, s)),
+        ] {
+            prop_assert_eq!(fast, exact);
+        }
+    }
+
+    #[test]
+    fn comparisons_are_the_hosts_and_only_a_nan_is_invalid(a in float(), b in float(), signals: bool) {
+        let (x, y) = (f32::from_bits(a), f32::from_bits(b));
+        let (flags, exceptions) = with(0, |s| {
+            float::compare(a, b, signals, s);
+            s.bits() >> 28
+        });
+        let (less, equal, unordered) = (x < y, x == y, x.is_nan() || y.is_nan());
+        prop_assert_eq!([flags & 8 != 0, flags & 4 != 0, flags & 1 != 0], [less, equal, unordered]);
+        prop_assert_eq!(flags & 2 != 0, !less);
+        let signalling = [(x, a), (y, b)].iter().any(|(x, bits)| x.is_nan() && bits & 0x40_0000 == 0);
+        prop_assert_eq!(exceptions & INVALID != 0, unordered && (signals || signalling));
+    }
+
+    #[test]
     fn directed_rounding_encloses_the_exact_product(a in 0x3000_0000u32..0x4f00_0000, b in 0x3000_0000u32..0x4f00_0000) {
         let exact = f64::from(f32::from_bits(a)) * f64::from(f32::from_bits(b));
         let rounded = |mode: u32| f64::from(f32::from_bits(with(mode << 22, |s| float::multiply(a, b, s)).0));
