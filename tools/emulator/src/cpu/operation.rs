@@ -147,8 +147,11 @@ pub(super) enum Part {
     Store,
     LoadFloat,
     StoreFloat,
-    /// VMOV of registers; VMUL; VCMP; VMRS of the flags.
+    /// PUSH.
+    Push,
+    /// VMOV of registers; VADD; VMUL; VCMP; VMRS of the flags.
     Float,
+    AddFloats,
     MultiplyFloats,
     CompareFloats,
     TakeFlags,

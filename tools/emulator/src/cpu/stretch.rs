@@ -12,7 +12,7 @@
 
 use super::Cpu;
 use super::execute::by_condition;
-use super::execute::pairs::{conditional_of, pair_of};
+use super::execute::pairs::{compared_of, conditional_of, pair_of};
 use super::execute::system::nothing;
 use super::operation::{Done, Execute, Flow, Leave, Operands, Operation, Part, Rest, Step, Trap, behind};
 use crate::bus::Bus;
@@ -61,7 +61,7 @@ pub(super) struct Stretches<B: Bus> {
     begins: Vec<Stretch>,
 }
 
-const NONE: Stretch = Stretch { first: u32::MAX, end: 0, before_last: 0, bytes: 0, overlaps: 0 };
+const NONE: Stretch = Stretch { first: 0, end: 0, before_last: 0, bytes: 0, overlaps: 0 };
 
 impl<B: Bus> Stretches<B> {
     /// None yet, of so many places.
@@ -93,7 +93,9 @@ impl<B: Bus> Stretches<B> {
             *self = Self::new(self.begins.len());
         }
         let first = self.steps.len();
-        let (mut next, mut before_last, mut mark, mut last) = (place, 0, Mark::default(), Part::None);
+        let (mut next, mut before_last, mut mark) = (place, 0, Mark::default());
+        // What the last instruction can be in a pair, and the one before.
+        let mut lately = [Part::None; 2];
         while let Some(operation) = kept(next)
             && usize::from(mark.instructions) < LONGEST
             && (mark.it == 0 || operation.timing.flow == Flow::On)
@@ -103,9 +105,20 @@ impl<B: Bus> Stretches<B> {
             before_last = mark.cycles;
             if block != 0 {
                 let passed = Operands { immediate: u32::from(timing.cycles), m: timing.single.into(), ..operands };
+                let (flags, between) = match lately {
+                    [Part::TakeFlags, Part::CompareFloats] => (Part::CompareFloats, 1),
+                    // Not the core's flags.
+                    [Part::CompareFloats, _] => (Part::None, 0),
+                    [last, _] => (last, 0),
+                };
+                if let Some(compared) = compared_of((flags, timing.part), block >> 4)
+                    && let Some(first) = self.steps.iter_mut().nth_back(between)
+                {
+                    first.execute = compared;
+                }
                 let execute = conditional_of(block >> 4, timing.part);
                 self.push(execute.unwrap_or(by_condition!(unless, block >> 4)), passed, mark);
-            } else if let Some(pair) = pair_of((last, timing.part), operands)
+            } else if let Some(pair) = pair_of((lately[0], timing.part), operands)
                 && let Some(first) = self.steps.last_mut()
             {
                 first.execute = pair;
@@ -117,7 +130,12 @@ impl<B: Bus> Stretches<B> {
                 single: timing.single,
                 it: if timing.flow == Flow::Block { operands.x } else { behind(block) },
             };
-            last = if block == 0 { timing.part } else { Part::None };
+            // IT is no step: what comes behind it is behind what came before it.
+            lately = match timing.flow {
+                Flow::Block => lately,
+                _ if block == 0 => [timing.part, lately[0]],
+                _ => [Part::None; 2],
+            };
             match timing.flow {
                 Flow::Block => {}
                 _ if block != 0 => self.push(execute, operands.in_block(), mark),
@@ -190,7 +208,8 @@ impl<B: Bus> Cpu<B> {
             if self.pc != begin || stretch.end == 0 {
                 begin = self.pc;
                 let place = self.code.place(begin);
-                let Some(found) = place.and_then(|place| self.code.stretches.begins.get(place)) else { return false };
+                let found = place.and_then(|place| self.code.stretches.begins.get(place));
+                let Some(found) = found.filter(|found| found.end != 0) else { return false };
                 stretch = *found;
             }
             self.now = self.now.wrapping_sub(u64::from(stretch.overlaps & u8::from(self.single)));

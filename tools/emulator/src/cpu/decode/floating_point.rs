@@ -3,9 +3,9 @@
 use super::{Decoded, Refused, bad, bits, unless};
 use crate::bus::Bus;
 use crate::cpu::execute::floating_point::{
-    NARROW, TO_HALF, TOP, TOWARDS_ZERO, UNSIGNED, VDIV, VFMS, VFNMS, VMLA, VMUL, VNMLA, from_core, three_of, to_core,
-    two_from_core, two_to_core, vcmp, vcvt_from_fixed, vcvt_half, vcvt_to_fixed, vldm, vldr, vmov, vmov_constant, vmrs,
-    vmrs_flags, vmsr, vsqrt, vstm, vstr,
+    NARROW, TO_HALF, TOP, TOWARDS_ZERO, UNSIGNED, VADD, VDIV, VFMS, VFNMS, VMLA, VMUL, VNMLA, from_core, three_of,
+    to_core, two_from_core, two_to_core, vcmp, vcvt_from_fixed, vcvt_half, vcvt_to_fixed, vldm, vldr, vmov,
+    vmov_constant, vmrs, vmrs_flags, vmsr, vsqrt, vstm, vstr,
 };
 use crate::cpu::execute::load_store::{BELOW, CHANGES};
 use crate::cpu::operation::{Operation, Part};
@@ -47,7 +47,11 @@ fn data_processing<B: Bus>(first: u32, second: u32) -> Decoded<B> {
         VDIV => FLOATING_POINT_DIVISION,
         _ => 1,
     };
-    let part = if operation == VMUL { Part::MultiplyFloats } else { Part::None };
+    let part = match operation {
+        VADD => Part::AddFloats,
+        VMUL => Part::MultiplyFloats,
+        _ => Part::None,
+    };
     Ok(Operation::new(execute).d(d).n(n).m(m).cycles(cycles).part(part))
 }
 

@@ -57,7 +57,7 @@ pub(super) fn decode<B: Bus>(address: u32, word: u32) -> Decoded<B> {
             Ok(decoded.part(access_part(what, OFFSET)))
         }
         20 => Ok(op(constant).d(of_byte).immediate((pc & !3).wrapping_add(4 * byte))),
-        21 => Ok(op(add_immediate).d(of_byte).n(13).immediate(4 * byte)),
+        21 => Ok(op(add_immediate).d(of_byte).n(13).immediate(4 * byte).part(Part::AddConstant)),
         22 | 23 => miscellaneous(word, pc),
         kind @ 24..=25 => {
             let (load, in_list) = (kind == 25, byte >> of_byte & 1 != 0);
@@ -157,7 +157,8 @@ fn miscellaneous<B: Bus>(word: u32, pc: u32) -> Decoded<B> {
         4 | 5 => {
             let list = word & 0xff | bits(word, 8, 8) << 14;
             let cycles = several(list.count_ones());
-            unless(list == 0, op(store_several).n(13).immediate(list).x(CHANGES | BELOW).cycles(cycles))
+            let decoded = op(store_several).n(13).immediate(list).x(CHANGES | BELOW).cycles(cycles);
+            unless(list == 0, decoded.part(Part::Push))
         }
         6 if word & 0xffec == 0xb660 => unless(word & 3 == 0, op(system::change_state).x(word & 0x13)),
         10 => {

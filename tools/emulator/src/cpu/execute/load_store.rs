@@ -246,11 +246,20 @@ fn load_several_elsewhere<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) 
 
 /// STM, PUSH.
 pub(in crate::cpu) fn store_several<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+    match store_several_at_once(cpu, o) {
+        true => cpu.next(rest),
+        false => store_several_elsewhere(cpu, o, rest),
+    }
+}
+
+/// The same where memory takes it at once; false where it does not, and nothing has changed.
+#[inline(always)]
+pub(super) fn store_several_at_once<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> bool {
     let bytes = 4 * o.immediate.count_ones();
     let (address, changed) = block(cpu.get(o.n), bytes, u32::from(o.x) & BELOW != 0);
     let unusual = address & 3 != 0 || cpu.code.changes_block(address, bytes);
     let at_once = if unusual { None } else { cpu.bus.block_mut(address, bytes) };
-    let Some(memory) = at_once else { return store_several_elsewhere(cpu, o, rest) };
+    let Some(memory) = at_once else { return false };
     let mut list = o.immediate;
     for word in memory.chunks_exact_mut(4) {
         word.copy_from_slice(&cpu.r[(list.trailing_zeros() & 15) as usize].to_le_bytes());
@@ -259,12 +268,12 @@ pub(in crate::cpu) fn store_several<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest:
     if u32::from(o.x) & CHANGES != 0 {
         cpu.set_any(o.n, changed);
     }
-    cpu.next(rest)
+    true
 }
 
 /// The same of other memory.
 #[inline(never)]
-fn store_several_elsewhere<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
+pub(super) fn store_several_elsewhere<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     cpu.at(rest);
     let (mut address, changed) = block(cpu.get(o.n), 4 * o.immediate.count_ones(), u32::from(o.x) & BELOW != 0);
     let mut list = o.immediate;

@@ -1,24 +1,24 @@
 //! What instructions do, by group. Operands were checked by `decode`; the names are the architecture's (ARM DDI 0403, A7.7).
 
-/// The function of a condition that only decoding knows; 14 and more always hold.
+/// The function of a condition that only decoding knows; 14 and more always hold. What else it is generic over comes before.
 macro_rules! by_condition {
-    ($function:ident, $condition:expr) => {
+    ($function:ident $(<$($before:ident),+>)?, $condition:expr) => {
         match $condition {
-            0 => $function::<B, 0>,
-            1 => $function::<B, 1>,
-            2 => $function::<B, 2>,
-            3 => $function::<B, 3>,
-            4 => $function::<B, 4>,
-            5 => $function::<B, 5>,
-            6 => $function::<B, 6>,
-            7 => $function::<B, 7>,
-            8 => $function::<B, 8>,
-            9 => $function::<B, 9>,
-            10 => $function::<B, 10>,
-            11 => $function::<B, 11>,
-            12 => $function::<B, 12>,
-            13 => $function::<B, 13>,
-            _ => $function::<B, 14>,
+            0 => $function::<B, $($($before,)+)? 0>,
+            1 => $function::<B, $($($before,)+)? 1>,
+            2 => $function::<B, $($($before,)+)? 2>,
+            3 => $function::<B, $($($before,)+)? 3>,
+            4 => $function::<B, $($($before,)+)? 4>,
+            5 => $function::<B, $($($before,)+)? 5>,
+            6 => $function::<B, $($($before,)+)? 6>,
+            7 => $function::<B, $($($before,)+)? 7>,
+            8 => $function::<B, $($($before,)+)? 8>,
+            9 => $function::<B, $($($before,)+)? 9>,
+            10 => $function::<B, $($($before,)+)? 10>,
+            11 => $function::<B, $($($before,)+)? 11>,
+            12 => $function::<B, $($($before,)+)? 12>,
+            13 => $function::<B, $($($before,)+)? 13>,
+            _ => $function::<B, $($($before,)+)? 14>,
         }
     };
 }

@@ -7,10 +7,13 @@
 use super::branch::branch_if_zero;
 use super::data_processing::{ADD, CONSTANT, MOV, NEVER, OUTSIDE_IT, REGISTER, SUB, TEST, operate, set_upper_half};
 use super::floating_point::{
-    VMUL, compare, ready_first, take_flags, three_at_once, three_exactly, vldr_at_once, vldr_elsewhere, vmov,
-    vmov_at_once, vstr_at_once, vstr_elsewhere,
+    VADD, VMUL, compare, ready_first, take_flags, three_at_once, three_exactly, vcmp, vldr_at_once, vldr_elsewhere,
+    vmov, vmov_at_once, vmrs_flags, vstr_at_once, vstr_elsewhere,
 };
-use super::load_store::{LDR, OFFSET, STR, access_at_once, access_elsewhere};
+use super::load_store::{
+    LDR, OFFSET, STR, access_at_once, access_elsewhere, store_several_at_once, store_several_elsewhere,
+};
+use super::system::nothing;
 use crate::bus::Bus;
 use crate::cpu::Cpu;
 use crate::cpu::operation::{Done, Execute, Operands, Part, Rest};
@@ -24,6 +27,10 @@ pub(in crate::cpu) fn pair_of<B: Bus>(parts: (Part, Part), second: Operands) -> 
         (Part::CompareFloats, Part::TakeFlags) => compare_and_take_flags,
         (Part::Constant, Part::UpperHalf) => both_halves,
         (Part::AddConstant, Part::LoadFloat) => add_and_load_float,
+        (Part::Push, Part::AddConstant) => push_and_add,
+        (Part::Float, Part::LoadFloat) => move_and_load_float,
+        (Part::LoadFloat, Part::AddFloats) => load_and_add_floats,
+        (Part::LoadFloat, Part::MultiplyFloats) => load_and_multiply_floats,
         (Part::Load, Part::Load) => load_twice,
         (Part::Store, Part::Store) => store_twice,
         (Part::LoadFloat, Part::LoadFloat) => load_floats,
@@ -35,12 +42,35 @@ pub(in crate::cpu) fn pair_of<B: Bus>(parts: (Part, Part), second: Operands) -> 
     })
 }
 
-/// What executes an instruction of an IT block if a condition holds; none where it takes more than that.
+/// What executes a move of an IT block if a condition holds, beginning with the step before it; none where the instruction is no move.
 pub(in crate::cpu) fn conditional_of<B: Bus>(condition: u8, part: Part) -> Option<Execute<B>> {
     Some(match part {
-        Part::Constant | Part::NarrowConstant => by_condition!(constant_if, condition),
-        Part::Register => by_condition!(register_if, condition),
-        Part::Float => by_condition!(float_if, condition),
+        Part::Constant | Part::NarrowConstant => by_condition!(move_if<MOVE_CONSTANT>, condition),
+        Part::Register => by_condition!(move_if<MOVE_REGISTER>, condition),
+        Part::Float => by_condition!(move_if<MOVE_FLOAT>, condition),
+        _ => return None,
+    })
+}
+
+/// What sets the flags before such a move and executes it as well; none where `parts` are none of both. Of VCMP, VMRS lies between.
+pub(in crate::cpu) fn compared_of<B: Bus>(parts: (Part, Part), condition: u8) -> Option<Execute<B>> {
+    macro_rules! what {
+        ($flags:ident) => {
+            match parts.1 {
+                Part::Constant | Part::NarrowConstant => {
+                    by_condition!(compare_and_move_if<$flags, MOVE_CONSTANT>, condition)
+                }
+                Part::Register => by_condition!(compare_and_move_if<$flags, MOVE_REGISTER>, condition),
+                Part::Float => by_condition!(compare_and_move_if<$flags, MOVE_FLOAT>, condition),
+                _ => return None,
+            }
+        };
+    }
+    Some(match parts.0 {
+        Part::CompareConstant => what!(COMPARE_CONSTANT),
+        Part::CompareRegister => what!(COMPARE_REGISTER),
+        Part::TakeFlags => what!(TAKE_FLAGS),
+        Part::CompareFloats => what!(COMPARE_FLOATS),
         _ => return None,
     })
 }
@@ -99,31 +129,55 @@ fn both_halves<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     cpu.next(behind)
 }
 
-/// ADD of a constant, and VLDR.
-fn add_and_load_float<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
-    operate::<B, ADD, CONSTANT, NEVER>(cpu, o);
-    let Some((second, behind)) = rest.split_first() else { return Ok(()) };
-    match vldr_at_once(cpu, second.operands) {
-        true => cpu.next(behind),
-        false => vldr_elsewhere(cpu, second.operands, behind),
-    }
-}
-
-/// Two of a kind: `at_once` if that suffices, `otherwise` if not.
-macro_rules! twice {
-    ($(#[$doc:meta])* $name:ident, $at_once:expr, $otherwise:expr) => {
+/// Two, each of them at once if that suffices, otherwise by a function that goes on by itself.
+macro_rules! both {
+    ($(#[$doc:meta])* $name:ident, $first:expr, $first_otherwise:expr, $second:expr, $second_otherwise:expr) => {
         $(#[$doc])*
         fn $name<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
-            if !$at_once(cpu, o) {
-                return $otherwise(cpu, o, rest);
+            if !$first(cpu, o) {
+                return $first_otherwise(cpu, o, rest);
             }
             let Some((second, behind)) = rest.split_first() else { return Ok(()) };
-            if !$at_once(cpu, second.operands) {
-                return $otherwise(cpu, second.operands, behind);
+            if !$second(cpu, second.operands) {
+                return $second_otherwise(cpu, second.operands, behind);
             }
             cpu.next(behind)
         }
     };
+}
+
+/// The same of two of a kind.
+macro_rules! twice {
+    ($(#[$doc:meta])* $name:ident, $at_once:expr, $otherwise:expr) => {
+        both!($(#[$doc])* $name, $at_once, $otherwise, $at_once, $otherwise);
+    };
+}
+
+/// ADD of a constant: always at once.
+fn add_constant<B: Bus>(cpu: &mut Cpu<B>, o: Operands) -> bool {
+    operate::<B, ADD, CONSTANT, NEVER>(cpu, o);
+    true
+}
+
+both! {
+    /// ADD of a constant, and VLDR.
+    add_and_load_float, add_constant, nothing, vldr_at_once, vldr_elsewhere
+}
+both! {
+    /// PUSH, and ADD of a constant.
+    push_and_add, store_several_at_once, store_several_elsewhere, add_constant, nothing
+}
+both! {
+    /// VMOV, and VLDR.
+    move_and_load_float, vmov_at_once, |cpu, o, rest| ready_first(cpu, o, rest, vmov), vldr_at_once, vldr_elsewhere
+}
+both! {
+    /// VLDR, and VADD.
+    load_and_add_floats, vldr_at_once, vldr_elsewhere, three_at_once::<B, VADD>, three_exactly::<B, VADD>
+}
+both! {
+    /// VLDR, and VMUL.
+    load_and_multiply_floats, vldr_at_once, vldr_elsewhere, three_at_once::<B, VMUL>, three_exactly::<B, VMUL>
 }
 
 twice! {
@@ -151,29 +205,51 @@ twice! {
     move_floats, vmov_at_once, |cpu, o, rest| ready_first(cpu, o, rest, vmov)
 }
 
-/// MOV of a constant, in an IT block.
-fn constant_if<B: Bus, const CONDITION: u8>(cpu: &mut Cpu<B>, _: Operands, rest: Rest<B>) -> Done {
+/// What is moved if a condition holds: a constant, a register, a floating-point register.
+const MOVE_CONSTANT: u8 = 0;
+const MOVE_REGISTER: u8 = 1;
+const MOVE_FLOAT: u8 = 2;
+
+/// What sets the flags before: CMP with a constant, CMP of registers, VMRS, VCMP and VMRS.
+const COMPARE_CONSTANT: u8 = 1;
+const COMPARE_REGISTER: u8 = 2;
+const TAKE_FLAGS: u8 = 3;
+const COMPARE_FLOATS: u8 = 4;
+
+/// MOV or VMOV in an IT block: the step before it.
+fn move_if<B: Bus, const WHAT: u8, const CONDITION: u8>(cpu: &mut Cpu<B>, _: Operands, rest: Rest<B>) -> Done {
     let Some((second, behind)) = rest.split_first() else { return Ok(()) };
     if cpu.holds(CONDITION) {
-        operate::<B, MOV, CONSTANT, NEVER>(cpu, second.operands);
+        match WHAT {
+            MOVE_CONSTANT => operate::<B, MOV, CONSTANT, NEVER>(cpu, second.operands),
+            MOVE_REGISTER => operate::<B, MOV, REGISTER, NEVER>(cpu, second.operands),
+            _ if vmov_at_once(cpu, second.operands) => {}
+            _ => return ready_first(cpu, second.operands, behind, vmov),
+        }
     }
     cpu.next(behind)
 }
 
-/// MOV of a register, in an IT block.
-fn register_if<B: Bus, const CONDITION: u8>(cpu: &mut Cpu<B>, _: Operands, rest: Rest<B>) -> Done {
-    let Some((second, behind)) = rest.split_first() else { return Ok(()) };
-    if cpu.holds(CONDITION) {
-        operate::<B, MOV, REGISTER, NEVER>(cpu, second.operands);
+/// What sets the flags, and such a move behind it.
+fn compare_and_move_if<B: Bus, const FLAGS: u8, const WHAT: u8, const CONDITION: u8>(
+    cpu: &mut Cpu<B>,
+    o: Operands,
+    rest: Rest<B>,
+) -> Done {
+    let mut rest = rest;
+    match FLAGS {
+        COMPARE_CONSTANT => operate::<B, SUB, CONSTANT, TEST>(cpu, o),
+        COMPARE_REGISTER => operate::<B, SUB, REGISTER, TEST>(cpu, o),
+        TAKE_FLAGS if cpu.floating_ready => take_flags(cpu),
+        TAKE_FLAGS => return ready_first(cpu, o, rest, vmrs_flags),
+        _ if cpu.floating_ready => {
+            compare(cpu, o);
+            let Some((_, behind)) = rest.split_first() else { return Ok(()) };
+            take_flags(cpu);
+            rest = behind;
+        }
+        _ => return ready_first(cpu, o, rest, vcmp),
     }
-    cpu.next(behind)
-}
-
-/// VMOV, in an IT block.
-fn float_if<B: Bus, const CONDITION: u8>(cpu: &mut Cpu<B>, _: Operands, rest: Rest<B>) -> Done {
-    let Some((second, behind)) = rest.split_first() else { return Ok(()) };
-    if cpu.holds(CONDITION) && !vmov_at_once(cpu, second.operands) {
-        return ready_first(cpu, second.operands, behind, vmov);
-    }
-    cpu.next(behind)
+    let Some((_, rest)) = rest.split_first() else { return Ok(()) };
+    move_if::<B, WHAT, CONDITION>(cpu, o, rest)
 }
