@@ -11,10 +11,14 @@ use host_tests::bare_core::{Core, Cost};
 use host_tests::bare_metal::{BOARDS, Board, build};
 use host_tests::control_steps::{friction, image_bytes, input, record};
 use host_tests::counted_steps::{PARTS, Step, counted, spread};
+use host_tests::emulated::bench::actuator;
+use host_tests::emulated::motion::{Moving, acting_image};
+use host_tests::emulated::observed::Observed;
 use host_tests::peer_networks::{Exact, scaled};
 use host_tests::states::within;
 use joint_firmware::friction::state::SIGNALS;
 use joint_firmware::joint::configuration::MOTION_STEPS;
+use libtest_mimic::Failed;
 use object::read::elf::{FileHeader, ProgramHeader};
 use plant::ActuatorParameters;
 use rand_chacha::ChaCha8Rng;
@@ -35,6 +39,8 @@ const INPUTS: usize = 200;
 const INTERRUPTS: usize = 1000;
 /// How long the boards' programs run, s.
 const RUN: f64 = 1.2;
+/// How long the joint moves, s.
+const MOTION: f64 = 2.0;
 
 /// A row of the first table: its name, its parts, and the most instructions and cycles that it should take.
 type Row = (&'static str, &'static [&'static str], Option<u64>, Option<u64>);
@@ -103,11 +109,18 @@ fn main() -> Outcome<()> {
         let longest = steps.iter().map(|step| step.sum.cycles).max().unwrap_or(0);
         let [least, median, most] = program.around;
         let whole = longest + most;
-        verdict(board, "whole interrupt", whole, WHOLE, "cycles", &mut missed);
+        verdict(board.name, "whole interrupt", whole, WHOLE, "cycles", &mut missed);
         println!("| the board's part of the interrupt, entry and return | | {least} {median} {most} | | |");
         let said = if whole <= WHOLE { "kept" } else { "missed" };
         println!("| **both, the longest of each** | | {whole} | {WHOLE} cycles | {said} |");
     }
+    println!(
+        "\n## The flashed programs in motion\n\nCycles of the control interrupt with the program's wait states, entry and return included, while the joint moves for {MOTION} s on the emulated board, over \
+         the bus and with\nphysical model and network acting. The target is {WHOLE} at the most. In the B-G431B-ESC1's program with the bus the friction model lies in flash.\n"
+    );
+    println!("| program | a period | least | mean | most |\n|---|---|---|---|---|");
+    in_motion("b-g431b-esc1-bus", BG431BEsc1::new, &mut missed)?;
+    in_motion("moteus-r4", MoteusR4::new, &mut missed)?;
     networks(&image, &mut missed)?;
     memories(&boards);
     println!("\n## What is missed\n");
@@ -118,15 +131,25 @@ fn main() -> Outcome<()> {
     Ok(())
 }
 
-fn verdict(board: &Board, name: &str, most: u64, target: u64, unit: &str, missed: &mut Vec<String>) -> bool {
+fn verdict(program: &str, name: &str, most: u64, target: u64, unit: &str, missed: &mut Vec<String>) -> bool {
     if most > target {
-        missed.push(format!(
-            "{}, {name}: {most} {unit}, {} more than the target of {target}",
-            board.name,
-            most - target
-        ));
+        missed.push(format!("{program}, {name}: {most} {unit}, {} more than the target of {target}", most - target));
     }
     most <= target
+}
+
+/// The control interrupt of a program with the bus while its joint moves.
+fn in_motion<W: Observed>(name: &str, board: fn(Drivetrain) -> W, missed: &mut Vec<String>) -> Outcome<()> {
+    let program = Program::parse(std::fs::read(build(name, TEMPORARY)?)?)?;
+    let failed = |failed: Failed| failed.message().unwrap_or("failed").to_owned();
+    let mut moving = Moving::start(board, &actuator(), &program, &acting_image()).map_err(failed)?;
+    moving.bench.emulation.cpu.clear_exception_times();
+    moving.run(MOTION).map_err(failed)?;
+    let times = moving.bench.emulation.cpu.exception_times().get(&CONTROL).ok_or("no control interrupt")?;
+    let (period, mean) = ((170e6 / W::CONFIGURATION.bridge.rate).round(), times.own_cycles / times.count.max(1));
+    println!("| {name} | {period} | {} | {mean} | {} |", times.least, times.most);
+    verdict(name, "control interrupt in motion", times.most, WHOLE, "cycles", missed);
+    Ok(())
 }
 
 fn cells(costs: &[Cost]) -> ([u64; 3], [u64; 3]) {
@@ -144,7 +167,7 @@ fn row(
     let (i, c) = cells(&costs);
     let mut kept = true;
     for (spread, target, unit) in [(i, instructions, "instructions"), (c, cycles, "cycles")] {
-        kept &= target.is_none_or(|target| verdict(board, name, spread[2], target, unit, missed));
+        kept &= target.is_none_or(|target| verdict(board.name, name, spread[2], target, unit, missed));
     }
     let targets =
         [instructions.map(|most| format!("{most} instructions")), cycles.map(|most| format!("{most} cycles"))];

@@ -9,14 +9,9 @@ use emulator::program::Program;
 use host_tests::bare_metal::build;
 use host_tests::emulated::Bench;
 use host_tests::emulated::bench::actuator;
-use host_tests::emulated::motion::Moving;
+use host_tests::emulated::motion::{Moving, acting_image};
 use host_tests::emulated::observed::Observed;
-use host_tests::image_bytes::encoded;
-use host_tests::parameters;
-use joint_firmware::friction::state::Signal;
 use libtest_mimic::Failed;
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 use std::error::Error;
 use std::time::Instant;
 
@@ -45,12 +40,7 @@ fn measure<W: Observed + Clone>(name: &str, board: fn(Drivetrain) -> W) -> Resul
         repeated(&off, |bench| bench.run(SECONDS), |bench| bench.emulation.cpu.instructions()).map_err(failed)?;
     report(name, rate, "off", runs);
 
-    let mut random = ChaCha8Rng::seed_from_u64(0);
-    let mut friction = parameters::tame(&mut random);
-    // The bench is at room temperature.
-    friction.domain.ranges[Signal::Temperature as usize] = parameters::range(10.0, 40.0);
-    let image = encoded(&parameters::image(&mut random, friction, 1));
-    let moving = Moving::start(board, &actuator(), &program, &image).map_err(failed)?;
+    let moving = Moving::start(board, &actuator(), &program, &acting_image()).map_err(failed)?;
     let runs = repeated(&moving, |moving| moving.run(SECONDS), |moving| moving.bench.emulation.cpu.instructions())
         .map_err(failed)?;
     report(name, rate, "in motion", runs);

@@ -4,13 +4,18 @@ use super::Bench;
 use super::kept::{Kept, configuration};
 use super::master::{Heard, heard, send};
 use super::observed::Observed;
+use crate::image_bytes::encoded;
+use crate::parameters;
 use emulator::board::{Drivetrain, MoteusR4, Wired};
 use emulator::chip::time::Instant;
 use emulator::program::Program;
 use joint_firmware::compensation::Request;
+use joint_firmware::friction::state::Signal;
 use joint_firmware::joint::configuration::Configuration;
 use libtest_mimic::Failed;
 use plant::ActuatorParameters;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
 
 /// Its node id.
@@ -25,6 +30,14 @@ const VELOCITY: u8 = 9;
 const ENABLING: [u16; 3] = [0x06, 0x07, 0x0F];
 /// Up to here the joint is enabled, s.
 const ENABLED: f64 = 0.3;
+
+/// An image whose physical model and network act on the bench, at room temperature.
+pub fn acting_image() -> Vec<u8> {
+    let mut random = ChaCha8Rng::seed_from_u64(0);
+    let mut friction = parameters::tame(&mut random);
+    friction.domain.ranges[Signal::Temperature as usize] = parameters::range(10.0, 40.0);
+    encoded(&parameters::image(&mut random, friction, 1))
+}
 
 /// A joint that somebody moves. A clone is a snapshot.
 #[derive(Clone)]
