@@ -380,16 +380,11 @@ pub(in crate::cpu) fn vldm<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>)
     cpu.at(rest);
     cpu.use_floating_point()?;
     let (start, changed) = block(cpu.get(o.n), o.immediate, u32::from(o.x) & BELOW != 0);
-    let at_once = if start & 3 == 0 { cpu.bus.block(start, o.immediate) } else { None };
-    if let Some(memory) = at_once {
-        for (register, bytes) in cpu.s.iter_mut().skip(usize::from(o.d & 31)).zip(memory.as_chunks().0) {
-            *register = u32::from_le_bytes(*bytes);
-        }
-    } else {
-        for i in 0..o.m {
-            let bits = cpu.load_aligned::<4>(start.wrapping_add(4 * u32::from(i)))?;
-            cpu.set_float(o.d + i, bits);
-        }
+    let mut words = [0; 32];
+    let words = words.get_mut(..usize::from(o.m)).unwrap_or_default();
+    cpu.load_words(start, words)?;
+    for (register, word) in cpu.s.iter_mut().skip(usize::from(o.d & 31)).zip(words) {
+        *register = *word;
     }
     if u32::from(o.x) & CHANGES != 0 {
         cpu.set_any(o.n, changed);
@@ -402,17 +397,8 @@ pub(in crate::cpu) fn vstm<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>)
     cpu.at(rest);
     cpu.use_floating_point()?;
     let (start, changed) = block(cpu.get(o.n), o.immediate, u32::from(o.x) & BELOW != 0);
-    let unusual = start & 3 != 0 || cpu.code.changes_block(start, o.immediate);
-    let at_once = if unusual { None } else { cpu.bus.block_mut(start, o.immediate) };
-    if let Some(memory) = at_once {
-        for (bytes, register) in memory.as_chunks_mut().0.iter_mut().zip(cpu.s.iter().skip(usize::from(o.d & 31))) {
-            *bytes = register.to_le_bytes();
-        }
-    } else {
-        for i in 0..o.m {
-            cpu.store_aligned::<4>(start.wrapping_add(4 * u32::from(i)), cpu.float(o.d + i))?;
-        }
-    }
+    let (words, first) = (cpu.s, usize::from(o.d & 31));
+    cpu.store_words(start, words.get(first..first + usize::from(o.m)).unwrap_or_default())?;
     if u32::from(o.x) & CHANGES != 0 {
         cpu.set_any(o.n, changed);
     }

@@ -1,8 +1,8 @@
 //! Pairs of instructions that compilers put one behind the other, executed as one step of a stretch: a jump less whose target the host has to
 //! guess, which takes longer than most of what the instructions do.
 //!
-//! Both remain steps of their own, and count as such: a stretch that ends between them executes the first alone. Which pairs there are was
-//! chosen by how often the boards' programs come across them.
+//! Both remain steps of their own, and count as such: a stretch that ends between them executes the first alone. Moves in IT blocks are one
+//! step with what decides them in the same way. Which of all these there are was chosen by how often the boards' programs come across them.
 
 use super::branch::branch_if_zero;
 use super::data_processing::{ADD, CONSTANT, MOV, NEVER, OUTSIDE_IT, REGISTER, SUB, TEST, operate, set_upper_half};
@@ -211,10 +211,10 @@ const MOVE_REGISTER: u8 = 1;
 const MOVE_FLOAT: u8 = 2;
 
 /// What sets the flags before: CMP with a constant, CMP of registers, VMRS, VCMP and VMRS.
-const COMPARE_CONSTANT: u8 = 1;
-const COMPARE_REGISTER: u8 = 2;
-const TAKE_FLAGS: u8 = 3;
-const COMPARE_FLOATS: u8 = 4;
+const COMPARE_CONSTANT: u8 = 0;
+const COMPARE_REGISTER: u8 = 1;
+const TAKE_FLAGS: u8 = 2;
+const COMPARE_FLOATS: u8 = 3;
 
 /// MOV or VMOV in an IT block: the step before it.
 fn move_if<B: Bus, const WHAT: u8, const CONDITION: u8>(cpu: &mut Cpu<B>, _: Operands, rest: Rest<B>) -> Done {
