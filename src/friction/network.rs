@@ -138,6 +138,12 @@ impl PackedNeuron {
         let Self { pairs: [first, second, third], shift } = *self;
         asr(smlad(third, activations[2], smlad(second, activations[1], smuad(first, activations[0]))), shift)
     }
+
+    /// The neuron's activation, Q31.
+    #[inline(always)]
+    fn activation(&self, before: [u32; 3]) -> i32 {
+        tanh(self.sum(before))
+    }
 }
 
 /// The input that multiplies a bias: the largest value of Q15, in the upper half of the third pair.
@@ -150,11 +156,19 @@ fn activate(sums: [i32; NEURONS]) -> [u32; 3] {
     [pkhtb(tanh(a), tanh(b)), pkhtb(tanh(c), tanh(d)), movt::<ONE>(tanh(e) as u32 >> 16)]
 }
 
+/// Layer 0's sums with one more input. No closure, here and below: optimised for nothing but size, the compiler calls those.
+#[inline(always)]
+fn add([a, b, c, d, e]: [i32; NEURONS], [wa, wb, wc, wd, we]: &[i32; NEURONS], x: i32) -> [i32; NEURONS] {
+    [smmla(*wa, x, a), smmla(*wb, x, b), smmla(*wc, x, c), smmla(*wd, x, d), smmla(*we, x, e)]
+}
+
 /// The activations of a layer of packed neurons.
 #[inline(always)]
 fn layer([a, b, c, d, e]: &[PackedNeuron; NEURONS], before: [u32; 3]) -> [u32; 3] {
-    let unit = |neuron: &PackedNeuron| tanh(neuron.sum(before));
-    [pkhtb(unit(a), unit(b)), pkhtb(unit(c), unit(d)), movt::<ONE>(unit(e) as u32 >> 16)]
+    // In this order only one value at a time waits for its partner.
+    let first = pkhtb(a.activation(before), b.activation(before));
+    let second = pkhtb(c.activation(before), d.activation(before));
+    [first, second, movt::<ONE>(e.activation(before) as u32 >> 16)]
 }
 
 impl Inputs {
@@ -204,9 +218,6 @@ impl Layers {
     /// Written out, neuron by neuron and layer 0 input by input: optimised for size, the compiler keeps a loop, and with it every sum in memory.
     #[inline]
     pub fn evaluate(&self, inputs: &Inputs, signals: &[i32; super::state::SIGNALS]) -> Torque {
-        let add = |[a, b, c, d, e]: [i32; NEURONS], [wa, wb, wc, wd, we]: &[i32; NEURONS], x: i32| {
-            [smmla(*wa, x, a), smmla(*wb, x, b), smmla(*wc, x, c), smmla(*wd, x, d), smmla(*we, x, e)]
-        };
         let ([s0, s1, s2, s3, s4], [w0, w1, w2, w3, w4]) = (&inputs.0, &self.first);
         let sums = add(self.biases, w0, s0.apply(signals[0]));
         let sums = add(sums, w1, s1.apply(signals[1]));

@@ -313,6 +313,13 @@ impl Sum {
     }
 }
 
+/// The sum of sines (Q30) with their amplitudes (Q16.16), rounded. No closure: optimised for nothing but size, the compiler calls those.
+#[inline(always)]
+fn weighted([b1, b3, b5, b7, b9]: &[i32; HARMONICS], [s1, s3, s5, s7, s9]: &[i32; HARMONICS]) -> i32 {
+    let sum = smlal(smlal(smlal(smlal(smull(*b1, *s1), *b3, *s3), *b5, *s5), *b7, *s7), *b9, *s9);
+    saturate((sum >> 30).wrapping_add((sum >> 29) & 1))
+}
+
 /// Coefficient (Q16.16) times factor (Q16.16), rounded.
 #[inline(always)]
 pub(crate) fn times(coefficient: i32, factor: i32) -> i32 {
@@ -487,12 +494,8 @@ impl PreparedTerms {
     #[inline(never)]
     fn harmonic_amplitude(&self, q: i32, direction: i32) -> i32 {
         let phase = (smull(self.harmonic_turns, q) >> 15) as u32;
-        let [s1, s3, s5, s7, s9] = odd_sines(phase);
-        let sum = |[b1, b3, b5, b7, b9]: [i32; HARMONICS]| {
-            smlal(smlal(smlal(smlal(smull(b1, s1), b3, s3), b5, s5), b7, s7), b9, s9)
-        };
-        let round = |sum: i64| saturate((sum >> 30).wrapping_add((sum >> 29) & 1));
-        let difference = round(sum(self.harmonic_difference));
-        round(sum(self.harmonic_mean)).saturating_add(narrow_product(difference, direction))
+        let sines = odd_sines(phase);
+        let difference = weighted(&self.harmonic_difference, &sines);
+        weighted(&self.harmonic_mean, &sines).saturating_add(narrow_product(difference, direction))
     }
 }
