@@ -170,7 +170,10 @@ pub struct CompensationGains {
 }
 
 /// Everything prepared that the control step reads. It is replaced as a whole between two steps.
+///
+/// In this order, the friction model last: the core's floating-point loads reach no further than 1020 bytes.
 #[derive(Clone, Debug)]
+#[repr(C)]
 pub struct Active {
     /// Current loop and modulation.
     pub field_oriented: FieldOrientedGains,
@@ -210,10 +213,10 @@ pub struct Active {
     pub compensation: CompensationGains,
     /// The bridge.
     pub bridge: BridgeConfiguration,
-    /// The verified friction model; none: no compensation.
-    pub friction: Option<FrictionModel>,
     /// For the slow task.
     pub thermal: ThermalSettings,
+    /// The verified friction model; none: no compensation.
+    pub friction: Option<FrictionModel>,
 }
 
 impl Configuration {

@@ -130,8 +130,9 @@ impl Telemetry {
     }
 }
 
-/// A joint, from one control step to the next.
+/// A joint, from one control step to the next. In this order, the history last, for the same reason as [`Active`].
 #[derive(Clone, Debug, Default)]
+#[repr(C)]
 pub struct Joint {
     offsets: Offsets,
     observer: Observer,
@@ -153,8 +154,8 @@ pub struct Joint {
     /// Faults since the last acknowledgement.
     latched: Faults,
     mean_square: MeanSquareCurrent,
-    history: History,
     found: Found,
+    history: History,
 }
 
 /// What the last step found and did, besides what other parts remember.
