@@ -161,7 +161,8 @@ impl Monitor {
         let limits = &active.limits;
         let mut faults = Faults::NONE;
         let Phases { a, b, c } = currents;
-        faults.set(Fault::OverCurrent, [a, b, c].iter().any(|current| exceeds(*current, limits.over_current)));
+        let over = |current: f32| exceeds(current, limits.over_current);
+        faults.set(Fault::OverCurrent, over(a) | over(b) | over(c));
         let unbalanced = exceeds(a + b + c, active.current_sum_limit);
         faults.set(Fault::CurrentSensor, self.current_sum.step(unbalanced, CURRENT_SUM_STEPS));
 
