@@ -67,6 +67,14 @@ pub struct Modulator {
     minimum_bus_voltage: f32,
 }
 
+/// A leg's part of [`Modulated`].
+struct Leg {
+    duty: f32,
+    /// The duty less what its dead time takes.
+    applied: f32,
+    limited: bool,
+}
+
 impl Modulator {
     /// Checks settings and prepares them.
     pub fn new(settings: &ModulationSettings) -> Result<Self, SettingError> {
@@ -127,23 +135,29 @@ impl Modulator {
         let smallest = lesser(wanted.a, lesser(wanted.b, wanted.c));
         let middle = self.centre - 0.5 * (largest + smallest);
 
-        let leg = |wanted: f32, current: f32| {
-            let compensation = limited(current * self.dead_time_per_ampere, self.dead_time);
-            let ideal = middle + wanted + compensation;
-            // A number: everything in it is limited.
-            let duty = match () {
-                () if ideal > self.maximum_duty => self.maximum_duty,
-                () if ideal < self.minimum_duty => self.minimum_duty,
-                () => ideal,
-            };
-            (duty, duty - compensation, duty != ideal)
-        };
-        let (a, b, c) = (leg(wanted.a, currents.a), leg(wanted.b, currents.b), leg(wanted.c, currents.c));
+        let a = self.leg(middle + wanted.a, currents.a);
+        let b = self.leg(middle + wanted.b, currents.b);
+        let c = self.leg(middle + wanted.c, currents.c);
         Modulated {
-            duties: Phases { a: a.0, b: b.0, c: c.0 },
-            applied: AlphaBeta::from_phases(Phases { a: a.1, b: b.1, c: c.1 }) * bus_voltage,
-            limited: a.2 || b.2 || c.2,
+            duties: Phases { a: a.duty, b: b.duty, c: c.duty },
+            applied: AlphaBeta::from_phases(Phases { a: a.applied, b: b.applied, c: c.applied }) * bus_voltage,
+            limited: a.limited | b.limited | c.limited,
         }
+    }
+
+    /// One leg: the duty that was asked for, and that for the dead time at a current, A. No closure: optimised for nothing but size, the compiler
+    /// calls those.
+    #[inline(always)]
+    fn leg(&self, wanted: f32, current: f32) -> Leg {
+        let compensation = limited(current * self.dead_time_per_ampere, self.dead_time);
+        let ideal = wanted + compensation;
+        // A number: everything in it is limited.
+        let duty = match () {
+            () if ideal > self.maximum_duty => self.maximum_duty,
+            () if ideal < self.minimum_duty => self.minimum_duty,
+            () => ideal,
+        };
+        Leg { duty, applied: duty - compensation, limited: duty != ideal }
     }
 }
 
