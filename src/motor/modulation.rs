@@ -50,7 +50,8 @@ pub struct Modulated {
 /// Compare value of a centre-aligned timer that counts up to `top`, for a duty of at most `largest`. A duty that is no number is 0.
 #[inline(always)]
 pub fn compare_value(duty: f32, top: u16, largest: f32) -> u16 {
-    (lesser(greater(duty, 0.0), largest) * f32::from(top)) as u16
+    // Held to 16 bits as an integer: one instruction, where the conversion to `u16` takes two comparisons.
+    ((lesser(greater(duty, 0.0), largest) * f32::from(top)) as i32).clamp(0, u16::MAX.into()) as u16
 }
 
 /// Modulation with its settings checked and prepared.
