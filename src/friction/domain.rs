@@ -107,18 +107,21 @@ struct Edge {
     range: Range,
     /// Width of the margin, at least 1 step of Q16.16.
     margin: u32,
-    /// Left shift that brings the margin's width to [2^31, 2^32).
-    shift: u32,
-    /// 2^63 divided by the shifted width.
+    /// The power of two that brings the margin's width to [2^31, 2^32).
+    factor: u32,
+    /// 2^63 divided by the width times the factor.
     per_step: u32,
 }
+
+/// A whole margin, of which two are told: Q31 without a sign.
+const MARGIN: u32 = 1 << 31;
 
 impl Edge {
     fn new(range: Range, margin: u32) -> Self {
         let width = ((range.half_width() as u64 * margin as u64) >> 16).clamp(1, i32::MAX as u64) as u32;
-        let shift = width.leading_zeros();
-        let divisor = core::num::NonZeroU64::new((width as u64) << shift).unwrap_or(core::num::NonZeroU64::MIN);
-        Self { range, margin: width, shift, per_step: ((1u64 << 63) / divisor).min(u32::MAX as u64) as u32 }
+        let factor = 1u32.wrapping_shl(width.leading_zeros());
+        let divisor = core::num::NonZeroU64::new(width as u64 * factor as u64).unwrap_or(core::num::NonZeroU64::MIN);
+        Self { range, margin: width, factor, per_step: ((1u64 << 63) / divisor).min(u32::MAX as u64) as u32 }
     }
 
     /// Whether `value` lies within the range: one comparison, because what is below wraps.
@@ -127,21 +130,29 @@ impl Edge {
         value.wrapping_sub(self.range.low) as u32 <= self.range.high.wrapping_sub(self.range.low) as u32
     }
 
-    /// Parts of the first and of the second margin that `value` has crossed, Q31.
+    /// How far `value` lies beyond the range, Q16.16.
     #[inline(always)]
-    fn crossed(&self, value: i32) -> (i32, i32) {
-        let nearest = self.range.nearest(value);
-        let distance = value.abs_diff(nearest);
-        (self.part(distance), self.part(distance.saturating_sub(self.margin)))
+    fn distance(&self, value: i32) -> u32 {
+        match () {
+            () if value > self.range.high => value.wrapping_sub(self.range.high) as u32,
+            () if value < self.range.low => self.range.low.wrapping_sub(value) as u32,
+            () => 0,
+        }
     }
 
+    /// Margins that `value` has crossed, in parts of [`MARGIN`]; `u32::MAX` from two on.
     #[inline(always)]
-    fn part(&self, distance: u32) -> i32 {
-        if distance >= self.margin {
-            return i32::MAX;
+    fn crossed(&self, value: i32) -> u32 {
+        let distance = self.distance(value);
+        let (whole, rest) = match distance.checked_sub(self.margin) {
+            Some(rest) => (MARGIN, rest),
+            None => (0, distance),
+        };
+        if rest >= self.margin {
+            return u32::MAX;
         }
-        // Below the margin the shift loses nothing and the product is below 2^63.
-        ((distance.wrapping_shl(self.shift) as u64 * self.per_step as u64) >> 32) as i32
+        // Below the margin the factor loses nothing and the product is below 2^63.
+        whole | ((rest.wrapping_mul(self.factor) as u64 * self.per_step as u64) >> 32) as u32
     }
 }
 
@@ -154,7 +165,7 @@ pub struct Fade {
 impl Fade {
     /// Not prepared yet.
     pub(super) const NONE: Self =
-        Self { edges: [Edge { range: Range { low: 0, high: 0 }, margin: 0, shift: 0, per_step: 0 }; SIGNALS] };
+        Self { edges: [Edge { range: Range { low: 0, high: 0 }, margin: 0, factor: 0, per_step: 0 }; SIGNALS] };
 
     /// Prepares the fade of `domain`.
     pub fn new(domain: &Domain) -> Self {
@@ -166,32 +177,31 @@ impl Fade {
     pub fn weights(&self, signals: &[i32; SIGNALS]) -> Weights {
         let [a, b, c, d, e, f] = *signals;
         let [ea, eb, ec, ed, ee, ef] = &self.edges;
-        let edges = [(ea, a), (eb, b), (ec, c), (ed, d), (ee, e), (ef, f)];
-        // Within the ranges, where signals are as a rule, nothing fades.
-        match edges.into_iter().all(|(edge, signal)| edge.holds(signal)) {
+        // Within the ranges, where signals are as a rule, nothing fades. Written out: an array of pairs would be made in memory.
+        match ea.holds(a) && eb.holds(b) && ec.holds(c) && ed.holds(d) && ee.holds(e) && ef.holds(f) {
             true => Weights::full(),
             false => self.faded(signals),
         }
     }
 
-    /// The weights in a state in which at least one signal has left its range.
+    /// The weights in a state in which at least one signal has left its range: by the one that has crossed most.
     #[inline(never)]
     #[expect(clippy::needless_range_loop, reason = "optimised for size, `zip` copies and calls")]
     fn faded(&self, signals: &[i32; SIGNALS]) -> Weights {
-        let mut weights = Weights::full();
+        // At none of the signals.
+        let (mut most, mut place) = (0, SIGNALS);
         for i in 0..SIGNALS {
-            if self.edges[i].holds(signals[i]) {
-                continue;
+            let crossed = self.edges[i].crossed(signals[i]);
+            if crossed > most {
+                (most, place) = (crossed, i);
             }
-            let (first, second) = self.edges[i].crossed(signals[i]);
-            let (network, physical) = (i32::MAX - first, i32::MAX - second);
-            if network < weights.network || physical < weights.physical {
-                weights.outside = Signal::at(i);
-            }
-            weights.network = weights.network.min(network);
-            weights.physical = weights.physical.min(physical);
         }
-        weights
+        let left = |crossed: u32| i32::MAX.wrapping_sub_unsigned(crossed);
+        Weights {
+            network: left(most.min(MARGIN - 1)),
+            physical: left(most.saturating_sub(MARGIN)),
+            outside: Signal::at(place),
+        }
     }
 }
 
@@ -236,6 +246,7 @@ mod tests {
             let edge = Edge::new(range, 1 << 16);
             for value in [value, range.low.saturating_add(near), range.high.saturating_add(near), i32::MIN, i32::MAX] {
                 prop_assert_eq!(edge.holds(value), range.nearest(value) == value);
+                prop_assert_eq!(edge.distance(value), range.nearest(value).abs_diff(value));
             }
         }
 
@@ -246,10 +257,32 @@ mod tests {
             for value in [steps, edge.margin as i64 - 1].map(|steps| half_width as i64 + steps) {
                 let at = |value: i64| edge.crossed(value.clamp(0, i32::MAX as i64) as i32);
                 let (before, after) = (at(value), at(value + 1));
-                let slope = i32::MAX / edge.margin as i32 + 2;
-                prop_assert!((0..=slope).contains(&(after.0 - before.0)), "{:?} {:?}", before, after);
-                prop_assert!((0..=slope).contains(&(after.1 - before.1)), "{:?} {:?}", before, after);
+                let slope = MARGIN / edge.margin + 2;
+                prop_assert!(before <= after && after - before <= slope, "{} {}", before, after);
             }
+        }
+
+        #[test]
+        fn the_weights_are_the_least_that_one_signal_leaves(
+            ends in prop::array::uniform6(any::<(i16, i16)>()), margin in 0u32..=2 << 16, signals in prop::array::uniform6(any::<i16>()),
+        ) {
+            let ranges = ends.map(|(a, b)| Range { low: a.min(b).into(), high: a.max(b).into() });
+            let signals = signals.map(i32::from);
+            let fade = Fade::new(&Domain { ranges, margin, reference_temperature: 0 });
+            let weights = fade.weights(&signals);
+            let (mut network, mut physical) = (i32::MAX, i32::MAX);
+            for (edge, signal) in fade.edges.iter().zip(signals) {
+                // Of each margin, as it is said for both: nothing of it is left where it is crossed.
+                let left = |distance: u32| match edge.margin.checked_sub(distance) {
+                    None | Some(0) => 0,
+                    Some(_) => i32::MAX - ((distance as u64 * edge.factor as u64 * edge.per_step as u64) >> 32) as i32,
+                };
+                let distance = edge.range.nearest(signal).abs_diff(signal);
+                network = network.min(left(distance));
+                physical = physical.min(left(distance.saturating_sub(edge.margin)));
+            }
+            prop_assert_eq!((weights.network, weights.physical), (network, physical));
+            prop_assert_eq!(weights.outside.is_none(), (network, physical) == (i32::MAX, i32::MAX));
         }
 
         #[test]
