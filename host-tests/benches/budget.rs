@@ -116,7 +116,7 @@ fn main() -> Outcome<()> {
     }
     println!(
         "\n## The flashed programs in motion\n\nCycles of the control interrupt with the program's wait states, entry and return included, while the joint moves for {MOTION} s on the emulated board, over \
-         the bus and with\nphysical model and network acting. The target is {WHOLE} at the most. In the B-G431B-ESC1's program with the bus the friction model lies in flash.\n"
+         the bus and with\nphysical model and network acting. The target is {WHOLE} at the most. In the B-G431B-ESC1's program with the bus they lie in flash.\n"
     );
     println!("| program | a period | least | mean | most |\n|---|---|---|---|---|");
     in_motion("b-g431b-esc1-bus", BG431BEsc1::new, &mut missed)?;
