@@ -43,6 +43,13 @@ pub struct Part {
     cells: Vec<(u64, bool, Option<Torn>)>,
 }
 
+impl Part {
+    /// Where they lie.
+    pub fn offsets(&self) -> Range<u32> {
+        self.first * DOUBLE_WORD..(self.first + self.cells.len() as u32) * DOUBLE_WORD
+    }
+}
+
 /// The cells.
 #[derive(Clone, Debug)]
 pub struct Array {
@@ -120,6 +127,13 @@ impl Array {
             return Some((memory::load(&self.bytes, offset as usize, width)?, None));
         }
         self.read_with_torn(offset, width)
+    }
+
+    /// A word, where none of it is torn.
+    pub fn intact(&self, offset: u32) -> Option<u32> {
+        let torn =
+            self.torn.contains_key(&(offset / DOUBLE_WORD)) || self.torn.contains_key(&((offset + 3) / DOUBLE_WORD));
+        if torn { None } else { memory::load(&self.bytes, offset as usize, Width::Word) }
     }
 
     fn read_with_torn(&mut self, offset: u32, width: Width) -> Option<Read> {

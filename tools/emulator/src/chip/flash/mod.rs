@@ -151,6 +151,7 @@ impl Flash {
 
     fn stop(&mut self, kind: Torn) {
         if let Some(busy) = self.busy.take() {
+            self.rewrite(busy.before.offsets());
             self.array.tear(busy.before, kind);
         }
     }
@@ -158,7 +159,7 @@ impl Flash {
     /// The power came back.
     pub fn power_up(&mut self) {
         self.reset();
-        (self.cut, self.fails, self.rewritten) = (None, None, None);
+        (self.cut, self.fails) = (None, None);
     }
 
     /// Lets the power go in the middle of an operation: the `operation`th double word or page from now on, counted from 1.
@@ -352,16 +353,21 @@ impl Flash {
         self.array.program(word, value);
     }
 
+    /// Tells that cells are others than before.
+    fn rewrite(&mut self, offsets: Range<u32>) {
+        self.rewritten = Some(match self.rewritten.take() {
+            None => offsets,
+            Some(before) => before.start.min(offsets.start)..before.end.max(offsets.end),
+        });
+    }
+
     /// Begins an operation. The caller changes the cells at once: nobody can read them before it ends.
     fn begin(&mut self, at: Moment, offsets: Range<u32>, nanoseconds: u64) {
         self.operations += 1;
         let start = offsets.start / self.bank * self.bank;
         let before = self.array.part(offsets.clone());
         self.busy = Some(Busy { until: at.instant().after_ns(nanoseconds), bank: start..start + self.bank, before });
-        self.rewritten = Some(match self.rewritten.take() {
-            None => offsets,
-            Some(before) => before.start.min(offsets.start)..before.end.max(offsets.end),
-        });
+        self.rewrite(offsets);
         if let Some(cut) = self.cut.filter(|cut| cut.operation == self.operations) {
             self.fails = Some((at.instant().after_ns(nanoseconds / 2), cut.kind));
         }
