@@ -1,5 +1,5 @@
 //! The emulated boards are deterministic: a program's run is the same to the picosecond and the bit whenever it is repeated, however its time is cut
-//! into pieces, whether or not somebody watches, and by whichever clone it is gone on with.
+//! into pieces, whether or not somebody watches, by whichever clone it is gone on with, and whatever of it is translated.
 
 use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired, Witnessed};
 use emulator::chip::fdcan::line::CanFrame;
@@ -31,6 +31,8 @@ struct How {
     watched: bool,
     /// At each step a clone goes on instead.
     cloned: bool,
+    /// So often code is come across before it is translated.
+    translated: Option<u32>,
     /// Seed of the sensors' noise.
     seed: u64,
 }
@@ -39,6 +41,7 @@ struct How {
 fn run<W: Wired + Clone>(board: fn(Drivetrain) -> W, program: &Program, how: How) -> Result<(u64, Vec<u8>), Failed> {
     let drivetrain = Drivetrain::new(ActuatorParameters::reference().aligned(), 25.0, how.seed)?;
     let mut emulation = Emulation::new(Witnessed::new(board(drivetrain)), program)?;
+    emulation.cpu.set_translation(how.translated);
     if how.watched {
         emulation.cpu.set_watch(Some(Watch::new()));
     }
@@ -68,13 +71,15 @@ fn run<W: Wired + Clone>(board: fn(Drivetrain) -> W, program: &Program, how: How
 
 fn same_every_time<W: Wired + Clone>(board: fn(Drivetrain) -> W) -> Result<(), Failed> {
     let program = program(W::NAME, env!("CARGO_TARGET_TMPDIR"))?;
-    let once = How { pieces: 1, watched: false, cloned: false, seed: 1 };
+    let once = How { pieces: 1, watched: false, cloned: false, translated: Some(500), seed: 1 };
     let first = run(board, &program, once)?;
     for (what, how) in [
         ("again", once),
         ("in many pieces", How { pieces: 97, ..once }),
         ("watched", How { watched: true, ..once }),
         ("by clones", How { cloned: true, ..once }),
+        ("translated at once", How { translated: Some(8), ..once }),
+        ("never translated", How { translated: None, ..once }),
     ] {
         if run(board, &program, how)? != first {
             return Err(format!("{what}, the run is another one").into());

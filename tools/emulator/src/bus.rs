@@ -78,6 +78,19 @@ pub trait Bus {
     fn block_mut(&mut self, _address: u32, _bytes: u32) -> Option<&mut [u8]> {
         None
     }
+    /// All memory that answers so from 2000_0000h on, for translated code. It never changes its length, but that it is empty without power.
+    #[inline(always)]
+    fn memory(&mut self) -> &mut [u8] {
+        &mut []
+    }
+    /// Where in [`memory`](Self::memory) a word lies; none where it does not.
+    fn place(&self, _address: u32) -> Option<usize> {
+        None
+    }
+    /// A word of memory that changes only with [`Signals::rewritten`], and that nothing hears of when it is loaded; none where it is none.
+    fn constant(&self, _address: u32) -> Option<u32> {
+        None
+    }
     /// Half a word of code.
     fn fetch(&mut self, now: u64, address: u32) -> Result<u16, Refusal>;
     /// Where code may lie; what the core keeps decoded.

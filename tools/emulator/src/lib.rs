@@ -6,6 +6,8 @@
 //!
 //! Host only.
 
+#![deny(unsafe_code)]
+
 pub mod board;
 pub mod bus;
 pub mod chip;

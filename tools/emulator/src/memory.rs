@@ -9,7 +9,7 @@ use std::ops::Range;
 const SRAM: Range<u32> = 0x2000_0000..0x4000_0000;
 
 /// Blocks of memory, each of which can be loaded, stored and executed, and a line of which the test decides.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub struct Memory {
     blocks: Vec<Block>,
     /// What the core is told; `rewritten` and `reset` are told once.
@@ -18,6 +18,7 @@ pub struct Memory {
     pub wait_states: u32,
 }
 
+#[derive(Clone)]
 struct Block {
     start: u32,
     bytes: Vec<u8>,
@@ -103,6 +104,24 @@ impl Bus for Memory {
     #[inline(always)]
     fn store(&mut self, address: u32, width: Width, value: u32) -> bool {
         SRAM.contains(&address) && self.put(address, width, value).is_some()
+    }
+
+    #[inline(always)]
+    fn memory(&mut self) -> &mut [u8] {
+        match self.blocks.iter_mut().find(|block| block.start == SRAM.start) {
+            Some(block) => &mut block.bytes,
+            None => &mut [],
+        }
+    }
+
+    fn place(&self, address: u32) -> Option<usize> {
+        let block = self.blocks.iter().find(|block| block.start == SRAM.start)?;
+        let place = address.checked_sub(SRAM.start)? as usize;
+        (place + 4 <= block.bytes.len()).then_some(place)
+    }
+
+    fn constant(&self, address: u32) -> Option<u32> {
+        if SRAM.contains(&address) { None } else { self.get(address, Width::Word) }
     }
 
     fn fetch(&mut self, now: u64, address: u32) -> Result<u16, Refusal> {

@@ -48,6 +48,19 @@ impl<W: Wiring> Bus for Chip<W> {
         self.memory.block_mut(address, bytes)
     }
 
+    #[inline(always)]
+    fn memory(&mut self) -> &mut [u8] {
+        self.memory.bytes_mut()
+    }
+
+    fn place(&self, address: u32) -> Option<usize> {
+        self.memory.place_of(address)
+    }
+
+    fn constant(&self, address: u32) -> Option<u32> {
+        self.flash.array.intact(self.flash_offset(address)?)
+    }
+
     fn fetch(&mut self, now: u64, address: u32) -> Result<u16, Refusal> {
         self.read(now, address, Width::Half).map(|value| value as u16)
     }

@@ -91,6 +91,18 @@ impl Memory {
         &self.bytes
     }
 
+    /// The same, to change.
+    #[inline(always)]
+    pub fn bytes_mut(&mut self) -> &mut [u8] {
+        &mut self.bytes
+    }
+
+    /// Where in `bytes` a word lies; none where it does not.
+    pub fn place_of(&self, address: u32) -> Option<usize> {
+        let place = self.place(address);
+        self.block(address, 4).map(|_| place)
+    }
+
     /// Where an address would be in `bytes`, and far behind their end where it is neither's: below CCM SRAM it wraps.
     #[inline(always)]
     fn place(&self, address: u32) -> usize {

@@ -2,6 +2,7 @@
 
 use super::operation::{Operands, Operation, Rest, Trap};
 use super::stretch::{SPAN, Stretches};
+use super::translation::Translations;
 use super::{Cpu, End, decode};
 use crate::bus::{Bus, Refusal};
 use std::ops::Range;
@@ -10,6 +11,7 @@ use std::ops::Range;
 pub(super) struct Code<B: Bus> {
     operations: Vec<Operation<B>>,
     pub(super) stretches: Stretches<B>,
+    pub(super) translations: Translations,
     regions: Vec<Region>,
     /// The region that the program is in.
     current: Region,
@@ -48,8 +50,15 @@ impl<B: Bus> Code<B> {
         let nowhere = Region { start: 0, length: 0, offset: 0, wait_states: 0 };
         let operations = vec![Self::unknown(); offset];
         let stretches = Stretches::new(offset);
-        let mut code =
-            Self { operations, stretches, current: nowhere, regions, changeable: 0..0, changeable_length: 0 };
+        let mut code = Self {
+            operations,
+            stretches,
+            translations: Translations::default(),
+            current: nowhere,
+            regions,
+            changeable: 0..0,
+            changeable_length: 0,
+        };
         code.set_wait_states(bus);
         code
     }
@@ -77,6 +86,35 @@ impl<B: Bus> Code<B> {
     pub fn kept(operations: &[Operation<B>], place: usize) -> Option<Operation<B>> {
         let operation = *operations.get(place)?;
         (operation.timing.length != 0).then_some(operation)
+    }
+
+    /// The operation at an address of any region, None where nothing is decoded yet.
+    pub fn anywhere(&self, address: u32) -> Option<Operation<B>> {
+        Self::kept(&self.operations, self.place_anywhere(address)?)
+    }
+
+    /// Whether what begins at an address of any region is translated.
+    pub fn is_translated(&self, address: u32) -> bool {
+        self.place_anywhere(address).is_some_and(|place| self.stretches.is_translated(place))
+    }
+
+    fn place_anywhere(&self, address: u32) -> Option<usize> {
+        let region = self.region(address)?;
+        Some(region.offset + ((address - region.start) / 2) as usize)
+    }
+
+    /// Cycles that a fetch at an address of any region takes more.
+    pub fn wait_states_at(&self, address: u32) -> Option<u32> {
+        self.region(address).map(|region| region.wait_states as u32)
+    }
+
+    fn region(&self, address: u32) -> Option<&Region> {
+        self.regions.iter().find(|region| address.wrapping_sub(region.start) < region.length)
+    }
+
+    /// Addresses at which a store may change what is decoded.
+    pub fn changeable(&self) -> Range<u32> {
+        self.changeable.clone()
     }
 
     /// Forms the stretch that begins at an address of the current region; false where nothing is decoded yet.
@@ -114,14 +152,17 @@ impl<B: Bus> Code<B> {
     #[cold]
     pub fn enter(&mut self, address: u32) {
         let nowhere = Region { start: 0, length: 0, offset: 0, wait_states: 0 };
-        let found = self.regions.iter().find(|region| address.wrapping_sub(region.start) < region.length);
-        self.current = found.copied().unwrap_or(nowhere);
+        self.current = self.region(address).copied().unwrap_or(nowhere);
     }
 
     /// Asks anew what fetches cost.
     pub fn set_wait_states(&mut self, bus: &B) {
         for region in &mut self.regions {
-            region.wait_states = u64::from(bus.wait_states(region.start));
+            let wait_states = u64::from(bus.wait_states(region.start));
+            if region.wait_states != wait_states {
+                region.wait_states = wait_states;
+                self.translations.forget_all();
+            }
             if region.start == self.current.start {
                 self.current.wait_states = region.wait_states;
             }
@@ -132,6 +173,7 @@ impl<B: Bus> Code<B> {
     pub fn forget(&mut self, range: Range<u32>) {
         // An instruction that begins up to two bytes before may reach into it.
         let range = range.start.saturating_sub(2)..range.end;
+        self.translations.forget(range.clone());
         for region in &self.regions {
             let start = range.start.max(region.start);
             let end = range.end.min(region.start.saturating_add(region.length));
@@ -152,6 +194,7 @@ impl<B: Bus> Code<B> {
                 false => self.changeable.start.min(start)..self.changeable.end.max(end),
             };
             self.changeable_length = self.changeable.end - self.changeable.start;
+            self.translations.forget_all();
         }
         if let Some(kept) = self.operations.get_mut(place) {
             *kept = operation;

@@ -5,6 +5,7 @@
 //! architecture leaves open, ends the run and says where.
 //!
 //! - `run`, `stretch`: from one instruction to the next
+//! - `translation`: the same of what runs often, as functions of the host
 //! - `registers`, `reset`: what a debugger sees; special registers; how it all begins
 //! - `code`, `decode`, `operation`: half-words of code become calls, once
 //! - `execute`, `arithmetic`, `float`: what the calls do
@@ -35,6 +36,7 @@ mod stretch;
 mod system;
 mod system_timer;
 mod timing;
+mod translation;
 mod watch;
 
 #[cfg(test)]

@@ -49,7 +49,7 @@ impl From<Trap> for Leave {
 pub(super) type Done = Result<(), Leave>;
 
 /// Fields of an encoding, or what decoding made of them.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub(super) struct Operands {
     /// Constant, offset, list of registers, absolute address.
     pub immediate: u32,
@@ -108,10 +108,11 @@ pub(super) struct Operation<B: Bus> {
     pub execute: Execute<B>,
     pub operands: Operands,
     pub timing: Timing,
+    pub action: Action,
 }
 
 /// How long an instruction is, and how long it takes.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) struct Timing {
     /// Bytes; 0 for what is not decoded yet.
     pub length: u8,
@@ -125,7 +126,7 @@ pub(super) struct Timing {
 }
 
 /// What an instruction can be in a pair that is executed at once (see `execute::pairs`).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Part {
     None,
     /// CMP of n with a constant, with register m; SUBS of a constant, outside of IT blocks.
@@ -159,8 +160,93 @@ pub(super) enum Part {
     Nothing,
 }
 
+/// What an instruction does, as far as it can be translated (see `translation`); the fields are those that its function is chosen by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) enum Action {
+    /// Is always called.
+    Other,
+    /// A barrier; IT.
+    Nothing,
+    Data {
+        operation: u8,
+        second: u8,
+        flags: u8,
+    },
+    Shift {
+        kind: u8,
+        flags: u8,
+    },
+    ShiftByRegister {
+        kind: u8,
+        flags: u8,
+    },
+    Add,
+    Constant,
+    UpperHalf,
+    Extract {
+        signed: bool,
+    },
+    Insert,
+    Extend {
+        kind: u8,
+    },
+    CountZeros,
+    Multiply,
+    MultiplySubtract,
+    MultiplyHigh,
+    MultiplyLong {
+        signed: bool,
+        accumulates: bool,
+    },
+    Divide {
+        signed: bool,
+    },
+    Access {
+        what: u8,
+        address: u8,
+    },
+    Several {
+        load: bool,
+    },
+    Pair {
+        load: bool,
+    },
+    PairAt,
+    LoadExclusive {
+        bytes: u8,
+    },
+    StoreExclusive {
+        bytes: u8,
+    },
+    Branch,
+    BranchIf,
+    BranchIfZero,
+    Call,
+    BranchToRegister {
+        link: bool,
+    },
+    Floats {
+        operation: u8,
+    },
+    FloatConstant,
+    MoveFloat,
+    CompareFloats,
+    TakeFlags,
+    MoveToOrFromFloat {
+        load: bool,
+    },
+    Float {
+        load: bool,
+    },
+    SeveralFloats {
+        load: bool,
+    },
+    ToFixed,
+    FromFixed,
+}
+
 /// What comes behind an instruction.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Flow {
     /// The one behind it.
     On,
@@ -185,7 +271,7 @@ impl<B: Bus> Operation<B> {
     /// One cycle, no operands; the length is filled in by `decode`.
     pub fn new(execute: Execute<B>) -> Self {
         let timing = Timing { length: 0, cycles: 1, single: false, overlaps: 0, flow: Flow::On, part: Part::None };
-        Self { execute, operands: Operands::default(), timing }
+        Self { execute, operands: Operands::default(), timing, action: Action::Other }
     }
 
     pub fn d(mut self, register: u32) -> Self {
@@ -225,6 +311,12 @@ impl<B: Bus> Operation<B> {
 
     pub fn part(mut self, part: Part) -> Self {
         self.timing.part = part;
+        self
+    }
+
+    /// What it does, which it is called for otherwise.
+    pub fn does(mut self, action: Action) -> Self {
+        self.action = action;
         self
     }
 

@@ -61,7 +61,7 @@ impl<B: Bus> Cpu<B> {
 
     /// Runs one instruction, or decodes it.
     #[inline(always)]
-    fn instruct<const WATCHED: bool>(&mut self) {
+    pub(super) fn instruct<const WATCHED: bool>(&mut self) {
         let pc = self.pc;
         let Some(operation) = self.code.at(pc) else { return self.elsewhere(pc) };
         if WATCHED && self.watched(pc) {

@@ -15,6 +15,7 @@ use super::execute::by_condition;
 use super::execute::pairs::{compared_of, conditional_of, pair_of};
 use super::execute::system::nothing;
 use super::operation::{Done, Execute, Flow, Leave, Operands, Operation, Part, Rest, Step, Trap, behind};
+use super::translation::{Left, Translation};
 use crate::bus::Bus;
 
 /// Instructions of a stretch, at most.
@@ -49,7 +50,12 @@ struct Stretch {
     bytes: u8,
     /// Cycles that the first instruction saves behind a single load or store.
     overlaps: u8,
+    /// How often it has begun, or, from `TRANSLATED` on, which function begins there.
+    runs: u32,
 }
+
+/// Numbers of functions begin here; nothing begins so often.
+pub(super) const TRANSLATED: u32 = 1 << 31;
 
 /// All stretches.
 #[derive(Clone)]
@@ -61,7 +67,7 @@ pub(super) struct Stretches<B: Bus> {
     begins: Vec<Stretch>,
 }
 
-const NONE: Stretch = Stretch { first: 0, end: 0, before_last: 0, bytes: 0, overlaps: 0 };
+const NONE: Stretch = Stretch { first: 0, end: 0, before_last: 0, bytes: 0, overlaps: 0, runs: 0 };
 
 impl<B: Bus> Stretches<B> {
     /// None yet, of so many places.
@@ -86,6 +92,18 @@ impl<B: Bus> Stretches<B> {
         }
     }
 
+    /// A function begins at a place.
+    fn translated(&mut self, place: usize, number: u32) {
+        if let Some(stretch) = self.begins.get_mut(place) {
+            stretch.runs = TRANSLATED | number;
+        }
+    }
+
+    /// Whether a function begins at a place.
+    pub fn is_translated(&self, place: usize) -> bool {
+        self.begins.get(place).is_some_and(|stretch| stretch.runs >= TRANSLATED)
+    }
+
     /// Forms the stretch that begins at a place; false where nothing is decoded.
     pub fn form(&mut self, place: usize, kept: impl Fn(usize) -> Option<Operation<B>>) -> bool {
         let Some(begin) = kept(place) else { return false };
@@ -100,7 +118,7 @@ impl<B: Bus> Stretches<B> {
             && usize::from(mark.instructions) < LONGEST
             && (mark.it == 0 || operation.timing.flow == Flow::On)
         {
-            let Operation { execute, operands, timing } = operation;
+            let Operation { execute, operands, timing, .. } = operation;
             let block = mark.it;
             before_last = mark.cycles;
             if block != 0 {
@@ -158,6 +176,7 @@ impl<B: Bus> Stretches<B> {
             before_last,
             bytes: mark.bytes,
             overlaps: begin.timing.overlaps,
+            runs: 0,
         };
         true
     }
@@ -176,6 +195,16 @@ impl<B: Bus> Stretches<B> {
     }
 }
 
+/// Why no stretch follows.
+enum Stopped {
+    /// Something is due, or the core is in an IT block.
+    Due,
+    /// No stretch begins there yet.
+    Unformed,
+    /// The stretch of a place has begun often enough to be translated.
+    Often(usize),
+}
+
 /// Where the core is in a stretch.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Within {
@@ -190,35 +219,86 @@ pub(super) struct Within {
 impl<B: Bus> Cpu<B> {
     /// Runs one stretch after the other, as far as nothing is due and all is decoded; then decodes what is not.
     pub(super) fn run_stretches(&mut self) {
+        if self.code.translations.is_unsettled() {
+            self.code.translations.settle();
+        }
         // Not part of the core while they run, which changes the core.
         let steps = std::mem::take(&mut self.code.stretches.steps);
-        let complete = self.run_formed(&steps);
+        let functions = std::mem::take(&mut self.code.translations.functions);
+        let stopped = self.run_formed(&steps, &functions);
         self.code.stretches.steps = steps;
-        if !complete && !self.code.form(self.pc) {
-            self.elsewhere(self.pc);
+        self.code.translations.functions = functions;
+        match stopped {
+            Stopped::Due => {}
+            Stopped::Unformed => {
+                if !self.code.form(self.pc) {
+                    self.elsewhere(self.pc);
+                }
+            }
+            Stopped::Often(place) => {
+                let number = self.translate(self.pc);
+                self.code.stretches.translated(place, number);
+            }
         }
     }
 
-    /// Runs stretches until something is due, or in an IT block; false where none begins yet.
+    /// Runs stretches, and what is translated of them, until there is something else to do.
     #[inline(always)]
-    fn run_formed(&mut self, steps: &[Step<B>]) -> bool {
-        let (mut begin, mut stretch) = (self.pc, NONE);
+    fn run_formed(&mut self, steps: &[Step<B>], functions: &[Translation]) -> Stopped {
+        let (mut begin, mut stretch, mut place) = (self.pc, NONE, 0);
+        // The next instruction has to be called.
+        let mut call = false;
         loop {
             // A loop whose body is one stretch needs no search; jumps change no code.
             if self.pc != begin || stretch.end == 0 {
                 begin = self.pc;
-                let place = self.code.place(begin);
-                let found = place.and_then(|place| self.code.stretches.begins.get(place));
-                let Some(found) = found.filter(|found| found.end != 0) else { return false };
-                stretch = *found;
+                let Some(found) = self.code.place(begin) else { return Stopped::Unformed };
+                place = found;
             }
+            let after = self.code.translations.after();
+            let Some(found) = self.code.stretches.begins.get_mut(place).filter(|found| found.end != 0) else {
+                return Stopped::Unformed;
+            };
+            let function = match found.runs {
+                runs if runs >= TRANSLATED => functions.get((runs - TRANSLATED) as usize),
+                runs if runs >= after => return Stopped::Often(place),
+                runs => {
+                    found.runs = (runs + 1).min(TRANSLATED - 1);
+                    None
+                }
+            };
+            if function.is_some_and(|function| !function.holds()) {
+                found.runs = 0;
+            }
+            stretch = *found;
             self.now = self.now.wrapping_sub(u64::from(stretch.overlaps & u8::from(self.single)));
+            if let Some(function) = function
+                && !std::mem::take(&mut call)
+                && self.now < self.attention
+            {
+                let before = self.instructions;
+                match function.run(self) {
+                    Left::Jumped => {}
+                    Left::Branched => self.branch(self.pc),
+                    Left::Call => call = true,
+                }
+                if self.instructions != before {
+                    if !self.code.holds(self.pc) {
+                        self.code.enter(self.pc);
+                    }
+                    if self.now >= self.attention || self.it != 0 {
+                        return Stopped::Due;
+                    }
+                    continue;
+                }
+                call = false;
+            }
             let end = match self.now.wrapping_add(u64::from(stretch.before_last)) < self.attention {
                 true => stretch.end,
                 false => self.code.stretches.end_within(stretch, self.attention.saturating_sub(self.now)),
             };
             self.within.end = end;
-            let Some(steps) = steps.get(stretch.first as usize..end as usize) else { return false };
+            let Some(steps) = steps.get(stretch.first as usize..end as usize) else { return Stopped::Unformed };
             match self.next(steps) {
                 Ok(()) => {
                     self.settle_at(&[]);
@@ -232,8 +312,8 @@ impl<B: Bus> Cpu<B> {
                     stretch = NONE;
                 }
             }
-            if self.now >= self.attention || self.it != 0 {
-                return true;
+            if self.now >= self.attention || self.it != 0 || self.code.translations.is_unsettled() {
+                return Stopped::Due;
             }
         }
     }

@@ -5,7 +5,7 @@ use crate::bus::Bus;
 use crate::cpu::arithmetic::sign_extend;
 use crate::cpu::execute::load_store::clear_exclusive;
 use crate::cpu::execute::{branch, system};
-use crate::cpu::operation::{Flow, Operation, Part};
+use crate::cpu::operation::{Action, Execute, Flow, Operation, Part};
 
 pub(super) fn decode<B: Bus>(address: u32, first: u32, second: u32) -> Decoded<B> {
     let pc = address.wrapping_add(4);
@@ -17,14 +17,18 @@ pub(super) fn decode<B: Bus>(address: u32, first: u32, second: u32) -> Decoded<B
             let (i1, i2) = (1 ^ j1 ^ sign, 1 ^ j2 ^ sign);
             let offset = sign << 24 | i1 << 23 | i2 << 22 | bits(first, 9, 0) << 12 | low << 1;
             let target = pc.wrapping_add(sign_extend(offset, 25));
-            let execute = if link == 1 { branch::call } else { branch::branch };
-            Ok(op(execute).immediate(target).flow(Flow::Elsewhere))
+            let (execute, action): (Execute<B>, _) = match link {
+                1 => (branch::call, Action::Call),
+                _ => (branch::branch, Action::Branch),
+            };
+            Ok(op(execute).does(action).immediate(target).flow(Flow::Elsewhere))
         }
         (0, _) if bits(first, 9, 7) != 7 => {
             let offset = sign << 20 | j2 << 19 | j1 << 18 | bits(first, 5, 0) << 12 | low << 1;
             let target = pc.wrapping_add(sign_extend(offset, 21));
             let condition = bits(first, 9, 6);
             Ok(op(branch::branch_if_of(condition))
+                .does(Action::BranchIf)
                 .x(condition)
                 .immediate(target)
                 .flow(Flow::Perhaps)
@@ -52,11 +56,11 @@ fn special<B: Bus>(first: u32, second: u32) -> Decoded<B> {
         }
         (0xf3af, 0x8000..=0x8004) => narrow::hint(second & 0xff),
         // Debug hints, and what has no number yet, do nothing.
-        (0xf3af, 0x8005..=0x80ff) => Ok(op(system::nothing)),
+        (0xf3af, 0x8005..=0x80ff) => Ok(op(system::nothing).does(Action::Nothing)),
         (0xf3bf, 0x8f2f) => Ok(op(clear_exclusive)),
         // dsb, dmb, isb
         (0xf3bf, _) if matches!(second & 0xfff0, 0x8f40 | 0x8f50 | 0x8f60) => {
-            Ok(op(system::nothing).part(Part::Nothing))
+            Ok(op(system::nothing).does(Action::Nothing).part(Part::Nothing))
         }
         _ => Err(Refused::Unknown),
     }

@@ -8,7 +8,7 @@ use crate::cpu::execute::data_processing::{
     add_immediate, bfi, constant, data_of, extend, movt, pkh, sbfx, shift_register_of, ubfx,
 };
 use crate::cpu::execute::simd::{saturate_halves, ssat, usat};
-use crate::cpu::operation::{Operation, Part};
+use crate::cpu::operation::{Action, Operation, Part};
 
 /// What an operation of the table A5-10 or A5-22 is, with registers that mean something else: operation, flags, whether its outcome
 /// is open. `second` is the second operand's register, None for a constant; `plain` says that it is not shifted, or by at most 3 to the left.
@@ -60,7 +60,11 @@ pub(super) fn modified_immediate<B: Bus>(first: u32, second: u32) -> Decoded<B> 
         (ADD, NEVER) => Part::AddConstant,
         _ => Part::None,
     };
-    let decoded = Operation::new(data_of(operation, CONSTANT, flags)).part(part);
+    let decoded = Operation::new(data_of(operation, CONSTANT, flags)).part(part).does(Action::Data {
+        operation,
+        second: CONSTANT,
+        flags,
+    });
     unless(open, decoded.d(d).n(bits(first, 3, 0)).immediate(value).x(carry))
 }
 
@@ -84,7 +88,8 @@ pub(super) fn shifted_register<B: Bus>(first: u32, second: u32) -> Decoded<B> {
     let unshifted = kind == LEFT && amount == 0;
     let (operation, flags, open) = choose(first, d, Some(m), kind == LEFT && amount <= 3, unshifted)?;
     let source = if unshifted { REGISTER } else { SHIFTED };
-    let decoded = Operation::new(data_of(operation, source, flags));
+    let decoded =
+        Operation::new(data_of(operation, source, flags)).does(Action::Data { operation, second: source, flags });
     unless(open, decoded.d(d).n(n).m(m).immediate(amount).x(u32::from(kind)))
 }
 
@@ -100,12 +105,17 @@ pub(super) fn plain_immediate<B: Bus>(address: u32, first: u32, second: u32) -> 
     // Bits that bit-field and saturating instructions have as zeros.
     let stray = bits(first, 10, 10) != 0 || bits(second, 5, 5) != 0;
     match bits(first, 8, 4) {
-        0x00 if n == 15 => unless(bad(d), op(constant).d(d).immediate(pc.wrapping_add(value))),
-        0x0a if n == 15 => unless(bad(d), op(constant).d(d).immediate(pc.wrapping_sub(value))),
-        0x00 => unless(stack, op(add_immediate).d(d).n(n).immediate(value).part(Part::AddConstant)),
-        0x0a => unless(stack, op(add_immediate).d(d).n(n).immediate(value.wrapping_neg()).part(Part::AddConstant)),
-        0x04 => unless(bad(d), op(constant).d(d).immediate(n << 12 | value).part(Part::Constant)),
-        0x0c => unless(bad(d), op(movt).d(d).immediate(n << 12 | value).part(Part::UpperHalf)),
+        0x00 if n == 15 => unless(bad(d), op(constant).d(d).immediate(pc.wrapping_add(value)).does(Action::Constant)),
+        0x0a if n == 15 => unless(bad(d), op(constant).d(d).immediate(pc.wrapping_sub(value)).does(Action::Constant)),
+        0x00 => unless(stack, op(add_immediate).d(d).n(n).immediate(value).part(Part::AddConstant).does(Action::Add)),
+        0x0a => unless(
+            stack,
+            op(add_immediate).d(d).n(n).immediate(value.wrapping_neg()).part(Part::AddConstant).does(Action::Add),
+        ),
+        0x04 => {
+            unless(bad(d), op(constant).d(d).immediate(n << 12 | value).part(Part::Constant).does(Action::Constant))
+        }
+        0x0c => unless(bad(d), op(movt).d(d).immediate(n << 12 | value).part(Part::UpperHalf).does(Action::UpperHalf)),
         kind @ (0x10 | 0x12 | 0x18 | 0x1a) => {
             let (unsigned, shifts_right) = (kind & 8 != 0, kind & 2 != 0);
             let open = bad(d) || bad(n) || stray;
@@ -118,11 +128,17 @@ pub(super) fn plain_immediate<B: Bus>(address: u32, first: u32, second: u32) -> 
             let execute = if unsigned { usat } else { ssat };
             unless(open, op(execute).d(d).n(n).x(to).m(u32::from(shifts_right)).immediate(position))
         }
-        0x14 => unless(bad(d) || bad(n) || stray || position + width > 31, field(sbfx, d, n, position, width + 1)),
-        0x1c => unless(bad(d) || bad(n) || stray || position + width > 31, field(ubfx, d, n, position, width + 1)),
+        0x14 => unless(
+            bad(d) || bad(n) || stray || position + width > 31,
+            field(sbfx, d, n, position, width + 1).does(Action::Extract { signed: true }),
+        ),
+        0x1c => unless(
+            bad(d) || bad(n) || stray || position + width > 31,
+            field(ubfx, d, n, position, width + 1).does(Action::Extract { signed: false }),
+        ),
         0x16 => {
             let open = bad(d) || n == 13 || stray || width < position;
-            unless(open, field(bfi, d, n, position, (width + 1).saturating_sub(position)))
+            unless(open, field(bfi, d, n, position, (width + 1).saturating_sub(position)).does(Action::Insert))
         }
         _ => Err(Refused::Unknown),
     }
@@ -142,7 +158,8 @@ pub(super) fn register<B: Bus>(first: u32, second: u32) -> Decoded<B> {
     match bits(second, 7, 4) {
         0 if kind < 8 => {
             let flags = if kind & 1 == 1 { ALWAYS } else { NEVER };
-            let decoded = Operation::new(shift_register_of((kind >> 1) as u8, flags));
+            let decoded = Operation::new(shift_register_of((kind >> 1) as u8, flags))
+                .does(Action::ShiftByRegister { kind: (kind >> 1) as u8, flags });
             unless(bad(d) || bad(n) || bad(m), decoded.d(d).n(n).m(m))
         }
         rotation @ 8..=15 if kind < 6 => {
@@ -154,7 +171,12 @@ pub(super) fn register<B: Bus>(first: u32, second: u32) -> Decoded<B> {
                 4 => extend::<B, 4>,
                 _ => extend::<B, 5>,
             };
-            let decoded = Operation::new(execute).d(d).n(n).m(m).immediate(8 * (rotation & 3));
+            let decoded = Operation::new(execute)
+                .d(d)
+                .n(n)
+                .m(m)
+                .immediate(8 * (rotation & 3))
+                .does(Action::Extend { kind: kind.min(5) as u8 });
             unless(bad(d) || n == 13 || bad(m) || rotation & 4 != 0, decoded)
         }
         0..=7 if kind >= 8 => simd::parallel(first, second),

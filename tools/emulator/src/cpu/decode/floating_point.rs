@@ -8,7 +8,7 @@ use crate::cpu::execute::floating_point::{
     vmov_constant, vmrs, vmrs_flags, vmsr, vsqrt, vstm, vstr,
 };
 use crate::cpu::execute::load_store::{BELOW, CHANGES};
-use crate::cpu::operation::{Operation, Part};
+use crate::cpu::operation::{Action, Execute, Operation, Part};
 use crate::cpu::timing::{FLOATING_POINT_DIVISION, FLOATING_POINT_MULTIPLY_ACCUMULATE, several};
 
 /// Single-precision register: four bits and the lowest one.
@@ -52,7 +52,7 @@ fn data_processing<B: Bus>(first: u32, second: u32) -> Decoded<B> {
         VMUL => Part::MultiplyFloats,
         _ => Part::None,
     };
-    Ok(Operation::new(execute).d(d).n(n).m(m).cycles(cycles).part(part))
+    Ok(Operation::new(execute).does(Action::Floats { operation }).d(d).n(n).m(m).cycles(cycles).part(part))
 }
 
 /// Operations with one operand.
@@ -67,32 +67,37 @@ fn other<B: Bus>(first: u32, second: u32, d: u32, m: u32) -> Decoded<B> {
         let byte = bits(first, 3, 0) << 4 | bits(second, 3, 0);
         let exponent = if byte & 0x40 != 0 { 0x3e00_0000 } else { 0x4000_0000 };
         let value = (byte & 0x80) << 24 | exponent | (byte & 0x3f) << 19;
-        return unless(second & 0xa0 != 0, op(vmov_constant).d(d).immediate(value));
+        return unless(second & 0xa0 != 0, op(vmov_constant).does(Action::FloatConstant).d(d).immediate(value));
     }
     if fixed {
         let narrow = upper == 0;
         let behind = bits(second, 3, 0) << 1 | bits(second, 5, 5);
         let width = if narrow { 16 } else { 32 };
         let x = if bits(first, 0, 0) == 1 { UNSIGNED } else { 0 } | if narrow { NARROW } else { 0 };
-        let execute = if bits(first, 2, 2) == 1 { vcvt_to_fixed } else { vcvt_from_fixed::<B, false> };
+        let (execute, action): (Execute<B>, _) = match bits(first, 2, 2) {
+            1 => (vcvt_to_fixed, Action::ToFixed),
+            _ => (vcvt_from_fixed::<B, false>, Action::FromFixed),
+        };
         let fraction = u32::saturating_sub(width, behind);
-        return unless(behind > width, op(execute).d(d).m(d).x(x | TOWARDS_ZERO).immediate(fraction));
+        return unless(behind > width, op(execute).does(action).d(d).m(d).x(x | TOWARDS_ZERO).immediate(fraction));
     }
     Ok(match (opcode, upper) {
-        (0, 0) => op(vmov).d(d).m(m).part(Part::Float),
-        (0, _) => op(vmov).d(d).m(m).immediate(1 << 31),
-        (1, 0) => op(vmov).d(d).m(m).x(1),
+        (0, 0) => op(vmov).does(Action::MoveFloat).d(d).m(m).part(Part::Float),
+        (0, _) => op(vmov).does(Action::MoveFloat).d(d).m(m).immediate(1 << 31),
+        (1, 0) => op(vmov).does(Action::MoveFloat).d(d).m(m).x(1),
         (1, _) => op(vsqrt).d(d).m(m).cycles(FLOATING_POINT_DIVISION),
         (2 | 3, _) => {
             op(vcvt_half).d(d).m(m).x(if upper == 1 { TOP } else { 0 } | if opcode == 3 { TO_HALF } else { 0 })
         }
-        (4, _) => op(vcmp).d(d).m(m).x(upper).part(Part::CompareFloats),
+        (4, _) => op(vcmp).does(Action::CompareFloats).d(d).m(m).x(upper).part(Part::CompareFloats),
         (5, _) if second & 0x2f != 0 => return Err(Refused::Unpredictable),
-        (5, _) => op(vcmp).d(d).x(upper).immediate(1).part(Part::CompareFloats),
-        (8, _) => op(vcvt_from_fixed::<B, true>).d(d).m(m).x(if upper == 0 { UNSIGNED } else { 0 }),
+        (5, _) => op(vcmp).does(Action::CompareFloats).d(d).x(upper).immediate(1).part(Part::CompareFloats),
+        (8, _) => {
+            op(vcvt_from_fixed::<B, true>).does(Action::FromFixed).d(d).m(m).x(if upper == 0 { UNSIGNED } else { 0 })
+        }
         (12 | 13, _) => {
             let x = if opcode == 12 { UNSIGNED } else { 0 } | if upper == 1 { TOWARDS_ZERO } else { 0 };
-            op(vcvt_to_fixed).d(d).m(m).x(x)
+            op(vcvt_to_fixed).does(Action::ToFixed).d(d).m(m).x(x)
         }
         _ => return Err(Refused::Unknown),
     })
@@ -106,12 +111,15 @@ fn transfer<B: Bus>(first: u32, second: u32) -> Decoded<B> {
     match (bits(second, 8, 8), bits(first, 7, 5)) {
         (0, 0) => {
             let n = single(bits(first, 3, 0), bits(second, 7, 7));
-            unless(bad(t) || stray, op(if load { to_core } else { from_core }).d(t).n(n))
+            unless(
+                bad(t) || stray,
+                op(if load { to_core } else { from_core }).does(Action::MoveToOrFromFloat { load }).d(t).n(n),
+            )
         }
         (0, 7) if bits(first, 3, 0) == 1 => {
             let open = stray || second & 0x80 != 0 || t == 13 || t == 15 && !load;
             match load && t == 15 {
-                true => unless(open, op(vmrs_flags).part(Part::TakeFlags)),
+                true => unless(open, op(vmrs_flags).does(Action::TakeFlags).part(Part::TakeFlags)),
                 false => unless(open, op(if load { vmrs } else { vmsr }).d(t)),
             }
         }
@@ -119,7 +127,13 @@ fn transfer<B: Bus>(first: u32, second: u32) -> Decoded<B> {
         (1, half @ (0 | 1)) if second & 0x60 == 0 => {
             let register = bits(second, 7, 7) << 4 | bits(first, 3, 0);
             let open = bad(t) || second & 0xf != 0 || register > 15;
-            unless(open, op(if load { to_core } else { from_core }).d(t).n(register << 1 | half))
+            unless(
+                open,
+                op(if load { to_core } else { from_core })
+                    .does(Action::MoveToOrFromFloat { load })
+                    .d(t)
+                    .n(register << 1 | half),
+            )
         }
         _ => Err(Refused::Unknown),
     }
@@ -159,7 +173,8 @@ fn load_store<B: Bus>(address: u32, first: u32, second: u32) -> Decoded<B> {
         let open = d + count > 32 || !load && n == 15;
         let pc = address.wrapping_add(4) & !3;
         let immediate = if n == 15 { pc.wrapping_add(offset) } else { offset };
-        let decoded = op(if load { vldr } else { vstr }).d(d).n(n).immediate(immediate).x(count);
+        let decoded =
+            op(if load { vldr } else { vstr }).does(Action::Float { load }).d(d).n(n).immediate(immediate).x(count);
         let decoded = decoded.part(if load { Part::LoadFloat } else { Part::StoreFloat });
         return unless(open, if double { decoded.cycles(several(2)) } else { decoded.single(load) });
     }
@@ -170,6 +185,12 @@ fn load_store<B: Bus>(address: u32, first: u32, second: u32) -> Decoded<B> {
     // An odd number of words of double registers is the form with padding that nobody should use.
     let open = words == 0 || words > 32 || d + words > 32 || double && words & 1 == 1 || n == 15;
     let x = if change { CHANGES } else { 0 } | if below { BELOW } else { 0 };
-    let decoded = op(if load { vldm } else { vstm }).d(d).n(n).m(words).immediate(4 * words).x(x);
+    let decoded = op(if load { vldm } else { vstm })
+        .does(Action::SeveralFloats { load })
+        .d(d)
+        .n(n)
+        .m(words)
+        .immediate(4 * words)
+        .x(x);
     unless(open, decoded.cycles(several(words)))
 }

@@ -8,7 +8,7 @@ use crate::cpu::execute::load_store::{
     store_several, strd,
 };
 use crate::cpu::execute::{branch, system};
-use crate::cpu::operation::{Flow, Operation};
+use crate::cpu::operation::{Action, Execute, Flow, Operation};
 use crate::cpu::timing;
 
 /// LDM, STM.
@@ -22,7 +22,12 @@ pub(super) fn several_registers<B: Bus>(first: u32, list: u32, below: bool) -> D
         || change && list >> n & 1 != 0;
     let x = if change { CHANGES } else { 0 } | if below { BELOW } else { 0 };
     let execute = if load { load_several } else { store_several };
-    let operation = Operation::new(execute).n(n).immediate(list).x(x).cycles(timing::several(list.count_ones()));
+    let operation = Operation::new(execute)
+        .does(Action::Several { load })
+        .n(n)
+        .immediate(list)
+        .x(x)
+        .cycles(timing::several(list.count_ones()));
     unless(open, operation.flow_by(list))
 }
 
@@ -50,31 +55,44 @@ pub(super) fn pair<B: Bus>(address: u32, first: u32, second: u32) -> Decoded<B> 
             let at = (pc & !3).wrapping_add(signed);
             return unless(
                 open || change || t == t2,
-                op(ldrd_absolute).d(t).m(t2).immediate(at).cycles(timing::several(2)),
+                op(ldrd_absolute).does(Action::PairAt).d(t).m(t2).immediate(at).cycles(timing::several(2)),
             );
         }
         let open = open || n == 15 || load && t == t2;
         let execute = if load { ldrd } else { strd };
-        return unless(open, op(execute).d(t).m(t2).n(n).immediate(signed).x(x).cycles(timing::several(2)));
+        return unless(
+            open,
+            op(execute).does(Action::Pair { load }).d(t).m(t2).n(n).immediate(signed).x(x).cycles(timing::several(2)),
+        );
     }
     // Exclusive accesses take the two cycles of a load with a base address.
     let kind = bits(second, 7, 4);
     match (up, load) {
         (false, false) => {
             let open = bad(t) || bad(t2) || n == 15 || t2 == n || t2 == t;
-            unless(open, op(store_exclusive::<B, 4>).d(t2).m(t).n(n).immediate(offset).cycles(2))
+            unless(
+                open,
+                op(store_exclusive::<B, 4>)
+                    .does(Action::StoreExclusive { bytes: 4 })
+                    .d(t2)
+                    .m(t)
+                    .n(n)
+                    .immediate(offset)
+                    .cycles(2),
+            )
         }
-        (false, true) => {
-            unless(bad(t) || n == 15 || t2 != 15, op(load_exclusive::<B, 4>).d(t).n(n).immediate(offset).cycles(2))
-        }
+        (false, true) => unless(
+            bad(t) || n == 15 || t2 != 15,
+            op(load_exclusive::<B, 4>).does(Action::LoadExclusive { bytes: 4 }).d(t).n(n).immediate(offset).cycles(2),
+        ),
         (true, false) => {
             let open = bad(low) || bad(t) || n == 15 || low == n || low == t || t2 != 15;
-            let execute = match kind {
-                4 => store_exclusive::<B, 1>,
-                5 => store_exclusive::<B, 2>,
+            let (execute, bytes): (Execute<B>, _) = match kind {
+                4 => (store_exclusive::<B, 1>, 1),
+                5 => (store_exclusive::<B, 2>, 2),
                 _ => return Err(Refused::Unknown),
             };
-            unless(open, op(execute).d(low).m(t).n(n).cycles(2))
+            unless(open, op(execute).does(Action::StoreExclusive { bytes }).d(low).m(t).n(n).cycles(2))
         }
         (true, true) => {
             let open = bad(t) || n == 15 || t2 != 15 || low != 15;
@@ -83,8 +101,14 @@ pub(super) fn pair<B: Bus>(address: u32, first: u32, second: u32) -> Decoded<B> 
                     let open = n == 13 || bad(low) || t != 15 || t2 != 0;
                     unless(open, op(branch::table).n(n).m(low).x(kind).immediate(pc).cycles(2).flow(Flow::Elsewhere))
                 }
-                4 => unless(open, op(load_exclusive::<B, 1>).d(t).n(n).cycles(2)),
-                5 => unless(open, op(load_exclusive::<B, 2>).d(t).n(n).cycles(2)),
+                4 => unless(
+                    open,
+                    op(load_exclusive::<B, 1>).does(Action::LoadExclusive { bytes: 1 }).d(t).n(n).cycles(2),
+                ),
+                5 => unless(
+                    open,
+                    op(load_exclusive::<B, 2>).does(Action::LoadExclusive { bytes: 2 }).d(t).n(n).cycles(2),
+                ),
                 _ => Err(Refused::Unknown),
             }
         }
@@ -141,7 +165,7 @@ pub(super) fn single<B: Bus>(address: u32, first: u32, second: u32) -> Decoded<B
     if t == 15 && load && what != LDR {
         // Preloads; a change of the base makes it something that there is not.
         let open = open || changes || what == LDRSH;
-        return unless(open, Operation::new(system::nothing));
+        return unless(open, Operation::new(system::nothing).does(Action::Nothing));
     }
     if t == 15 && load {
         let decoded = Operation::new(load_branch_of(mode)).n(n).m(m).immediate(offset).cycles(2).flow(Flow::Elsewhere);
@@ -149,6 +173,12 @@ pub(super) fn single<B: Bus>(address: u32, first: u32, second: u32) -> Decoded<B
     }
     let word = what == LDR || what == STR;
     let open = open || t == 15 || t == 13 && !word;
-    let decoded = Operation::new(access_of(what, mode)).d(t).n(n).m(m).immediate(offset).single(load);
+    let decoded = Operation::new(access_of(what, mode))
+        .does(Action::Access { what, address: mode })
+        .d(t)
+        .n(n)
+        .m(m)
+        .immediate(offset)
+        .single(load);
     unless(open, decoded.part(access_part(what, mode)))
 }

@@ -4,7 +4,7 @@ use super::{Decoded, Refused, bad, bits, unless};
 use crate::bus::Bus;
 use crate::cpu::execute::data_processing::{clz, reverse};
 use crate::cpu::execute::simd::{parallel_of, saturating, sel};
-use crate::cpu::operation::Operation;
+use crate::cpu::operation::{Action, Operation};
 
 pub(super) fn parallel<B: Bus>(first: u32, second: u32) -> Decoded<B> {
     let (d, n, m) = (bits(second, 11, 8), bits(first, 3, 0), bits(second, 3, 0));
@@ -25,7 +25,7 @@ pub(super) fn miscellaneous<B: Bus>(first: u32, second: u32) -> Decoded<B> {
         (1, 2) => unless(one, op(reverse::<B, 2>).d(d).m(m)),
         (1, _) => unless(one, op(reverse::<B, 3>).d(d).m(m)),
         (2, 0) => unless(bad(d) || bad(n) || bad(m), op(sel).d(d).n(n).m(m)),
-        (3, 0) => unless(one, op(clz).d(d).m(m)),
+        (3, 0) => unless(one, op(clz).does(Action::CountZeros).d(d).m(m)),
         _ => Err(Refused::Unknown),
     }
 }

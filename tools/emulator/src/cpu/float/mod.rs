@@ -42,6 +42,7 @@ pub enum Rounding {
 
 /// FPSCR: flags of the last comparison, modes, sticky exception flags.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(transparent)]
 pub struct Status(u32);
 
 impl Status {
@@ -90,10 +91,13 @@ impl Status {
         self.is_usual() && result & 0x7f80_0000 != 0x7f80_0000
     }
 
+    /// Bits of the usual mode, with the sticky inexact flag set, and what they are then.
+    pub(super) const USUAL: (u32, u32) = (MODES | INEXACT, INEXACT);
+
     /// The usual mode, with the sticky inexact flag set.
     #[inline(always)]
     pub(super) fn is_usual(self) -> bool {
-        self.0 & (MODES | INEXACT) == INEXACT
+        self.0 & Self::USUAL.0 == Self::USUAL.1
     }
 }
 

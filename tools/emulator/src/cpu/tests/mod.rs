@@ -8,6 +8,7 @@ mod floating_point;
 mod load_store;
 mod priorities;
 mod stretches;
+mod translation;
 mod watching;
 
 use super::{Cpu, End};

@@ -1,4 +1,4 @@
-//! Stretches against single steps: the same registers, flags, memory, cycles and counts, wherever a run ends.
+//! Stretches, and what is translated of them, against single steps: the same registers, flags, memory, cycles and counts, wherever a run ends.
 
 use super::{DATA, START, machine, with_floating_point};
 use crate::cpu::{Cpu, End};
@@ -90,7 +90,7 @@ const PIECES: &[&[u16]] = &[
     &[0xbfac, 0xeeb0, 0x0a60, 0xee70, 0x0a80],
 ];
 
-/// All pieces three times around; a breakpoint follows. SRAM does not answer before cycle `stalled`.
+/// All pieces five times around; a breakpoint follows. SRAM does not answer before cycle `stalled`.
 fn looped(pieces: &[usize], wait_states: u32, stalled: u64) -> Cpu<Memory> {
     let mut code: Vec<u16> =
         pieces.iter().filter_map(|piece| PIECES.get(*piece)).flat_map(|piece| piece.to_vec()).collect();
@@ -101,7 +101,7 @@ fn looped(pieces: &[usize], wait_states: u32, stalled: u64) -> Cpu<Memory> {
     let mut cpu = with_floating_point(machine(&code));
     cpu.bus.wait_states = wait_states;
     cpu.bus.signals.stall = Some((DATA..DATA + 0x100, stalled));
-    cpu.set_register(6, 3);
+    cpu.set_register(6, 5);
     cpu.set_register(7, DATA);
     cpu.set_register(8, START);
     cpu
@@ -117,9 +117,11 @@ fn state(cpu: &Cpu<Memory>) -> (Vec<u32>, u32, u64, u64, Vec<u8>) {
 proptest! {
     #[test]
     fn a_run_is_its_steps(
-        pieces in prop::collection::vec(0..PIECES.len(), 1..20), wait_states in 0u32..5, stalled in 0u64..300, parts in prop::collection::vec(1u64..60, 1..40)
+        pieces in prop::collection::vec(0..PIECES.len(), 1..20), wait_states in 0u32..5, stalled in 0u64..300, parts in prop::collection::vec(1u64..60, 1..40),
+        translated in prop::option::of(0u32..3),
     ) {
         let (mut runs, mut steps) = (looped(&pieces, wait_states, stalled), looped(&pieces, wait_states, stalled));
+        runs.set_translation(translated);
         for part in parts.iter().cycle() {
             let until = runs.now() + part;
             let end = runs.run(until);
