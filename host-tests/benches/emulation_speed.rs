@@ -15,6 +15,8 @@ use libtest_mimic::Failed;
 use std::error::Error;
 use std::time::Instant;
 
+/// Emulated time before the snapshot, s: what runs often is translated by then.
+const WARM: f64 = 5.0;
 /// Emulated time of a run, s.
 const SECONDS: f64 = 1.0;
 /// Runs, of which the slowest, the median and the fastest are printed.
@@ -35,12 +37,13 @@ fn measure<W: Observed + Clone>(name: &str, board: fn(Drivetrain) -> W) -> Resul
     let rate = f64::from(W::CONFIGURATION.bridge.rate);
 
     let mut off = Bench::new(board, &program).map_err(failed)?;
-    off.run(0.2).map_err(failed)?;
+    off.run(WARM).map_err(failed)?;
     let runs =
         repeated(&off, |bench| bench.run(SECONDS), |bench| bench.emulation.cpu.instructions()).map_err(failed)?;
     report(name, rate, "off", runs);
 
-    let moving = Moving::start(board, &actuator(), &program, &acting_image()).map_err(failed)?;
+    let mut moving = Moving::start(board, &actuator(), &program, &acting_image()).map_err(failed)?;
+    moving.run(WARM).map_err(failed)?;
     let runs = repeated(&moving, |moving| moving.run(SECONDS), |moving| moving.bench.emulation.cpu.instructions())
         .map_err(failed)?;
     report(name, rate, "in motion", runs);
