@@ -68,6 +68,15 @@ pub(super) fn complete(cpu: &mut Cpu<Memory>) {
     assert!(matches!(end, End::Breakpoint { number: 0, .. }), "{end}");
 }
 
+/// Single steps until a cycle is reached, or something else ends them.
+pub(super) fn steps_to(cpu: &mut Cpu<Memory>, until: u64) -> Option<End> {
+    let mut end = None;
+    while end.is_none() && cpu.now() < until {
+        end = cpu.step();
+    }
+    end
+}
+
 /// A word of memory or of the core's own registers, read as the program would.
 pub(super) fn read(cpu: &mut Cpu<Memory>, address: u32) -> u32 {
     cpu.load::<4>(address).expect("a register that is modelled")

@@ -1,6 +1,6 @@
 //! Stretches, and what is translated of them, against single steps: the same registers, flags, memory, cycles and counts, wherever a run ends.
 
-use super::{DATA, START, machine, with_floating_point};
+use super::{DATA, START, machine, steps_to, with_floating_point};
 use crate::cpu::{Cpu, End};
 use crate::memory::Memory;
 use proptest::prelude::*;
@@ -124,11 +124,7 @@ proptest! {
         runs.set_translation(translated);
         for part in parts.iter().cycle() {
             let until = runs.now() + part;
-            let end = runs.run(until);
-            let mut stepped = None;
-            while stepped.is_none() && steps.now() < until {
-                stepped = steps.step();
-            }
+            let (end, stepped) = (runs.run(until), steps_to(&mut steps, until));
             prop_assert_eq!(state(&runs), state(&steps));
             prop_assert_eq!(stepped, if end == End::Time { None } else { Some(end.clone()) });
             if end != End::Time {

@@ -1,6 +1,6 @@
 //! What is translated against single steps, with random instructions of those that are: registers, flags, memory, cycles and counts.
 
-use super::{DATA, START, machine, with_floating_point};
+use super::{DATA, START, machine, steps_to, with_floating_point};
 use crate::cpu::{Cpu, End};
 use crate::memory::Memory;
 use proptest::prelude::*;
@@ -159,6 +159,97 @@ fn float() -> impl Strategy<Value = u32> {
     prop_oneof![4 => (-1e3f32..1e3).prop_map(f32::to_bits), 1 => Just(0), 1 => Just(0x8000_0000), 1 => any::<u32>()]
 }
 
+/// Code that goes round and round, translated as soon as it does.
+fn endless(code: &[u16]) -> Cpu<Memory> {
+    let mut code = code.to_vec();
+    // b to the beginning.
+    code.push(0xe000 | (-(code.len() as i32) - 2) as u16 & 0x7ff);
+    let mut cpu = machine(&code);
+    cpu.set_translation(Some(1));
+    cpu
+}
+
+fn run(cpu: &mut Cpu<Memory>, cycles: u64) {
+    assert_eq!(cpu.run(cpu.now() + cycles), End::Time);
+}
+
+#[test]
+fn code_that_has_changed_is_not_what_was_translated() {
+    // adds r0, #1, further behind the beginning than a stretch is long.
+    let mut code = [0xbf00; 101];
+    code[100] = 0x3001;
+    let mut cpu = endless(&code);
+    run(&mut cpu, 2000);
+    let counted = cpu.register(0);
+    assert!(counted > 15);
+    // subs r0, #1
+    assert!(cpu.bus.set(START + 200, &0x3801u16.to_le_bytes()));
+    run(&mut cpu, 4000);
+    assert!((cpu.register(0) as i32) < counted as i32 - 20, "{}", cpu.register(0) as i32);
+}
+
+#[test]
+fn a_word_of_code_that_has_changed_is_loaded_as_it_is() {
+    // ldr r0, [pc, #508]
+    let mut cpu = endless(&[0x487f]);
+    let word = START + 4 + 508;
+    assert!(cpu.bus.set(word, &7u32.to_le_bytes()));
+    run(&mut cpu, 1000);
+    assert_eq!(cpu.register(0), 7);
+    assert!(cpu.bus.set(word, &8u32.to_le_bytes()));
+    run(&mut cpu, 100);
+    assert_eq!(cpu.register(0), 8);
+}
+
+#[test]
+fn wait_states_that_have_changed_count() {
+    let mut cpu = endless(&[0x3001]);
+    run(&mut cpu, 1000);
+    cpu.bus.wait_states = 4;
+    let mut stepped = cpu.clone();
+    run(&mut cpu, 1000);
+    assert_eq!(steps_to(&mut stepped, cpu.now()), None);
+    assert_eq!(state(&cpu), state(&stepped));
+}
+
+#[test]
+fn behind_the_last_byte_of_memory_nothing_is_accessed() {
+    let end = 0x2000_9000;
+    // ldr r0, [r7]; ldrh; ldrb; str; strh; strb; ldm r7, {r0, r1}; stm.w; vldr s0, [r7] and what it takes of memory.
+    let accesses: [(&[u16], u32); 9] = [
+        (&[0x6838], 4),
+        (&[0x8838], 2),
+        (&[0x7838], 1),
+        (&[0x6038], 4),
+        (&[0x8038], 2),
+        (&[0x7038], 1),
+        (&[0xe897, 0x0003], 8),
+        (&[0xe887, 0x0003], 8),
+        (&[0xed97, 0x0a00], 4),
+    ];
+    for (access, bytes) in accesses {
+        let mut cpu = with_floating_point(endless(access));
+        cpu.set_register(7, end - bytes);
+        run(&mut cpu, 1000);
+        assert_eq!(cpu.fault_status(), (0, 0), "{access:x?}");
+        cpu.set_register(7, end);
+        run(&mut cpu, 20);
+        assert_ne!(cpu.fault_status(), (0, 0), "{access:x?}");
+    }
+}
+
+#[test]
+fn memory_that_is_gone_is_not_accessed() {
+    // str r0, [r7]
+    let mut cpu = endless(&[0x6038]);
+    cpu.set_register(7, DATA);
+    run(&mut cpu, 1000);
+    let mut other = Memory::new().with(0x0800_0000..0x0800_3800, true);
+    std::mem::swap(&mut cpu.bus, &mut other);
+    let end = cpu.run(cpu.now() + 1000);
+    assert!(matches!(end, End::Lockup(_)) || cpu.exception() != 0, "{end}");
+}
+
 proptest! {
     #[test]
     fn translated_code_does_what_its_instructions_do(
@@ -173,11 +264,7 @@ proptest! {
         runs.set_translation(Some(1));
         for part in parts.iter().cycle() {
             let until = runs.now() + part;
-            let end = runs.run(until);
-            let mut stepped = None;
-            while stepped.is_none() && steps.now() < until {
-                stepped = steps.step();
-            }
+            let (end, stepped) = (runs.run(until), steps_to(&mut steps, until));
             // A step goes on to the first instruction of a fault's handler.
             if runs.exception() != 0 || steps.exception() != 0 {
                 break;

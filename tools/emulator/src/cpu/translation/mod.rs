@@ -14,8 +14,10 @@ mod emit;
 mod float;
 #[expect(unsafe_code, reason = "calls what was compiled")]
 mod host;
+mod leaving;
 mod memory;
 mod region;
+mod registers;
 
 use super::Cpu;
 use super::operation::{Action, Operands, Operation, Timing};
