@@ -190,15 +190,17 @@ fn code_that_has_changed_is_not_what_was_translated() {
 
 #[test]
 fn a_word_of_code_that_has_changed_is_loaded_as_it_is() {
-    // ldr r0, [pc, #508]
-    let mut cpu = endless(&[0x487f]);
+    // ldr r0, [pc, #508]; adds r1, r1, r0
+    let mut cpu = endless(&[0x487f, 0x1809]);
     let word = START + 4 + 508;
     assert!(cpu.bus.set(word, &7u32.to_le_bytes()));
     run(&mut cpu, 1000);
     assert_eq!(cpu.register(0), 7);
     assert!(cpu.bus.set(word, &8u32.to_le_bytes()));
-    run(&mut cpu, 100);
-    assert_eq!(cpu.register(0), 8);
+    let mut stepped = cpu.clone();
+    run(&mut cpu, 1000);
+    assert_eq!(steps_to(&mut stepped, cpu.now()), None);
+    assert_eq!(state(&cpu), state(&stepped));
 }
 
 #[test]
