@@ -25,7 +25,7 @@ const KEPT: usize = 4096;
 /// What compiles.
 pub(in crate::cpu) struct Compiler {
     pub isa: OwnedTargetIsa,
-    compiled: Mutex<HashMap<(usize, Region), Option<Function>>>,
+    compiled: Mutex<HashMap<(Fields, Region), Option<Function>>>,
 }
 
 impl Compiler {
@@ -64,8 +64,7 @@ impl Compiler {
 
     /// A region; none where it cannot be compiled. What another core has compiled is not compiled again.
     pub fn compile(&self, fields: &Fields, region: Region) -> Option<Function> {
-        // Who calls tells kinds of cores from each other.
-        let key = (fields.call, region);
+        let key = (fields.clone(), region);
         let mut compiled = self.compiled.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(function) = compiled.get(&key) {
             return function.clone();

@@ -80,7 +80,8 @@ pub(super) enum Left {
     Call = 2,
 }
 
-/// Where the parts of a core lie in it, in bytes.
+/// Where the parts of a core lie in it, in bytes: one kind of core from the other.
+#[derive(Clone, PartialEq, Eq, Hash)]
 struct Fields {
     registers: i32,
     floats: i32,
