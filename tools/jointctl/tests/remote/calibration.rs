@@ -58,5 +58,7 @@ pub fn a_calibration_ends_with_its_client_and_with_the_network_and_changes_nothi
         let ask = || show_entry(&other, Entry::one(name).unwrap());
         (0..20).map(|_| ask()).find(|shown| !told(shown)).unwrap_or_else(ask).unwrap()
     };
-    assert_eq!([show("pole-pairs"), show("calibration-failure")], ["3", "1"]);
+    // The joint may still be on its way out of the calibration.
+    let failure = (0..100).map(|_| show("calibration-failure")).find(|failure| failure != "0");
+    assert_eq!((show("pole-pairs").as_str(), failure.as_deref()), ("3", Some("1")));
 }
