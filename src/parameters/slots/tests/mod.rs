@@ -212,6 +212,28 @@ fn a_store_that_the_flash_refuses_leaves_the_content_in_use() {
 }
 
 #[test]
+fn a_payload_that_does_not_read_back_is_refused_and_the_content_in_use_stays() {
+    let payload = b"the newest content, four words";
+    for word in 0..payload.len().div_ceil(DOUBLE_WORD) {
+        for (slot, before) in [(Slot::First, &[][..]), (Slot::Second, &[&b"a"[..]]), (Slot::First, &[b"a", b"b"])] {
+            let mut flash = stored(before);
+            let in_use = before.last().map(|payload| payload.to_vec());
+            let mut slots = Slots::open(&mut flash, layout()).expect("opens");
+            let active_before = slots.active();
+            flash.weaken(layout().first_word(slot) + HEADER_WORDS + word);
+            assert_eq!(slots.store(&mut flash, payload), Err(SlotError::Verify { slot }), "double word {word}");
+            assert_eq!((slots.active(), slots.state(slot)), (active_before, SlotState::Interrupted));
+            let mut buffer = [0; PAGE];
+            let loaded = slots.load(&mut flash, &mut buffer).expect("loads");
+            assert_eq!(loaded.map(|length| buffer[..length].to_vec()), in_use);
+            assert_eq!(active(&mut flash), in_use, "after a restart");
+            slots.store(&mut flash, payload).expect("stores");
+            assert_eq!(active(&mut flash), Some(payload.to_vec()));
+        }
+    }
+}
+
+#[test]
 fn errors_name_what_where_and_the_limit() {
     let text = |error: SlotError| error.to_string();
     assert_eq!(text(SlotError::Length { length: 0, limit: 2016 }), "payload of 0 bytes, must be 1 to 2016");

@@ -38,6 +38,8 @@ pub struct Flash {
     noise: u64,
     /// Operations until the power goes; none: it stays.
     left: Option<usize>,
+    /// A double word whose next write takes another value, and reports success.
+    weak: Option<usize>,
     /// Erases and writes so far.
     pub operations: usize,
     pub off: bool,
@@ -46,7 +48,7 @@ pub struct Flash {
 impl Flash {
     pub fn new(pages: usize, torn: Torn, seed: u64) -> Self {
         let words = vec![Word::Blank; pages * PAGE_WORDS];
-        Self { words, torn, noise: seed | 1, left: None, operations: 0, off: false }
+        Self { words, torn, noise: seed | 1, left: None, weak: None, operations: 0, off: false }
     }
 
     /// Power goes in the middle of the operation number `operation` (from 1) from now.
@@ -64,6 +66,11 @@ impl Flash {
         if let Word::Written(bytes) = &mut self.words[word] {
             bytes[bit / 8 % DOUBLE_WORD] ^= 1 << (bit % 8);
         }
+    }
+
+    /// The next write of a double word has one bit wrong, without an error of the flash or of its ECC.
+    pub fn weaken(&mut self, word: usize) {
+        self.weak = Some(word);
     }
 
     /// A double word that was written whole reads as an error, or at random, from now on.
@@ -139,6 +146,10 @@ impl SlotFlash for Flash {
             return Err(refused);
         }
         self.words[word] = Word::Written(bytes);
+        if self.weak == Some(word) && bytes != ZERO {
+            self.weak = None;
+            self.rot(word, 0);
+        }
         Ok(())
     }
 
