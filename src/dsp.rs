@@ -179,21 +179,27 @@ pub fn interpolate(table: &[i32; TABLE_LEN], x: i32) -> i32 {
     word.wrapping_add((word as i16 as i32) * fraction)
 }
 
-/// Words in half a table, of an odd function.
-pub const HALF_TABLE_LEN: usize = TABLE_LEN / 2;
+/// Knots of half a table, of an odd function: both ends of 256 steps.
+pub const HALF_TABLE_LEN: usize = TABLE_LEN / 2 + 1;
 
-/// [`interpolate`] in the half of an odd function's table that lies right of zero; the same bits as in the whole one.
+/// [`interpolate`] between the knots (Q15) of an odd function right of zero; the same bits as in a whole table of words. It takes a load and an addition more
+/// than a word that holds its slope, and a quarter of the memory.
 #[inline(always)]
-pub fn interpolate_odd(table: &[i32; HALF_TABLE_LEN], x: i32) -> i32 {
+pub fn interpolate_odd(knots: &[i16; HALF_TABLE_LEN], x: i32) -> i32 {
     let sign = x >> 31;
     // Left of zero the complement: its step and fraction count from the step's right end, which is the mirrored one's left.
     let magnitude = (x ^ sign) as u32;
-    let step = (magnitude >> 20).min(255);
-    let fraction = (magnitude >> 8 & 0xfff) as i32;
-    let word = table[step as usize];
-    let slope = word as i16 as i32;
-    // A word's lower half is its slope, which counts as one step of the fraction, but not on the way back.
-    let value = word.wrapping_add(slope * fraction).wrapping_sub(slope & sign);
+    between_knots(knots, magnitude >> 20, (magnitude >> 8 & 0xfff) as i32, sign)
+}
+
+/// What [`interpolate_odd`] gives at a step (held at the last) and a fraction of it right of zero, with the function's sign: 0, or -1 left of zero.
+#[inline(always)]
+fn between_knots(knots: &[i16; HALF_TABLE_LEN], step: u32, fraction: i32, sign: i32) -> i32 {
+    let step = step.min(HALF_TABLE_LEN as u32 - 2) as usize;
+    let (here, next) = (knots[step] as i32, knots[step + 1] as i32);
+    let slope = (next - here) << 4;
+    // A word of a whole table has its slope in its lower half, which counts as one step of the fraction, but not on the way back.
+    let value = (here << 16).wrapping_add(slope * (fraction + 1 + sign));
     (value ^ sign).wrapping_sub(sign)
 }
 
@@ -209,15 +215,11 @@ pub fn interpolate_product<const SHIFT: u32>(table: &[i32; TABLE_LEN], product: 
 
 /// [`interpolate_odd`] at a product, as [`interpolate_product`] is [`interpolate`].
 #[inline(always)]
-pub fn interpolate_odd_product<const SHIFT: u32>(table: &[i32; HALF_TABLE_LEN], product: i64) -> i32 {
+pub fn interpolate_odd_product<const SHIFT: u32>(knots: &[i16; HALF_TABLE_LEN], product: i64) -> i32 {
     let high = (product >> 32) as i32;
     let sign = high >> 31;
-    let step = ((high ^ sign) as u32 >> (SHIFT - 12)).min(255);
-    let fraction = ((product >> (SHIFT + 8)) as i32 ^ sign) & 0xfff;
-    let word = table[step as usize];
-    let slope = word as i16 as i32;
-    let value = word.wrapping_add(slope * fraction).wrapping_sub(slope & sign);
-    (value ^ sign).wrapping_sub(sign)
+    let step = (high ^ sign) as u32 >> (SHIFT - 12);
+    between_knots(knots, step, ((product >> (SHIFT + 8)) as i32 ^ sign) & 0xfff, sign)
 }
 
 /// Rounds a product sum with 47 fractional bits to Q16.16, half up; saturates.

@@ -5,8 +5,8 @@
 //! interpolation is continuous and follows the knots exactly, therefore it is monotone wherever the knots are; the
 //! certificate relies on that.
 //!
-//! All of them are odd, so half a table is enough: 256 words. Only tanh, which a network looks up 15 times in a step, has all its 512 words:
-//! the sign takes six instructions.
+//! All of them are odd, so the 257 knots of half a table are enough: 514 bytes. Only tanh, which a network looks up 15 times in a step, has a table of 512 words, each
+//! with its slope: sign and slope take nine instructions.
 
 use crate::dsp::{
     HALF_TABLE_LEN, TABLE_LEN, interpolate, interpolate_odd, interpolate_odd_product, interpolate_product, smmul,
@@ -15,10 +15,10 @@ use crate::sine::cos_sin;
 
 /// Words cover [-8, 8): a step of 1/32. Argument of [`tanh`] in Q25.
 pub static TANH: [i32; TABLE_LEN] = table(Shape::Tanh, -256, 1.0 / 32.0);
-/// Words cover [0, 4): a step of 1/64. Argument of [`stribeck`] in Q26.
-static STRIBECK: [i32; HALF_TABLE_LEN] = table(Shape::Stribeck, 0, 1.0 / 64.0);
-/// Words cover [0, 1): a step of 1/256. Holds atan in quarter turns.
-static ATAN: [i32; HALF_TABLE_LEN] = table(Shape::Atan, 0, 1.0 / 256.0);
+/// Knots cover [0, 4]: a step of 1/64. Argument of [`stribeck`] in Q26.
+static STRIBECK: [i16; HALF_TABLE_LEN] = knots(Shape::Stribeck, 1.0 / 64.0);
+/// Knots cover [0, 1]: a step of 1/256. Holds atan in quarter turns.
+static ATAN: [i16; HALF_TABLE_LEN] = knots(Shape::Atan, 1.0 / 256.0);
 
 /// Hyperbolic tangent: argument in Q25 (saturates beyond +-8), result in Q31. Error: 7e-5 maximum, 2.2e-5 RMS.
 #[inline(always)]
@@ -48,8 +48,8 @@ pub fn stribeck_of_product(u: i64) -> i32 {
 /// Slope of the bump's table over step `step` (of 1/64; -256 to 255, held there), Q13: for the certificate.
 pub fn stribeck_slope(step: i64) -> i64 {
     // An odd function's slope is even.
-    let place = if step < 0 { -1 - step } else { step };
-    STRIBECK[place.min(255) as usize & (HALF_TABLE_LEN - 1)] as i16 as i64
+    let place = if step < 0 { -1 - step } else { step }.min(255) as usize & 255;
+    16 * (STRIBECK[place + 1] as i64 - STRIBECK[place] as i64)
 }
 
 /// Arc tangent in quarter turns (1 is pi/2): argument in Q16.16, result in Q31. Error: 2.5e-5 maximum.
@@ -120,6 +120,17 @@ const fn table<const LEN: usize>(shape: Shape, first: i32, step: f64) -> [i32; L
         i += 1;
     }
     words
+}
+
+/// The knots of half a table, from zero on.
+const fn knots(shape: Shape, step: f64) -> [i16; HALF_TABLE_LEN] {
+    let mut knots = [0; HALF_TABLE_LEN];
+    let mut i = 0;
+    while i < HALF_TABLE_LEN {
+        knots[i] = knot(shape, i as i32, step) as i16;
+        i += 1;
+    }
+    knots
 }
 
 const fn knot(shape: Shape, index: i32, step: f64) -> i32 {

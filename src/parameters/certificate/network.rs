@@ -43,20 +43,22 @@ pub(super) fn bounds(parameters: &NetworkParameters, domain: &Domain, depth: u32
     let root = Cell { inputs: Inputs::new(domain).intervals() };
     check_sums(&root, parameters)?;
     let torque = torque_bounds(root, parameters, depth);
-    let tanh_slopes = tanh_slopes(&root, parameters);
+    let (torque_gain, velocity_slope) = slopes_over_signals(&root, parameters, domain);
+    Ok(Bounds { torque, torque_gain, velocity_slope, resolution: resolution(parameters) })
+}
+
+// Functions of their own, so that their stacks are not taken side by side.
+
+/// Slopes over measured torque and velocity.
+#[inline(never)]
+fn slopes_over_signals(root: &Cell, parameters: &NetworkParameters, domain: &Domain) -> (Interval, Interval) {
+    let tanh_slopes = tanh_slopes(root, parameters);
     let slope = |signal: Signal, fraction_bits: u32| {
         let over_input = slopes::over_input(parameters, &tanh_slopes, signal as usize);
         per_signal(over_input, parameters.scale, domain.ranges[signal as usize].half_width(), fraction_bits)
     };
-    Ok(Bounds {
-        torque,
-        torque_gain: slope(Signal::MeasuredTorque, 16),
-        velocity_slope: slope(Signal::Velocity, 8),
-        resolution: resolution(parameters),
-    })
+    (slope(Signal::MeasuredTorque, 16), slope(Signal::Velocity, 8))
 }
-
-// Functions of their own, so that their stacks are not taken side by side.
 
 #[inline(never)]
 fn torque_bounds(root: Cell, parameters: &NetworkParameters, depth: u32) -> Interval {
@@ -64,16 +66,28 @@ fn torque_bounds(root: Cell, parameters: &NetworkParameters, depth: u32) -> Inte
     bisect(
         root,
         depth,
-        &|cell| Layers::of(cell, parameters).output.map(|sum| to_torque(sum as i32, scale) as i64),
+        &|cell| output(cell, parameters).map(|sum| to_torque(sum as i32, scale) as i64),
         &|a, b| a.union(b),
         &|found, new| found.contains(*new),
         &|cell| split(cell, parameters),
     )
 }
 
+/// Of the three hidden layers.
 #[inline(never)]
 fn tanh_slopes(root: &Cell, parameters: &NetworkParameters) -> [[Interval; NEURONS]; 3] {
-    Layers::of(root, parameters).sums.map(|sums| sums.map(slopes::of_tanh))
+    let [second, third] = &parameters.hidden;
+    let mut slopes = [[Interval::ZERO; NEURONS]; 3];
+    let mut sums = first_sums(root, parameters);
+    for (place, next) in slopes.iter_mut().zip([Some(second), Some(third), None]) {
+        *place = sums;
+        place.iter_mut().for_each(|sum| *sum = slopes::of_tanh(*sum));
+        if let Some(neurons) = next {
+            activate(&mut sums);
+            sums = hidden_sums(neurons, &sums);
+        }
+    }
+    slopes
 }
 
 /// Slope over a scaled input (Q20) times the output's scale (Q16.16), divided by the input's half width (Q16.16).
@@ -133,10 +147,10 @@ fn shifted(neuron: &Neuron, raw: Interval) -> Interval {
     raw.map(|sum| sum >> shift.min(31))
 }
 
-/// Activations in Q15 for sums in Q25 that fit 32 bits.
+/// Activations in Q15 in place of sums in Q25 that fit 32 bits.
 #[inline(never)]
-fn activations(sums: [Interval; NEURONS]) -> [Interval; NEURONS] {
-    sums.map(|sum| sum.map(|end| tanh_at(end) >> 16))
+fn activate(sums: &mut [Interval; NEURONS]) {
+    sums.iter_mut().for_each(|sum| *sum = sum.map(|end| tanh_at(end) >> 16));
 }
 
 #[inline(never)]
@@ -146,39 +160,32 @@ fn check_sums(root: &Cell, parameters: &NetworkParameters) -> Result<(), Overflo
         let bound = sum.low.saturating_abs().max(sum.high.saturating_abs());
         if fits.contains(sum) { Ok(sum) } else { Err(Overflow { layer, neuron, bound }) }
     };
-    let sums = first_sums(root, parameters);
-    for (j, sum) in sums.iter().enumerate() {
+    let mut active = first_sums(root, parameters);
+    for (j, sum) in active.iter().enumerate() {
         check(0, j, *sum)?;
     }
-    let mut active = activations(sums);
+    activate(&mut active);
     for (layer, neurons) in parameters.hidden.iter().enumerate() {
         let mut sums = [Interval::ZERO; NEURONS];
         for (j, (neuron, place)) in neurons.iter().zip(&mut sums).enumerate() {
             *place = shifted(neuron, check(layer + 1, j, raw_sum(neuron, &active))?);
         }
-        active = activations(sums);
+        activate(&mut sums);
+        active = sums;
     }
     check(3, 0, raw_sum(&parameters.output, &active)).map(|_| ())
 }
 
-/// What the layers can give in one cell.
-struct Layers {
-    /// Sums of the three hidden layers, Q25.
-    sums: [[Interval; NEURONS]; 3],
-    /// The output's sum, Q25.
-    output: Interval,
-}
-
-impl Layers {
-    #[inline(never)]
-    fn of(cell: &Cell, parameters: &NetworkParameters) -> Self {
-        let [second, third] = &parameters.hidden;
-        let sums_0 = first_sums(cell, parameters);
-        let sums_1 = hidden_sums(second, &activations(sums_0));
-        let sums_2 = hidden_sums(third, &activations(sums_1));
-        let output = shifted(&parameters.output, raw_sum(&parameters.output, &activations(sums_2)));
-        Self { sums: [sums_0, sums_1, sums_2], output }
+/// The output's sum in one cell, Q25. One layer at a time: what all of them give takes a quarter of a kilobyte of stack.
+#[inline(never)]
+fn output(cell: &Cell, parameters: &NetworkParameters) -> Interval {
+    let mut active = first_sums(cell, parameters);
+    activate(&mut active);
+    for neurons in &parameters.hidden {
+        active = hidden_sums(neurons, &active);
+        activate(&mut active);
     }
+    shifted(&parameters.output, raw_sum(&parameters.output, &active))
 }
 
 #[inline(never)]
