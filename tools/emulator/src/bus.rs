@@ -97,6 +97,11 @@ pub trait Bus {
     fn code(&self) -> Vec<Range<u32>>;
     /// Cycles that an access there takes more than the core's own.
     fn wait_states(&self, address: u32) -> u32;
+    /// Bytes of a line of code, a power of two, where each line costs the wait states of its address although the one before it was fetched; none where fetching
+    /// in sequence costs nothing.
+    fn line(&self) -> Option<u32> {
+        None
+    }
     /// When something next happens by itself; `u64::MAX` for never.
     fn next_event(&self) -> u64;
     /// Does what is due up to `now`.

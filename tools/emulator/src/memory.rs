@@ -16,6 +16,8 @@ pub struct Memory {
     pub signals: Signals,
     /// Cycles that every access outside of SRAM takes more.
     pub wait_states: u32,
+    /// Bytes of a line that costs them in sequence too; none where that costs nothing.
+    pub line: Option<u32>,
 }
 
 #[derive(Clone)]
@@ -135,6 +137,10 @@ impl Bus for Memory {
 
     fn wait_states(&self, _: u32) -> u32 {
         self.wait_states
+    }
+
+    fn line(&self) -> Option<u32> {
+        self.line
     }
 
     fn next_event(&self) -> u64 {

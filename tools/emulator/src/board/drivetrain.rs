@@ -4,7 +4,11 @@
 //! values in force on the way down and on the way up. The converters sample just before the top; what is sampled there is the
 //! state at the end of the period, so the period ends a little early then, with the rest of it as the counter will go. While no PWM
 //! runs the plant moves in periods of its own.
+//!
+//! A shunt carries its phase's current while the leg's low side conducts; the amplifiers follow that ([`Drivetrain::phase_current`]).
 
+use super::amplifier::Amplifier;
+use super::encoder::Encoder;
 use crate::chip::time::Instant;
 use crate::chip::wiring::{Gate, Pwm};
 use plant::actuator::{Actuator, ActuatorParameters, DriveSample};
@@ -20,11 +24,16 @@ const SHORTEST: u64 = 1_000_000;
 #[derive(Clone, Debug)]
 pub struct Drivetrain {
     actuator: Actuator,
+    encoder: Encoder,
     /// Up to here the actuator has moved.
     moved: Instant,
     /// What the sensors show of that.
     sample: DriveSample,
     pwm: Option<(Instant, Pwm)>,
+    /// Since when the timer has asked for each low side; none where it asks for the high side.
+    low_since: [Option<Instant>; 3],
+    /// The least part of a phase's current that a sample showed while the bridge switched.
+    least_followed: f64,
     /// Time for which each high side was on since `moved`, ps.
     on: [f64; 3],
     /// The bridge follows its inputs.
@@ -41,11 +50,14 @@ pub struct Drivetrain {
 
 impl Drivetrain {
     /// An actuator at rest, with the bridge off. Delays, steps of duty and resolutions of the plant's own sensors and timer are taken
-    /// away, because chip and board have theirs.
+    /// away, because chip and board have theirs. The encoder's geometry is for the board: what a [`sample`](Self::sample) shows of it is the
+    /// rotor's own angle.
     ///
     /// # Errors
     /// What the plant refuses.
     pub fn new(mut parameters: ActuatorParameters, temperature: f64, seed: u64) -> Result<Self, plant::ParameterError> {
+        parameters.validate()?;
+        let encoder = Encoder::take(&mut parameters);
         parameters.inverter.duty_delay = 0;
         parameters.inverter.duty_steps = 0;
         parameters.sensors.currents.delay = 0;
@@ -58,9 +70,12 @@ impl Drivetrain {
         let sample = actuator.measure();
         Ok(Self {
             actuator,
+            encoder,
             moved: Instant(0),
             sample,
             pwm: None,
+            low_since: [Some(Instant(0)); 3],
+            least_followed: 1.0,
             on: [0.0; 3],
             enabled: false,
             dead_time: None,
@@ -78,6 +93,11 @@ impl Drivetrain {
     /// The actuator, to change.
     pub const fn actuator_mut(&mut self) -> &mut Actuator {
         &mut self.actuator
+    }
+
+    /// Encoder of the actuator as its parameters describe it.
+    pub const fn encoder(&self) -> Encoder {
+        self.encoder
     }
 
     /// Whether the bridge switches: the timer drives the gates of all legs, and they reach the transistors.
@@ -114,7 +134,10 @@ impl Drivetrain {
 
     /// The timer's outputs from now on.
     pub fn pwm(&mut self, at: Instant, pwm: &Pwm) {
-        self.change(at, |drivetrain| drivetrain.pwm = Some((at, *pwm)));
+        self.change(at, |drivetrain| {
+            drivetrain.pwm = Some((at, *pwm));
+            drivetrain.follow_low_sides(at, at);
+        });
         if pwm.running && pwm.count >= pwm.top {
             self.period(at);
         }
@@ -134,6 +157,46 @@ impl Drivetrain {
             _ => self.pass(at),
         }
         &self.sample
+    }
+
+    /// What an amplifier at a phase's low-side shunt shows at an instant, A. Where the bridge does not switch, that is whatever current there is.
+    pub fn phase_current(&mut self, at: Instant, phase: usize, amplifier: &Amplifier) -> f64 {
+        let current = self.sample(at).phase_currents[phase];
+        if !self.is_switching() {
+            return current;
+        }
+        let followed = amplifier.followed(self.conducting(at, phase));
+        self.least_followed = self.least_followed.min(followed);
+        current * followed
+    }
+
+    /// For how long a phase's low side has conducted, s; 0 where it does not, or both switches of the leg are off.
+    pub fn conducting(&self, at: Instant, phase: usize) -> f64 {
+        let Some(since) = self.low_since[phase] else { return 0.0 };
+        let is_high = self.pwm.is_some_and(|(from, pwm)| {
+            let passed = at.0.saturating_sub(from.0) as f64 / ticks(&pwm, 1.0);
+            let count = f64::from(pwm.count);
+            let count = if pwm.up { count + passed } else { count - passed };
+            pwm.running && is_active(&pwm, phase, count)
+        });
+        let low = at.0.saturating_sub(since.0) as f64 * 1e-12;
+        if is_high { 0.0 } else { (low - self.dead_time.unwrap_or(0.0)).max(0.0) }
+    }
+
+    /// The least part of a phase's current that a sample has shown while the bridge switched since the last call, 0 to 1.
+    pub fn take_least_followed(&mut self) -> f64 {
+        std::mem::replace(&mut self.least_followed, 1.0)
+    }
+
+    /// Which low sides the timer asks for at an instant, to which it has counted; where one was asked for since `from`, from when on.
+    fn follow_low_sides(&mut self, from: Instant, until: Instant) {
+        let Some((_, pwm)) = self.pwm else { return };
+        for phase in 0..self.low_since.len() {
+            let low = !is_active(&pwm, phase, f64::from(pwm.count));
+            let beyond = f64::from(pwm.count.abs_diff(pwm.legs[phase].compare));
+            let began = Instant(until.0.saturating_sub(ticks(&pwm, beyond) as u64).max(from.0));
+            self.low_since[phase] = low.then(|| self.low_since[phase].unwrap_or(began));
+        }
     }
 
     /// Switches that are on between the last instant and this one.
@@ -163,6 +226,7 @@ impl Drivetrain {
         }
         let turned = Pwm { count: count.round() as u32, ..pwm };
         self.pwm = Some((until, turned));
+        self.follow_low_sides(since, until);
     }
 
     /// The actuator moves on up to an instant, at which the counter is at its top.
@@ -195,7 +259,94 @@ fn ticks(pwm: &Pwm, counts: f64) -> f64 {
 /// A cycle of the core while PWM runs, ps: both boards' programs run it at 170 MHz.
 pub(super) const CYCLE: f64 = 1e12 / 170e6;
 
+/// Whether a leg's reference is active at a count: the high side is asked for.
+fn is_active(pwm: &Pwm, phase: usize, count: f64) -> bool {
+    let leg = &pwm.legs[phase];
+    (count < f64::from(leg.compare)) == leg.active_below
+}
+
 /// Whether the timer drives the gates of all legs.
 fn is_switching(pwm: &Pwm) -> bool {
     pwm.legs.iter().all(|leg| matches!(leg.high, Gate::Switching { .. }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chip::wiring::{Leg, TimerName};
+    use plant::ActuatorParameters;
+
+    const TOP: u32 = 2_125;
+    const DEAD_TIME: f64 = 200e-9;
+
+    /// Three periods of a counter to 2,125 at 170 MHz with these compare values; the drivetrain at the last top.
+    fn at_the_top(compares: [u32; 3]) -> (Drivetrain, Instant) {
+        let mut drivetrain = Drivetrain::new(ActuatorParameters::reference().aligned(), 25.0, 1).unwrap();
+        drivetrain.enable(Instant(0), true);
+        drivetrain.set_dead_time(DEAD_TIME);
+        let legs = compares.map(|compare| Leg {
+            compare,
+            active_below: true,
+            high: Gate::Switching { inverted: false },
+            low: Gate::Released,
+        });
+        let timer = TimerName::Tim2;
+        let mut at = 0.0;
+        for turn in 0..6 {
+            let up = turn % 2 == 0;
+            let count = if up { 0 } else { TOP };
+            let pwm = Pwm { timer, running: true, count, up, top: TOP, tick: 1, dead_time: 0, legs };
+            drivetrain.pwm(Instant(at as u64), &pwm);
+            at += f64::from(TOP) * CYCLE;
+        }
+        (drivetrain, Instant((at - f64::from(TOP) * CYCLE) as u64))
+    }
+
+    #[test]
+    fn a_low_side_conducts_from_its_dead_time_after_the_compare_value_up_to_the_compare_value() {
+        let (drivetrain, top) = at_the_top([0, 1_000, 1_870]);
+        let counts = |counts: f64| counts * CYCLE * 1e-12;
+        let conducting = |after: f64, phase| drivetrain.conducting(Instant(top.0 + (after * CYCLE) as u64), phase);
+        assert!(conducting(0.0, 0) > counts(4_000.0), "duty 0: for ever");
+        assert!((conducting(0.0, 1) - (counts(1_125.0) - DEAD_TIME)).abs() < 1e-11);
+        assert!((conducting(60.0, 2) - (counts(255.0 + 60.0) - DEAD_TIME)).abs() < 1e-11);
+        assert!(conducting(254.0, 2) > 0.0 && conducting(256.0, 2) == 0.0);
+    }
+
+    /// The currents are held 13 cycles and 12.5 clocks of four cycles after the trigger, a count before the top.
+    #[test]
+    fn at_the_duties_that_were_permitted_once_the_amplifiers_had_not_settled_and_at_those_of_now_they_have() {
+        let [_, _, moteus, _] = super::super::moteus_r4::STEP_RESPONSE;
+        let esc1 = super::super::b_g431b_esc1::STEP_RESPONSE;
+        for (amplifier, rate, dead_time, then, now) in [
+            (moteus, 40e3, 200e-9, 0.9, 0.8635),
+            (moteus, 40e3, 50e-9, 0.9, 0.8755),
+            (esc1, 20e3, 800e-9, 0.95, 0.8958),
+        ] {
+            let followed = |duty: f64| {
+                let held = (1.0 - duty) / 2.0 / rate + (13.0 + 50.0 - 1.0) / 170e6;
+                amplifier.followed(held - dead_time)
+            };
+            assert!(followed(now) > 0.99, "{} at {now}", followed(now));
+            // With the shorter dead time the old limit just did.
+            assert!(followed(then) < if dead_time < 100e-9 { 0.995 } else { 0.99 }, "{} at {then}", followed(then));
+        }
+    }
+
+    #[test]
+    fn a_leg_that_has_just_switched_shows_too_little_and_a_bridge_that_is_off_everything() {
+        let amplifier = Amplifier::settling(500e-9, 1_000e-9);
+        let (mut drivetrain, top) = at_the_top([0, 1_000, 1_870]);
+        let held = Instant(top.0 + (60.0 * CYCLE) as u64);
+        let sampled = drivetrain.sample(held).phase_currents;
+        assert_eq!(drivetrain.phase_current(held, 0, &amplifier), sampled[0]);
+        assert_eq!(drivetrain.take_least_followed(), 1.0);
+        let expected = amplifier.followed((255.0 + 60.0) * CYCLE * 1e-12 - DEAD_TIME);
+        let shown = drivetrain.phase_current(held, 2, &amplifier);
+        assert!((shown / sampled[2] - expected).abs() < 1e-4 && (0.9..0.999).contains(&expected), "{expected}");
+        assert!((drivetrain.take_least_followed() - expected).abs() < 1e-4);
+        drivetrain.enable(held, false);
+        assert_eq!(drivetrain.phase_current(held, 2, &amplifier), sampled[2]);
+        assert_eq!(drivetrain.take_least_followed(), 1.0);
+    }
 }

@@ -5,6 +5,11 @@ pub fn divided(volts: f64, upper: f64, lower: f64) -> f64 {
     volts * lower / (upper + lower)
 }
 
+/// Resistance of two resistors side by side, Ohm.
+pub fn parallel(one: f64, other: f64) -> f64 {
+    1.0 / (1.0 / one + 1.0 / other)
+}
+
 /// Voltage of a node that resistors pull to several voltages (Millman's theorem); (V, Ohm) each.
 pub fn node(branches: &[(f64, f64)]) -> f64 {
     let conductance: f64 = branches.iter().map(|(_, resistance)| 1.0 / resistance).sum();
@@ -29,6 +34,11 @@ impl Ntc {
         self.nominal * (self.beta * (1.0 / (temperature + 273.15) - 1.0 / 298.15)).exp()
     }
 
+    /// Resistance of the node between it and a resistor to ground, Ohm.
+    pub fn source(&self, temperature: f64, lower: f64) -> f64 {
+        parallel(self.resistance(temperature), lower)
+    }
+
     /// Voltage behind it, with a resistor from there to ground.
     pub fn voltage(&self, temperature: f64, supply: f64, lower: f64) -> f64 {
         supply * lower / (self.resistance(temperature) + lower)
@@ -41,8 +51,7 @@ mod tests {
 
     #[test]
     fn a_node_without_a_shunt_s_voltage_is_the_divider_of_its_resistors() {
-        let parallel = 1.0 / (1.0 / 1_500.0 + 1.0 / 2_200.0);
-        let divider = divided(3.3, 22_000.0, parallel);
+        let divider = divided(3.3, 22_000.0, parallel(1_500.0, 2_200.0));
         assert!((node(&[(3.3, 22_000.0), (0.0, 1_500.0), (0.0, 2_200.0)]) - divider).abs() < 1e-12);
     }
 

@@ -2,14 +2,17 @@
 //!
 //! Each board's parts are those of its schematics, not the firmware's constants: where both agree, a run says something.
 
+pub mod amplifier;
 pub mod b_g431b_esc1;
 pub mod drivetrain;
 pub mod electrics;
+pub mod encoder;
 pub mod moteus_r4;
 pub mod witnessed;
 
 pub use b_g431b_esc1::BG431BEsc1;
 pub use drivetrain::Drivetrain;
+pub use encoder::Encoder;
 pub use moteus_r4::MoteusR4;
 pub use witnessed::Witnessed;
 
@@ -18,6 +21,7 @@ use crate::chip::variant::Variant;
 use crate::chip::wiring::Wiring;
 use crate::chip::{Chip, Deviation};
 use crate::cpu::Cpu;
+use plant::ParameterError;
 
 /// What a person or a broken part does to a board.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -29,7 +33,7 @@ pub struct Inputs {
     /// The bridge's thermistor is not connected any more.
     pub thermistor_open: bool,
     /// The level that the data line of an encoder with a serial interface stays at, whatever the encoder says. Of one that is silent it is
-    /// high: the line is pulled up.
+    /// high: the line is pulled up. The lines of an incremental encoder stay as they are.
     pub encoder_line: Option<bool>,
 }
 
@@ -40,12 +44,25 @@ pub trait Wired: Wiring {
     /// As the firmware's feature for it is called.
     const NAME: &'static str;
 
+    /// Whether it has a button.
+    const BUTTON: bool;
+    /// Whether it has a gate driver with a fault line.
+    const FAULT_LINE: bool;
+
     /// What the program does against the manual, knowingly.
     const DEVIATIONS: &'static [Deviation];
 
     /// A core for its chip. A board says this itself, so that a core's thousand operations are compiled with the board, once, and not again in every
     /// program that runs it.
     fn core(chip: Chip<Self>) -> Cpu<Chip<Self>>
+    where
+        Self: Sized;
+
+    /// The board with another encoder on the motor's shaft than the actuator's with the board's usual counts.
+    ///
+    /// # Errors
+    /// An encoder that is outside its ranges, or that the board cannot have.
+    fn with_encoder(self, encoder: Encoder) -> Result<Self, ParameterError>
     where
         Self: Sized;
 

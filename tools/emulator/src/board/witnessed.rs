@@ -3,7 +3,7 @@
 //!
 //! Host only.
 
-use super::{Drivetrain, Inputs, Wired};
+use super::{Drivetrain, Encoder, Inputs, Wired};
 use crate::chip::fdcan::line::{CanLine, Line};
 use crate::chip::time::Instant;
 use crate::chip::variant::Variant;
@@ -11,6 +11,7 @@ use crate::chip::wiring::{Pin, Pwm, Quadrature, SpiFrame, TimerName, Wiring};
 use crate::chip::{Chip, Deviation};
 use crate::cpu::Cpu;
 use crate::emulation::Emulation;
+use plant::ParameterError;
 use std::hash::{Hash, Hasher};
 
 /// A board, and the number of what passed between it and the chip.
@@ -88,10 +89,16 @@ impl<W: Wired> Emulation<Witnessed<W>> {
 impl<W: Wired> Wired for Witnessed<W> {
     const VARIANT: &'static Variant = W::VARIANT;
     const NAME: &'static str = W::NAME;
+    const BUTTON: bool = W::BUTTON;
+    const FAULT_LINE: bool = W::FAULT_LINE;
     const DEVIATIONS: &'static [Deviation] = W::DEVIATIONS;
 
     fn core(chip: Chip<Self>) -> Cpu<Chip<Self>> {
         Cpu::new(chip)
+    }
+
+    fn with_encoder(self, encoder: Encoder) -> Result<Self, ParameterError> {
+        Ok(Self { board: self.board.with_encoder(encoder)?, ..self })
     }
 
     fn drivetrain(&mut self) -> &mut Drivetrain {
@@ -116,6 +123,10 @@ impl<W: Wiring> Wiring for Witnessed<W> {
         let volts = self.board.volts(at, pin);
         (at, pin, volts.to_bits()).hash(&mut self.passed);
         volts
+    }
+
+    fn source_resistance(&mut self, at: Instant, pin: Pin) -> f64 {
+        self.board.source_resistance(at, pin)
     }
 
     fn reference(&self) -> f64 {

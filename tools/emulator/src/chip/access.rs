@@ -4,7 +4,7 @@ use super::map::{self, Device, Place};
 use super::rcc;
 use super::variant::ClockGate;
 use super::wiring::Wiring;
-use super::{Chip, Deviation, gpio, iwdg, variant};
+use super::{Chip, Deviation, FLASH_WIDTH, Waiting, gpio, iwdg, variant};
 use crate::bus::{Bus, Refusal, Signals, Width};
 use std::ops::Range;
 
@@ -72,9 +72,13 @@ impl<W: Wiring> Bus for Chip<W> {
     #[inline]
     fn wait_states(&self, address: u32) -> u32 {
         match self.flash_offset(address) {
-            Some(_) => self.flash.latency(),
-            None => 0,
+            Some(_) if self.waiting != Waiting::Never => self.flash.latency(),
+            _ => 0,
         }
+    }
+
+    fn line(&self) -> Option<u32> {
+        (self.waiting == Waiting::Always).then_some(FLASH_WIDTH)
     }
 
     #[inline(always)]
@@ -263,6 +267,10 @@ impl<W: Wiring> Chip<W> {
             }
             Device::Flash => {
                 self.flash.write(offset, value, at)?;
+                if self.flash.take_launch() {
+                    self.reset(now, super::rcc::Cause::OptionBytes);
+                    return Ok(());
+                }
                 self.check_speed()?;
             }
             Device::Crc => self.crc.write(offset, width, value)?,

@@ -5,8 +5,9 @@
 //!
 //! Times: the regulator needs 20 µs, a calibration 116 clocks (DS12288, "ADC characteristics"), a conversion the sampling time and 12.5 clocks
 //! (21.4.16). From the trigger to the beginning of the sampling pass 3, 3.25 or 3.125 clocks at a clock divided by 1, 2 or 4 (DS12288, trigger
-//! conversion latency of injected channels; from memory, unconfirmed), here rounded up to a cycle of the core. The converters are ideal but
-//! for their 12 bits; the input's resistance does not matter.
+//! conversion latency of injected channels; from memory, unconfirmed), here rounded up to a cycle of the core. While it samples, a converter's capacitor of
+//! 5 pF charges from what it held before through a switch of 1 kOhm and the source's resistance (DS12288, "ADC characteristics", from memory); otherwise
+//! the converters are ideal but for their 12 bits.
 
 use super::register::{Block, Register, register};
 use super::time::{Instant, Moment};
@@ -64,6 +65,19 @@ const AFTER_CALIBRATION_CLOCKS: u64 = 4;
 /// Twice the sampling times, in clocks (21.6.5).
 const TWICE_SAMPLING: [u64; 8] = [5, 13, 25, 49, 95, 185, 495, 1281];
 
+/// Sampling capacitor, F, and its switch, Ohm.
+const CAPACITOR: f64 = 5e-12;
+const SWITCH: f64 = 1e3;
+
+/// What a converter samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Source {
+    /// Its voltage without load, V.
+    pub volts: f64,
+    /// Its resistance, Ohm.
+    pub resistance: f64,
+}
+
 /// Triggers of injected sequences that are modelled: number in JEXTSEL, the same for all converters (tables 166 and 167).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Trigger {
@@ -89,6 +103,8 @@ struct Conversion {
     rank: u32,
     /// When its sample is held; none once it is.
     sample: Option<u64>,
+    /// For how long it is sampled, in cycles of the core.
+    sampling: u64,
     end: u64,
     code: u32,
 }
@@ -103,13 +119,15 @@ pub struct Converter {
     /// When ADRDY is set; none where it will not be.
     ready: Option<u64>,
     conversion: Option<Conversion>,
+    /// Voltage of the sampling capacitor.
+    held: f64,
 }
 
 impl Converter {
     /// As after reset.
     pub fn new(description: &'static ConverterDescription) -> Self {
         let block = Block::new(description.text, "21.6", REGISTERS);
-        Self { description, block, regulator: Instant::NEVER, calibrated: 0, ready: None, conversion: None }
+        Self { description, block, regulator: Instant::NEVER, calibrated: 0, ready: None, conversion: None, held: 0.0 }
     }
 
     /// Back to reset.
@@ -149,11 +167,13 @@ impl Converter {
         Some(Due::End)
     }
 
-    /// The value of the sample, of 4096 for the reference.
-    pub fn hold(&mut self, volts: f64, reference: f64) {
+    /// The value of the sample, of 4096 for the reference; `frequency` is that of the core, Hz.
+    pub fn hold(&mut self, source: Source, reference: f64, frequency: u64) {
         if let Some(conversion) = &mut self.conversion {
             conversion.sample = None;
-            conversion.code = (volts / reference * 4096.0).clamp(0.0, 4095.0) as u32;
+            let constants = conversion.sampling as f64 / frequency as f64 / ((source.resistance + SWITCH) * CAPACITOR);
+            self.held = source.volts + (self.held - source.volts) * (-constants).exp();
+            conversion.code = (self.held / reference * 4096.0).clamp(0.0, 4095.0) as u32;
         }
     }
 
@@ -176,8 +196,9 @@ impl Converter {
         let channel = self.channel(rank);
         let (register, place) = if channel < 10 { (SMPR1, channel) } else { (SMPR2, channel - 10) };
         let twice = TWICE_SAMPLING[(self.block.get(register) >> (3 * place) & 7) as usize];
-        let sample = start + (twice * divider).div_ceil(2);
-        Conversion { rank, sample: Some(sample), end: start + (twice + 25) / 2 * divider, code: 0 }
+        let sampling = (twice * divider).div_ceil(2);
+        let end = start + (twice + 25) / 2 * divider;
+        Conversion { rank, sample: Some(start + sampling), sampling, end, code: 0 }
     }
 
     /// A trigger's edge: starts an armed sequence, unless one is under way (21.4.19).

@@ -1,6 +1,6 @@
 //! What happens by itself, in the order of time, and what peripherals tell each other.
 
-use super::adc::{Due, Trigger};
+use super::adc::{Due, Source, Trigger};
 use super::gpio::Mode;
 use super::memory::SRAM;
 use super::rcc::Cause;
@@ -101,7 +101,12 @@ impl<W: Wiring> Chip<W> {
         while let Some(due) = self.converters[index].advance(cycle, divider) {
             if let Due::Sample(input) = due {
                 let volts = self.volts(input, cycle);
-                self.converters[index].hold(volts, self.wiring.reference());
+                let resistance = match input {
+                    Input::Pin(pin) => self.wiring.source_resistance(self.clock.instant(cycle), pin),
+                    Input::Amplifier(_) => 0.0,
+                };
+                let (reference, frequency) = (self.wiring.reference(), self.clock.frequency());
+                self.converters[index].hold(Source { volts, resistance }, reference, frequency);
             }
         }
     }

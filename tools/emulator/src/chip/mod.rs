@@ -36,7 +36,7 @@ use adc::{Common, Converter};
 use agenda::Agenda;
 use crc::Crc;
 use fdcan::Fdcan;
-use flash::{Flash, Torn};
+use flash::{Flash, KeptError, Torn};
 use gpio::{Driven, Gpio, PORTS};
 use iwdg::Iwdg;
 use map::Places;
@@ -63,6 +63,21 @@ pub enum Deviation {
     WithoutBoost,
 }
 
+/// Bytes that one access to the flash brings: 64 bits, of the chip with one bank and of that with two (RM0440, 3.3.1 and 5.3.1).
+const FLASH_WIDTH: u32 = 8;
+
+/// Where the flash's wait states (ACR.LATENCY) are counted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Waiting {
+    /// Nowhere: as if all code and data lay in SRAM.
+    Never,
+    /// At the target of each taken branch and for each datum: the caches always miss, and the prefetch keeps up with code in sequence.
+    #[default]
+    Prefetched,
+    /// For each line of code that is begun, in sequence too, and for each datum: caches and prefetch are of no use. Nothing can take longer.
+    Always,
+}
+
 /// A chip, and the board that its pins are connected to.
 #[derive(Clone, Debug)]
 pub struct Chip<W> {
@@ -72,6 +87,7 @@ pub struct Chip<W> {
     powered: bool,
     memory: Memory,
     flash: Flash,
+    waiting: Waiting,
     rcc: Rcc,
     pwr: Pwr,
     syscfg: Syscfg,
@@ -110,6 +126,7 @@ impl<W: Wiring> Chip<W> {
             powered: true,
             memory: Memory::new(variant),
             flash: Flash::new(variant),
+            waiting: Waiting::default(),
             rcc: Rcc::new(),
             pwr: Pwr::new(),
             syscfg: Syscfg::new(variant.identity),
@@ -168,6 +185,11 @@ impl<W: Wiring> Chip<W> {
         &self.flash
     }
 
+    /// Chooses what the core waits for where it wants something from flash.
+    pub const fn set_waiting(&mut self, waiting: Waiting) {
+        self.waiting = waiting;
+    }
+
     /// Chooses, by a seed, what is left to chance when the power goes.
     pub fn seed(&mut self, seed: u64) {
         self.flash.array.seed(seed);
@@ -181,6 +203,27 @@ impl<W: Wiring> Chip<W> {
     /// Writes flash as a programmer would, before the run. False where it does not fit.
     pub fn program(&mut self, address: u32, bytes: &[u8]) -> bool {
         address.checked_sub(access::FLASH).is_some_and(|offset| self.flash.array.flash(offset, bytes))
+    }
+
+    /// Pages of the flash in a range of addresses as a loss of power would leave them now, to be kept; none outside of the flash.
+    pub fn kept(&self, addresses: std::ops::Range<u32>) -> Option<Vec<u8>> {
+        Some(self.flash.kept(self.pages(addresses)?))
+    }
+
+    /// Puts pages back that were [kept](Self::kept), before the run.
+    ///
+    /// # Errors
+    /// Bytes that are no such pages.
+    pub fn restore(&mut self, addresses: std::ops::Range<u32>, bytes: &[u8]) -> Result<(), KeptError> {
+        match self.pages(addresses) {
+            Some(offsets) => self.flash.restore(offsets, bytes),
+            None => Err(KeptError::Foreign),
+        }
+    }
+
+    fn pages(&self, addresses: std::ops::Range<u32>) -> Option<std::ops::Range<u32>> {
+        let offset = |address: u32| address.checked_sub(access::FLASH).filter(|offset| *offset <= self.variant.flash);
+        Some(offset(addresses.start)?..offset(addresses.end)?)
     }
 
     /// Lets the program go on with something that the manual forbids.

@@ -83,6 +83,8 @@ pub enum Cause {
     Software,
     /// The independent watchdog.
     IndependentWatchdog,
+    /// The option bytes were loaded.
+    OptionBytes,
 }
 
 impl Cause {
@@ -94,6 +96,7 @@ impl Cause {
             Self::Pin => PIN,
             Self::Software => 1 << 28 | PIN,
             Self::IndependentWatchdog => 1 << 29 | PIN,
+            Self::OptionBytes => 1 << 25 | PIN,
         }
     }
 }

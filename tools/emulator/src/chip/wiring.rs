@@ -133,6 +133,11 @@ pub trait Wiring {
     /// Volts between a pin and ground, as a high-impedance input sees them.
     fn volts(&mut self, at: Instant, pin: Pin) -> f64;
 
+    /// Resistance of what gives a pin its voltage, Ohm. Where nothing is known of a capacitor beside it, there is none.
+    fn source_resistance(&mut self, _at: Instant, _pin: Pin) -> f64 {
+        0.0
+    }
+
     /// Volts of VREF+ and VDDA.
     fn reference(&self) -> f64 {
         3.3

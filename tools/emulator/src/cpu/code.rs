@@ -13,6 +13,8 @@ pub(super) struct Code<B: Bus> {
     pub(super) stretches: Stretches<B>,
     pub(super) translations: Translations,
     regions: Vec<Region>,
+    /// As [`Bus::line`].
+    line: Option<u32>,
     /// The region that the program is in.
     current: Region,
     /// From the first to behind the last address in SRAM at which something was ever decoded: a store there may change it.
@@ -56,6 +58,7 @@ impl<B: Bus> Code<B> {
             translations: Translations::default(),
             current: nowhere,
             regions,
+            line: None,
             changeable: 0..0,
             changeable_length: 0,
         };
@@ -155,8 +158,24 @@ impl<B: Bus> Code<B> {
         self.current = self.region(address).copied().unwrap_or(nowhere);
     }
 
+    /// Whether lines of code cost something in sequence too.
+    #[inline(always)]
+    pub const fn waits_for_lines(&self) -> bool {
+        self.line.is_some()
+    }
+
+    /// Cycles that an instruction in the current region waits for the lines that it lies in, without the one that it begins in where a branch leads there, which
+    /// the branch has waited for. `before` is where the instruction before it ends.
+    pub fn waits_for_lines_of(&self, address: u32, length: u8, before: u32) -> u64 {
+        let Some(line) = self.line else { return 0 };
+        let fetched = if before == address { address.wrapping_sub(1) } else { address };
+        let last = address.wrapping_add(u32::from(length)).wrapping_sub(1);
+        u64::from((last / line).saturating_sub(fetched / line)) * self.current.wait_states
+    }
+
     /// Asks anew what fetches cost.
     pub fn set_wait_states(&mut self, bus: &B) {
+        self.line = bus.line();
         for region in &mut self.regions {
             let wait_states = u64::from(bus.wait_states(region.start));
             if region.wait_states != wait_states {

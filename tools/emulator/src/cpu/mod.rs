@@ -103,6 +103,8 @@ pub struct Cpu<B: Bus> {
     instructions: u64,
     /// Whether the last instruction loaded or stored one register.
     single: bool,
+    /// Where the last instruction ends that waited for its lines of code.
+    fetched: u32,
     /// The cycle at which `attend` has to look, and the one at which the run is to end.
     attention: u64,
     until: u64,

@@ -40,6 +40,7 @@ impl<B: Bus> Cpu<B> {
             slept: 0,
             instructions: 0,
             single: false,
+            fetched: 0,
             attention: 0,
             until: 0,
             end: None,

@@ -20,7 +20,7 @@ impl<B: Bus> Cpu<B> {
             {
                 return end;
             }
-            match self.watch.is_some() {
+            match self.watch.is_some() || self.code.waits_for_lines() {
                 true => self.instruct::<true>(),
                 false => self.flow(),
             }
@@ -68,6 +68,10 @@ impl<B: Bus> Cpu<B> {
             return;
         }
         self.pc = pc.wrapping_add(u32::from(operation.timing.length));
+        if self.code.waits_for_lines() {
+            self.now += self.code.waits_for_lines_of(pc, operation.timing.length, self.fetched);
+            self.fetched = self.pc;
+        }
         self.instructions = self.instructions.wrapping_add(1);
         let cycles = operation.timing.cycles.wrapping_sub(operation.timing.overlaps & u8::from(self.single));
         self.now = self.now.wrapping_add(u64::from(cycles));

@@ -10,6 +10,8 @@
 //! - An instruction that an IT block skips takes 1 cycle; IT itself takes 1, it is never folded into its neighbour.
 //! - Fetching in sequence costs no wait states: the flash's prefetch is taken to keep up. A taken branch costs those of its target once, a
 //!   load costs those of its address each time: the accelerator's caches (RM0440, 3.3.5) are taken to miss always.
+//!   With `chip::Waiting` it is otherwise: without wait states at all, or with those of each line of code also in sequence, which bounds what
+//!   there can be (a load from flash is taken to leave the line that code is fetched from).
 //!   Where code lies in CCM SRAM, which has none, none of this matters.
 //! - SRAM from 0x2000_0000 to 0x3fff_ffff has no wait states and no contention with DMA; devices have those that the bus states.
 //! - A barrier, CPS, MRS and MSR take what TRM 3.3.1 gives as least: nothing outstanding is modelled that they could wait for.

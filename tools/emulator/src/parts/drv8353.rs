@@ -1,14 +1,21 @@
-//! DRV8353S, a gate driver for three half bridges: its registers, its enable and its fault output.
+//! DRV8353S, a gate driver for three half bridges: its registers, its enable, its supply and its fault output.
 //!
 //! Source: TI SLVSDY6, "SPI" and "Register maps": frames of 16 bits, mode 1: bit 15 reads, bits 14 to 11 are the register, bits 10 to 0 the data; the
-//! register's content comes back in the same frame. Values after reset are from memory of that document: unconfirmed; the firmware
-//! writes every register.
+//! register's content comes back in the same frame. From memory of that document, unconfirmed: values after reset (the firmware writes every register), both voltages of
+//! the supply, and that the registers are lost at the lower one.
+//!
+//! Faults are latched: they stay, and keep the outputs off, until they are cleared or the enable was low. One whose cause is still [present](Drv8353::set_present)
+//! comes back at once.
 
 use crate::chip::time::Instant;
 use crate::chip::wiring::SpiFrame;
 
-/// From the enable to the first frame, ns.
+/// From the enable, or the supply, to the first frame, ns.
 pub const WAKE_NS: u64 = 1_000_000;
+/// Supply below which the outputs are off, V (VM under-voltage lock-out).
+pub const LOCK_OUT: f64 = 8.0;
+/// Supply below which everything is lost, V.
+pub const LOST: f64 = 5.0;
 
 const REGISTERS: usize = 8;
 const RESET: [u16; REGISTERS] = [0, 0, 0x000, 0x3ff, 0x7ff, 0x159, 0x283, 0x000];
@@ -23,33 +30,78 @@ const LOCKED: u16 = 0b110 << 8;
 /// Fault status 1: any fault.
 const FAULT: u16 = 1 << 10;
 
+/// Faults to inject, as both status words name them.
+pub mod fault {
+    /// Over-current of the low-side transistor of phase B, by its voltage.
+    pub const OVER_CURRENT: [u16; 2] = [1 << 9 | 1 << 2, 0];
+    /// Supply below the lock-out.
+    pub const UNDER_VOLTAGE: [u16; 2] = [1 << 7, 0];
+    /// The driver is too hot.
+    pub const OVER_TEMPERATURE: [u16; 2] = [1 << 6, 0];
+    /// The gate of the high-side transistor of phase C does not follow.
+    pub const GATE_DRIVE: [u16; 2] = [1 << 8, 1 << 1];
+}
+
 /// The driver.
 #[derive(Clone, Debug)]
 pub struct Drv8353 {
     registers: [u16; REGISTERS],
     selected: bool,
-    /// Since when it is enabled; none while it sleeps.
-    enabled: Option<Instant>,
+    /// Level of its enable.
+    enabled: bool,
+    /// Since when it has both enable and supply; none while it sleeps.
+    awake: Option<Instant>,
+    supplied: bool,
+    /// Causes of faults that are still there.
+    present: [u16; 2],
+    /// Its data line is broken.
+    silent: bool,
+    clears: u32,
 }
 
 impl Drv8353 {
-    /// Asleep.
+    /// Asleep, with a supply.
     pub const fn new() -> Self {
-        Self { registers: RESET, selected: false, enabled: None }
+        Self {
+            registers: RESET,
+            selected: false,
+            enabled: false,
+            awake: None,
+            supplied: true,
+            present: [0; 2],
+            silent: false,
+            clears: 0,
+        }
     }
 
     /// The enable pin. Without it the registers are lost.
     pub fn enable(&mut self, at: Instant, enabled: bool) {
-        match (enabled, self.enabled) {
-            (true, None) => self.enabled = Some(at),
-            (false, _) => *self = Self { selected: self.selected, ..Self::new() },
+        self.enabled = enabled;
+        self.wake(at);
+    }
+
+    /// Its supply, V.
+    pub fn supply(&mut self, at: Instant, volts: f64) {
+        if self.supplied != (volts >= LOST) {
+            self.supplied = volts >= LOST;
+            self.wake(at);
+        }
+        if volts < LOCK_OUT && self.is_awake(at) {
+            self.fail(fault::UNDER_VOLTAGE);
+        }
+    }
+
+    fn wake(&mut self, at: Instant) {
+        match (self.enabled && self.supplied, self.awake) {
+            (true, None) => self.awake = Some(at),
+            (false, Some(_)) => (self.awake, self.registers) = (None, RESET),
             _ => {}
         }
     }
 
     /// Whether it has woken up.
     pub fn is_awake(&self, at: Instant) -> bool {
-        self.enabled.is_some_and(|since| at >= since.after_ns(WAKE_NS))
+        self.awake.is_some_and(|since| at >= since.after_ns(WAKE_NS))
     }
 
     /// The select line, low or not.
@@ -62,6 +114,21 @@ impl Drv8353 {
         self.registers.get(number).copied()
     }
 
+    /// How often faults were cleared by a frame.
+    pub const fn clears(&self) -> u32 {
+        self.clears
+    }
+
+    /// Forgets what was written, as a disturbance may: without a fault.
+    pub fn forget(&mut self) {
+        self.registers = RESET;
+    }
+
+    /// Its data line breaks, or is whole again: nobody drives it then.
+    pub fn set_silent(&mut self, silent: bool) {
+        self.silent = silent;
+    }
+
     /// Whether its outputs follow its inputs: awake, no fault, not told to coast.
     pub fn drives(&self, at: Instant) -> bool {
         self.is_awake(at) && !self.has_fault() && self.registers[2] & COAST == 0
@@ -72,9 +139,18 @@ impl Drv8353 {
         [50e-9, 100e-9, 200e-9, 400e-9][usize::from(self.registers[5] >> 8 & 0b11)]
     }
 
-    /// Something went wrong in the bridge: bits of fault status 1. They stay until they are cleared, and pull nFAULT low.
-    pub fn fail(&mut self, status: u16) {
-        self.registers[0] |= status & DATA | FAULT;
+    /// Something went wrong in the bridge, and is over: bits of both fault status words. They stay until they are cleared, and pull nFAULT low.
+    pub fn fail(&mut self, status: [u16; 2]) {
+        if status != [0; 2] {
+            self.registers[0] |= status[0] & DATA | FAULT;
+            self.registers[1] |= status[1] & DATA;
+        }
+    }
+
+    /// Something is wrong from now on: clearing it has no effect until this is called with zeros.
+    pub fn set_present(&mut self, status: [u16; 2]) {
+        self.present = status;
+        self.fail(status);
     }
 
     /// Whether nFAULT is pulled low.
@@ -82,11 +158,12 @@ impl Drv8353 {
         self.registers[0] & FAULT != 0
     }
 
-    /// A frame that ended. None where it is asleep or not selected: it leaves the line alone.
+    /// A frame that ended. None where it is asleep, silent or not selected: it leaves the line alone.
     pub fn exchange(&mut self, at: Instant, frame: &SpiFrame) -> Option<u16> {
-        if !self.selected || !self.is_awake(at) {
+        if !self.selected || self.silent || !self.is_awake(at) {
             return None;
         }
+        self.fail(self.present);
         let number = usize::from(frame.sent >> 11 & 0xf);
         // A wrong mode or size is no command; what is read then is nothing.
         let valid = frame.bits == 16 && frame.mode == 1;
@@ -107,7 +184,9 @@ impl Drv8353 {
                 let writable = if locked { 0b111 } else { DATA };
                 self.registers[2] = self.registers[2] & !writable | data & writable & !CLEAR;
                 if data & CLEAR != 0 {
+                    self.clears += 1;
                     (self.registers[0], self.registers[1]) = (0, 0);
+                    self.fail(self.present);
                 }
             }
             3 => {
@@ -182,12 +261,56 @@ mod tests {
     fn a_fault_switches_off_until_it_is_cleared() {
         let mut driver = awake();
         assert!(driver.drives(LATER));
-        driver.fail(1 << 9);
+        driver.fail([1 << 9, 0]);
         assert!(driver.has_fault() && !driver.drives(LATER));
         assert_eq!(driver.exchange(LATER, &frame(1 << 15)), Some(1 << 10 | 1 << 9));
         driver.exchange(LATER, &frame(2 << 11 | 1));
         assert!(!driver.has_fault() && driver.drives(LATER));
         assert_eq!(driver.register(2), Some(0), "the request clears itself");
+    }
+
+    #[test]
+    fn a_fault_that_is_still_there_comes_back_and_one_of_the_past_does_not() {
+        let mut driver = awake();
+        driver.set_present(fault::OVER_TEMPERATURE);
+        driver.exchange(LATER, &frame(2 << 11 | 1));
+        assert_eq!(driver.exchange(LATER, &frame(1 << 15)), Some(1 << 10 | 1 << 6));
+        driver.set_present([0; 2]);
+        assert!(driver.has_fault(), "latched");
+        driver.exchange(LATER, &frame(2 << 11 | 1));
+        assert!(!driver.has_fault());
+        assert_eq!(driver.clears(), 2);
+        driver.fail(fault::GATE_DRIVE);
+        assert_eq!(driver.exchange(LATER, &frame(1 << 15 | 1 << 11)), Some(1 << 1), "the second word");
+        driver.enable(LATER, false);
+        driver.enable(LATER, true);
+        assert!(!driver.has_fault(), "the enable clears, too");
+    }
+
+    #[test]
+    fn a_supply_that_sags_locks_out_and_one_that_is_lost_takes_the_registers_with_it() {
+        let mut driver = awake();
+        driver.exchange(LATER, &frame(6 << 11 | 5));
+        driver.supply(LATER, LOCK_OUT);
+        assert!(!driver.has_fault());
+        driver.supply(LATER, LOCK_OUT - 0.01);
+        assert_eq!(driver.exchange(LATER, &frame(1 << 15)), Some(1 << 10 | 1 << 7));
+        assert_eq!(driver.register(6), Some(5));
+        driver.supply(LATER, LOST - 0.01);
+        assert!(!driver.is_awake(LATER) && !driver.has_fault());
+        driver.supply(LATER, 18.0);
+        assert!(!driver.is_awake(LATER));
+        assert!(driver.is_awake(LATER.after_ns(WAKE_NS)));
+        assert_eq!(driver.register(6), Some(0x283));
+    }
+
+    #[test]
+    fn a_silent_one_leaves_the_line_alone_and_takes_nothing() {
+        let mut driver = awake();
+        driver.set_silent(true);
+        assert_eq!(driver.exchange(LATER, &frame(6 << 11 | 5)), None);
+        driver.set_silent(false);
+        assert_eq!(driver.exchange(LATER, &frame(1 << 15 | 6 << 11)), Some(0x283));
     }
 
     #[test]

@@ -39,8 +39,8 @@ pub type Read = (u32, Option<u32>);
 /// Double words before an operation: value, whether written, how torn.
 #[derive(Clone, Debug)]
 pub struct Part {
-    first: u32,
-    cells: Vec<(u64, bool, Option<Torn>)>,
+    pub(super) first: u32,
+    pub(super) cells: Vec<(u64, bool, Option<Torn>)>,
 }
 
 impl Part {
@@ -198,16 +198,25 @@ impl Array {
             match if page { self.random() % 3 } else { 1 } {
                 0 => self.erase_word(word),
                 1 => self.tear_word(word, kind),
-                _ => {
-                    self.set_word(word, value);
-                    self.written[word as usize] = written;
-                    match torn {
-                        Some(kind) => self.torn.insert(word, kind),
-                        None => self.torn.remove(&word),
-                    };
-                }
+                _ => self.put_word(word, value, written, torn),
             }
         }
+    }
+
+    /// Makes double words what they were.
+    pub fn put(&mut self, part: Part) {
+        for (word, (value, written, torn)) in (part.first..).zip(part.cells) {
+            self.put_word(word, value, written, torn);
+        }
+    }
+
+    fn put_word(&mut self, word: u32, value: u64, written: bool, torn: Option<Torn>) {
+        self.set_word(word, value);
+        self.written[word as usize] = written;
+        match torn {
+            Some(kind) => self.torn.insert(word, kind),
+            None => self.torn.remove(&word),
+        };
     }
 
     fn tear_word(&mut self, word: u32, kind: Torn) {

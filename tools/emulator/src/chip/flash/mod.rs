@@ -1,7 +1,7 @@
 //! FLASH, the interface of the embedded flash: RM0440, chapter 3 (category 3, STM32G474) and chapter 5 (category 2, STM32G431).
 //!
-//! Keys, standard programming, page erase, error flags, error correction with its interrupt. Not modelled: fast programming, mass erase,
-//! option bytes but for OPTR, write and read protection, power-down.
+//! Keys, standard programming, page erase, error flags, error correction with its interrupt, the user options of OPTR. Not modelled: fast programming, mass
+//! erase, other option bytes, write and read protection, power-down; nor what the options do, but for the number of banks as delivered.
 //!
 //! Assumptions:
 //! - Programming and erasing take the datasheet's typical times (DS12288, "Flash memory characteristics").
@@ -10,9 +10,11 @@
 //! - An address in ECCR counts bytes from the bank's start (3.7.7; unconfirmed).
 
 mod array;
+mod kept;
 
 use array::Part;
 pub use array::{Array, DOUBLE_WORD, PAGE, Torn};
+pub use kept::KeptError;
 
 use super::register::{Block, Register, register};
 use super::time::{Instant, Moment};
@@ -27,12 +29,14 @@ pub const ERASE_NS: u64 = 22_020_000;
 
 const ACR: u32 = 0x00;
 const KEYR: u32 = 0x08;
+const OPTKEYR: u32 = 0x0c;
 const SR: u32 = 0x10;
 const CR: u32 = 0x14;
 const ECCR: u32 = 0x18;
 const OPTR: u32 = 0x20;
 
 const KEYS: [u32; 2] = [0x4567_0123, 0xcdef_89ab];
+const OPTION_KEYS: [u32; 2] = [0x0819_2a3b, 0x4c5d_6e7f];
 
 const EOP: u32 = 1 << 0;
 const OPERR: u32 = 1 << 1;
@@ -48,6 +52,11 @@ const PG: u32 = 1 << 0;
 const PER: u32 = 1 << 1;
 const BKER: u32 = 1 << 11;
 const STRT: u32 = 1 << 16;
+const OPTSTRT: u32 = 1 << 17;
+const OBL_LAUNCH: u32 = 1 << 27;
+const OPTLOCK: u32 = 1 << 30;
+/// Read protection and the number of banks: changing them erases flash, which is not modelled.
+const OPTIONS_KEPT: u32 = 0xff | 1 << 22;
 const EOPIE: u32 = 1 << 24;
 const ERRIE: u32 = 1 << 25;
 const LOCK: u32 = 1 << 31;
@@ -57,14 +66,14 @@ const ECCD: u32 = 1 << 31;
 /// ECCC2, ECCD2, ECCC and ECCD: cleared by a one.
 const ECC_FLAGS: u32 = 0xf000_0000;
 
-/// ACR: RUN_PD, SLEEP_PD. CR: MER1, MER2, OPTSTRT, FSTPG, OBL_LAUNCH, securable areas. ECCR: ECCIE, as nothing is ever corrected.
+/// ACR: RUN_PD, SLEEP_PD. CR: MER1, MER2, FSTPG, securable areas. ECCR: ECCIE, as nothing is ever corrected.
 const REGISTERS: &[Register] = &[
     register(ACR, "ACR", 0x0004_0600, 0x0004_1f0f, 0x0000_6000),
     register(0x04, "PDKEYR", 0, 0, u32::MAX),
     register(KEYR, "KEYR", 0, 0, 0),
-    register(0x0c, "OPTKEYR", 0, 0, u32::MAX),
+    register(OPTKEYR, "OPTKEYR", 0, 0, 0),
     register(SR, "SR", 0, 0, 0),
-    register(CR, "CR", 0xc000_0000, 0x0700_0bfb, 0x380e_8004),
+    register(CR, "CR", 0xc000_0000, 0x0700_0bfb, 0x300c_8004),
     register(ECCR, "ECCR", 0, 0, 0x0100_0000),
     register(OPTR, "OPTR", 0, 0, 0),
 ];
@@ -84,8 +93,8 @@ struct Busy {
     until: Instant,
     /// Offsets that cannot be read meanwhile.
     bank: Range<u32>,
-    /// What it changes, as it was.
-    before: Part,
+    /// What it changes, as it was; none where that is the options.
+    before: Option<Part>,
 }
 
 /// A loss of power to come.
@@ -104,6 +113,12 @@ pub struct Flash {
     size: u32,
     bank: u32,
     keys: Keys,
+    option_keys: Keys,
+    /// OPTR in its cells, and as the chip has loaded it.
+    options: u32,
+    loaded: u32,
+    /// The options are to be loaded, which resets the chip.
+    launched: bool,
     /// First word of a double word that waits for the second.
     first: Option<(u32, u32)>,
     busy: Option<Busy>,
@@ -126,6 +141,10 @@ impl Flash {
             size: variant.flash,
             bank: if variant.two_banks { variant.flash / 2 } else { variant.flash },
             keys: Keys::None,
+            option_keys: Keys::None,
+            options: variant.options,
+            loaded: variant.options,
+            launched: false,
             first: None,
             busy: None,
             operations: 0,
@@ -138,10 +157,9 @@ impl Flash {
     /// Back to reset. What an operation under way leaves is undefined (3.3.6): here a double error wherever it had begun to work.
     pub fn reset(&mut self) {
         self.stop(Torn::Error);
-        let options = self.block.get(OPTR);
         self.block.reset();
-        self.block.set(OPTR, options);
-        (self.keys, self.first, self.busy) = (Keys::None, None, None);
+        self.block.set(OPTR, self.loaded);
+        (self.keys, self.option_keys, self.first, self.busy) = (Keys::None, Keys::None, None, None);
     }
 
     /// The power goes: an operation under way leaves what was asked for by [`cut_at`](Self::cut_at), or a double error.
@@ -150,14 +168,15 @@ impl Flash {
     }
 
     fn stop(&mut self, kind: Torn) {
-        if let Some(busy) = self.busy.take() {
-            self.rewrite(busy.before.offsets());
-            self.array.tear(busy.before, kind);
+        if let Some(before) = self.busy.take().and_then(|busy| busy.before) {
+            self.rewrite(before.offsets());
+            self.array.tear(before, kind);
         }
     }
 
     /// The power came back.
     pub fn power_up(&mut self) {
+        self.loaded = self.options;
         self.reset();
         (self.cut, self.fails) = (None, None);
     }
@@ -201,6 +220,15 @@ impl Flash {
         self.busy.as_ref().map(|busy| (busy.bank.clone(), busy.until))
     }
 
+    /// Whether the options are to be loaded (OBL_LAUNCH, 3.4.3), once: they are, and the caller resets the chip.
+    pub fn take_launch(&mut self) -> bool {
+        if !std::mem::take(&mut self.launched) {
+            return false;
+        }
+        self.loaded = self.options;
+        true
+    }
+
     /// When something happens by itself.
     pub fn next(&self) -> Instant {
         let end = self.busy.as_ref().map_or(Instant::NEVER, |busy| busy.until);
@@ -214,8 +242,10 @@ impl Flash {
 
     /// Ends what is over.
     pub fn advance(&mut self, at: Instant) {
-        if self.busy.as_ref().is_some_and(|busy| busy.until <= at) {
-            self.busy = None;
+        if let Some(busy) = self.busy.take_if(|busy| busy.until <= at) {
+            if busy.before.is_none() {
+                self.options = self.block.get(OPTR);
+            }
             if self.block.get(CR) & EOPIE != 0 {
                 self.flag(EOP);
             }
@@ -256,6 +286,8 @@ impl Flash {
     pub fn write(&mut self, offset: u32, value: u32, at: Moment) -> Result<(), Refusal> {
         match offset {
             KEYR => return self.unlock(value),
+            OPTKEYR => return self.unlock_options(value),
+            OPTR => return self.write_options(value),
             SR => self.block.set(SR, self.block.get(SR) & !value),
             ECCR => {
                 self.block.write(ECCR, value & !ECC_FLAGS & !0x007f_ffff)?;
@@ -286,13 +318,48 @@ impl Flash {
         if self.keys == Keys::Wrong { Err(Refusal::NoAnswer) } else { Ok(()) }
     }
 
+    /// 3.4.2: the flash is unlocked first; a wrong key as above.
+    fn unlock_options(&mut self, key: u32) -> Result<(), Refusal> {
+        let control = self.block.get(CR);
+        let locked = control & LOCK == 0 && control & OPTLOCK != 0;
+        self.option_keys = match self.option_keys {
+            Keys::None if locked && key == OPTION_KEYS[0] => Keys::First,
+            Keys::First if key == OPTION_KEYS[1] => {
+                self.block.set(CR, control & !OPTLOCK);
+                Keys::None
+            }
+            _ => Keys::Wrong,
+        };
+        if self.option_keys == Keys::Wrong { Err(Refusal::NoAnswer) } else { Ok(()) }
+    }
+
+    /// Locked, what is written is ignored (3.7.8).
+    fn write_options(&mut self, value: u32) -> Result<(), Refusal> {
+        let before = self.block.get(OPTR);
+        if self.block.get(CR) & OPTLOCK == 0 {
+            if (before ^ value) & OPTIONS_KEPT != 0 {
+                return Err(self.block.refuse(OPTR, "another read protection or number of banks"));
+            }
+            self.block.set(OPTR, value);
+        }
+        Ok(())
+    }
+
     fn control(&mut self, value: u32, at: Moment) -> Result<(), Refusal> {
         if self.block.get(CR) & LOCK != 0 {
             return Ok(());
         }
-        let locks = value & (LOCK | 1 << 30);
-        self.block.write(CR, value & !(LOCK | 1 << 30 | STRT))?;
+        let locks = value & (LOCK | OPTLOCK);
+        let open = self.block.get(CR) & OPTLOCK == 0;
+        self.block.write(CR, value & !(LOCK | OPTLOCK | STRT | OPTSTRT | OBL_LAUNCH))?;
         self.block.set(CR, self.block.get(CR) | locks);
+        // Without the options' keys neither has an effect.
+        self.launched |= open && value & OBL_LAUNCH != 0;
+        if open && value & OPTSTRT != 0 {
+            let until = at.instant().after_ns(ERASE_NS);
+            self.busy = Some(Busy { until, bank: 0..self.bank, before: None });
+            return Ok(());
+        }
         if value & STRT != 0 {
             self.start_erase(value, at)?;
         }
@@ -365,7 +432,7 @@ impl Flash {
     fn begin(&mut self, at: Moment, offsets: Range<u32>, nanoseconds: u64) {
         self.operations += 1;
         let start = offsets.start / self.bank * self.bank;
-        let before = self.array.part(offsets.clone());
+        let before = Some(self.array.part(offsets.clone()));
         self.busy = Some(Busy { until: at.instant().after_ns(nanoseconds), bank: start..start + self.bank, before });
         self.rewrite(offsets);
         if let Some(cut) = self.cut.filter(|cut| cut.operation == self.operations) {

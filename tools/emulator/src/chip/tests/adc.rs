@@ -75,6 +75,29 @@ fn a_sequence_starts_with_the_trigger_and_holds_its_samples_at_known_instants() 
 }
 
 #[test]
+fn a_source_of_10_kohm_takes_longer_than_12_5_clocks_to_charge_the_capacitor() {
+    // SMPR of all channels: 12.5 clocks as in `arm`, 47.5 clocks.
+    let coded = |sampling: Option<u32>| {
+        let mut bench = bench();
+        enable(&mut bench, ADC2);
+        bench.board().resistance = 10e3;
+        bench.board().volts.insert(Pin::new('A', 4), 1.65);
+        arm(&mut bench, ADC2, &[17]);
+        if let Some(sampling) = sampling {
+            bench.set(ADC2 + 0x08, ADVREGEN | 1 | 1 << 5);
+            bench.set(ADC2 + 0x18, sampling << 21);
+            bench.set(ADC2 + 0x08, ADVREGEN | 1 | 1 << 3);
+        }
+        trigger(&mut bench);
+        bench.pass(1_900);
+        bench.get(ADC2 + 0x80)
+    };
+    // 12.5 clocks are 5.35 time constants of 55 ns.
+    assert_eq!(coded(None), 2_038);
+    assert_eq!(coded(Some(3)), 2_047);
+}
+
+#[test]
 fn the_end_of_a_sequence_comes_25_clocks_a_conversion_after_the_trigger() {
     let mut bench = bench();
     enable(&mut bench, ADC2);

@@ -2,7 +2,7 @@
 
 use super::super::flash::{ERASE_NS, PROGRAM_NS};
 use super::super::rcc::Cause;
-use super::super::{flash::Torn, variant};
+use super::super::{Waiting, flash::Torn, variant};
 use super::*;
 
 const KEYR: u32 = FLASH + 0x08;
@@ -243,6 +243,77 @@ fn wait_states_are_the_flashs_alone() {
     assert_eq!(bench.chip.wait_states(0x0800_1000), 4);
     assert_eq!(bench.chip.wait_states(0x2000_1000), 0);
     assert_eq!(bench.chip.wait_states(0x1000_1000), 0);
+    assert_eq!(bench.chip.line(), None, "the prefetch keeps up");
+}
+
+#[test]
+fn wait_states_are_counted_where_that_is_chosen() {
+    let mut bench = Bench::fast();
+    bench.chip.set_waiting(Waiting::Always);
+    assert_eq!((bench.chip.wait_states(0x0800_1000), bench.chip.line()), (4, Some(8)));
+    bench.chip.set_waiting(Waiting::Never);
+    assert_eq!((bench.chip.wait_states(0x0800_1000), bench.chip.line()), (0, None));
+}
+
+const OPTKEYR: u32 = FLASH + 0x0c;
+const OPTR: u32 = FLASH + 0x20;
+const OPTSTRT: u32 = 1 << 17;
+const OBL_LAUNCH: u32 = 1 << 27;
+
+fn unlock_options(bench: &mut Bench) {
+    unlock(bench);
+    bench.set(OPTKEYR, 0x0819_2a3b);
+    bench.set(OPTKEYR, 0x4c5d_6e7f);
+}
+
+#[test]
+fn options_are_locked_until_both_pairs_of_keys_came() {
+    let mut bench = Bench::fast();
+    let before = bench.get(OPTR);
+    bench.set(OPTR, before & !(1 << 24));
+    unlock(&mut bench);
+    bench.set(OPTR, before & !(1 << 24));
+    bench.set(CR, OPTSTRT);
+    assert_eq!((bench.get(OPTR), bench.get(SR)), (before, 0), "writes are ignored");
+    assert_eq!(bench.try_write(OPTKEYR, Width::Word, 1), Err(Refusal::NoAnswer));
+    assert_eq!(bench.try_write(OPTKEYR, Width::Word, 0x0819_2a3b), Err(Refusal::NoAnswer), "until the next reset");
+    let mut bench = Bench::fast();
+    assert_eq!(
+        bench.try_write(OPTKEYR, Width::Word, 0x0819_2a3b),
+        Err(Refusal::NoAnswer),
+        "the flash's own come first"
+    );
+}
+
+#[test]
+fn options_that_are_programmed_count_once_they_are_loaded() {
+    let mut bench = Bench::fast();
+    let before = bench.get(OPTR);
+    unlock_options(&mut bench);
+    bench.set(OPTR, before & !(1 << 24));
+    bench.set(CR, OPTSTRT);
+    bench.until(SR, BSY, 0);
+    bench.chip.reset(bench.now, Cause::Software);
+    assert_eq!(bench.get(OPTR), before, "a reset does not load them");
+    unlock_options(&mut bench);
+    bench.set(CR, OBL_LAUNCH);
+    assert!(bench.signals.reset);
+    assert_eq!(bench.get(OPTR), before & !(1 << 24));
+    bench.chip.power_down(bench.now);
+    bench.chip.power_up(bench.now);
+    assert_eq!(bench.get(OPTR), before & !(1 << 24));
+}
+
+#[test]
+fn options_that_were_not_programmed_are_as_before() {
+    let mut bench = Bench::fast();
+    let before = bench.get(OPTR);
+    unlock_options(&mut bench);
+    bench.set(OPTR, before & !(1 << 26));
+    bench.set(CR, OBL_LAUNCH);
+    assert_eq!(bench.get(OPTR), before);
+    unlock_options(&mut bench);
+    assert!(bench.refused(OPTR, before ^ 1).contains("another read protection"));
 }
 
 #[test]

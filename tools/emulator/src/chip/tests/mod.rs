@@ -27,6 +27,7 @@ const FLASH: u32 = 0x4002_2000;
 #[derive(Clone, Debug)]
 struct Board {
     volts: BTreeMap<Pin, f64>,
+    resistance: f64,
     levels: BTreeMap<Pin, bool>,
     quadrature: Quadrature,
     answers: VecDeque<u16>,
@@ -42,6 +43,7 @@ impl Board {
     fn new() -> Self {
         Self {
             volts: BTreeMap::new(),
+            resistance: 0.0,
             levels: BTreeMap::new(),
             quadrature: Quadrature::default(),
             answers: VecDeque::new(),
@@ -66,6 +68,10 @@ impl Wiring for Board {
         self.at(at);
         self.sampled.push((at, pin));
         self.volts.get(&pin).copied().unwrap_or(0.0)
+    }
+
+    fn source_resistance(&mut self, _: Instant, _: Pin) -> f64 {
+        self.resistance
     }
 
     fn level(&mut self, at: Instant, pin: Pin) -> Option<bool> {

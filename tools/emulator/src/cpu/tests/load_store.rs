@@ -145,6 +145,28 @@ fn wait_states_count_for_branches_and_for_loads_from_there() {
 }
 
 #[test]
+fn lines_of_code_cost_wait_states_in_sequence_where_nothing_prefetches() {
+    let cycles = |code: &[u16], line: Option<u32>| {
+        let mut cpu = machine(code);
+        cpu.bus.wait_states = 4;
+        cpu.bus.line = line;
+        cpu.read_signals();
+        complete(&mut cpu);
+        cpu.now()
+    };
+    let extra = |code: &[u16]| cycles(code, Some(8)) - cycles(code, None);
+    // Where the run begins costs nothing: nothing has led there.
+    assert_eq!(super::START % 8, 0);
+    assert_eq!(extra(&[0xbf00; 3]), 0, "a line with what ends the run");
+    assert_eq!(extra(&[0xbf00; 4]), 4, "what ends the run lies in the next line");
+    assert_eq!(extra(&[0xbf00; 11]), 8, "three lines");
+    // nop, nop, nop, movw r0, #0: half of it in the next line.
+    assert_eq!(extra(&[0xbf00, 0xbf00, 0xbf00, 0xf240, 0x0000]), 4);
+    // A branch over three half-words to the second line has waited for it.
+    assert_eq!(extra(&[0xe002, 0xbf00, 0xbf00, 0xbf00, 0xbf00]), 0);
+}
+
+#[test]
 fn code_that_changes_is_decoded_anew() {
     // strh r1, [r0]; b back to the first of two instructions that have run
     let mut cpu = machine(&[0x2001, 0xbf00]);
