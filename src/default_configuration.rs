@@ -6,6 +6,7 @@
 //! `src/board/`.
 
 use crate::compensation::Request;
+use crate::joint::BoardLimits;
 use crate::joint::configuration::{
     BridgeConfiguration, CompensationConfiguration, Configuration, Gains, GearConfiguration, Limits,
     MotorConfiguration, ThermalConfiguration, VelocitySource,
@@ -24,60 +25,118 @@ pub struct BoardConfiguration {
     pub joint: Configuration,
 }
 
+const B_G431B_ESC1_ANALOG: Analog = Analog {
+    // Derived: 3.3 V / 4096 / (3 mOhm * 64/7); F, O. Codes fall with a current into the motor: the sense resistor lies
+    // between the low side and ground, and the low side conducts when the current is sampled. The sign is unconfirmed.
+    amperes_per_code: -0.029_38,
+    // Derived: about 2.06 V. The joint's start finds each phase's own.
+    current_zero: 2_557.0,
+    // Divider of 169 kOhm and 18 kOhm (N, K, R), at a reference of 3.3 V.
+    volts_per_code: 3.3 / 4_095.0 * (169.0 + 18.0) / 18.0,
+};
+
+const MOTEUS_R4_ANALOG: Analog = Analog {
+    // Derived: 3.3 V / 4096 / (0.5 mOhm * 20). The amplifier's output rises with a current into the motor (derived from
+    // the driver's datasheet and the place of the resistors; sign unconfirmed).
+    amperes_per_code: 0.0806,
+    // Half the reference. The joint's start finds each phase's own.
+    current_zero: 2_048.0,
+    // Divider of 100 kOhm and 4.7 kOhm.
+    volts_per_code: 0.017_947,
+};
+
+/// What holds for both boards. No source states how hot their bridges may be: the chip beside it bears a junction of 105 °C (temperature class 6), and
+/// the moteus' own firmware stops at 75 °C unless told otherwise. A joint that nobody commands for longer is not under control.
+const HOT_OR_SILENT: BoardLimits = BoardLimits {
+    supply: 0.0,
+    over_current: 0.0,
+    current: 0.0,
+    bridge_temperature: 100.0,
+    command_deadline: 0.5,
+    current_range: (0.0, 0.0),
+    supply_end: 0.0,
+};
+
 /// ST B-G431B-ESC1. Supply: the board's limit is 25 V. The encoder's counter is read after the currents' conversions: no age.
 pub const B_G431B_ESC1: BoardConfiguration = BoardConfiguration {
-    bridge: BridgeConfiguration {
-        rate: 20_000.0,
-        // The low sides conduct at least 2.5 µs around the top: dead time, settling of the amplifiers, two conversions.
-        duty: (0.0, 0.95),
-        dead_time: 800e-9,
-        dead_time_band: 1.0,
-        has_bridge_sensor: true,
-        has_winding_sensor: false,
-    },
-    analog: Analog {
-        // Derived: 3.3 V / 4096 / (3 mOhm * 64/7); F, O. Codes fall with a current into the motor: the sense resistor lies
-        // between the low side and ground, and the low side conducts when the current is sampled. The sign is unconfirmed.
-        amperes_per_code: -0.029_38,
-        // Derived: about 2.06 V. The joint's calibration finds each phase's own.
-        current_zero: 2_557.0,
-        // Divider of 169 kOhm and 18 kOhm (N, K, R), at a reference of 3.3 V.
-        volts_per_code: 3.3 / 4_095.0 * (169.0 + 18.0) / 18.0,
-    },
-    joint: uncommissioned((8.0, 25.0), 0.0),
+    bridge: settled(
+        B_G431B_ESC1_SETTLING,
+        BridgeConfiguration {
+            rate: 20_000.0,
+            duty: (0.0, 1.0),
+            dead_time: 800e-9,
+            dead_time_band: 1.0,
+            has_bridge_sensor: true,
+            has_winding_sensor: false,
+            counts_an_encoder: true,
+            limits: BoardLimits {
+                // 6S, 25 V (the maker's limit); its converter ends at 34 V.
+                supply: 25.0,
+                // The board's peak; of the converters' range, -45 to 75 A, the nearer end is 11 % above it.
+                over_current: 40.0,
+                current: 38.0,
+                ..HOT_OR_SILENT
+            }
+            .seen_by(&B_G431B_ESC1_ANALOG),
+        },
+    ),
+    analog: B_G431B_ESC1_ANALOG,
+    joint: uncommissioned((8.0, 25.0), 1.0, 0.0),
 };
 
 /// mjbots moteus r4.11. Supply: a bench supply of 12 to 24 V. The encoder's answer is two control periods old. The motor's
 /// thermistor is the user's to fit, so none is expected.
 pub const MOTEUS_R4: BoardConfiguration = BoardConfiguration {
-    bridge: BridgeConfiguration {
-        rate: MOTEUS_R4_RATE,
-        // A period has 4,250 cycles: too few for all of it in each.
-        // The low sides conduct at least 2.5 µs around the top: dead time, settling of the amplifiers, one conversion.
-        duty: (0.0, 0.9),
-        // As the gate driver is configured.
-        dead_time: 200e-9,
-        dead_time_band: 1.0,
-        has_bridge_sensor: true,
-        has_winding_sensor: false,
-    },
-    analog: Analog {
-        // Derived: 3.3 V / 4096 / (0.5 mOhm * 20). The amplifier's output rises with a current into the motor (derived from
-        // the driver's datasheet and the place of the resistors; sign unconfirmed).
-        amperes_per_code: 0.0806,
-        // Half the reference. The joint's calibration finds each phase's own.
-        current_zero: 2_048.0,
-        // Divider of 100 kOhm and 4.7 kOhm.
-        volts_per_code: 0.017_947,
-    },
-    joint: uncommissioned((10.0, 30.0), 2.0 / MOTEUS_R4_RATE),
+    bridge: settled(
+        MOTEUS_R4_SETTLING,
+        BridgeConfiguration {
+            rate: MOTEUS_R4_RATE,
+            duty: (0.0, 1.0),
+            // As the gate driver is configured.
+            dead_time: 50e-9,
+            dead_time_band: 1.0,
+            has_bridge_sensor: true,
+            has_winding_sensor: false,
+            counts_an_encoder: false,
+            limits: BoardLimits {
+                // The vendor's range is 10 to 44 V (specifications in the README of mjbots/moteus); its converter ends at 73 V.
+                supply: 44.0,
+                // The vendor's peak of a phase (there, too); the converters' range is +-165 A.
+                over_current: 100.0,
+                current: 95.0,
+                ..HOT_OR_SILENT
+            }
+            .seen_by(&MOTEUS_R4_ANALOG),
+        },
+    ),
+    analog: MOTEUS_R4_ANALOG,
+    joint: uncommissioned((10.0, 30.0), 4.0, 2.0 / MOTEUS_R4_RATE),
 };
 
 /// Control steps a second, Hz.
 const MOTEUS_R4_RATE: f32 = 40_000.0;
 
-/// A joint that nobody has described, at a lowest and highest supply, V, with an encoder whose samples are so old, s.
-const fn uncommissioned(bus_voltage: (f32, f32), encoder_latency: f32) -> Configuration {
+/// From the edge of a low side until its current can be sampled, s: by the vendor's measurement at gain 20, which is the settling time of the gate driver's
+/// data sheet and 500 ns.
+const MOTEUS_R4_SETTLING: f32 = 1.5e-6;
+
+/// The same on the B-G431B-ESC1, *derived*: the gate driver's 110 ns, and 4.6 time constants (1 %) of an amplifier with a gain-bandwidth product of 7 MHz, the
+/// least of the chip's data sheet, at a gain of 16: 364 ns each. The typical amplifier takes half of that.
+const B_G431B_ESC1_SETTLING: f32 = 1.8e-6;
+
+/// The conversions start so long before the top of the PWM counter, s: a count of the timer.
+const TRIGGER: f32 = 1.0 / 170e6;
+
+/// A bridge with the greatest duty at which a low side's dead time is over and its amplifier has settled (s after that) when the conversions start. From there on
+/// the low side conducts for as long again, which is longer than the currents are sampled: 0.4 µs, on the B-G431B-ESC1, where the second current
+/// follows the first on the same converter, 1 µs.
+const fn settled(settling: f32, bridge: BridgeConfiguration) -> BridgeConfiguration {
+    let greatest = 1.0 - 2.0 * bridge.rate * (bridge.dead_time + settling + TRIGGER);
+    BridgeConfiguration { duty: (bridge.duty.0, greatest), ..bridge }
+}
+
+/// A joint that nobody has described, at a lowest and highest supply, V, that fades braking from two thirds of the way from 24 V on, with an encoder whose samples are so old, s.
+const fn uncommissioned(bus_voltage: (f32, f32), regeneration_band: f32, encoder_latency: f32) -> Configuration {
     Configuration {
         node_id: 255,
         motor: MotorConfiguration {
@@ -86,12 +145,15 @@ const fn uncommissioned(bus_voltage: (f32, f32), encoder_latency: f32) -> Config
             inductance_q: 20e-6,
             torque_constant: 0.02,
             current_limit: 2.0,
+            loss_current: 0.0,
             alignment: EncoderAlignment {
                 pole_pairs: 7,
                 direction: Direction::Forward,
                 electrical_zero: ElectricalAngle(0),
             },
             encoder_latency,
+            // 1,000 lines.
+            encoder_counts: 4_000,
         },
         gear: GearConfiguration { ratio: 1.0, zero: 0.0 },
         limits: Limits {
@@ -99,10 +161,13 @@ const fn uncommissioned(bus_voltage: (f32, f32), encoder_latency: f32) -> Config
             velocity: 10.0,
             position: (-0.5, 0.5),
             position_margin: 0.1,
+            // Stops up to 1e-3 kg m² within the margin: half the torque is for the quick stop's deceleration then.
+            damping: 0.03,
             // A quarter of it is the largest offset that a current sensor may start with: 2.5 A are 85 codes of the one board and 31
             // of the other.
             over_current: 10.0,
             bus_voltage,
+            regeneration_band,
             bridge_temperature: 70.0,
             winding_temperature: 80.0,
             command_deadline: 0.1,
@@ -140,6 +205,7 @@ mod tests {
     use super::*;
     use crate::joint::state_machine::State;
     use crate::joint::{Bridge, Demand, Joint, Measurements, OFFSET_STEPS, Slow};
+    use crate::motor::modulation::compare_value;
     use crate::motor::phases::Phases;
     use crate::motor::thermal::WindingTemperature;
 
@@ -179,10 +245,69 @@ mod tests {
         }
     }
 
+    /// The part of docs/boards.md from its heading on.
+    fn limits() -> String {
+        let [esc1, moteus] = BOARDS.map(|board| board.bridge.limits);
+        let row = |what: &str, unit: &str, value: fn(&BoardLimits) -> String| {
+            format!("| {what}, {unit} | {} | {} |\n", value(&esc1), value(&moteus))
+        };
+        let rows = [
+            row("highest supply", "V", |of| of.supply.to_string()),
+            row("supply at which its converter ends", "V", |of| format!("{:.1}", of.supply_end)),
+            row("highest over-current limit", "A", |of| of.over_current.to_string()),
+            row("phase currents at which a converter ends", "A", |of| {
+                format!("{:.1} and {:.1}", of.current_range.0, of.current_range.1)
+            }),
+            row("largest current limit of a motor", "A", |of| of.current.to_string()),
+            row("highest limit of the bridge's temperature", "°C", |of| of.bridge_temperature.to_string()),
+            row("longest command deadline", "s", |of| of.command_deadline.to_string()),
+        ];
+        format!("{LIMITS}| | `b-g431b-esc1` | `moteus-r4` |\n|---|---|---|\n{}\n", rows.concat())
+    }
+
+    const LIMITS: &str = "## Limits
+
+What a configuration may ask of a board at the most; made from `src/default_configuration.rs`, where the sources stand: a test fails where this
+table says anything else, and `UPDATE_DOCS=1 cargo test -p joint-firmware --lib default_configuration` writes it anew. A configuration beyond it is
+refused by the name of the setting with the board's range, and the control step is held to it in any case. A current or supply at the end of its
+converter's range counts as beyond its limit.
+
+";
+
     #[test]
-    fn the_low_sides_conduct_long_enough_to_sample_the_currents() {
-        for BoardConfiguration { bridge, .. } in BOARDS {
-            assert!((1.0 - bridge.duty.1) / bridge.rate >= 2.499e-6);
+    fn the_documentation_tells_the_boards_limits() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/boards.md");
+        let text = std::fs::read_to_string(path).unwrap();
+        let (before, rest) = text.split_once("## Limits\n").unwrap();
+        let (_, after) = rest.split_once("\n## ").unwrap();
+        let expected = format!("{before}{}## {after}", limits());
+        if std::env::var_os("UPDATE_DOCS").is_some() {
+            std::fs::write(path, &expected).unwrap();
         }
+        let found = std::fs::read_to_string(path).unwrap();
+        assert!(found == expected, "docs/boards.md has other limits; UPDATE_DOCS=1 writes them anew");
+    }
+
+    #[test]
+    fn at_the_greatest_duty_the_amplifiers_have_just_settled_when_the_conversions_start() {
+        for (BoardConfiguration { bridge, .. }, settling, sampled) in
+            [(B_G431B_ESC1, 1.8e-6, 1e-6), (MOTEUS_R4, 1.5e-6, 0.4e-6)]
+        {
+            let timer = 170e6;
+            let top = (timer / (2.0 * f64::from(bridge.rate))) as u16;
+            let greatest = compare_value(1.0, top, bridge.duty.1);
+            let settles =
+                |compare: u16| f64::from(top - 1 - compare) / timer >= f64::from(bridge.dead_time) + settling - 1e-9;
+            assert!(settles(greatest) && !settles(greatest + 2), "{greatest} of {top}");
+            // On the way down it conducts up to the same count.
+            assert!(f64::from(top - greatest) / timer > sampled);
+        }
+    }
+
+    #[test]
+    fn the_greatest_duty_follows_the_dead_time() {
+        let longer = settled(1.5e-6, BridgeConfiguration { dead_time: 200e-9, ..MOTEUS_R4.bridge });
+        assert!((MOTEUS_R4.bridge.duty.1 - 0.8755).abs() < 1e-4 && (longer.duty.1 - 0.8635).abs() < 1e-4);
+        assert!((B_G431B_ESC1.bridge.duty.1 - 0.8958).abs() < 1e-4);
     }
 }

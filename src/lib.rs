@@ -10,6 +10,7 @@ pub mod dsp;
 
 pub mod exchange;
 pub mod friction;
+pub mod hardware;
 pub mod joint;
 pub mod motor;
 pub mod objects;

@@ -4,16 +4,19 @@
 //! `cargo bench -p host-tests --bench budget > docs/budget.md`; needs the board's target.
 
 use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired};
-use emulator::cpu::Watch;
+use emulator::chip::Waiting;
+use emulator::cpu::{ExceptionTimes, Watch};
 use emulator::emulation::Emulation;
 use emulator::program::Program;
+use emulator::variables::Variables;
 use host_tests::bare_core::{Core, Cost};
 use host_tests::bare_metal::{BOARDS, Board, build};
 use host_tests::control_steps::{friction, image_bytes, input, record};
 use host_tests::counted_steps::{PARTS, Step, counted, spread};
 use host_tests::emulated::bench::actuator;
-use host_tests::emulated::motion::{Moving, acting_image};
+use host_tests::emulated::motion::{AMPLITUDE, MOTION, Moving, acting_image};
 use host_tests::emulated::observed::Observed;
+use host_tests::emulated::taken::{CONTROL, taken};
 use host_tests::peer_networks::{Exact, scaled};
 use host_tests::states::within;
 use joint_firmware::friction::state::SIGNALS;
@@ -31,16 +34,12 @@ type Outcome<T> = Result<T, Box<dyn Error>>;
 
 /// Where the programs are built.
 const TEMPORARY: &str = env!("CARGO_TARGET_TMPDIR");
-/// Exception of the control interrupt, ADC1_2: interrupt 18 of both chips.
-const CONTROL: u16 = 16 + 18;
 /// Inputs that each network evaluates; as many as the program `networks` has room for.
 const INPUTS: usize = 200;
 /// Control interrupts of a board's program that are taken apart: more than come between two that do what a task asks for.
 const INTERRUPTS: usize = 1000;
 /// How long the boards' programs run, s.
 const RUN: f64 = 1.2;
-/// How long the joint moves, s.
-const MOTION: f64 = 2.0;
 
 /// A row of the first table: its name, its parts, and the most instructions and cycles that it should take.
 type Row = (&'static str, &'static [&'static str], Option<u64>, Option<u64>);
@@ -49,7 +48,7 @@ type Row = (&'static str, &'static [&'static str], Option<u64>, Option<u64>);
 const FRICTION: &[&str] = &["network's inputs", "network", "physical model", "regimes", "compensation"];
 
 const ROWS: [Row; 8] = [
-    ("network, from its inputs in Q31", &["network"], Some(230), Some(330)),
+    ("network, from its inputs in Q31", &["network"], Some(230), Some(NETWORK)),
     ("the network's inputs, clamped and scaled", &["network's inputs"], None, None),
     ("physical model", &["physical model"], None, None),
     ("compensation: regimes, fade, limits", &["regimes", "compensation"], None, None),
@@ -64,6 +63,8 @@ type Peer<'a> = (&'a str, &'a str, &'a dyn Fn(i32) -> f64);
 
 /// Most cycles of a whole step, interrupt entry included: 30 % of a period of 20 kHz at 170 MHz.
 const WHOLE: u64 = 2500;
+/// Most cycles of the network from its inputs in Q31.
+const NETWORK: u64 = 330;
 
 fn main() -> Outcome<()> {
     println!("# Budget\n");
@@ -115,12 +116,21 @@ fn main() -> Outcome<()> {
         println!("| **both, the longest of each** | | {whole} | {WHOLE} cycles | {said} |");
     }
     println!(
-        "\n## The flashed programs in motion\n\nCycles of the control interrupt with the program's wait states, entry and return included, while the joint moves for {MOTION} s on the emulated board, over \
-         the bus and with\nphysical model and network acting. The target is {WHOLE} at the most. In the B-G431B-ESC1's program with the bus they lie in flash.\n"
+        "\n## The flashed programs in motion\n\nCycles of the control interrupt, entry and return included, while the joint moves for {MOTION} s on the emulated board, over the \
+         bus: a velocity of {AMPLITUDE} rad/s, a sine\nof 1 Hz, with the model of above. Rounds: those of the motion loop in which physical model and network acted. In the \
+         B-G431B-ESC1's program with the bus both lie in flash.\nWait states of the flash: none, as if all of it lay in SRAM; prefetched, those of branches and data, as everywhere \
+         in this file; always, those of each line\nof code and of data as if prefetch and caches were of no use, which nothing can exceed. Targets: {WHOLE} cycles the whole \
+         interrupt, {NETWORK} the network.\n"
     );
-    println!("| program | a period | least | mean | most |\n|---|---|---|---|---|");
-    in_motion("b-g431b-esc1-bus", BG431BEsc1::new, &mut missed)?;
-    in_motion("moteus-r4", MoteusR4::new, &mut missed)?;
+    println!(
+        "| program | rounds | wait states | a period | least | mean | most | |\n|---|---|---|---|---|---|---|---|"
+    );
+    let mut network = Vec::new();
+    in_motion("b-g431b-esc1-bus", BG431BEsc1::new, &mut network, &mut missed)?;
+    in_motion("moteus-r4", MoteusR4::new, &mut network, &mut missed)?;
+    println!("\nOf this the network, from its inputs in Q31 as above, as it is linked:\n");
+    println!("| program | wait states | network | its inputs | |\n|---|---|---|---|---|");
+    network.iter().for_each(|line| println!("{line}"));
     networks(&image, &mut missed)?;
     memories(&boards);
     println!("\n## What is missed\n");
@@ -138,17 +148,34 @@ fn verdict(program: &str, name: &str, most: u64, target: u64, unit: &str, missed
     most <= target
 }
 
-/// The control interrupt of a program with the bus while its joint moves.
-fn in_motion<W: Observed>(name: &str, board: fn(Drivetrain) -> W, missed: &mut Vec<String>) -> Outcome<()> {
-    let program = Program::parse(std::fs::read(build(name, TEMPORARY)?)?)?;
+/// The control interrupt of a program with the bus while its joint moves; rows on the network.
+fn in_motion<W: Observed + Clone>(
+    name: &str,
+    board: fn(Drivetrain) -> W,
+    network: &mut Vec<String>,
+    missed: &mut Vec<String>,
+) -> Outcome<()> {
+    let path = build(name, TEMPORARY)?;
+    let program = Program::parse(std::fs::read(&path)?)?;
+    let variables = Variables::of(&program)?;
     let failed = |failed: Failed| failed.message().unwrap_or("failed").to_owned();
-    let mut moving = Moving::start(board, &actuator(), &program, &acting_image()).map_err(failed)?;
-    moving.bench.emulation.cpu.clear_exception_times();
-    moving.run(MOTION).map_err(failed)?;
-    let times = moving.bench.emulation.cpu.exception_times().get(&CONTROL).ok_or("no control interrupt")?;
-    let (period, mean) = ((170e6 / W::CONFIGURATION.bridge.rate).round(), times.own_cycles / times.count.max(1));
-    println!("| {name} | {period} | {} | {mean} | {} |", times.least, times.most);
-    verdict(name, "control interrupt in motion", times.most, WHOLE, "cycles", missed);
+    let moving = Moving::start(board, &actuator(), &program, &acting_image()).map_err(failed)?;
+    let period = (170e6 / W::CONFIGURATION.bridge.rate).round();
+    for (waiting, wait_states) in
+        [(Waiting::Never, "none"), (Waiting::Prefetched, "prefetched"), (Waiting::Always, "always")]
+    {
+        let taken = taken(moving.clone(), (&path, &program), &variables, waiting, MOTION).map_err(failed)?;
+        taken.check().map_err(failed)?;
+        let ExceptionTimes { count, own_cycles, least, most, .. } = taken.interrupt;
+        let (mean, rounds) = (own_cycles / count.max(1), format!("{} of {}", taken.acting(), taken.rounds));
+        let [net, [_, _, inputs]] = taken.network;
+        let said = |kept: bool| if kept { "kept" } else { "missed" };
+        let name_of = |what: &str| format!("{what}, wait states {wait_states}");
+        let kept = verdict(name, &name_of("control interrupt in motion"), most, WHOLE, "cycles", missed);
+        println!("| {name} | {rounds} | {wait_states} | {period} | {least} | {mean} | {most} | {} |", said(kept));
+        let kept = verdict(name, &name_of("network as linked"), net[2], NETWORK, "cycles", missed);
+        network.push(format!("| {name} | {wait_states} | {} | {inputs} | {} |", net[2], said(kept)));
+    }
     Ok(())
 }
 

@@ -24,7 +24,7 @@ pub const PARTS: [(&str, &[&str]); 17] = [
     ("modulation", &["motor::modulation::"]),
     ("monitors", &["joint::monitor::", "joint::Joint::watch", "joint::Joint::count_stale_steps"]),
     ("state machine", &["joint::state_machine::", "joint::Joint::decide", "joint::Joint::has_stopped"]),
-    ("motion law", &["joint::motion_law::"]),
+    ("motion law", &["joint::motion_law::", "joint::limit_law::"]),
     ("offsets, encoder", &["joint::offsets::", "joint::Joint::without_offsets", "joint::Joint::encoder_sample"]),
     ("history", &["joint::history::", "joint::Joint::note"]),
     ("mean square", &["motor::thermal::"]),
@@ -58,7 +58,7 @@ impl Step {
 }
 
 /// The part that an address belongs to; none for what is called out of line.
-fn part(loader: &addr2line::Loader, address: u32) -> Option<usize> {
+pub fn part(loader: &addr2line::Loader, address: u32) -> Option<usize> {
     let mut frames = loader.find_frames(address.into()).ok()?;
     while let Ok(Some(frame)) = frames.next() {
         let Some(name) = frame.function.as_ref().and_then(|function| function.demangle().ok()) else { continue };

@@ -25,6 +25,7 @@ pub fn demand(joint: &VirtualJoint, trajectory: &Trajectory, n: u64) -> Demand {
             torque: 0.0,
             stiffness: gains.stiffness,
             damping: gains.damping,
+            ..Command::NOTHING
         },
         sequence: command as u32 + 1,
         ..Demand::default()

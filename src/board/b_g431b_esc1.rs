@@ -44,6 +44,8 @@ use embassy_stm32::timer::low_level::CountingMode;
 use embassy_stm32::timer::qei;
 use embassy_stm32::timer::simple_pwm::PwmPin;
 use joint_firmware::default_configuration::{self, BoardConfiguration};
+#[cfg(feature = "bus")]
+use joint_firmware::hardware::Hardware;
 use joint_firmware::joint::{Bridge, BridgeState, Measurements};
 use joint_firmware::sensors::incremental::Incremental;
 use joint_firmware::sensors::thermistor::Thermistor;
@@ -74,7 +76,7 @@ const TOP: u16 = pwm::top(CONTROL_HZ);
 /// Dead time, ns. Other firmware for this board uses 300 (K), 500 (N) and 800 to 847 (O, ST's kit). The longest is taken: too long a
 /// dead time distorts the voltage, which the joint compensates; too short a one shorts the supply. 1.6 % of a half period.
 const DEAD_TIME_NS: u32 = (CONFIGURATION.bridge.dead_time * 1e9 + 0.5) as u32;
-/// The low sides conduct at least 2.5 µs around the top; that the amplifiers settle in that time is unconfirmed.
+/// Greatest duty at which the amplifiers have settled when they are sampled; their settling time is derived.
 const LARGEST_DUTY: f32 = CONFIGURATION.bridge.duty.1;
 
 /// Thermistor of the bridge (K, O; the network is unconfirmed).
@@ -83,25 +85,60 @@ const BRIDGE_NTC: Thermistor = Thermistor { nominal: 10_000.0, beta: 3_425.0, di
 /// TIM1_TRGO2 as the trigger of injected conversions of ADC1 and ADC2 (RM0440, table 166).
 const TRIGGER: u8 = 8;
 
-/// 170 MHz from the internal oscillator: whether a crystal is fitted, sources do not agree. FDCAN gets the same 170 MHz from PLLQ.
+/// embassy's set-up, at 16 MHz.
 pub fn chip_configuration() -> Config {
     let mut config = Config::default();
-    config.rcc.hsi48 = None;
-    config.rcc.pll = Some(rcc::Pll {
-        source: rcc::PllSource::HSI,
-        prediv: rcc::PllPreDiv::DIV4,
-        mul: rcc::PllMul::MUL85,
-        divp: None,
-        divq: Some(rcc::PllQDiv::DIV2),
-        divr: Some(rcc::PllRDiv::DIV2),
-    });
-    config.rcc.sys = rcc::Sysclk::PLL1_R;
-    config.rcc.boost = true;
-    config.rcc.mux.fdcansel = rcc::mux::Fdcansel::PLL1_Q;
+    // The bus' clock, whatever it is: embassy's driver reads it and uses it for nothing that is used here.
+    config.rcc.mux.fdcansel = rcc::mux::Fdcansel::PCLK1;
     // USB-C's pull-downs would load the encoder's A line (PB6); this is the default, said because it matters here.
     config.enable_ucpd1_dead_battery = false;
     config
 }
+
+/// 170 MHz from the internal oscillator: whether a crystal is fitted, sources do not agree. All buses, the timers and FDCAN get them.
+///
+/// Written here, because embassy's set-up of clocks, which is not a constant where it is called twice, takes 2 KB of flash. **embassy goes on believing in
+/// 16 MHz.** Of this board's drivers three ask for a frequency: that of time, whose prescaler is set anew here; that of the PWM, whose prescaler is none at
+/// either frequency and whose period this file sets ([`set_up_bridge`]); that of FDCAN, which needs it for nothing but bit timings that it computes, and
+/// ours is said (`can::BIT_TIMING`).
+pub fn start_clocks(_peripherals: &mut Peripherals) {
+    use pac::flash::vals::Latency;
+    use pac::rcc::vals::{Hpre, Pllm, Plln, Pllr, Pllsrc, Sw};
+
+    let (clocks, flash) = (pac::RCC, pac::FLASH);
+    clocks.pllcfgr().write(|w| {
+        w.set_pllsrc(Pllsrc::HSI);
+        w.set_pllm(Pllm::DIV4);
+        w.set_plln(Plln::MUL85);
+        w.set_pllr(Pllr::DIV2);
+        w.set_pllren(true);
+    });
+    clocks.cr().modify(|w| w.set_pllon(true));
+    while !clocks.cr().read().pllrdy() {}
+    flash.acr().modify(|w| w.set_latency(Latency::WS4));
+    while flash.acr().read().latency() != Latency::WS4 {}
+    // Half of it for at least a microsecond (6.1.5).
+    clocks.cfgr().modify(|w| {
+        w.set_hpre(Hpre::DIV2);
+        w.set_sw(Sw::PLL1_R);
+    });
+    while clocks.cfgr().read().sws() != Sw::PLL1_R {}
+    cortex_m::asm::delay(TIMER_HZ / 1_000_000);
+    clocks.cfgr().modify(|w| w.set_hpre(Hpre::DIV1));
+
+    let time = pac::TIM15;
+    time.psc().write_value((TIMER_HZ / 1_000_000 - 1) as u16);
+    // The update that takes it, and no more: it is no overflow.
+    time.cr1().modify(|w| w.set_urs(pac::timer::vals::Urs::COUNTER_ONLY));
+    time.egr().write(|w| w.set_ug(true));
+    time.cr1().modify(|w| w.set_urs(pac::timer::vals::Urs::ANY_EVENT));
+}
+
+/// The encoder until a configuration says what it counts.
+const ENCODER: Incremental = match Incremental::new(CONFIGURATION.joint.motor.encoder_counts as u16) {
+    Some(encoder) => encoder,
+    None => panic!("no incremental encoder has so few counts"),
+};
 
 /// What the control interrupt measures with.
 pub struct Sensors {
@@ -111,8 +148,7 @@ pub struct Sensors {
 
 /// Sets the peripherals up; everything but the PWM counter runs afterwards. The bridge stays off.
 #[inline(never)]
-pub fn start(p: Peripherals, encoder_counts: u16) -> Result<Parts, StartError> {
-    let encoder = Incremental::new(encoder_counts).ok_or(StartError::EncoderCounts(encoder_counts))?;
+pub fn start(p: Peripherals) -> Result<Parts, StartError> {
     set_up_bridge(p.TIM1, (p.PA8, p.PC13), (p.PA9, p.PA12), (p.PA10, p.PB15));
 
     // The amplifiers stay on: dropping an output would switch its amplifier off.
@@ -130,7 +166,7 @@ pub fn start(p: Peripherals, encoder_counts: u16) -> Result<Parts, StartError> {
         ch1_pull: Pull::None,
         ch2_pull: Pull::None,
         mode: qei::QeiMode::Mode3,
-        auto_reload: encoder.counts_per_turn() - 1,
+        auto_reload: ENCODER.counts_per_turn() - 1,
     };
     core::mem::forget(qei::Qei::new(p.TIM4, p.PB6, p.PB7, counter));
     capture_index(p.PB8);
@@ -139,8 +175,8 @@ pub fn start(p: Peripherals, encoder_counts: u16) -> Result<Parts, StartError> {
     core::mem::forget(Output::new(p.PC14, Level::Low, Speed::Low));
     core::mem::forget(Output::new(p.PC11, Level::Low, Speed::Low));
     Ok(Parts {
-        sensors: Sensors { encoder, counts_kept: true },
-        led: Led { pin: Output::new(p.PC6, Level::Low, Speed::Low), lit_when_low: false },
+        sensors: Some(Sensors { encoder: ENCODER, counts_kept: true }),
+        led: Led { pin: Some(Output::new(p.PC6, Level::Low, Speed::Low)), lit_when_low: false },
         button: Some(Input::new(p.PC10, Pull::Up)),
         #[cfg(feature = "bus")]
         can: super::can::configure(p.FDCAN1, p.PA11, p.PB9),
@@ -255,6 +291,14 @@ pub fn start_pwm() {
 }
 
 impl Sensors {
+    /// Before the control interrupt starts: the counts a turn of the encoder, which a checked configuration has.
+    pub fn set_encoder_counts(&mut self, counts: u32) {
+        if let Some(encoder) = Incremental::new(counts as u16) {
+            self.encoder = encoder;
+            pac::TIM4.arr().write(|w| w.set_arr(encoder.counts_per_turn() - 1));
+        }
+    }
+
     /// What is known now; temperatures and overrun are filled in by the caller.
     #[inline(always)]
     pub fn measure(&mut self) -> Measurements {
@@ -330,6 +374,22 @@ extern "C" fn TIM1_UP_TIM16() {
     tim.ccr(1).write(|register| register.set_ccr(v));
     tim.ccr(2).write(|register| register.set_ccr(w));
     tim.cr1().modify(|w| w.set_udis(false));
+}
+
+/// Whether the joint may start: nothing of this board has to get ready first.
+#[inline(always)]
+pub const fn is_started() -> bool {
+    true
+}
+
+/// A fault reset waits for the gate driver: here there is none to be cleared.
+#[inline(always)]
+pub const fn ask_reset(_waits: bool) {}
+
+/// What the board tells of its hardware.
+#[cfg(feature = "bus")]
+pub fn hardware() -> Hardware {
+    Hardware { options: super::options::found(), ..Hardware::default() }
 }
 
 /// Switches all transistors off, now. For fault handlers too: needs nothing initialised, takes no lock, cannot fail.

@@ -28,18 +28,17 @@ use embassy_stm32::{Peri, interrupt, pac};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
 use embassy_time::Instant;
-use joint_firmware::canopen::{self, Buffers, Frame, PDOS, Receiver, Route, TransmitQueue};
+use joint_firmware::canopen::{self, Buffers, Frame, PDOS, Receiver, Route, TransmitQueue, bit_timing};
 use joint_firmware::joint::Demand;
 use joint_firmware::objects::{JointImage, Observed};
 
-/// 1 Mbit/s from the 170 MHz that both boards give the controller: 170 quanta a bit, sampled after 149 of them (CiA 301 asks for 7/8 of a bit),
-/// and resynchronised by up to an eighth. Said here, because embassy would compute it while the program runs, from ten quanta at most, and bring the
-/// text of an error that cannot happen.
+/// The bus's timing ([`bit_timing`]) as the driver takes it. Said here, because embassy would compute it while the program runs, from ten quanta at
+/// most, and bring the text of an error that cannot happen.
 const BIT_TIMING: NominalBitTiming = NominalBitTiming {
     prescaler: NonZeroU16::MIN,
-    seg1: NonZeroU8::new(148).unwrap(),
-    seg2: NonZeroU8::new(21).unwrap(),
-    sync_jump_width: NonZeroU8::new(21).unwrap(),
+    seg1: NonZeroU8::new(bit_timing::BUS.before_sample()).unwrap(),
+    seg2: NonZeroU8::new(bit_timing::BUS.phase2).unwrap(),
+    sync_jump_width: NonZeroU8::new(bit_timing::BUS.jump_width).unwrap(),
 };
 /// Segments of a downloaded block.
 pub const BLOCK: u8 = 24;

@@ -15,9 +15,9 @@ use joint_firmware::joint::fault::Faults;
 #[cfg(feature = "bus")]
 use joint_firmware::joint::history::History;
 use joint_firmware::joint::state_machine::Controlword;
-use joint_firmware::joint::{Active, Bridge, BridgeState, Command, Coupled, Demand, Joint, Mode, Slow, Telemetry};
+use joint_firmware::joint::{Active, Bridge, BridgeState, Command, Coupled, Demand, Joint, Slow, Telemetry};
 #[cfg(feature = "bus")]
-use joint_firmware::motor::calibration::{CalibrationSettings, Progress};
+use joint_firmware::motor::open_loop::Window;
 use joint_firmware::motor::phases::Phases;
 
 /// Everything that the control interrupt owns.
@@ -38,34 +38,9 @@ pub struct Commands {
     pub demand: Publisher<Demand>,
     /// Configuration and friction model, prepared: swapped between two control steps.
     pub active: Offering<Active>,
-    /// The calibration of the motor.
+    /// The open loop's last window.
     #[cfg(feature = "bus")]
-    pub calibration: Calibration,
-}
-
-/// A task's end of the calibration.
-#[cfg(feature = "bus")]
-pub struct Calibration {
-    asked: Publisher<Option<CalibrationSettings>>,
-    progress: Subscriber<Option<Progress>>,
-}
-
-#[cfg(feature = "bus")]
-impl Calibration {
-    /// Begins one, or gives up the one that runs (none), in the next control step.
-    pub fn ask(&mut self, settings: Option<&CalibrationSettings>) {
-        self.asked.publish(&settings.copied());
-        WORDS.calibration_asked.store(true, Ordering::Release);
-    }
-
-    /// Where the one is that runs or ran last.
-    pub fn progress(&mut self) -> Option<Progress> {
-        // Until the control step has taken what it was asked, it tells of the one before.
-        if WORDS.calibration_asked.load(Ordering::Acquire) {
-            return Some(Progress::Offsets);
-        }
-        *self.progress.newest()
-    }
+    pub window: Subscriber<Window>,
 }
 
 /// The control interrupt's ends of the exchanges.
@@ -74,9 +49,7 @@ pub struct Ends {
     demand: Subscriber<Demand>,
     report: Publisher<Report>,
     #[cfg(feature = "bus")]
-    asked: Subscriber<Option<CalibrationSettings>>,
-    #[cfg(feature = "bus")]
-    progress: Publisher<Option<Progress>>,
+    window: Publisher<Window>,
 }
 
 struct Owned(UnsafeCell<MaybeUninit<Control>>);
@@ -101,9 +74,6 @@ struct Words {
     mean_square_current: Real,
     /// The mean square current is taken anew in the next control step.
     mean_square_wanted: AtomicBool,
-    /// A calibration is to begin, or to be given up.
-    #[cfg(feature = "bus")]
-    calibration_asked: AtomicBool,
     /// The joint stays off, whatever it is commanded.
     #[cfg(feature = "bus")]
     held_off: AtomicBool,
@@ -142,8 +112,6 @@ static WORDS: Words = Words {
     mean_square_current: Real::new(0.0),
     mean_square_wanted: AtomicBool::new(false),
     #[cfg(feature = "bus")]
-    calibration_asked: AtomicBool::new(false),
-    #[cfg(feature = "bus")]
     held_off: AtomicBool::new(false),
 };
 
@@ -152,15 +120,13 @@ static DEMAND: Newest<Demand> = Newest::new(NOBODY);
 /// What is commanded before anybody does.
 const NOBODY: Demand = Demand {
     controlword: Controlword::DISABLE_VOLTAGE,
-    command: Command { mode: Mode::Torque, position: 0.0, velocity: 0.0, torque: 0.0, stiffness: 0.0, damping: 0.0 },
+    command: Command::NOTHING,
     sequence: 0,
     coupled: Coupled { velocity: 0.0, sequence: 0 },
 };
 static REPORT: Newest<Report> = Newest::new(Report::NOTHING);
 #[cfg(feature = "bus")]
-static ASKED: Newest<Option<CalibrationSettings>> = Newest::new(None);
-#[cfg(feature = "bus")]
-static PROGRESS: Newest<Option<Progress>> = Newest::new(None);
+static WINDOW: Newest<Window> = Newest::new(Window::NOTHING);
 /// Tasks of both executors read it, one at a time.
 static READER: Mutex<RefCell<Option<Subscriber<Report>>>> = Mutex::new(RefCell::new(None));
 
@@ -210,6 +176,11 @@ pub fn statistics() -> Statistics {
     }
 }
 
+/// Whether the control interrupt has been started.
+pub fn is_enabled() -> bool {
+    NVIC::is_enabled(Interrupt::ADC1_2)
+}
+
 /// Switches the bridge off from the next control step on, until the next reset. The joint sees a fault of the bridge.
 pub fn stop() {
     WORDS.stopped.store(true, Ordering::Relaxed);
@@ -229,7 +200,7 @@ pub fn hold_off() -> bool {
     }
     WORDS.held_off.store(true, Ordering::Release);
     // Where the joint was enabled in the last step, the next one disables it. Without control steps the watchdog ends this.
-    let (runs, before) = (NVIC::is_enabled(Interrupt::ADC1_2), WORDS.steps.load(Ordering::Relaxed));
+    let (runs, before) = (is_enabled(), WORDS.steps.load(Ordering::Relaxed));
     while runs && WORDS.steps.load(Ordering::Acquire) == before {
         core::hint::spin_loop();
     }
@@ -288,21 +259,19 @@ pub fn exchange() -> Option<(Commands, Ends)> {
     let (report, reader) = REPORT.split()?;
     critical_section::with(|section| READER.replace(section, Some(reader)));
     #[cfg(feature = "bus")]
-    let ((asking, asked), (progress, told)) = (ASKED.split()?, PROGRESS.split()?);
+    let (window, windows) = WINDOW.split()?;
     let commands = Commands {
         demand: publisher,
         active: offering,
         #[cfg(feature = "bus")]
-        calibration: Calibration { asked: asking, progress: told },
+        window: windows,
     };
     let ends = Ends {
         active,
         demand,
         report,
         #[cfg(feature = "bus")]
-        asked,
-        #[cfg(feature = "bus")]
-        progress,
+        window,
     };
     Some((commands, ends))
 }
@@ -363,9 +332,10 @@ extern "C" fn ADC1_2() {
     #[cfg(not(feature = "bus"))]
     let held_off = false;
     let wanted = match control.ends.active.current() {
-        Some(active) => control.joint.control_step(active, demand, &slow, &measurements),
-        None => Bridge::OFF,
+        Some(active) if super::is_started() => control.joint.control_step(active, demand, &slow, &measurements),
+        _ => Bridge::OFF,
     };
+    super::ask_reset(control.joint.waits_for_driver());
     let bridge = if stopped { Bridge::OFF } else { wanted };
     super::apply(&bridge);
 
@@ -379,8 +349,8 @@ extern "C" fn ADC1_2() {
         WORDS.mean_square_current.store(control.joint.take_mean_square_current(), Ordering::Release);
     }
     #[cfg(feature = "bus")]
-    if control.joint.is_calibrating() || WORDS.calibration_asked.load(Ordering::Acquire) {
-        calibrate(&mut control.joint, &mut control.ends);
+    if control.joint.has_new_window() {
+        publish_window(&control.joint, &mut control.ends);
     }
     control.sensors.complete();
     WORDS.switching.store(bridge.state == BridgeState::Switching, Ordering::Relaxed);
@@ -397,22 +367,10 @@ extern "C" fn ADC1_2() {
     WORDS.longest_cycles.store(WORDS.longest_cycles.load(Ordering::Relaxed).max(cycles), Ordering::Relaxed);
 }
 
-/// Has the joint do what was asked of its calibration, and tells where it is. While the joint is off: it may lie in flash, as the calibration
-/// itself does.
+/// While the bridge switches: it may lie in flash, as the open loop itself does.
 #[cfg(feature = "bus")]
 #[inline(never)]
-#[unsafe(link_section = ".text.calibrating")]
-fn calibrate(joint: &mut Joint, ends: &mut Ends) {
-    if WORDS.calibration_asked.load(Ordering::Acquire) {
-        match ends.asked.newest() {
-            // Checked by the task.
-            Some(settings) => drop(joint.calibrate(settings)),
-            None => joint.abort_calibration(),
-        }
-        ends.progress.publish(&joint.calibration());
-        // After the progress: the task takes what it reads then for that of the new one.
-        WORDS.calibration_asked.store(false, Ordering::Release);
-    } else {
-        ends.progress.publish(&joint.calibration());
-    }
+#[unsafe(link_section = ".text.open_loop")]
+fn publish_window(joint: &Joint, ends: &mut Ends) {
+    ends.window.publish(joint.window());
 }

@@ -5,7 +5,7 @@ use defmt_rtt as _;
 use embassy_executor::{Executor, InterruptExecutor};
 use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::{InterruptExt, Priority};
-use embassy_stm32::{Peripherals, pac, rcc};
+use embassy_stm32::{Peripherals, pac};
 use static_cell::StaticCell;
 
 /// Runs the tasks that must not wait for the slow ones. Its interrupt is one that the boards do not use otherwise: clock
@@ -34,18 +34,16 @@ fn main() -> ! {
 /// The regulator's range 1 in normal mode, PWR_CR5 bit 8 (RM0440, 6.4.23: R1MODE): enough for 150 MHz. Cleared, it is in boost mode.
 const R1MODE: u32 = 1 << 8;
 
-/// embassy's set-up, in two steps: at the 16 MHz that the chip starts with, then with the board's clocks.
+/// embassy's set-up at the 16 MHz that the chip starts with, then the board's clocks.
 ///
 /// Between them the regulator is switched to boost mode, which 170 MHz need (RM0440, 6.1.5). embassy's own switch has no effect:
 /// stm32-metapac 21 has R1MODE at bit 0. Before the first step it would be lost, because that resets PWR.
 fn start_chip() -> Peripherals {
     let mut configuration = super::chip_configuration();
-    let clocks = configuration.rcc;
-    configuration.rcc = rcc::Config::default();
     configuration.rcc.hsi48 = None;
     let mut peripherals = embassy_stm32::init(configuration);
     pac::PWR.cr5().modify(|w| w.0 &= !R1MODE);
-    rcc::reinit(clocks, &mut peripherals.RCC);
+    super::start_clocks(&mut peripherals);
     peripherals
 }
 

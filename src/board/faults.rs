@@ -68,6 +68,11 @@ pub fn report() {
         flags.oblrstf(),
         flags.lpwrrstf()
     );
+    if flags.borrstf() {
+        // Without power the record is noise, and where parity is checked reading it would be an error.
+        store([0; WORDS]);
+        return;
+    }
     let Some(record) = Record::decode(&words()) else { return };
     if record.repeats == 0 {
         // The run before this one got over it.

@@ -1,6 +1,6 @@
 //! The boards: everything that knows a pin or a register, and all unsafe code of the program.
 //!
-//! One file a board, all with the same items (`NAME`, `CONTROL_HZ`, `chip_configuration`, `start`, `Sensors`, `apply`, ...); the
+//! One file a board, all with the same items (`NAME`, `CONTROL_HZ`, `chip_configuration`, `start_clocks`, `start`, `Sensors`, `apply`, ...); the
 //! others are shared. Nothing of this has run on a board; facts that nobody confirmed are marked in the boards' files.
 //!
 //! embassy's drivers do the clocks, the pins, the timers' time bases, the operational amplifiers, the encoder counter, SPI
@@ -16,11 +16,14 @@ pub mod can;
 pub mod control;
 mod copy;
 mod critical_section;
+#[cfg(all(feature = "b-g431b-esc1", feature = "bus"))]
+mod division;
 pub mod entry;
 pub mod faults;
 #[cfg(feature = "bus")]
 pub mod flash;
 pub mod memory;
+pub mod options;
 pub mod pwm;
 #[cfg(feature = "bus")]
 pub mod shadow;
@@ -35,6 +38,8 @@ pub use b_g431b_esc1::*;
 #[cfg(feature = "moteus-r4")]
 mod drv8353;
 #[cfg(feature = "moteus-r4")]
+pub mod gate;
+#[cfg(feature = "moteus-r4")]
 mod moteus_r4;
 #[cfg(feature = "moteus-r4")]
 pub use moteus_r4::*;
@@ -45,12 +50,15 @@ use embassy_stm32::peripherals::IWDG;
 pub use joint_firmware::default_configuration::BoardConfiguration;
 pub use shared::Publisher;
 #[cfg(feature = "bus")]
-pub use shared::{Offering, Prepared};
+pub use shared::{Offering, Prepared, Subscriber};
 
 /// What a started board hands to the program.
 pub struct Parts {
-    /// What the control interrupt measures with.
-    pub sensors: Sensors,
+    /// What the control interrupt measures with. None where it may not start; the bridge then stays off, and the watchdog does not wait for it.
+    pub sensors: Option<Sensors>,
+    /// The gate driver, for its task.
+    #[cfg(feature = "moteus-r4")]
+    pub gate: gate::Parts,
     /// The light that a person sees.
     pub led: Led,
     /// The button, on boards that have one.
@@ -67,36 +75,23 @@ pub struct Parts {
 
 /// A light with its polarity.
 pub struct Led {
-    pin: Output<'static>,
+    /// None on a board that the program is not for.
+    pin: Option<Output<'static>>,
     lit_when_low: bool,
 }
 
 impl Led {
     /// Switches the light.
     pub fn set(&mut self, lit: bool) {
-        self.pin.set_level((lit != self.lit_when_low).into());
+        if let Some(pin) = &mut self.pin {
+            pin.set_level((lit != self.lit_when_low).into());
+        }
     }
 }
 
 /// Why a board does not start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
-#[allow(dead_code, reason = "a board has some of these")]
 pub enum StartError {
-    /// An incremental encoder cannot have so few counts a turn.
-    EncoderCounts(u16),
-    /// A register of the gate driver does not hold what was written.
-    GateDriver {
-        /// Number of the register.
-        register: u16,
-        /// What was written.
-        written: u16,
-        /// What was read.
-        read: u16,
-    },
-    /// The bus to the gate driver failed.
-    GateDriverBus,
-    /// The bus to the encoder failed.
-    EncoderBus,
     /// A converter did not get ready.
     Converter,
 }

@@ -20,11 +20,14 @@
 
 use super::adc::{self, FULL_SCALE, Sequence};
 use super::drv8353::Drv8353;
+use super::gate::{self, Gate};
+pub use super::gate::{ask_reset, is_started};
 use super::pwm;
 use super::{Led, Parts, Peripherals, StartError};
+use core::sync::atomic::{AtomicU8, Ordering};
 use cortex_m::peripheral::DWT;
 use embassy_stm32::Config;
-use embassy_stm32::gpio::{Input, Level, Output, OutputType, Pull, Speed};
+use embassy_stm32::gpio::{Input, Level, Output, OutputType, Pin, Pull, Speed};
 use embassy_stm32::pac;
 use embassy_stm32::pac::adc::Adc;
 use embassy_stm32::pac::adc::vals::SampleTime;
@@ -36,6 +39,8 @@ use embassy_stm32::time::Hertz;
 use embassy_stm32::timer::low_level::CountingMode;
 use embassy_stm32::timer::simple_pwm::{PwmPin, SimplePwm};
 use joint_firmware::default_configuration::{self, BoardConfiguration};
+use joint_firmware::hardware::moteus_revision::{Pins, SUPPORTED};
+use joint_firmware::hardware::{Hardware, Setup};
 use joint_firmware::joint::{Bridge, BridgeState, Measurements};
 use joint_firmware::sensors::as5047p;
 use joint_firmware::sensors::thermistor::Thermistor;
@@ -63,7 +68,7 @@ pub const FLASH_BANK: u32 = 256 * 1024;
 
 /// Top of TIM2's counter.
 const TOP: u16 = pwm::top(CONTROL_HZ);
-/// The low sides conduct at least 2.5 µs around the top; that the amplifiers settle in that time is unconfirmed.
+/// Greatest duty at which the amplifiers have settled when they are sampled, by the vendor's measurement.
 const LARGEST_DUTY: f32 = CONFIGURATION.bridge.duty.1;
 
 /// Thermistor of the bridge.
@@ -79,11 +84,16 @@ const ENCODER_POLLS: u32 = 200;
 /// Core cycles in 350 ns.
 const SELECT_CYCLES: u32 = 60;
 
-/// 170 MHz from the internal oscillator: the crystal's pins drive LEDs. FDCAN gets the same 170 MHz from PLLQ.
+/// embassy's set-up, at 16 MHz.
 pub fn chip_configuration() -> Config {
-    let mut config = Config::default();
-    config.rcc.hsi48 = None;
-    config.rcc.pll = Some(rcc::Pll {
+    Config::default()
+}
+
+/// 170 MHz from the internal oscillator: the crystal's pins drive LEDs. FDCAN gets the same 170 MHz from PLLQ.
+pub fn start_clocks(peripherals: &mut Peripherals) {
+    let mut config = rcc::Config::default();
+    config.hsi48 = None;
+    config.pll = Some(rcc::Pll {
         source: rcc::PllSource::HSI,
         prediv: rcc::PllPreDiv::DIV4,
         mul: rcc::PllMul::MUL85,
@@ -91,38 +101,78 @@ pub fn chip_configuration() -> Config {
         divq: Some(rcc::PllQDiv::DIV2),
         divr: Some(rcc::PllRDiv::DIV2),
     });
-    config.rcc.sys = rcc::Sysclk::PLL1_R;
-    config.rcc.boost = true;
-    config.rcc.mux.fdcansel = rcc::mux::Fdcansel::PLL1_Q;
-    config
+    config.sys = rcc::Sysclk::PLL1_R;
+    config.boost = true;
+    config.mux.fdcansel = rcc::mux::Fdcansel::PLL1_Q;
+    rcc::reinit(config, &mut peripherals.RCC);
 }
+
+/// Family and revision, by the pins.
+static REVISION: AtomicU8 = AtomicU8::new(0);
 
 /// What the control interrupt measures with.
 pub struct Sensors {
+    /// Codes of the currents, as they were when the amplifiers last had power.
+    currents: [u16; 3],
     angle: u32,
     /// What the encoder answered in the last frame.
     answer: Option<u16>,
 }
 
-/// Sets the peripherals up; everything but the PWM counter runs afterwards. The bridge stays off.
-///
-/// `_encoder_counts` is for boards with an incremental encoder.
+/// Level of a pin with a pull; afterwards it is as after reset.
+fn level(pin: embassy_stm32::Peri<'_, impl Pin>, pull: Pull) -> bool {
+    let pin = Input::new(pin, pull);
+    // A pull of 40 kOhm and whatever hangs at a pin: microseconds.
+    cortex_m::asm::delay(100 * 170);
+    pin.is_high()
+}
+
+/// Reads family and revision of the board; drives no pin.
+fn identify(p: &mut Peripherals) -> u8 {
+    let pins = Pins {
+        pulled_up: [level(p.PB10.reborrow(), Pull::Up), level(p.PB11.reborrow(), Pull::Up)],
+        pulled_down: [level(p.PB10.reborrow(), Pull::Down), level(p.PB11.reborrow(), Pull::Down)],
+        revision: [
+            level(p.PC6.reborrow(), Pull::Up),
+            level(p.PA15.reborrow(), Pull::Up),
+            level(p.PA10.reborrow(), Pull::Up),
+        ],
+    };
+    pins.code()
+}
+
+/// Sets the peripherals up; everything but the PWM counter and the gate driver, which its task sets up, runs afterwards. The bridge stays off. On a board that
+/// the program is not for nothing is driven but the CAN bus, which says so.
 #[inline(never)]
-pub fn start(p: Peripherals, _encoder_counts: u16) -> Result<Parts, StartError> {
+pub fn start(mut p: Peripherals) -> Result<Parts, StartError> {
+    let revision = identify(&mut p);
+    REVISION.store(revision, Ordering::Relaxed);
+    let known = revision == SUPPORTED;
+    let can = super::can::configure(p.FDCAN1, p.PA11, p.PA12);
+    let converts = convert();
+    let mut parts = Parts {
+        sensors: None,
+        gate: gate::Parts::Missing(if known { Setup::Converter } else { Setup::WrongBoard }, revision),
+        led: Led { pin: known.then(|| Output::new(p.PF0, Level::High, Speed::Low)), lit_when_low: true },
+        button: None,
+        can,
+        flash: p.FLASH,
+        watchdog: p.IWDG,
+    };
+    if !known || converts.is_err() {
+        return Ok(parts);
+    }
     core::mem::forget(Output::new(p.PB7, Level::Low, Speed::Medium));
-    core::mem::forget(Output::new(p.PA3, Level::High, Speed::Low));
     core::mem::forget(Input::new(p.PB6, Pull::Up));
-    // The driver is ready 1 ms after its enable.
-    cortex_m::asm::delay(2 * 170_000);
     let mut bus = spi::Config::default();
     bus.mode = spi::MODE_1;
     bus.frequency = Hertz(1_000_000);
     bus.miso_pull = Pull::Up;
-    Drv8353 {
+    let driver = Drv8353 {
         spi: Spi::new_blocking(p.SPI1, p.PA5, p.PA7, p.PA6, bus),
         select: Output::new(p.PC4, Level::High, Speed::Medium),
-    }
-    .configure()?;
+    };
+    parts.gate = gate::Parts::Gate(Gate { driver, enable: Output::new(p.PA3, Level::Low, Speed::Low) });
 
     // Set up by embassy, used by register in the control interrupt. 5.3 MHz: the next faster is over the encoder's 10 MHz.
     let mut bus = spi::Config::default();
@@ -130,23 +180,19 @@ pub fn start(p: Peripherals, _encoder_counts: u16) -> Result<Parts, StartError> 
     bus.frequency = Hertz(6_000_000);
     let mut encoder = Spi::new_blocking(p.SPI2, p.PB13, p.PB15, p.PB14, bus);
     core::mem::forget(Output::new(p.PB11, Level::High, Speed::VeryHigh));
-    // The first transfer leaves the bus enabled, with frames of 16 bits; its answer is thrown away.
-    encoder.blocking_transfer_in_place(&mut [as5047p::READ_ANGLE]).map_err(|_| StartError::EncoderBus)?;
+    // The first transfer leaves the bus enabled, with frames of 16 bits; its answer is thrown away. An encoder that does not answer is the joint's to find.
+    let _ = encoder.blocking_transfer_in_place(&mut [as5047p::READ_ANGLE]);
     core::mem::forget(encoder);
     pac::SPI2.cr1().modify(|w| w.set_spe(true));
 
     set_up_pwm(p.TIM2, p.PA0, p.PA1, p.PA2);
-    convert()?;
-    Ok(Parts {
-        sensors: Sensors { angle: 0, answer: None },
-        led: Led { pin: Output::new(p.PF0, Level::High, Speed::Low), lit_when_low: true },
-        button: None,
-        #[cfg(feature = "bus")]
-        can: super::can::configure(p.FDCAN1, p.PA11, p.PA12),
-        #[cfg(feature = "bus")]
-        flash: p.FLASH,
-        watchdog: p.IWDG,
-    })
+    parts.sensors = Some(Sensors { currents: [0; 3], angle: 0, answer: None });
+    Ok(parts)
+}
+
+/// What the board tells of its hardware.
+pub fn hardware() -> Hardware {
+    Hardware { driver: gate::report(), revision: REVISION.load(Ordering::Relaxed), options: super::options::found() }
 }
 
 /// Pins and time base; the conversions start one count before the top.
@@ -183,7 +229,8 @@ fn set_up_pwm(
     tim.egr().write(|w| w.set_ug(true));
 }
 
-/// The three currents at the same instant on three converters; supply and thermistors follow, theirs are of the period before.
+/// The three currents at the same instant on three converters. The supply follows: the control interrupt comes at the end of the currents and finds the supply's
+/// code of the period before. ADC5 begins with the others and samples until their first conversions are over, so none of its steps disturbs them.
 fn convert() -> Result<(), StartError> {
     pac::RCC.ahb2enr().modify(|w| {
         w.set_adc12en(true);
@@ -197,13 +244,14 @@ fn convert() -> Result<(), StartError> {
     }
     adc::choose_clock(pac::ADC12_COMMON);
     adc::choose_clock(pac::ADC345_COMMON);
-    let time = SampleTime::CYCLES12_5;
+    // Dividers and thermistors have up to 10 kOhm: they are sampled for as long as the vendor does.
+    let (current, divider) = (SampleTime::CYCLES12_5, SampleTime::CYCLES47_5);
     let arm =
         |adc, channels: &[(u8, SampleTime)], interrupt| Sequence { adc, channels, trigger: TRIGGER, interrupt }.arm();
-    arm(pac::ADC1, &[(12, time), (11, time)], false)?;
-    arm(pac::ADC3, &[(12, time)], false)?;
-    arm(pac::ADC5, &[(2, time), (1, time)], false)?;
-    arm(pac::ADC2, &[(12, time)], true)
+    arm(pac::ADC1, &[(12, current), (11, divider)], false)?;
+    arm(pac::ADC3, &[(12, current)], false)?;
+    arm(pac::ADC5, &[(2, divider), (1, divider)], false)?;
+    arm(pac::ADC2, &[(12, current)], true)
 }
 
 /// Starts the PWM counter, and with it the control interrupt.
@@ -248,6 +296,9 @@ fn end_frame() -> Option<u16> {
 }
 
 impl Sensors {
+    /// For boards that count an encoder.
+    pub fn set_encoder_counts(&mut self, _counts: u32) {}
+
     /// What is known now; temperatures and overrun are filled in by the caller.
     ///
     /// The encoder's angle is the one that the frame of the period before brought, which runs while the control step does: two periods old, because an
@@ -256,18 +307,22 @@ impl Sensors {
     pub fn measure(&mut self) -> Measurements {
         let selected = select();
         let analog = &CONFIGURATION.analog;
+        // The bridge is off while they have none.
+        if gate::amplifies() {
+            self.currents = [pac::ADC3, pac::ADC1, pac::ADC2].map(adc::code::<0>);
+        }
         let angle = self.answer.take().and_then(as5047p::angle);
         // The last good angle stands in: a jump to zero would be worse for whoever looks at the angle only.
         self.angle = angle.unwrap_or(self.angle);
         let measurements = Measurements {
-            phase_currents: analog.currents([pac::ADC3, pac::ADC1, pac::ADC2].map(adc::code::<0>)),
+            phase_currents: analog.currents(self.currents),
             bus_voltage: analog.supply(adc::code::<1>(pac::ADC1)),
             encoder: self.angle,
             encoder_valid: angle.is_some(),
             encoder_referenced: true,
             winding_temperature: f32::NAN,
             bridge_temperature: f32::NAN,
-            bridge_fault: pac::GPIOB.idr().read().idr(6) == pac::gpio::vals::Idr::LOW,
+            bridge_fault: gate::is_faulty(),
             overrun: false,
         };
         begin_frame(selected);

@@ -56,15 +56,15 @@ impl Watchdog {
         self.hardware.unleash();
     }
 
-    /// Feeds it, if the control interrupt has run since the last call and the slow executor not too long ago; the caller is the medium one.
+    /// Feeds it, if the control interrupt, where it has been started, has run since the last call and the slow executor not too long ago; the caller is the medium one.
     pub fn feed(&mut self) {
-        let (control, slow) = (control::statistics().steps, SLOW.load(Ordering::Relaxed));
+        let (steps, slow) = (control::statistics().steps, SLOW.load(Ordering::Relaxed));
         if slow != self.slow {
             (self.slow, self.slow_seen) = (slow, Instant::now());
         }
-        if control != self.control && self.slow_seen.elapsed() < PATIENCE {
+        if (steps != self.control || !control::is_enabled()) && self.slow_seen.elapsed() < PATIENCE {
             self.hardware.pet();
         }
-        self.control = control;
+        self.control = steps;
     }
 }

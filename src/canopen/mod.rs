@@ -45,6 +45,7 @@
 
 mod abort;
 mod access;
+pub mod bit_timing;
 mod communication;
 mod dictionary;
 pub mod emergency;

@@ -3,14 +3,16 @@
 use super::configuration::{
     BridgeConfiguration, Configuration, ConfigurationError, GearConfiguration, Limits, MOTION_STEPS, VelocitySource,
 };
+use super::limit_law::LimitGains;
 use crate::compensation::Settings;
 use crate::friction::FrictionModel;
 use crate::motor::angle::{Direction, EncoderAlignment, STEPS, TAU};
 use crate::motor::current::{CurrentSettings, MotorConstants};
 use crate::motor::field_oriented::FieldOrientedGains;
 use crate::motor::modulation::ModulationSettings;
-use crate::motor::number::{greater, within};
+use crate::motor::number::{greater, lesser, within};
 use crate::motor::observer::{Motion, ObserverGains, ObserverSettings};
+use crate::motor::open_loop::OpenLoopGains;
 use crate::motor::thermal::{ThermalSettings, WindingTemperature};
 use crate::motor::transform::Dq;
 use crate::quantity::Torque;
@@ -20,8 +22,11 @@ use core::mem::MaybeUninit;
 pub const SLOW_RATE: f32 = 100.0;
 /// Temperature at which the heat paths are checked, °C.
 const REFERENCE_TEMPERATURE: f32 = 25.0;
-/// Span over which the current is derated below the winding's limit, K.
-const DERATING: f32 = 20.0;
+/// Span over which the current is derated below the limits of winding and bridge, K.
+pub const DERATING: f32 = 20.0;
+/// Part of the regeneration band in which braking current fades. In the rest nothing feeds the supply: the board takes so little that its voltage comes to
+/// rest where almost all is withheld, and there noise would find the limit.
+const FADE: f32 = 0.8;
 /// Fastest rotor that the observer follows, beyond the velocity limit.
 const OBSERVER_RESERVE: f32 = 2.0;
 /// Highest rotor acceleration, rad/s²: a rotor of 1e-6 kg m² under 1 Nm.
@@ -128,6 +133,8 @@ pub struct MotionGains {
     pub velocity_step: f32,
     /// rad/s².
     pub acceleration: f32,
+    /// The quick stop's, rad/s².
+    pub deceleration: f32,
     /// Change of the quick stop's ramp in a round, rad/s.
     pub quick_stop_step: f32,
     /// Control steps that braking may take.
@@ -183,8 +190,12 @@ pub struct Active {
     pub alignment: EncoderAlignment,
     /// Rotor to joint.
     pub scales: Scales,
-    /// Limits.
+    /// Limits, the board's among them.
     pub limits: Limits,
+    /// How the torque fades towards them.
+    pub limit_gains: LimitGains,
+    /// Largest offset of a current sensor, A.
+    pub largest_offset: f32,
     /// Largest current, A.
     pub current_limit: f32,
     /// Largest sum of the phase currents, A.
@@ -207,12 +218,24 @@ pub struct Active {
     pub bridged_steps: u32,
     /// Control steps without a new command.
     pub deadline_steps: u32,
+    /// Open loop.
+    pub open_loop: OpenLoopGains,
+    /// Supply from which on braking current is withheld, V.
+    pub onset: f32,
+    /// Part of it that a volt above withholds, 1/V.
+    pub withheld_per_volt: f32,
+    /// Largest d current that flows instead, A.
+    pub loss_current: f32,
     /// Motion.
     pub motion: MotionGains,
     /// Compensation.
     pub compensation: CompensationGains,
-    /// The bridge.
-    pub bridge: BridgeConfiguration,
+    /// Rotor's speed, rad/s, for a way of the encoder in a control step, 2^32 a turn.
+    pub encoder_speed: f32,
+    /// The board measures the bridge's temperature.
+    pub has_bridge_sensor: bool,
+    /// The motor has a temperature sensor.
+    pub has_winding_sensor: bool,
     /// For the slow task.
     pub thermal: ThermalSettings,
     /// The verified friction model; none: no compensation.
@@ -319,7 +342,9 @@ impl Checked {
     /// Always inlined: what it gives is built where the caller wants it.
     #[inline(always)]
     fn active(self, configuration: &Configuration, bridge: &BridgeConfiguration) -> Active {
-        let Configuration { motor, gear, limits, gains, compensation, .. } = configuration;
+        let Configuration { motor, gear, gains, compensation, .. } = configuration;
+        let limits = bridge.limits.hold(&configuration.limits);
+        let current_limit = lesser(motor.current_limit, bridge.limits.current);
         let (rate, motion_rate) = (bridge.rate, bridge.motion_rate() as f32);
         let period = 1.0 / motion_rate;
         let pole_pairs = motor.alignment.pole_pairs as f32;
@@ -335,8 +360,10 @@ impl Checked {
             observer: self.observer,
             alignment: motor.alignment,
             scales: Scales::new(gear, &motor.alignment, motor.torque_constant),
-            limits: *limits,
-            current_limit: motor.current_limit,
+            limit_gains: LimitGains::new(&limits, gains, period),
+            limits,
+            largest_offset: bridge.limits.largest_offset(limits.over_current),
+            current_limit,
             current_sum_limit: CURRENT_SUM * limits.over_current,
             implausible_voltage: Dq { d: unexplained(motor.inductance_d), q: unexplained(motor.inductance_q) },
             uncompensated_voltage,
@@ -348,6 +375,10 @@ impl Checked {
             jump_limit: 0.5 / pole_pairs,
             bridged_steps: (0.25 * TAU / self.rotor_velocity * rate) as u32,
             deadline_steps: (limits.command_deadline * rate) as u32,
+            open_loop: OpenLoopGains::new(rate),
+            onset: highest_voltage - limits.regeneration_band,
+            withheld_per_volt: 1.0 / (FADE * limits.regeneration_band),
+            loss_current: lesser(motor.loss_current, current_limit),
             motion: MotionGains {
                 rate: motion_rate,
                 period,
@@ -357,6 +388,7 @@ impl Checked {
                 position_integral: 0.1 * gains.integral * period,
                 velocity_step: gains.acceleration * period,
                 acceleration: gains.acceleration,
+                deceleration: gains.quick_stop_deceleration,
                 quick_stop_step: gains.quick_stop_deceleration * period,
                 braking_steps: (gains.braking_time * rate) as u32,
             },
@@ -368,7 +400,9 @@ impl Checked {
                 period,
                 guard: GuardGains::new(period),
             },
-            bridge: *bridge,
+            encoder_speed: TAU / STEPS * rate,
+            has_bridge_sensor: bridge.has_bridge_sensor,
+            has_winding_sensor: bridge.has_winding_sensor,
             friction: None,
             thermal: self.thermal,
         }

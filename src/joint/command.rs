@@ -1,6 +1,7 @@
 //! What the joint is asked to do; written by a task, read by the control step.
 
 use super::state_machine::Controlword;
+use crate::motor::open_loop::Frame;
 
 /// Modes of operation (object 6060h).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -14,6 +15,8 @@ pub enum Mode {
     Position,
     /// Stiffness and damping around a position and a velocity, and a torque, all of the command's own.
     Impedance,
+    /// A voltage along a turning field, for commissioning ([`crate::motor::open_loop`]).
+    OpenLoop,
 }
 
 /// One set-point.
@@ -31,6 +34,21 @@ pub struct Command {
     pub stiffness: f32,
     /// Nm s/rad; impedance mode, 0 to 1e4.
     pub damping: f32,
+    /// Open loop.
+    pub open_loop: Frame,
+}
+
+impl Command {
+    /// No torque, in torque mode.
+    pub const NOTHING: Self = Self {
+        mode: Mode::Torque,
+        position: 0.0,
+        velocity: 0.0,
+        torque: 0.0,
+        stiffness: 0.0,
+        damping: 0.0,
+        open_loop: Frame { voltage: 0, speed: 0, along: 0, across: 0 },
+    };
 }
 
 /// Everything that is asked of the joint in a control step. The set-point is looked at once a round of the motion loop.

@@ -3,9 +3,10 @@
 //! It is separate from the friction image: it changes when the joint is built or its limits are set, the image whenever the
 //! friction is learned anew.
 
+use super::board_limits::BoardLimits;
 use crate::compensation::SettingsError;
 use crate::motor::angle::EncoderAlignment;
-use crate::motor::setting::{SettingError, check};
+use crate::motor::setting::{Name, SettingError, in_range, within_range};
 
 /// Control steps of a round of the motion loop, each of which does a [stage](super::motion_loop::Stage) of it.
 pub const MOTION_STEPS: u32 = 5;
@@ -21,12 +22,16 @@ pub struct MotorConfiguration {
     pub inductance_q: f32,
     /// Torque at the rotor by q current, Nm/A; 0.001 to 5.
     pub torque_constant: f32,
-    /// Largest current, A; 0.1 to 200.
+    /// Largest current, A; 0.1 to the board's largest.
     pub current_limit: f32,
+    /// Largest d current that makes loss of braking energy which the supply does not take, A; 0 (none) to the current limit.
+    pub loss_current: f32,
     /// How the encoder sits on the motor.
     pub alignment: EncoderAlignment,
     /// Age of an encoder sample when the control step sees it, s; 0 to 1 ms.
     pub encoder_latency: f32,
+    /// Counts a turn of an incremental encoder, four times its lines; 16 to 65,535. An absolute one has no use for it.
+    pub encoder_counts: u32,
 }
 
 /// Gear and joint.
@@ -49,16 +54,31 @@ pub struct Limits {
     pub position: (f32, f32),
     /// Margin beyond the position limits, rad; 0.001 to 10.
     pub position_margin: f32,
-    /// Phase current at which the bridge switches off, A; above the motor's current limit.
+    /// Damping of the limits and of braking, Nm s/rad; 5 times the torque limit over the velocity limit to 1e6. See [`super::limit_law`].
+    pub damping: f32,
+    /// Phase current at which the bridge switches off, A; 5 % above the motor's current limit at least, and at most the board's highest.
     pub over_current: f32,
-    /// Lowest and highest supply, V; 5 to 100.
+    /// Lowest and highest supply, V; 5 to the board's highest, the second 1 V above the first at least.
     pub bus_voltage: (f32, f32),
-    /// Bridge temperature, °C; 40 to 150.
+    /// Span below the highest supply over which a braking current that feeds it fades to nothing, V; 0.1 to what lies between lowest and highest supply.
+    pub regeneration_band: f32,
+    /// Bridge temperature, °C; 40 to the board's highest. Current is derated over the last 20 K.
     pub bridge_temperature: f32,
     /// Winding temperature, °C; 40 to 200. Current is derated over the last 20 K.
     pub winding_temperature: f32,
-    /// Time without a command after which the joint brakes, s; 0.001 to 10.
+    /// Time without a command after which the joint brakes, s; 0.001 to the board's longest.
     pub command_deadline: f32,
+}
+
+/// Velocity limit over the widest fade of the torque towards it.
+const LEAST_FADE: f32 = 5.0;
+
+impl Limits {
+    /// Least limit damping, Nm s/rad: the torque fades over a fifth of the velocity limit. Where nobody has set another one, it is the one to
+    /// take: the less damping, the lighter a joint may be.
+    pub const fn least_damping(&self) -> f32 {
+        LEAST_FADE * self.torque / self.velocity
+    }
 }
 
 /// How the joint follows its commands.
@@ -125,6 +145,10 @@ pub struct BridgeConfiguration {
     pub has_bridge_sensor: bool,
     /// The motor has a temperature sensor: a reading out of range is a fault.
     pub has_winding_sensor: bool,
+    /// The encoder is an incremental one with an index, which it has to meet after each start; otherwise it is absolute.
+    pub counts_an_encoder: bool,
+    /// What no configuration may exceed.
+    pub limits: BoardLimits,
 }
 
 impl BridgeConfiguration {
@@ -179,6 +203,8 @@ pub enum ConfigurationError {
     NodeId(u8),
     /// The motor has no poles.
     PolePairs(u32),
+    /// The encoder cannot have so many counts a turn.
+    EncoderCounts(u32),
 }
 
 impl From<SettingError> for ConfigurationError {
@@ -200,38 +226,35 @@ impl core::fmt::Display for ConfigurationError {
             Self::Compensation(error) => error.fmt(f),
             Self::NodeId(id) => write!(f, "node id is {id}, must be 1 to 127, or 255 for none"),
             Self::PolePairs(pairs) => write!(f, "motor has {pairs} pole pairs, must have 1 to 64"),
+            Self::EncoderCounts(counts) => write!(f, "encoder has {counts} counts a turn, must have 16 to 65535"),
         }
     }
 }
 
 impl core::error::Error for ConfigurationError {}
 
-/// Name, unit and range of each number whose range does not depend on another: as a table they take a third less flash than as calls.
-const RANGES: [(&str, &str, f32, f32); 24] = [
-    ("control rate", "Hz", 1e3, 100e3),
-    ("dead time", "s", 0.0, 5e-6),
-    ("torque constant", "Nm/A", 1e-3, 5.0),
-    ("current limit", "A", 0.1, 200.0),
-    ("encoder's latency", "s", 0.0, 1e-3),
-    ("gear ratio's magnitude", "", 1.0, 500.0),
-    ("joint's zero", "rad", -1000.0, 1000.0),
-    ("torque limit", "Nm", 0.01, 2000.0),
-    ("velocity limit", "rad/s", 0.1, 200.0),
-    ("lowest position", "rad", -1000.0, 1000.0),
-    ("margin beyond the position limits", "rad", 1e-3, 10.0),
-    ("lowest supply voltage", "V", 5.0, 100.0),
-    ("bridge temperature limit", "°C", 40.0, 150.0),
-    ("winding temperature limit", "°C", 60.0, 200.0),
-    ("command deadline", "s", 1e-3, 10.0),
-    ("stiffness", "Nm/rad", 0.0, 1e5),
-    ("damping", "Nm s/rad", 0.0, 1e4),
-    ("integral gain", "Nm/rad", 0.0, 1e6),
-    ("acceleration", "rad/s²", 0.1, 1e5),
-    ("quick-stop deceleration", "rad/s²", 0.1, 1e5),
-    ("braking time", "s", 0.01, 10.0),
-    ("compensation gain", "", 0.0, 1.0),
-    ("compensation slew limit", "Nm/s", 0.5, 32e3),
-    ("standstill velocity", "rad/s", 1e-4, 10.0),
+/// Name and range of each number whose range does not depend on another: as a table they take a third less flash than as calls.
+static RANGES: [(Name, f32, f32); 20] = [
+    (Name::of("control rate", "Hz"), 1e3, 100e3),
+    (Name::of("dead time", "s"), 0.0, 5e-6),
+    (Name::of("torque constant", "Nm/A"), 1e-3, 5.0),
+    (Name::of("encoder's latency", "s"), 0.0, 1e-3),
+    (Name::of("gear ratio's magnitude", ""), 1.0, 500.0),
+    (Name::of("joint's zero", "rad"), -1000.0, 1000.0),
+    (Name::of("torque limit", "Nm"), 0.01, 2000.0),
+    (Name::of("velocity limit", "rad/s"), 0.1, 200.0),
+    (Name::of("lowest position", "rad"), -1000.0, 1000.0),
+    (Name::of("margin beyond the position limits", "rad"), 1e-3, 10.0),
+    (Name::of("winding temperature limit", "°C"), 60.0, 200.0),
+    (Name::of("stiffness", "Nm/rad"), 0.0, 1e5),
+    (Name::of("damping", "Nm s/rad"), 0.0, 1e4),
+    (Name::of("integral gain", "Nm/rad"), 0.0, 1e6),
+    (Name::of("acceleration", "rad/s²"), 0.1, 1e5),
+    (Name::of("quick-stop deceleration", "rad/s²"), 0.1, 1e5),
+    (Name::of("braking time", "s"), 0.01, 10.0),
+    (Name::of("compensation gain", ""), 0.0, 1.0),
+    (Name::of("compensation slew limit", "Nm/s"), 0.5, 32e3),
+    (Name::of("standstill velocity", "rad/s"), 1e-4, 10.0),
 ];
 
 impl Configuration {
@@ -243,6 +266,9 @@ impl Configuration {
         if !(1..=64).contains(&self.motor.alignment.pole_pairs) {
             return Err(ConfigurationError::PolePairs(self.motor.alignment.pole_pairs));
         }
+        if !(16..=65_535).contains(&self.motor.encoder_counts) {
+            return Err(ConfigurationError::EncoderCounts(self.motor.encoder_counts));
+        }
         let Self { motor, gear, limits, gains, compensation, .. } = self;
         let magnitude = if gear.ratio < 0.0 { -gear.ratio } else { gear.ratio };
         let ((lowest, highest), (lowest_supply, highest_supply)) = (limits.position, limits.bus_voltage);
@@ -251,7 +277,6 @@ impl Configuration {
             bridge.rate,
             bridge.dead_time,
             motor.torque_constant,
-            motor.current_limit,
             motor.encoder_latency,
             magnitude,
             gear.zero,
@@ -259,10 +284,7 @@ impl Configuration {
             limits.velocity,
             lowest,
             limits.position_margin,
-            lowest_supply,
-            limits.bridge_temperature,
             limits.winding_temperature,
-            limits.command_deadline,
             gains.stiffness,
             gains.damping,
             gains.integral,
@@ -273,13 +295,21 @@ impl Configuration {
             compensation.slew,
             compensation.standstill_velocity,
         ];
-        for ((name, unit, low, high), value) in RANGES.iter().zip(values) {
-            check(name, unit, value, *low, *high)?;
+        for ((name, low, high), value) in RANGES.iter().zip(values) {
+            within_range(*name, value, *low, *high)?;
         }
-        check("highest position", "rad", highest, lowest + 1e-3, 1000.0)?;
-        check("over-current limit", "A", limits.over_current, 1.05 * motor.current_limit, 500.0)?;
-        check("highest supply voltage", "V", highest_supply, lowest_supply + 1.0, 100.0)?;
-        check("compensation clamp", "Nm", compensation.clamp, 0.0, limits.torque)?;
+        in_range!("highest position", "rad", highest, lowest + 1e-3, 1000.0)?;
+        let board = &bridge.limits;
+        in_range!("current limit", "A", motor.current_limit, 0.1, board.current)?;
+        in_range!("over-current limit", "A", limits.over_current, 1.05 * motor.current_limit, board.over_current)?;
+        in_range!("lowest supply voltage", "V", lowest_supply, 5.0, board.supply - 1.0)?;
+        in_range!("highest supply voltage", "V", highest_supply, lowest_supply + 1.0, board.supply)?;
+        in_range!("regeneration band", "V", limits.regeneration_band, 0.1, highest_supply - lowest_supply)?;
+        in_range!("loss current", "A", motor.loss_current, 0.0, motor.current_limit)?;
+        in_range!("bridge temperature limit", "°C", limits.bridge_temperature, 40.0, board.bridge_temperature)?;
+        in_range!("command deadline", "s", limits.command_deadline, 1e-3, board.command_deadline)?;
+        in_range!("limit damping", "Nm s/rad", limits.damping, limits.least_damping(), 1e6)?;
+        in_range!("compensation clamp", "Nm", compensation.clamp, 0.0, limits.torque)?;
         Ok(())
     }
 }

@@ -139,6 +139,10 @@ impl Faults {
     /// No fault.
     pub const NONE: Self = Self(0);
 
+    /// Faults of motion that count in the open loop, too: where its position is, a joint under commissioning need not know.
+    pub(super) const OPEN_LOOP: Self =
+        Self(Fault::OverSpeed.bit() | Fault::WindingTemperature.bit() | Fault::StaleCommand.bit());
+
     /// One bit a fault, at its number.
     #[inline(always)]
     pub(super) const fn bits(self) -> u32 {
@@ -148,6 +152,12 @@ impl Faults {
     /// The set with these [bits](Self::bits).
     pub(super) const fn from_bits(bits: u32) -> Self {
         Self(bits)
+    }
+
+    /// Whether this fault is there and no other.
+    #[inline(always)]
+    pub const fn is_only(self, fault: Fault) -> bool {
+        self.0 == fault.bit()
     }
 
     /// Adds a fault where a condition holds.

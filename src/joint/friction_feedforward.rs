@@ -179,3 +179,156 @@ impl FrictionFeedforward {
         self.withheld
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::compensation::Request;
+    use crate::friction::domain::{Domain, Range};
+    use crate::friction::physical::{Coefficients, PhysicalParameters, Terms};
+    use crate::friction::regime::Selector;
+    use crate::friction::state::SIGNALS;
+    use crate::friction::{FrictionModel, FrictionParameters, ParameterSet};
+
+    /// Below it compensation fades, rad/s.
+    const STANDSTILL: f32 = 0.1;
+    /// Offset of the models that have one, Nm.
+    const OFFSET: f32 = 0.25;
+
+    /// A joint with friction of a constant (Nm) and a viscous part (Nm s/rad).
+    fn active(source: VelocitySource, constant: f32, viscous: f32) -> Active {
+        let mut board = crate::default_configuration::B_G431B_ESC1;
+        let joint = &mut board.joint;
+        (joint.limits.torque, joint.limits.damping) = (2.0, 2.0);
+        joint.compensation = crate::joint::configuration::CompensationConfiguration {
+            request: Request::Physical,
+            gain: 1.0,
+            clamp: 2.0,
+            slew: 32e3,
+            velocity_source: source,
+            standstill_velocity: STANDSTILL,
+        };
+        let range = Range { low: q16(-100.0), high: q16(100.0) };
+        let domain = Domain { ranges: [range; SIGNALS], margin: 1 << 13, reference_temperature: q16(25.0) };
+        // Full scale of a signal in such a range is 128.
+        let coefficients =
+            Coefficients { constant: q16(constant), viscous: q16(128.0 * viscous), ..Coefficients::default() };
+        let physical = PhysicalParameters { terms: Terms::CONSTANT.union(Terms::VISCOUS), coefficients };
+        let mut sets = [ParameterSet::default(); 4];
+        sets[0].physical = physical;
+        let friction = FrictionParameters { domain, selector: Selector::default(), sets };
+        let model = FrictionModel::new(&friction, board.bridge.motion_rate());
+        joint.prepare(&board.bridge).unwrap().with_friction(Some(model))
+    }
+
+    /// A round at a velocity, rad/s, with a command's torque, Nm, and velocity, rad/s.
+    fn round(
+        feedforward: &mut FrictionFeedforward,
+        active: &Active,
+        velocity: f32,
+        torque: f32,
+        reference: Option<f32>,
+    ) -> Compensated {
+        let motion = JointMotion { velocity, ..JointMotion::default() };
+        let wanted = Wanted { torque, velocity: reference };
+        feedforward.begin(active, &motion, &wanted, 0.0, &Surroundings { temperature: 25.0, coupled_velocity: 0.0 });
+        feedforward.network(active);
+        feedforward.physical_model(active);
+        feedforward.compensate(active, &motion, &wanted)
+    }
+
+    /// A joint that has moved at a velocity, rad/s, for 0.5 s, with a command that pushes it.
+    fn pushed(active: &Active, velocity: f32) -> FrictionFeedforward {
+        let mut feedforward = FrictionFeedforward::default();
+        (0..2_000).for_each(|_| _ = round(&mut feedforward, active, velocity, velocity, None));
+        assert_eq!(feedforward.withheld(), 0.0);
+        feedforward
+    }
+
+    #[test]
+    fn a_model_with_an_offset_pushes_no_joint_at_rest_and_a_slow_one_in_proportion() {
+        for (source, reference) in [
+            (VelocitySource::Reference, true),
+            (VelocitySource::Reference, false),
+            (VelocitySource::Measured, true),
+            (VelocitySource::Measured, false),
+        ] {
+            let active = active(source, OFFSET, 0.0);
+            for (part, expected) in [(0.0, 0.0), (0.25, 0.25), (0.5, 0.5), (0.999, 0.999), (1.0, 1.0), (1.001, 1.0)] {
+                for velocity in [part * STANDSTILL, -part * STANDSTILL] {
+                    let mut feedforward = FrictionFeedforward::default();
+                    let found = round(&mut feedforward, &active, velocity, velocity, reference.then_some(velocity));
+                    let whole = found.output.torque.to_bits() as f32 / 65536.0;
+                    assert!((whole - OFFSET).abs() < 1e-4, "{whole} Nm");
+                    assert!((found.permitted - expected).abs() < 1e-6, "{source:?} {velocity}: {}", found.permitted);
+                    assert!((found.torque - expected * OFFSET).abs() < 1e-4, "{source:?} {velocity}: {}", found.torque);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_reference_at_rest_adds_nothing_however_the_joint_moves() {
+        let active = active(VelocitySource::Reference, OFFSET, 0.0);
+        let mut feedforward = FrictionFeedforward::default();
+        for velocity in [-5.0, 0.0, 0.5 * STANDSTILL, 5.0] {
+            assert_eq!(round(&mut feedforward, &active, velocity, 0.0, Some(0.0)).torque, 0.0, "{velocity} rad/s");
+        }
+    }
+
+    #[test]
+    fn the_guard_answers_to_a_speed_that_grows_by_a_factor_of_e_in_less_than_a_second() {
+        let active = active(VelocitySource::Measured, 0.0, 0.01);
+        let period = active.compensation.period;
+        for direction in [1.0, -1.0] {
+            // Growth of the speed, 1/s; behind its mean over 10 ms it is 1 % ahead where that is 1.
+            for (growth, command, withholds) in
+                [(0.97, 0.0, false), (1.03, 0.0, true), (1.03, -direction, true), (1.03, direction, false)]
+            {
+                let mut feedforward = pushed(&active, direction);
+                for n in 0..2_000 {
+                    let velocity = direction * (growth * period * n as f32).exp();
+                    round(&mut feedforward, &active, velocity, command, None);
+                }
+                assert_eq!(feedforward.withheld() > 0.0, withholds, "{growth}/s, command {command}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_guard_takes_compensation_away_in_5_ms_and_gives_it_back_in_100() {
+        let active = active(VelocitySource::Measured, 0.0, 0.01);
+        let period = active.compensation.period;
+        let mut feedforward = pushed(&active, 1.0);
+        let mut velocity = 2.0;
+        let away = (1..1_000).find(|_| {
+            velocity *= 1.01;
+            round(&mut feedforward, &active, velocity, 0.0, None).permitted == 0.0
+        });
+        let back = (1..1_000).find(|_| round(&mut feedforward, &active, velocity, 1.0, None).permitted == 1.0);
+        for (rounds, time) in [(away.unwrap(), 0.005), (back.unwrap(), 0.1)] {
+            assert!((rounds as f32 * period / time - 1.0).abs() < 0.06, "{rounds} rounds for {time} s");
+        }
+    }
+
+    /// Speed, rad/s, of a joint that was let go at 0.5 rad/s, with a viscous friction (Nm s/rad) and a model of more of it, after 3 s.
+    fn let_go(active: &Active, friction: f32) -> f32 {
+        // Without the guard it would run away with a time constant of 0.3 s: inertia over what the model has too much.
+        let inertia = 0.3 * 0.3 * friction;
+        let mut velocity = 0.5;
+        let mut feedforward = pushed(active, velocity);
+        let period = active.compensation.period;
+        for _ in 0..(3.0 / period) as u32 {
+            let torque = round(&mut feedforward, active, velocity, 0.0, None).torque;
+            velocity += (torque - friction * velocity) / inertia * period;
+        }
+        velocity
+    }
+
+    #[test]
+    fn a_joint_whose_friction_is_30_percent_less_than_its_models_does_not_run_away() {
+        let active = active(VelocitySource::Measured, 0.0, 1.3 * 0.05);
+        let velocity = let_go(&active, 0.05);
+        assert!((0.0..0.5).contains(&velocity), "{velocity} rad/s");
+    }
+}

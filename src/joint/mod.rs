@@ -7,44 +7,49 @@
 //!  - `offsets`: the current sensors' offsets, from the first steps;
 //!  - [`monitor`]: faults, and [`fault`]: what they lead to;
 //!  - [`state_machine`]: whether the joint may move;
-//!  - [`motion_loop`], slower than the rest, a stage a step: [`command`] and [`motion_law`], from a set-point to a torque within every limit, and
-//!    [`friction_feedforward`], what friction will take of it;
-//!  - `calibrating`: measuring the motor instead of moving it, while the joint is off;
+//!  - [`motion_loop`], slower than the rest, a stage a step: [`command`] and [`motion_law`], from a set-point to a torque, [`limit_law`], how much of it
+//!    the limits permit, and [`friction_feedforward`], what friction will take of it;
+//!  - `regeneration`: how much of a braking current the supply bears;
 //!  - [`history`]: the last steps before a fault.
 //!
-//! Beside it, outside the interrupt: [`configuration`] what the joint is, [`active`] the same prepared for the step, [`commissioning`] what a
-//! calibration is given and gives.
+//! In place of the motion loop and the current loop, for commissioning: [`open_loop`](crate::motor::open_loop).
+//!
+//! Beside it, outside the interrupt: [`configuration`] what the joint is, [`board_limits`] what it may be on its board, [`active`] the same prepared for
+//! the step.
 
 pub mod active;
-mod calibrating;
+pub mod board_limits;
 pub mod command;
-pub mod commissioning;
 pub mod configuration;
 pub mod fault;
 pub mod friction_feedforward;
 pub mod history;
+pub mod limit_law;
 pub mod monitor;
 pub mod motion_law;
 pub mod motion_loop;
 mod offsets;
+mod regeneration;
+#[cfg(test)]
+mod rig;
 pub mod shadow;
 mod signals;
 pub mod state_machine;
 
 pub use active::{Active, JointMotion};
+pub use board_limits::BoardLimits;
 pub use command::{Command, Coupled, Demand, Mode};
 pub use offsets::OFFSET_STEPS;
 pub use signals::{Bridge, BridgeState, Measurements};
 
-use crate::motor::calibration::{CalibrationSettings, Progress};
 use crate::motor::field_oriented::{FieldOriented, FieldOrientedInput};
-use crate::motor::number::{limited, or_zero, within};
+use crate::motor::number::{greater, lesser, limited, or_zero, within};
 use crate::motor::observer::Observer;
+use crate::motor::open_loop::{OpenLoop, OpenLoopInput, OpenLoopOutput, Window};
 use crate::motor::phases::Phases;
-use crate::motor::setting::SettingError;
 use crate::motor::thermal::MeanSquareCurrent;
 use crate::motor::transform::Dq;
-use calibrating::Calibrating;
+use active::DERATING;
 use fault::{Fault, Faults, Reaction};
 use friction_feedforward::{Compensated, Surroundings};
 use history::{History, Snapshot};
@@ -52,17 +57,18 @@ use monitor::Monitor;
 use motion_law::Wanted;
 use motion_loop::{MotionLoop, Seen, Stage};
 use offsets::Offsets;
+use regeneration::Regeneration;
 use state_machine::{Events, State, StateMachine};
 
 /// Speed below which a braking joint counts as standing, as a part of the velocity limit.
-const STANDING: f32 = 0.01;
+pub(crate) const STANDING: f32 = 0.01;
 /// Control steps for which it must stand before the bridge switches off.
-const STANDING_STEPS: u32 = 400;
+pub(crate) const STANDING_STEPS: u32 = 400;
 
 /// What the slow task knows and the control step uses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slow {
-    /// Part of current and torque limit that the winding's temperature permits, 0 to 1.
+    /// Part of current and torque limit that the winding's temperature permits, 0 to 1. That of the bridge is the control step's own.
     pub derating: f32,
     /// Temperature of the gear, °C: for friction.
     pub gear_temperature: f32,
@@ -139,12 +145,13 @@ pub struct Joint {
     monitor: Monitor,
     machine: StateMachine,
     motion_loop: MotionLoop,
+    regeneration: Regeneration,
     field_oriented: FieldOriented,
     /// The last valid reading of the encoder.
     encoder: u32,
     /// The encoder's zero is known.
     referenced: bool,
-    calibrating: Calibrating,
+    open_loop: OpenLoop,
     sequence: u32,
     stale_steps: u32,
     coupled_sequence: u32,
@@ -165,7 +172,7 @@ struct Found {
     motion: JointMotion,
     measured_torque: f32,
     gear_temperature: f32,
-    reference: f32,
+    reference: Dq,
     current: Dq,
     bus_voltage: f32,
 }
@@ -217,40 +224,52 @@ impl Joint {
         let observation = self.observer.step(&active.observer, sample, 0.0);
         let motion = active.scales.joint(&observation.motion);
 
-        let derating = within(slow.derating, 0.0, 1.0);
-        let faults = self.watch(active, demand, derating, measured, currents, &observation, &motion);
+        let winding = within(slow.derating, 0.0, 1.0);
+        let faults = self.watch(active, demand, winding, measured, currents, &observation, &motion);
         let state = self.decide(active, demand, faults, &motion);
 
-        let measured_torque = or_zero(self.found.current.q * active.scales.torque_per_current);
+        // No sensor is no number, and derates nothing.
+        let bridge = (active.limits.bridge_temperature - measured.bridge_temperature) * (1.0 / DERATING);
+        let derating = greater(lesser(bridge, winding), 0.0);
+        let mut measured_torque = or_zero(self.found.current.q * active.scales.torque_per_current);
         let coupled_velocity = self.coupled(active, demand);
         let surroundings = Surroundings { temperature: slow.gear_temperature, coupled_velocity };
         let seen = Seen { motion: &motion, derating, measured_torque, surroundings };
         let torque = self.motion_loop.step::<COMPENSATION>(active, state, &demand.command, &seen);
 
-        let (bridge, reference, current) = if state.switches() {
-            // A hot winding bears the current of braking for as long as braking may take; a joint that coasts into somebody is worse.
+        let (bridge, reference, current) = if state.makes_torque() {
+            // What is hot bears the current of braking for as long as braking may take; a joint that coasts into somebody is worse.
             let limit = match state {
                 State::OperationEnabled => active.current_limit * derating,
                 _ => active.current_limit,
             };
-            let reference = limited(torque * active.scales.current_per_torque, limit);
+            let wanted = limited(torque * active.scales.current_per_torque, limit);
+            let speed = active.alignment.electrical_speed(observation.motion.velocity);
+            let reference = self.regeneration.step(active, wanted, speed, measured.bus_voltage, derating);
             let input = FieldOrientedInput {
                 phase_currents: currents,
                 angle: active.alignment.electrical(observation.motion.angle()),
-                speed: active.alignment.electrical_speed(observation.motion.velocity),
+                speed,
                 bus_voltage: measured.bus_voltage,
-                reference: Dq { d: 0.0, q: reference },
+                reference,
             };
             let output = self.field_oriented.step(&active.field_oriented, &input);
             self.monitor.current_loop(reference, &output, way);
             self.mean_square.add(output.current);
             (Bridge { state: BridgeState::Switching, duties: output.duties }, reference, output.current)
         } else {
-            self.field_oriented.reset();
-            self.monitor.loop_is_off();
-            let (bridge, flowing) = self.calibrating.step(state, active, measured, currents);
-            self.mean_square.add(flowing);
-            (bridge, 0.0, Dq::default())
+            match state {
+                State::OpenLoop => {
+                    let output = self.apply_open_loop(active, demand, derating, measured, currents);
+                    self.mean_square.add(output.current);
+                    measured_torque = output.torque;
+                    (Bridge { state: BridgeState::Switching, duties: output.duties }, Dq::ZERO, output.current)
+                }
+                _ => {
+                    self.mean_square.add(Dq::ZERO);
+                    (Bridge::OFF, Dq::ZERO, Dq::ZERO)
+                }
+            }
         };
 
         self.found = Found {
@@ -284,7 +303,7 @@ impl Joint {
         telemetry.compensated = *self.motion_loop.compensated();
         telemetry.measured_torque = found.measured_torque;
         telemetry.gear_temperature = found.gear_temperature;
-        telemetry.reference = Dq { d: 0.0, q: found.reference };
+        telemetry.reference = found.reference;
         telemetry.current = found.current;
         telemetry.bus_voltage = found.bus_voltage;
     }
@@ -294,28 +313,21 @@ impl Joint {
         self.latched
     }
 
-    /// Begins a calibration with the next control step; in a joint that is not off it is given up at once.
-    ///
-    /// # Errors
-    /// A setting out of its range; what ran goes on.
-    pub fn calibrate(&mut self, settings: &CalibrationSettings) -> Result<(), SettingError> {
-        self.calibrating.begin(self.machine.state(), settings)
+    /// The last complete window of the open loop.
+    pub fn window(&self) -> &Window {
+        self.open_loop.window()
     }
 
-    /// Gives the calibration up, where one runs: the bridge is off from the next control step on.
-    pub fn abort_calibration(&mut self) {
-        self.calibrating.abort();
-    }
-
-    /// Whether a calibration runs.
+    /// Whether the last step completed it.
     #[inline(always)]
-    pub fn is_calibrating(&self) -> bool {
-        self.calibrating.runs()
+    pub fn has_new_window(&self) -> bool {
+        self.machine.state() == State::OpenLoop && self.open_loop.is_complete()
     }
 
-    /// Where the calibration is that runs or ran last.
-    pub fn calibration(&self) -> Option<Progress> {
-        self.calibrating.progress()
+    /// Whether a fault reset waits until the gate driver's fault has been cleared: the board is asked to clear it.
+    #[inline(always)]
+    pub fn waits_for_driver(&self) -> bool {
+        self.machine.waits_for_driver()
     }
 
     /// The steps before the last fault.
@@ -328,10 +340,33 @@ impl Joint {
         self.mean_square.take()
     }
 
+    /// A commanded voltage in place of the current loop. A function of its own, which may lie where code waits for the flash: on a board that has only
+    /// one bank, nothing is written there while the bridge switches.
+    #[inline(never)]
+    fn apply_open_loop(
+        &mut self,
+        active: &Active,
+        demand: &Demand,
+        derating: f32,
+        measured: &Measurements,
+        phase_currents: Phases,
+    ) -> OpenLoopOutput {
+        let input = OpenLoopInput {
+            phase_currents,
+            current_limit: active.current_limit * derating,
+            torque_per_current: active.scales.torque_per_current,
+            bus_voltage: measured.bus_voltage,
+            encoder: self.encoder,
+            referenced: self.referenced,
+        };
+        let frame = &demand.command.open_loop;
+        self.open_loop.step(&active.open_loop, &active.field_oriented.modulator, frame, &input)
+    }
+
     #[inline(always)]
     fn without_offsets(&mut self, active: &Active, measured: Phases) -> Phases {
-        if !self.offsets.are_known() {
-            self.offsets.add(measured, active.limits.over_current);
+        if !self.machine.state().makes_torque() {
+            self.rest(active, measured);
         }
         self.offsets.taken_from(measured)
     }
@@ -358,7 +393,7 @@ impl Joint {
         &mut self,
         active: &Active,
         demand: &Demand,
-        derating: f32,
+        winding: f32,
         measured: &Measurements,
         currents: Phases,
         observation: &crate::motor::observer::Observation,
@@ -374,8 +409,11 @@ impl Joint {
         let mut faults = self.monitor.measurements(active, measured, currents, observation);
         // What an encoder that is lost or jumps says of the motion counts for nothing.
         if !faults.contains(Fault::EncoderLost) && !faults.contains(Fault::EncoderJump) {
-            let moving = self.monitor.motion(active, motion, self.stale_steps, derating);
+            let open_loop = demand.command.mode == Mode::OpenLoop;
+            let moving = self.monitor.motion(active, motion, self.stale_steps, winding);
             faults = faults.union(match state {
+                State::OpenLoop => self.open_loop_faults(active, moving),
+                State::SwitchedOn if open_loop => Faults::NONE,
                 State::OperationEnabled | State::QuickStopActive | State::FaultReactionActive => moving,
                 // Refused before it gives torque.
                 State::SwitchedOn if demand.controlword.enables_operation() => moving,
@@ -388,6 +426,14 @@ impl Joint {
             self.monitor.check_current_loop(active);
         }
         faults.union(self.monitor.found())
+    }
+
+    /// Of the faults of motion those that count in the open loop, in which a shorter deadline holds.
+    #[inline(never)]
+    fn open_loop_faults(&self, active: &Active, moving: Faults) -> Faults {
+        let mut faults = moving.intersection(Faults::OPEN_LOOP);
+        faults.set(Fault::StaleCommand, self.stale_steps > active.open_loop.deadline_steps);
+        faults
     }
 
     /// Counts the steps without a new set-point from "ready to switch on" on. In "fault" a count that has led there stays until one comes.
@@ -415,14 +461,22 @@ impl Joint {
     #[inline(never)]
     fn decide(&mut self, active: &Active, demand: &Demand, faults: Faults, motion: &JointMotion) -> State {
         let before = self.machine.state();
-        let started = self.offsets.are_known() && self.referenced;
-        let mut events =
-            Events { started, fault: !faults.is_empty(), stopped: self.has_stopped(active, before, motion) };
+        let open_loop = demand.command.mode == Mode::OpenLoop;
+        let events = Events {
+            // The open loop looks for the encoder's zero.
+            started: self.offsets.are_known() && (self.referenced || open_loop),
+            open_loop,
+            fault: !faults.is_empty(),
+            driver_alone: faults.is_only(Fault::BridgeDriver),
+            stopped: self.has_stopped(active, before, motion),
+        };
         let mut state = self.machine.step(demand.controlword, events);
+        if state == State::OpenLoop && before != state {
+            self.open_loop.begin();
+        }
         let reaction = faults.union(self.latched).reaction();
-        if state == State::FaultReactionActive && reaction != Some(Reaction::Brake) {
-            events.stopped = true;
-            state = self.machine.step(demand.controlword, events);
+        if reaction != Some(Reaction::Brake) {
+            state = self.machine.end_reaction();
         }
         if !faults.is_empty() {
             self.latched = self.latched.union(faults);
@@ -464,56 +518,4 @@ impl Joint {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::motor::angle::TAU;
-
-    fn at_rest(encoder: u32, encoder_referenced: bool) -> Measurements {
-        Measurements {
-            phase_currents: Phases::uniform(0.0),
-            bus_voltage: 18.0,
-            encoder,
-            encoder_valid: true,
-            encoder_referenced,
-            winding_temperature: f32::NAN,
-            bridge_temperature: 25.0,
-            bridge_fault: false,
-            overrun: false,
-        }
-    }
-
-    #[test]
-    fn a_joint_is_not_ready_before_its_encoder_knows_its_zero_and_then_begins_there() {
-        let board = crate::default_configuration::B_G431B_ESC1;
-        let active = board.joint.prepare(&board.bridge).unwrap();
-        let mut joint = Joint::new();
-        let mut step = |encoder, referenced| {
-            joint.control_step(&active, &Demand::default(), &Slow::default(), &at_rest(encoder, referenced));
-            (joint.telemetry().state, joint.latched_faults().is_empty(), joint.telemetry().motion.position)
-        };
-        for _ in 0..2 * OFFSET_STEPS {
-            assert_eq!(step(1 << 30, false), (State::NotReadyToSwitchOn, true, TAU / 4.0));
-        }
-        // The index lies an eighth of a turn back from here: no jump, but where the joint is.
-        for _ in 0..100 {
-            let (state, healthy, position) = step(1 << 29, true);
-            assert!(state == State::SwitchOnDisabled && healthy && (position - TAU / 8.0).abs() < 1e-6, "{position}");
-        }
-    }
-
-    #[test]
-    fn a_coupled_joint_that_falls_silent_counts_as_standing_after_the_command_deadline() {
-        let board = crate::default_configuration::B_G431B_ESC1;
-        let active = board.joint.prepare(&board.bridge).unwrap();
-        let mut joint = Joint::new();
-        let mut demand = Demand::default();
-        assert_eq!(joint.coupled(&active, &demand), 0.0);
-        demand.coupled = Coupled { velocity: -2.5, sequence: 1 };
-        for _ in 0..=active.deadline_steps {
-            assert_eq!(joint.coupled(&active, &demand), -2.5);
-        }
-        assert_eq!(joint.coupled(&active, &demand), 0.0);
-        demand.coupled.sequence = 2;
-        assert_eq!(joint.coupled(&active, &demand), -2.5);
-    }
-}
+mod tests;

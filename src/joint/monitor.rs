@@ -14,7 +14,6 @@ use super::active::{Active, VOLTAGE_FILTER};
 use super::configuration::MOTION_STEPS;
 use super::fault::{Fault, Faults};
 use super::signals::Measurements;
-use crate::motor::angle::{STEPS, TAU};
 use crate::motor::field_oriented::FieldOrientedOutput;
 use crate::motor::number::{exceeds, greater, magnitude, or_zero};
 use crate::motor::observer::Observation;
@@ -87,8 +86,8 @@ pub struct Monitor {
 struct Sums {
     /// Control steps.
     steps: f32,
-    /// q reference, A; that of d is zero.
-    reference: f32,
+    /// Reference, A.
+    reference: Dq,
     /// A.
     current: Dq,
     /// V.
@@ -175,37 +174,37 @@ impl Monitor {
         faults.set(Fault::EncoderJump, !lost && exceeds(observation.innovation, active.jump_limit));
 
         let implausible = |sensor: bool, value: f32| sensor && !within(value, SENSOR_RANGE.0, SENSOR_RANGE.1);
-        let bridge = implausible(active.bridge.has_bridge_sensor, measured.bridge_temperature);
-        let winding = implausible(active.bridge.has_winding_sensor, measured.winding_temperature);
+        let bridge = implausible(active.has_bridge_sensor, measured.bridge_temperature);
+        let winding = implausible(active.has_winding_sensor, measured.winding_temperature);
         faults.set(Fault::TemperatureSensor, bridge || winding);
-        faults.set(Fault::BridgeTemperature, measured.bridge_temperature > limits.bridge_temperature);
+        faults.set(Fault::BridgeTemperature, measured.bridge_temperature >= limits.bridge_temperature);
         faults.set(Fault::BridgeDriver, measured.bridge_fault);
         faults.set(Fault::Overrun, measured.overrun);
         faults
     }
 
-    /// Faults that only a joint in motion, or meant to be, can have.
+    /// Faults that only a joint in motion, or meant to be, can have. `winding` is the part of the current that the winding's temperature permits.
     #[inline(always)]
-    pub fn motion(&mut self, active: &Active, motion: &JointMotion, stale_steps: u32, derating: f32) -> Faults {
+    pub fn motion(&mut self, active: &Active, motion: &JointMotion, stale_steps: u32, winding: f32) -> Faults {
         let limits = &active.limits;
         let mut faults = Faults::NONE;
         faults.set(Fault::OverSpeed, exceeds(motion.velocity, OVER_SPEED * limits.velocity));
         let (low, high) = limits.position;
         let margin = limits.position_margin;
         faults.set(Fault::PositionLimit, !within(motion.position, low - margin, high + margin));
-        faults.set(Fault::WindingTemperature, derating <= 0.0);
+        faults.set(Fault::WindingTemperature, winding <= 0.0);
         faults.set(Fault::StaleCommand, stale_steps > active.deadline_steps);
         faults
     }
 
-    /// What the current loop did in a step in which the bridge switched. `reference` is that of the q current, A; `way` the encoder's since the step
+    /// What the current loop did in a step in which the bridge switched. `reference` is the wanted current, A; `way` the encoder's since the step
     /// before, 2^32 a turn: the observer's speed takes some milliseconds to see a rotor stopped by an obstacle, and what its estimate then
     /// induces would look like a fault.
     #[inline(always)]
-    pub fn current_loop(&mut self, reference: f32, output: &FieldOrientedOutput, way: f32) {
+    pub fn current_loop(&mut self, reference: Dq, output: &FieldOrientedOutput, way: f32) {
         let Voltage { sums, last, .. } = &mut self.voltage;
         sums.steps += 1.0;
-        sums.reference += reference;
+        sums.reference = sums.reference + reference;
         sums.current = sums.current + output.current;
         sums.voltage = sums.voltage + output.voltage;
         sums.way += way;
@@ -229,13 +228,13 @@ impl Monitor {
         let share = 1.0 / steps;
         let (current, voltage) = (current * share, voltage * share);
         let reference = reference * share;
-        let speed = active.alignment.electrical_speed(way * share * (TAU / STEPS) * active.bridge.rate);
+        let speed = active.alignment.electrical_speed(way * share * active.encoder_speed);
         let (resistance, inductance) = (active.resistance, active.inductance);
         let induced = Dq { d: -inductance.q * current.q, q: inductance.d * current.d + active.flux_linkage } * speed;
 
         filter(&mut memory.unexplained, voltage - current * resistance - induced);
         filter(&mut memory.induced, induced);
-        filter(&mut memory.error, Dq { d: -current.d, q: reference - current.q });
+        filter(&mut memory.error, reference - current);
 
         // The filtered slope of the current is that of the filtered current.
         let before = memory.current;
@@ -255,7 +254,8 @@ impl Monitor {
             || exceeds(left.q, active.implausible_voltage.q + explained(memory.current.q));
         let found = memory.rounds.step(contradicts, UNEXPLAINED_ROUNDS);
 
-        let permitted = MISSED_LIMIT * active.current_limit + MISSED_REFERENCE * magnitude(reference);
+        let permitted =
+            MISSED_LIMIT * active.current_limit + MISSED_REFERENCE * (magnitude(reference.d) + magnitude(reference.q));
         let missed = memory.error.norm_squared() > permitted * permitted;
         memory.missed = match (contradicts, missed) {
             (true, true) => memory.missed.saturating_add(1),

@@ -1,8 +1,10 @@
-//! From a command to a torque: ramps, stiffness and damping, and the limits of torque, velocity and position; control step, once a round of the
-//! motion loop.
+//! From a command to a torque: ramps, stiffness and damping; control step, once a round of the motion loop.
+//!
+//! Whatever a mode and its gains want, the torque stays within the [bounds](super::limit_law) of the limits.
 
 use super::active::{Active, JointMotion};
 use super::command::{Command, Mode};
+use super::limit_law::Bounds;
 use crate::motor::number::{greater, lesser, limited, or_zero, square_root};
 
 /// What a command wants in this round.
@@ -24,6 +26,8 @@ pub struct MotionLaw {
     velocity: f32,
     /// Nm.
     integral: f32,
+    /// Of the torque.
+    bounds: Bounds,
 }
 
 impl MotionLaw {
@@ -37,12 +41,17 @@ impl MotionLaw {
     #[inline(always)]
     pub fn step(&mut self, active: &Active, command: &Command, motion: &JointMotion, derating: f32) -> Wanted {
         if self.mode != Some(command.mode) {
-            *self =
-                Self { mode: Some(command.mode), position: motion.position, velocity: motion.velocity, integral: 0.0 };
+            *self = Self {
+                mode: Some(command.mode),
+                position: motion.position,
+                velocity: motion.velocity,
+                ..Self::default()
+            };
         }
         let gains = &active.motion;
         let (torque, velocity) = match command.mode {
-            Mode::Torque => (0.0, None),
+            // The open loop knows no torque.
+            Mode::Torque | Mode::OpenLoop => (0.0, None),
             Mode::Velocity => {
                 self.ramp(limited(command.velocity, active.limits.velocity), gains.velocity_step);
                 let error = self.velocity - motion.velocity;
@@ -67,19 +76,30 @@ impl MotionLaw {
         self.integral = limited(self.integral, limit);
         // Two opposite infinities add up to no number.
         let torque = or_zero(or_zero(torque) + or_zero(command.torque));
-        Wanted { torque: bounded(torque, limit, active, motion), velocity }
+        self.bounds = Bounds::at(active, motion, limit);
+        Wanted { torque: self.bounds.hold(torque), velocity }
     }
 
-    /// One round of braking: the velocity comes down along the quick stop's ramp.
+    /// What the torque of this round must not exceed, compensation included.
+    #[inline(always)]
+    pub fn bounds(&self) -> &Bounds {
+        &self.bounds
+    }
+
+    /// One round of braking: the velocity comes down along the quick stop's ramp, by the limit damping and an integral of its own, whatever the
+    /// modes' gains are.
     #[inline(never)]
     pub fn brake(&mut self, active: &Active, motion: &JointMotion) -> Wanted {
         if self.mode.is_some() {
             *self = Self { velocity: motion.velocity, ..Self::default() };
         }
         self.ramp(0.0, active.motion.quick_stop_step);
+        let (gains, limit) = (&active.limit_gains, active.limits.torque);
         let error = self.velocity - motion.velocity;
-        self.integral = limited(self.integral + active.motion.velocity_integral * error, active.limits.torque);
-        let torque = limited(active.motion.damping * error + self.integral, active.limits.torque);
+        let damped = limited(active.limits.damping * error, limit);
+        let torque = limited(damped + self.integral + gains.braking_integral * error, limit);
+        // What the limit has cut off is not integrated: it would drive the joint back after its stop.
+        self.integral = torque - damped;
         Wanted { torque, velocity: Some(self.velocity) }
     }
 
@@ -114,29 +134,4 @@ impl MotionLaw {
         self.ramp(wanted, gains.velocity_step);
         self.position += self.velocity * gains.period;
     }
-}
-
-/// The torque within its limit, held back towards the velocity limit and, like a spring and a damper, beyond the position limits.
-#[inline(always)]
-fn bounded(torque: f32, limit: f32, active: &Active, motion: &JointMotion) -> f32 {
-    let gains = &active.motion;
-    let (low, high) = active.limits.position;
-    let speed = active.limits.velocity;
-    // What still may push up, and down: nothing at the limit, an opposite torque beyond it.
-    let up_position = gains.stiffness * (high - motion.position) - gains.damping * motion.velocity;
-    let down_position = gains.stiffness * (low - motion.position) - gains.damping * motion.velocity;
-    let up = limited(
-        lesser(up_position + limit_at(gains.stiffness, limit), gains.damping * (speed - motion.velocity)),
-        limit,
-    );
-    let down = limited(
-        greater(down_position - limit_at(gains.stiffness, limit), gains.damping * (-speed - motion.velocity)),
-        limit,
-    );
-    limited(greater(lesser(torque, up), down), limit)
-}
-
-/// Without stiffness there is no wall: the limit itself is permitted everywhere.
-fn limit_at(stiffness: f32, limit: f32) -> f32 {
-    if stiffness > 0.0 { 0.0 } else { limit }
 }

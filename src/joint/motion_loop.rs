@@ -9,7 +9,6 @@ use super::command::Command;
 use super::friction_feedforward::{Compensated, FrictionFeedforward, Surroundings};
 use super::motion_law::{MotionLaw, Wanted};
 use super::state_machine::State;
-use crate::motor::number::limited;
 
 /// The stages of a round, in their order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -63,14 +62,14 @@ impl MotionLoop {
         if state != self.state {
             self.begin(state);
         }
-        if !state.switches() {
+        if !state.makes_torque() {
             return 0.0;
         }
         let enabled = state == State::OperationEnabled;
         self.stage::<COMPENSATION>(active, enabled, command, seen);
         match self.compensated.torque {
             0.0 => self.wanted.torque,
-            compensation => limited(self.wanted.torque + compensation, active.limits.torque),
+            compensation => self.law.bounds().hold(self.wanted.torque + compensation),
         }
     }
 
@@ -80,7 +79,7 @@ impl MotionLoop {
         (self.state, self.stage) = (state, Stage::default());
         self.friction.reset();
         self.compensated = Compensated::NOTHING;
-        if !state.switches() {
+        if !state.makes_torque() {
             self.law.reset();
             self.wanted = Wanted::default();
         }
@@ -191,5 +190,27 @@ mod tests {
         assert_eq!(torque(0.02), 0.02);
         (1..MOTION_STEPS).for_each(|n| assert_eq!(torque(0.01), 0.02, "step {n}"));
         assert_eq!(torque(0.01), 0.01);
+    }
+
+    #[test]
+    fn compensation_pushes_through_no_limit() {
+        let mut active = active();
+        active.limits.position = (-10.0, 10.0);
+        let limits = active.limits;
+        let half = limits.position.1 + 0.5 * limits.position_margin;
+        for (position, velocity) in [(half, 0.0), (0.0, limits.velocity)] {
+            let motion = JointMotion { position, velocity, acceleration: 0.0 };
+            let surroundings = Surroundings { temperature: 25.0, coupled_velocity: 0.0 };
+            let seen = Seen { motion: &motion, derating: 1.0, measured_torque: 0.0, surroundings };
+            let mut motion_loop = MotionLoop::default();
+            let mut torque = || {
+                let command = Command { torque: limits.torque, ..Command::default() };
+                let torque = motion_loop.step::<false>(&active, State::OperationEnabled, &command, &seen);
+                motion_loop.compensated.torque = 0.5 * limits.torque;
+                torque
+            };
+            let (without, with) = (torque(), torque());
+            assert!(without.abs() < 1e-6 && with.abs() < 1e-6, "{position} rad, {velocity} rad/s: {without} {with}");
+        }
     }
 }

@@ -1,7 +1,13 @@
 //! The drive's state machine (CiA 402-2, "Power drive system finite state automaton"); control step.
 //!
 //! What the network asks for comes as the controlword, what the drive is comes out as the statusword; the bridge switches only in
-//! [`State::OperationEnabled`], [`State::QuickStopActive`] and while a fault reaction brakes.
+//! [`State::OperationEnabled`], [`State::QuickStopActive`], while a fault reaction brakes, and in [`State::OpenLoop`].
+//!
+//! [`State::OpenLoop`] is not of the profile: it takes the place of "operation enabled" in [`Mode::OpenLoop`](super::Mode::OpenLoop), in which a voltage
+//! turns the motor and nothing can brake it. Whatever leaves it switches the bridge off in the same step.
+
+/// Control steps for which a fault reset waits for the gate driver: a task clears it, and configures it anew where it has to. 100 ms at 40 kHz.
+pub const RESET_STEPS: u16 = 4_000;
 
 /// States of the power drive system.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -24,6 +30,8 @@ pub enum State {
     FaultReactionActive = 6,
     /// A fault happened; nothing may move until it is acknowledged.
     Fault = 7,
+    /// The motor is under a commanded voltage.
+    OpenLoop = 8,
 }
 
 /// The controlword, object 6040h.
@@ -65,23 +73,45 @@ impl Controlword {
         self.has(1 << 1)
     }
 
-    const fn asks_quick_stop(self) -> bool {
-        self.enables_voltage() && !self.has(1 << 2)
+    /// How far the command lets the machine go, whether or not bit 7 is set.
+    #[inline(always)]
+    const fn permits(self) -> Permits {
+        if !self.enables_voltage() {
+            Permits::Nothing
+        } else if !self.has(1 << 2) {
+            Permits::QuickStop
+        } else if !self.has(1) {
+            Permits::Ready
+        } else if !self.has(1 << 3) {
+            Permits::SwitchedOn
+        } else {
+            Permits::Operation
+        }
     }
+}
 
-    /// "Shutdown", "switch on" or "enable operation": voltage and no quick stop.
-    const fn keeps_running(self) -> bool {
-        self.has(1 << 1 | 1 << 2)
-    }
+/// How far a command lets the machine go.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd)]
+#[repr(u8)]
+enum Permits {
+    Nothing,
+    QuickStop,
+    Ready,
+    SwitchedOn,
+    Operation,
 }
 
 /// What the machine is told in a control step besides the controlword.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Events {
-    /// The start is complete.
+    /// The start is complete, and what the mode needs is known.
     pub started: bool,
+    /// The mode is [`Mode::OpenLoop`](super::Mode::OpenLoop).
+    pub open_loop: bool,
     /// A fault is present: new, or one that has not gone.
     pub fault: bool,
+    /// The gate driver is at fault, and nothing else: a fault reset waits until it has been cleared.
+    pub driver_alone: bool,
     /// Braking, of a quick stop or of a fault reaction, is over or not permitted.
     pub stopped: bool,
 }
@@ -92,11 +122,28 @@ pub struct StateMachine {
     state: State,
     /// Fault reset was set in the last controlword.
     reset: bool,
+    /// Control steps for which a fault reset still waits for the gate driver.
+    waits: u16,
 }
 
 impl StateMachine {
+    /// Whether a fault reset waits for the gate driver.
+    #[inline(always)]
+    pub const fn waits_for_driver(&self) -> bool {
+        self.waits > 0
+    }
+
     /// Where it is.
     pub const fn state(&self) -> State {
+        self.state
+    }
+
+    /// Ends a fault reaction that must not brake, in the step that begins it.
+    #[inline(always)]
+    pub fn end_reaction(&mut self) -> State {
+        if self.state == State::FaultReactionActive {
+            self.state = State::Fault;
+        }
         self.state
     }
 
@@ -106,24 +153,37 @@ impl StateMachine {
         use State::*;
         let reset = word.has(1 << 7) && !self.reset;
         self.reset = word.has(1 << 7);
+        let asked = reset || self.waits > 0;
+        self.waits = match (self.state, events.driver_alone) {
+            (Fault, true) if reset => RESET_STEPS,
+            (Fault, true) => self.waits.saturating_sub(1),
+            _ => 0,
+        };
         let faulty = events.fault && !matches!(self.state, FaultReactionActive | Fault);
+        let (permits, commands) = (word.permits(), word.commands());
+        let enables = permits == Permits::Operation && commands;
         self.state = match self.state {
             // A joint that was not moving has nothing to react with.
-            NotReadyToSwitchOn | SwitchOnDisabled | ReadyToSwitchOn | SwitchedOn if faulty => Fault,
+            NotReadyToSwitchOn | SwitchOnDisabled | ReadyToSwitchOn | SwitchedOn | OpenLoop if faulty => Fault,
             _ if faulty => FaultReactionActive,
             NotReadyToSwitchOn if events.started => SwitchOnDisabled,
-            SwitchOnDisabled if word.commands() && word.keeps_running() && !word.has(1) => ReadyToSwitchOn,
-            ReadyToSwitchOn if !word.keeps_running() => SwitchOnDisabled,
-            ReadyToSwitchOn if word.commands() && word.has(1) => SwitchedOn,
-            SwitchedOn | OperationEnabled if !word.enables_voltage() => SwitchOnDisabled,
-            SwitchedOn if word.asks_quick_stop() => SwitchOnDisabled,
-            SwitchedOn | OperationEnabled if word.keeps_running() && !word.has(1) => ReadyToSwitchOn,
-            SwitchedOn if word.enables_operation() => OperationEnabled,
-            OperationEnabled if word.asks_quick_stop() => QuickStopActive,
-            OperationEnabled if !word.has(1 << 3) => SwitchedOn,
-            QuickStopActive if !word.enables_voltage() || events.stopped => SwitchOnDisabled,
+            // Another mode needs more than the one before.
+            SwitchOnDisabled | ReadyToSwitchOn | SwitchedOn if !events.started => NotReadyToSwitchOn,
+            SwitchOnDisabled if permits == Permits::Ready && commands => ReadyToSwitchOn,
+            ReadyToSwitchOn | SwitchedOn | OpenLoop if permits as u8 <= Permits::QuickStop as u8 => SwitchOnDisabled,
+            OperationEnabled | QuickStopActive if permits == Permits::Nothing => SwitchOnDisabled,
+            OperationEnabled if permits == Permits::QuickStop || events.open_loop => QuickStopActive,
+            SwitchedOn | OperationEnabled | OpenLoop if permits == Permits::Ready => ReadyToSwitchOn,
+            ReadyToSwitchOn if permits as u8 >= Permits::SwitchedOn as u8 && commands => SwitchedOn,
+            // Not "switched on": the controlword that applied the voltage would enable the other mode.
+            OpenLoop if !events.open_loop => SwitchOnDisabled,
+            SwitchedOn if enables && events.open_loop => OpenLoop,
+            SwitchedOn if enables => OperationEnabled,
+            OpenLoop if !enables => SwitchedOn,
+            OperationEnabled if permits == Permits::SwitchedOn => SwitchedOn,
+            QuickStopActive if events.stopped => SwitchOnDisabled,
             FaultReactionActive if events.stopped => Fault,
-            Fault if reset && !events.fault => SwitchOnDisabled,
+            Fault if asked && !events.fault => SwitchOnDisabled,
             state => state,
         };
         self.state
@@ -141,16 +201,18 @@ impl State {
             4 => Self::OperationEnabled,
             5 => Self::QuickStopActive,
             6 => Self::FaultReactionActive,
+            8 => Self::OpenLoop,
             _ => Self::Fault,
         }
     }
 
-    /// Whether the bridge switches.
-    pub const fn switches(self) -> bool {
+    /// Whether the current loop makes a torque.
+    pub const fn makes_torque(self) -> bool {
         matches!(self, Self::OperationEnabled | Self::QuickStopActive | Self::FaultReactionActive)
     }
 
-    /// The statusword's bits that tell the state (object 6041h, mask 006Fh), quick stop bit included.
+    /// The statusword's bits that tell the state (object 6041h, mask 006Fh), quick stop bit included. The open loop is "operation enabled" with the
+    /// manufacturer's bit 14.
     pub const fn statusword(self) -> u16 {
         match self {
             Self::NotReadyToSwitchOn => 0x00,
@@ -161,6 +223,7 @@ impl State {
             Self::QuickStopActive => 0x07,
             Self::FaultReactionActive => 0x0f,
             Self::Fault => 0x08,
+            Self::OpenLoop => 0x4027,
         }
     }
 }
@@ -171,7 +234,7 @@ mod tests {
     use State::*;
     use proptest::prelude::*;
 
-    const QUIET: Events = Events { started: true, fault: false, stopped: false };
+    const QUIET: Events = Events { started: true, open_loop: false, fault: false, driver_alone: false, stopped: false };
 
     fn enabled() -> StateMachine {
         let mut machine = StateMachine::default();
@@ -288,6 +351,58 @@ mod tests {
         }
     }
 
+    const OPEN_LOOP: Events = Events { open_loop: true, ..QUIET };
+
+    fn in_open_loop() -> StateMachine {
+        let mut machine = StateMachine::default();
+        for word in [Controlword(0), Controlword::SHUTDOWN, Controlword::SWITCH_ON, Controlword::ENABLE_OPERATION] {
+            machine.step(word, OPEN_LOOP);
+        }
+        assert_eq!(machine.state(), OpenLoop);
+        machine
+    }
+
+    #[test]
+    fn the_open_loop_is_left_by_everything_but_its_own_command_and_brakes_for_nothing() {
+        for (word, state) in [
+            (Controlword::SHUTDOWN, ReadyToSwitchOn),
+            (Controlword::SWITCH_ON, SwitchedOn),
+            (Controlword::DISABLE_VOLTAGE, SwitchOnDisabled),
+            (Controlword::QUICK_STOP, SwitchOnDisabled),
+            (Controlword::FAULT_RESET, SwitchOnDisabled),
+            (Controlword(0x8f), SwitchedOn),
+            (Controlword::ENABLE_OPERATION, OpenLoop),
+        ] {
+            assert_eq!(in_open_loop().step(word, OPEN_LOOP), state, "{word:?}");
+        }
+        // Another mode, a fault.
+        let mut machine = in_open_loop();
+        for _ in 0..3 {
+            assert_eq!(machine.step(Controlword::ENABLE_OPERATION, QUIET), SwitchOnDisabled);
+        }
+        let faulty = Events { fault: true, ..OPEN_LOOP };
+        assert_eq!(in_open_loop().step(Controlword::ENABLE_OPERATION, faulty), Fault);
+    }
+
+    #[test]
+    fn a_moving_joint_brakes_before_it_is_under_an_open_loop_voltage() {
+        let mut machine = enabled();
+        assert_eq!(machine.step(Controlword::ENABLE_OPERATION, OPEN_LOOP), QuickStopActive);
+        let stopped = Events { stopped: true, ..OPEN_LOOP };
+        assert_eq!(machine.step(Controlword::ENABLE_OPERATION, stopped), SwitchOnDisabled);
+    }
+
+    #[test]
+    fn a_mode_that_needs_more_than_is_known_is_not_ready() {
+        let unknown = Events { started: false, ..QUIET };
+        for state in [SwitchOnDisabled, ReadyToSwitchOn, SwitchedOn] {
+            assert_eq!(in_state(state).step(Controlword::ENABLE_OPERATION, unknown), NotReadyToSwitchOn, "{state:?}");
+        }
+        let mut machine = in_open_loop();
+        assert_eq!(machine.step(Controlword::ENABLE_OPERATION, unknown), SwitchOnDisabled);
+        assert_eq!(machine.step(Controlword::ENABLE_OPERATION, unknown), NotReadyToSwitchOn);
+    }
+
     #[test]
     fn nothing_is_switched_on_by_a_word_that_also_resets_faults() {
         for (state, command) in [
@@ -336,6 +451,42 @@ mod tests {
         assert_eq!(machine.step(Controlword::FAULT_RESET, QUIET), Fault, "the bit was set already");
         assert_eq!(machine.step(Controlword(0), QUIET), Fault);
         assert_eq!(machine.step(Controlword::FAULT_RESET, QUIET), SwitchOnDisabled);
+    }
+
+    #[test]
+    fn a_reset_of_the_gate_driver_alone_waits_until_it_is_cleared_and_not_longer_than_its_time() {
+        let driver = Events { fault: true, driver_alone: true, ..QUIET };
+        let faulty = in_state(Fault);
+        for (steps, ends) in [(RESET_STEPS, SwitchOnDisabled), (RESET_STEPS + 1, Fault)] {
+            let mut machine = faulty;
+            assert_eq!(machine.step(Controlword::FAULT_RESET, driver), Fault);
+            for _ in 1..steps {
+                assert!(machine.waits_for_driver());
+                assert_eq!(machine.step(Controlword(0), driver), Fault);
+            }
+            assert_eq!(machine.step(Controlword(0), QUIET), ends, "{steps}");
+            assert!(!machine.waits_for_driver());
+        }
+    }
+
+    #[test]
+    fn another_fault_beside_the_gate_driver_s_ends_the_wait() {
+        let driver = Events { fault: true, driver_alone: true, ..QUIET };
+        let mut machine = in_state(Fault);
+        machine.step(Controlword::FAULT_RESET, driver);
+        machine.step(Controlword(0), Events { driver_alone: false, ..driver });
+        assert!(!machine.waits_for_driver());
+        assert_eq!(machine.step(Controlword(0), QUIET), Fault);
+    }
+
+    #[test]
+    fn a_reset_before_the_fault_waits_for_nothing() {
+        let mut machine = enabled();
+        machine.step(Controlword::FAULT_RESET, QUIET);
+        let driver = Events { fault: true, driver_alone: true, stopped: true, ..QUIET };
+        machine.step(Controlword::FAULT_RESET, driver);
+        assert_eq!(machine.step(Controlword::FAULT_RESET, driver), Fault);
+        assert!(!machine.waits_for_driver());
     }
 
     proptest! {

@@ -16,7 +16,7 @@
 //! (Hanus' conditioning), so nothing winds up.
 
 use super::number::{limited, or_zero};
-use super::setting::{SettingError, check};
+use super::setting::{SettingError, in_range};
 use super::transform::Dq;
 use core::f32::consts::TAU;
 
@@ -71,15 +71,15 @@ impl CurrentGains {
     /// Checks settings and prepares them. The bandwidth is refused where the delay would leave a phase margin below 60°, and the
     /// winding where its time constant is below two periods: it is too fast for the rate.
     pub fn new(settings: &CurrentSettings) -> Result<Self, SettingError> {
-        let rate = check("control rate", "Hz", settings.rate, 1e3, 200e3)?;
-        let bandwidth = check("current loop's bandwidth", "Hz", settings.bandwidth, 10.0, rate / LEAST_PERIODS)?;
+        let rate = in_range!("control rate", "Hz", settings.rate, 1e3, 200e3)?;
+        let bandwidth = in_range!("current loop's bandwidth", "Hz", settings.bandwidth, 10.0, rate / LEAST_PERIODS)?;
         let motor = &settings.motor;
-        let resistance = check("phase resistance", "Ω", motor.resistance, 1e-3, 100.0)?;
+        let resistance = in_range!("phase resistance", "Ω", motor.resistance, 1e-3, 100.0)?;
         let fastest = 2.0 / rate * resistance;
         let least = if fastest > 1e-6 { fastest } else { 1e-6 };
         let inductance = Dq {
-            d: check("inductance along d", "H", motor.inductance_d, least, 0.1)?,
-            q: check("inductance along q", "H", motor.inductance_q, least, 0.1)?,
+            d: in_range!("inductance along d", "H", motor.inductance_d, least, 0.1)?,
+            q: in_range!("inductance along q", "H", motor.inductance_q, least, 0.1)?,
         };
         let crossover = TAU * bandwidth;
         let half_drop = 0.5 * resistance / rate;
@@ -89,8 +89,8 @@ impl CurrentGains {
             inverse_proportional: Dq { d: 1.0 / proportional.d, q: 1.0 / proportional.q },
             integral: crossover * resistance / rate,
             inductance,
-            flux_linkage: check("flux linkage", "Wb", motor.flux_linkage, 0.0, 1.0)?,
-            highest_voltage: check("highest voltage", "V", settings.highest_voltage, 1.0, 1000.0)?,
+            flux_linkage: in_range!("flux linkage", "Wb", motor.flux_linkage, 0.0, 1.0)?,
+            highest_voltage: in_range!("highest voltage", "V", settings.highest_voltage, 1.0, 1000.0)?,
         })
     }
 }

@@ -15,17 +15,17 @@
 //!
 //! Beside it:
 //!  - [`thermal`]: how hot the winding is and how much current it bears; slow task;
-//!  - [`calibration`]: current offsets, resistance, inductances, electrical zero, direction and pole pairs; control step;
+//!  - [`open_loop`]: a field of a commanded voltage, and means of the winding's answer, for commissioning; control step;
 //!  - [`setting`]: how a setting out of its range is refused; task, host;
 //!  - [`number`]: limits and roots that treat NaN the same everywhere.
 
 pub mod angle;
-pub mod calibration;
 pub mod current;
 pub mod field_oriented;
 pub mod modulation;
 pub mod number;
 pub mod observer;
+pub mod open_loop;
 pub mod phases;
 pub mod setting;
 pub mod thermal;

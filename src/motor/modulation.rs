@@ -11,7 +11,7 @@
 
 use super::number::{greater, lesser, limited, square_root};
 use super::phases::Phases;
-use super::setting::{SettingError, check};
+use super::setting::{SettingError, in_range};
 use super::transform::{AlphaBeta, Dq, FRAC_1_SQRT_3};
 
 /// 2 / sqrt 3: from the circle in the hexagon to its corners.
@@ -79,14 +79,14 @@ struct Leg {
 impl Modulator {
     /// Checks settings and prepares them.
     pub fn new(settings: &ModulationSettings) -> Result<Self, SettingError> {
-        let fraction = check("voltage fraction", "", settings.voltage_fraction, 0.1, HIGHEST_VOLTAGE_FRACTION)?;
-        let minimum_duty = check("minimum duty", "", settings.minimum_duty, 0.0, 0.4)?;
-        let maximum_duty = check("maximum duty", "", settings.maximum_duty, 0.6, 1.0)?;
-        let dead_time = check("dead time in PWM periods", "", settings.dead_time, 0.0, 0.1)?;
-        let band = check("dead-time compensation band", "A", settings.dead_time_band, 1e-3, 100.0)?;
-        let minimum_bus_voltage = check("least supply voltage", "V", settings.minimum_bus_voltage, 1.0, 1000.0)?;
+        let fraction = in_range!("voltage fraction", "", settings.voltage_fraction, 0.1, HIGHEST_VOLTAGE_FRACTION)?;
+        let minimum_duty = in_range!("minimum duty", "", settings.minimum_duty, 0.0, 0.4)?;
+        let maximum_duty = in_range!("maximum duty", "", settings.maximum_duty, 0.6, 1.0)?;
+        let dead_time = in_range!("dead time in PWM periods", "", settings.dead_time, 0.0, 0.1)?;
+        let band = in_range!("dead-time compensation band", "A", settings.dead_time_band, 1e-3, 100.0)?;
+        let minimum_bus_voltage = in_range!("least supply voltage", "V", settings.minimum_bus_voltage, 1.0, 1000.0)?;
         let span = maximum_duty - minimum_duty - 2.0 * dead_time;
-        check("duty range left by the dead time", "", span, 0.1, 1.0)?;
+        in_range!("duty range left by the dead time", "", span, 0.1, 1.0)?;
         Ok(Self {
             centre: 0.5 * (minimum_duty + maximum_duty),
             minimum_duty,

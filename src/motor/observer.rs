@@ -22,7 +22,7 @@
 
 use super::angle::{STEPS, TAU};
 use super::number::{limited, or_zero};
-use super::setting::{SettingError, check};
+use super::setting::{SettingError, in_range};
 
 /// How the observer tracks.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,9 +58,9 @@ pub struct ObserverGains {
 impl ObserverGains {
     /// Checks settings and prepares them.
     pub fn new(settings: &ObserverSettings) -> Result<Self, SettingError> {
-        let rate = check("control rate", "Hz", settings.rate, 1e3, 200e3)?;
-        let bandwidth = check("observer's bandwidth", "Hz", settings.bandwidth, 1.0, 0.1 * rate)?;
-        let latency = check("encoder's latency", "s", settings.latency, 0.0, 0.01)?;
+        let rate = in_range!("control rate", "Hz", settings.rate, 1e3, 200e3)?;
+        let bandwidth = in_range!("observer's bandwidth", "Hz", settings.bandwidth, 1.0, 0.1 * rate)?;
+        let latency = in_range!("encoder's latency", "s", settings.latency, 0.0, 0.01)?;
         // exp(-x) as its first Padé approximation: 2 % off at the highest bandwidth, 0.03 % off at a hundredth of the rate.
         let half = 0.5 * TAU * bandwidth / rate;
         let theta = (1.0 - half) / (1.0 + half);
@@ -71,8 +71,8 @@ impl ObserverGains {
             position: 1.0 - theta * theta * theta,
             velocity: 1.5 * rest * rest * (1.0 + theta) * rate,
             acceleration: rest * rest * rest * rate * rate,
-            highest_velocity: check("highest velocity", "rad/s", settings.highest_velocity, 1.0, 0.5 * TAU * rate)?,
-            highest_acceleration: check("highest acceleration", "rad/s²", settings.highest_acceleration, 1.0, 1e9)?,
+            highest_velocity: in_range!("highest velocity", "rad/s", settings.highest_velocity, 1.0, 0.5 * TAU * rate)?,
+            highest_acceleration: in_range!("highest acceleration", "rad/s²", settings.highest_acceleration, 1.0, 1e9)?,
         })
     }
 }

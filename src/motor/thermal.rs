@@ -14,7 +14,7 @@
 //! down: a sensor that sticks while the motor is cold looks just like good cooling, and would take the protection away.
 
 use super::number::{greater, lesser, or_zero, within};
-use super::setting::{SettingError, check};
+use super::setting::{SettingError, in_range};
 use super::transform::Dq;
 
 /// Rise of copper's resistance with temperature, of its value at 25 °C, 1/K: 0.393 %.
@@ -114,20 +114,20 @@ impl WindingTemperature {
     /// heat path is too fast for the rate.
     pub fn new(settings: &ThermalSettings, start: f32) -> Result<Self, SettingError> {
         let s = settings;
-        let rate = check("thermal model's rate", "Hz", s.rate, 1.0, 1000.0)?;
-        check("phase resistance", "Ω", s.resistance, 1e-3, 100.0)?;
-        check("thermal resistance from winding to housing", "K/W", s.winding_to_housing, 0.01, 100.0)?;
-        check("thermal resistance from housing to ambient", "K/W", s.housing_to_ambient, 0.01, 100.0)?;
+        let rate = in_range!("thermal model's rate", "Hz", s.rate, 1.0, 1000.0)?;
+        in_range!("phase resistance", "Ω", s.resistance, 1e-3, 100.0)?;
+        in_range!("thermal resistance from winding to housing", "K/W", s.winding_to_housing, 0.01, 100.0)?;
+        in_range!("thermal resistance from housing to ambient", "K/W", s.housing_to_ambient, 0.01, 100.0)?;
         // Explicit integration: each node's own time constant is to be ten periods at least.
         let winding = 10.0 / (rate * s.winding_to_housing);
         let housing = 10.0 / rate * (1.0 / s.winding_to_housing + 1.0 / s.housing_to_ambient);
-        check("winding's heat capacity", "J/K", s.winding_capacity, greater(winding, 0.1), 10e3)?;
-        check("housing's heat capacity", "J/K", s.housing_capacity, greater(housing, 0.1), 100e3)?;
-        check("ambient temperature", "°C", s.ambient, -40.0, 85.0)?;
-        check("sensor's correction time", "s", s.correction_time, greater(10.0 / rate, 1.0), 10e3)?;
-        check("warning temperature", "°C", s.warning, 30.0, 180.0)?;
-        check("limit temperature", "°C", s.limit, s.warning + 5.0, 200.0)?;
-        let start = check("start temperature", "°C", start, PLAUSIBLE_SENSOR.0, PLAUSIBLE_SENSOR.1)?;
+        in_range!("winding's heat capacity", "J/K", s.winding_capacity, greater(winding, 0.1), 10e3)?;
+        in_range!("housing's heat capacity", "J/K", s.housing_capacity, greater(housing, 0.1), 100e3)?;
+        in_range!("ambient temperature", "°C", s.ambient, -40.0, 85.0)?;
+        in_range!("sensor's correction time", "s", s.correction_time, greater(10.0 / rate, 1.0), 10e3)?;
+        in_range!("warning temperature", "°C", s.warning, 30.0, 180.0)?;
+        in_range!("limit temperature", "°C", s.limit, s.warning + 5.0, 200.0)?;
+        let start = in_range!("start temperature", "°C", start, PLAUSIBLE_SENSOR.0, PLAUSIBLE_SENSOR.1)?;
         Ok(Self {
             settings: *settings,
             period: 1.0 / rate,
@@ -336,7 +336,7 @@ mod tests {
         assert_eq!(refused(ThermalSettings { resistance: 0.0, ..SETTINGS }).name, "phase resistance");
         assert_eq!(refused(ThermalSettings { limit: 91.0, ..SETTINGS }).name, "limit temperature");
         let fast = refused(ThermalSettings { winding_capacity: 1.0, winding_to_housing: 0.05, ..SETTINGS });
-        assert_eq!((fast.name, fast.low), ("winding's heat capacity", 2.0));
+        assert_eq!((fast.name.text(), fast.low), ("winding's heat capacity", 2.0));
         assert!(WindingTemperature::new(&SETTINGS, f32::NAN).is_err());
     }
 }

@@ -1,9 +1,9 @@
 //! The joint's objects as [`canopen`](crate::canopen) asks for them; the task.
 
-use super::calibration::{self, CalibrationState};
-use super::communication::default_communication;
 use super::emergency::{Emergency, Reports, of_refusal};
-use super::field::{ConfigurationField, Field, ImageField, Range, ResetField, SetPoint};
+use super::field::{
+    ConfigurationField, Field, HardwareField, ImageField, OpenLoopField, RANGES, Range, ResetField, SetPoint,
+};
 use super::images::{Circumstances, Failure, Images, StoredImages, abort};
 use super::observed::{Observed, signed};
 use super::program::{NotConfigured, Program};
@@ -11,13 +11,14 @@ use super::refused::Refused;
 use super::set_points::mode;
 use super::settings::Setting;
 use super::shared::Shared;
-use super::stored::{RECORD, Stored, is_range};
-use super::{history, last_reset, table};
+use super::stored::{Part, RECORD, Update, communication_parameters, is_range};
+use super::{hardware, history, last_reset, open_loop, table};
 use crate::canopen::{Abort, Access, CommunicationParameters, Entry, Event, Group, Length, NmtState, ObjectDictionary};
+use crate::hardware::chip_options::COMMAND;
 use crate::joint::configuration::Configuration;
 use crate::joint::state_machine::State;
-use crate::motor::calibration::Calibration;
 use crate::motor::number::exceeds;
+use crate::motor::open_loop::Window;
 use crate::parameters::authentication::{KEY, STAGING};
 use crate::parameters::life_cycle::{Action, LifeCycle, Refusal};
 use crate::parameters::slots::SlotError;
@@ -36,8 +37,8 @@ const QUARTER_TURN: f32 = core::f32::consts::FRAC_PI_2;
 pub struct Start {
     /// Configuration in use, with which the control step runs.
     pub configuration: Configuration,
-    /// The stored record, or [`Stored::NOTHING`].
-    pub stored: Stored,
+    /// Ranges of the impedance frame, by number.
+    pub ranges: [f32; RANGES],
     /// Code and parameters lie in one bank of flash: writing stops the program, so the motor has to be off, and nearly at rest.
     pub single_bank: bool,
 }
@@ -53,8 +54,8 @@ pub struct Objects<'a, P> {
     configuration: Configuration,
     staged: Configuration,
     refused: Refused,
-    calibration: CalibrationState,
-    stored: Stored,
+    /// As it was when its number was read.
+    window: Cell<Window>,
     single_bank: bool,
     now: u64,
     heartbeat_lost: bool,
@@ -69,8 +70,8 @@ pub struct Objects<'a, P> {
 impl<'a, P: Program> Objects<'a, P> {
     /// One for each [`Shared`].
     pub fn new(shared: &'a Shared, program: P, images: Images<'a>, start: &Start) -> Self {
-        let Start { configuration, stored, single_bank } = *start;
-        for (range, value) in Range::ALL.into_iter().zip(stored.ranges()) {
+        let Start { configuration, ranges, single_bank } = *start;
+        for (range, value) in Range::ALL.into_iter().zip(ranges) {
             shared.set_range(range, value);
         }
         shared.set_rated_torque(configuration.limits.torque);
@@ -83,8 +84,7 @@ impl<'a, P: Program> Objects<'a, P> {
             configuration,
             staged: configuration,
             refused: Refused::default(),
-            calibration: CalibrationState::default(),
-            stored,
+            window: Cell::new(Window::NOTHING),
             single_bank,
             now: 0,
             heartbeat_lost: false,
@@ -100,16 +100,16 @@ impl<'a, P: Program> Objects<'a, P> {
     /// Begins anew, as at power-on: for a program that goes on running when the node is reset
     /// ([`Event::Reset`](crate::canopen::Event::Reset)). What is staged, tried, or waits to be reported is forgotten.
     pub fn restart(&mut self, life: LifeCycle, stored_images: StoredImages, start: &Start) {
-        let Start { configuration, stored, single_bank } = *start;
+        let Start { configuration, ranges, single_bank } = *start;
         self.images.restart(life, stored_images);
         (self.configuration, self.staged, self.refused) = (configuration, configuration, Refused::default());
-        (self.stored, self.single_bank) = (stored, single_bank);
+        self.single_bank = single_bank;
         (self.heartbeat_lost, self.told_reset) = (false, false);
-        for (range, value) in Range::ALL.into_iter().zip(stored.ranges()) {
+        for (range, value) in Range::ALL.into_iter().zip(ranges) {
             self.shared.set_range(range, value);
         }
         self.shared.set_rated_torque(configuration.limits.torque);
-        self.calibration = CalibrationState::default();
+        self.window.set(Window::NOTHING);
         self.reports = Reports::default();
         self.emergencies.clear();
         self.publish();
@@ -130,9 +130,8 @@ impl<'a, P: Program> Objects<'a, P> {
         self.now = now;
         self.observed = *observed;
         self.images.tick(now, self.heartbeat_lost);
-        self.take_calibration();
         while !self.emergencies.is_full()
-            && let Some(emergency) = self.reports.next(observed, now)
+            && let Some(emergency) = self.reports.next(observed, &self.program.hardware().driver, now)
         {
             self.report(emergency);
         }
@@ -192,8 +191,7 @@ impl<'a, P: Program> Objects<'a, P> {
     /// Under current, or one command away from it.
     fn armed(&self) -> bool {
         let state = self.observed.telemetry.state;
-        let off = matches!(state, State::NotReadyToSwitchOn | State::SwitchOnDisabled | State::Fault);
-        !off || calibration::runs(self.program.calibration())
+        !matches!(state, State::NotReadyToSwitchOn | State::SwitchOnDisabled | State::Fault)
     }
 
     /// Whether the joint cannot do without its control steps for as long as the erasing of a page takes them on one bank: it is armed, or turns so fast
@@ -236,7 +234,6 @@ impl<'a, P: Program> Objects<'a, P> {
             Field::Image(ImageField::Staging) => self.images.life().length() as u32,
             Field::History => self.program.history(history::length).unwrap_or(0),
             Field::Reset(_) => last_reset::place(&self.program.last_reset()).len() as u32,
-            Field::Configuration(_) => self.refused.name().len() as u32,
             _ => 0,
         }
     }
@@ -244,7 +241,7 @@ impl<'a, P: Program> Objects<'a, P> {
     fn value(&self, field: Field) -> u64 {
         match field {
             Field::Highest(number) => number.into(),
-            Field::Constant(number) => signed(number),
+            Field::Constant(constant) => signed(constant.number()),
             Field::SetPoint(set_point) => self.shared.set_point(set_point),
             Field::Range(range) => self.shared.range(range).to_bits().into(),
             Field::Actual(actual) => self.observed.actual(actual, self.shared),
@@ -252,9 +249,15 @@ impl<'a, P: Program> Objects<'a, P> {
             Field::Compensation(setting) => setting.get(&self.configuration).into(),
             Field::Configuration(ConfigurationField::Changed) => self.is_changed().into(),
             Field::Configuration(part) => self.refused.get(part).into(),
-            Field::Calibration(part) => self.calibration.get(part, self.program.calibration()),
+            Field::OpenLoop(part) => {
+                if part == OpenLoopField::Number {
+                    self.window.set(self.program.window());
+                }
+                open_loop::get(&self.window.get(), self.program.bridge(), part)
+            }
             Field::Image(part) => self.images.get(part, self.now).into(),
             Field::Reset(part) => last_reset::get(&self.program.last_reset(), part).into(),
+            Field::Hardware(part) => hardware::get(&self.program.hardware(), part).into(),
             Field::Server | Field::History => 0,
         }
     }
@@ -320,47 +323,6 @@ impl<'a, P: Program> Objects<'a, P> {
         }
     }
 
-    /// Begins a calibration, or gives it up.
-    #[inline(never)]
-    fn calibrate(&mut self, current: f32) -> Result<(), Abort> {
-        if current == 0.0 {
-            self.program.abort_calibration();
-            return Ok(());
-        }
-        if self.armed() || self.observed.telemetry.state == State::Fault {
-            return Err(Abort::DEVICE_STATE);
-        }
-        match self.program.calibrate(&self.configuration, current) {
-            Ok(()) => {
-                self.calibration.begin(current);
-                Ok(())
-            }
-            Err(error) => {
-                self.refused = Refused::by(&error.into());
-                Err(Abort::VALUE)
-            }
-        }
-    }
-
-    /// Has the control step take what a calibration found, once there is something. With settings that do not go with it, it is staged only,
-    /// and 2100h says which one is refused.
-    fn take_calibration(&mut self) {
-        if let Some(found) = self.calibration.result(self.program.calibration()) {
-            self.take(&found);
-        }
-    }
-
-    #[inline(never)]
-    fn take(&mut self, found: &Calibration) {
-        let temperature = self.observed.winding_temperature;
-        self.staged = self.staged.calibrated(found, temperature);
-        let configuration = self.configuration.calibrated(found, temperature);
-        // Where the control step has not taken the one before, in the next millisecond again.
-        if self.configure(&configuration) != Err(Abort::DEVICE_STATE) {
-            self.calibration.taken();
-        }
-    }
-
     #[inline(never)]
     fn write_compensation(&mut self, setting: Setting, number: u32) -> Result<(), Abort> {
         let mut configuration = self.configuration;
@@ -390,19 +352,33 @@ impl<'a, P: Program> Objects<'a, P> {
         kept.map_err(|error| self.refuse(error.into()))
     }
 
+    /// Sets the chip's option bytes, where `command` is the one that does.
+    fn set_options(&mut self, command: u32) -> Result<(), Abort> {
+        if command != COMMAND {
+            return Err(Abort::VALUE);
+        }
+        if self.needs_control() || !self.program.set_options() {
+            return Err(Abort::DEVICE_STATE);
+        }
+        Ok(())
+    }
+
     /// A function of its own: the record is more than 1 KiB of stack.
     #[inline(never)]
-    fn store_record(&mut self, stored: &Stored) -> Result<(), Abort> {
+    fn store_record(&mut self, update: &Update) -> Result<(), Abort> {
         if self.single_bank && self.needs_control() {
             return Err(Abort::DEVICE_STATE);
         }
         let mut record = [0; RECORD];
-        let length = stored.encode(&mut record).ok_or(Abort::MEMORY)?;
+        let length = self.program.record(|before| update.encode(before, &mut record)).ok_or(Abort::MEMORY)?;
         let record = record.get(..length).ok_or(Abort::MEMORY)?;
-        self.program.store(record).map_err(|error| self.refuse(error.into()))?;
-        self.stored = *stored;
-        Ok(())
+        self.program.store(record).map_err(|error| self.refuse(error.into()))
     }
+}
+
+/// A part that belongs to `own` where `group` is to be changed, otherwise as it was.
+fn part<T>(group: Group, own: Group, changed: Part<T>) -> Part<T> {
+    if group == Group::All || group == own { changed } else { Part::Kept }
 }
 
 impl<P: Program> ObjectDictionary for Objects<'_, P> {
@@ -435,9 +411,6 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
             }
             Field::Image(ImageField::Staging) => self.images.read_staged(offset, out),
             Field::History => self.program.history(|steps| history::read(steps, offset, out)).unwrap_or(false),
-            Field::Configuration(ConfigurationField::RefusedSetting) => {
-                history::copy(self.refused.name().as_bytes(), offset, out)
-            }
             Field::Reset(ResetField::Place) => {
                 history::copy(last_reset::place(&self.program.last_reset()), offset, out)
             }
@@ -467,8 +440,8 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
             }
             Field::Compensation(setting) => self.write_compensation(setting, word),
             Field::Configuration(ConfigurationField::Command) => self.command_configuration(word),
-            Field::Calibration(_) => self.calibrate(f32::from_bits(word)),
             Field::Image(field) => self.write_image(field, word),
+            Field::Hardware(HardwareField::SetOptions) => self.set_options(word),
             _ => Err(Abort::READ_ONLY),
         }
     }
@@ -505,31 +478,28 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
 
     #[inline(never)]
     fn store(&mut self, group: Group, communication: &CommunicationParameters) -> Result<(), Abort> {
-        let mut stored = self.stored;
-        if matches!(group, Group::All | Group::Application) {
-            stored.application = Some((self.configuration, Range::ALL.map(|range| self.shared.range(range))));
-        }
-        if matches!(group, Group::All | Group::Communication) {
-            stored.communication = Some((self.node_id.get(), *communication));
-        }
-        self.store_record(&stored)
+        let configuration = self.configuration;
+        let ranges = Range::ALL.map(|range| self.shared.range(range));
+        self.store_record(&Update {
+            node_id: None,
+            application: part(group, Group::Application, Part::New((&configuration, ranges))),
+            communication: part(group, Group::Communication, Part::New((self.node_id.get(), communication))),
+        })
     }
 
     #[inline(never)]
     fn restore(&mut self, group: Group) -> Result<(), Abort> {
-        let mut stored = self.stored;
-        if matches!(group, Group::All | Group::Application) {
-            stored.application = None;
-        }
-        if matches!(group, Group::All | Group::Communication) {
-            stored.communication = None;
-        }
-        self.store_record(&stored)
+        self.store_record(&Update {
+            node_id: None,
+            application: part(group, Group::Application, Part::Removed),
+            communication: part(group, Group::Communication, Part::Removed),
+        })
     }
 
     #[inline(never)]
     fn store_node_id(&mut self, node_id: u8) -> Result<(), Abort> {
-        self.store_record(&Stored { node_id, ..self.stored })?;
+        let update = Update { node_id: Some(node_id), application: Part::Kept, communication: Part::Kept };
+        self.store_record(&update)?;
         self.configuration.node_id = node_id;
         self.staged.node_id = node_id;
         Ok(())
@@ -538,10 +508,7 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
     #[inline(never)]
     fn communication_parameters(&self, node_id: u8) -> CommunicationParameters {
         self.node_id.set(node_id);
-        match self.stored.communication {
-            Some((of, parameters)) if of == node_id => parameters,
-            _ => default_communication(node_id),
-        }
+        self.program.record(|record| communication_parameters(record, node_id))
     }
 
     fn event(&mut self, event: Event) {
@@ -555,12 +522,8 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
                         self.report(emergency);
                     }
                 }
-                self.program.abort_calibration();
             }
-            Event::HeartbeatLost { .. } => {
-                self.heartbeat_lost = true;
-                self.program.abort_calibration();
-            }
+            Event::HeartbeatLost { .. } => self.heartbeat_lost = true,
             Event::HeartbeatBack { .. } => self.heartbeat_lost = false,
             _ => {}
         }

@@ -1,6 +1,7 @@
 //! Errors as EMCY messages: which code, which bits of the error register; the task.
 
 use super::observed::{Observed, fault_bits, reason_number};
+use crate::hardware::GateDriver;
 use crate::joint::fault::{Fault, Faults};
 use crate::parameters::life_cycle::Refusal;
 
@@ -59,17 +60,20 @@ pub(super) struct Reports {
 
 impl Reports {
     /// The next thing to report: a fault that is new, the end of all, a departure from the trained range. Information of a fault: its
-    /// number, and the bits of object 2021h:4 (u16).
-    pub(super) fn next(&mut self, observed: &Observed, now: u64) -> Option<Emergency> {
+    /// number, and the bits of object 2021h:4 (u16); of the gate driver's: its number, and both its status words (u16 each), for which it waits.
+    pub(super) fn next(&mut self, observed: &Observed, driver: &GateDriver, now: u64) -> Option<Emergency> {
         let latched = observed.latched;
         if latched.is_empty() && !self.faults.is_empty() {
             self.faults = Faults::NONE;
             return Some(Emergency { code: RESET, register: 0, information: [0; 5] });
         }
-        if let Some(fault) = latched.iter().find(|fault| !self.faults.contains(*fault)) {
+        let waits = |fault: &Fault| *fault == Fault::BridgeDriver && driver.unread;
+        let new = |fault: &Fault| !(self.faults.contains(*fault) || waits(fault));
+        if let Some(fault) = latched.iter().find(new) {
             self.faults.set(fault, true);
-            let [low, high] = fault_bits(latched).to_le_bytes();
-            let information = [fault as u8, low, high, 0, 0];
+            let words = if fault == Fault::BridgeDriver { driver.status } else { [fault_bits(latched), 0] };
+            let [[a, b], [c, d]] = words.map(u16::to_le_bytes);
+            let information = [fault as u8, a, b, c, d];
             return Some(Emergency { code: fault.error_code(), register: register(latched), information });
         }
         let violations = observed.friction.violations();

@@ -10,7 +10,7 @@ pub enum Field {
     /// Sub-index 0 of a record: its highest sub-index.
     Highest(u8),
     /// A number that never changes.
-    Constant(i32),
+    Constant(Constant),
     /// What is asked of the joint.
     SetPoint(SetPoint),
     /// The range of a part of the impedance frame.
@@ -23,14 +23,61 @@ pub enum Field {
     Compensation(Setting),
     /// Taking the configuration, and why it was refused.
     Configuration(ConfigurationField),
-    /// The calibration of the motor.
-    Calibration(CalibrationField),
+    /// The open loop's last window.
+    OpenLoop(OpenLoopField),
     /// The life of a parameter image.
     Image(ImageField),
     /// The control steps before a fault.
     History,
     /// Why the program started.
     Reset(ResetField),
+    /// What the board tells of its hardware.
+    Hardware(HardwareField),
+}
+
+/// A part of what the board tells of its hardware.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HardwareField {
+    /// Fault status 1 of the gate driver.
+    DriverStatus1,
+    /// Fault status 2 of the gate driver.
+    DriverStatus2,
+    /// Faults of the gate driver since the start.
+    DriverFaults,
+    /// What is missing of the gate driver's set-up.
+    DriverSetup,
+    /// Family and revision of the board.
+    Revision,
+    /// Option bytes of the chip.
+    OptionsFound,
+    /// The same as they are needed.
+    OptionsNeeded,
+    /// Which of them are wrong.
+    OptionsWrong,
+    /// Sets them.
+    SetOptions,
+}
+
+/// A number that never changes. Without the number itself, which is wider than all other fields, an entry of the table takes six bytes less.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Constant {
+    /// Reaction to a lost connection: quick stop.
+    AbortConnectionOption,
+    /// A quick stop brakes and then disables.
+    QuickStopOption,
+    /// Modes of operation, a bit each.
+    SupportedModes,
+}
+
+impl Constant {
+    /// The number.
+    pub const fn number(self) -> i32 {
+        match self {
+            Self::AbortConnectionOption => 3,
+            Self::QuickStopOption => 2,
+            Self::SupportedModes => 0x0003_0380,
+        }
+    }
 }
 
 /// A part of why the program started.
@@ -70,10 +117,12 @@ pub enum SetPoint {
     ImpedanceFrame = 6,
     /// Velocity of the joint that shares this joint's drive.
     CoupledVelocity = 7,
+    /// Open loop: all of its four set-points.
+    OpenLoop = 8,
 }
 
 /// Number of [`SetPoint`]s.
-pub(super) const SET_POINTS: usize = 8;
+pub(super) const SET_POINTS: usize = 9;
 
 /// A part of the impedance frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -166,7 +215,7 @@ pub enum ConfigurationField {
     Command,
     /// What came of the last command.
     Result,
-    /// Name of the setting that was refused.
+    /// The setting that was refused.
     RefusedSetting,
     /// Value that was refused.
     RefusedValue,
@@ -178,23 +227,43 @@ pub enum ConfigurationField {
     Changed,
 }
 
-/// The calibration of the motor.
+/// The open loop's last window. Reading the number holds the rest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum CalibrationField {
-    /// Current, A, that begins it; 0 gives it up.
-    Current,
-    /// Where it is.
-    Progress,
-    /// Why it was given up.
-    Failure,
-    /// What was measured then.
-    Value,
-    /// What that was held against.
-    Limit,
-    /// How far the rotor lagged behind the field, electrical turns.
-    Lag,
-    /// Voltage that a leg loses, V.
-    LostVoltage,
+pub enum OpenLoopField {
+    /// Number of the window.
+    Number,
+    /// Mean current along the field.
+    CurrentAlong,
+    /// Mean current across the field.
+    CurrentAcross,
+    /// Mean voltage along the field.
+    VoltageAlong,
+    /// Mean voltage across the field.
+    VoltageAcross,
+    /// Current along the field in phase with the alternating voltage.
+    InPhaseAlong,
+    /// Current along the field a quarter of a period ahead.
+    QuadratureAlong,
+    /// Current across the field in phase with the alternating voltage.
+    InPhaseAcross,
+    /// Current across the field a quarter of a period ahead.
+    QuadratureAcross,
+    /// Amplitude of the alternating voltage along the field.
+    AlternatingAlong,
+    /// Amplitude of the alternating voltage across the field.
+    AlternatingAcross,
+    /// Encoder in the window's last step.
+    Encoder,
+    /// Field in the window's last step.
+    Field,
+    /// Mean supply.
+    BusVoltage,
+    /// Whether the encoder's zero is known.
+    Referenced,
+    /// Control steps a second.
+    ControlRate,
+    /// Kind of the encoder.
+    EncoderKind,
 }
 
 /// The life of a parameter image.

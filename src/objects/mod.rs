@@ -24,17 +24,18 @@
 //! A demand that nobody refreshes becomes stale by its deadline. The task has the interrupt run on every
 //! [`Event::State`](crate::canopen::Event::State), so that a transition of its own reaches the joint without a frame.
 
-mod calibration;
 mod communication;
 mod dictionary;
 pub mod emergency;
 pub mod field;
 mod friction_statistics;
+mod hardware;
 mod history;
 mod images;
 mod last_reset;
 mod number;
 mod observed;
+mod open_loop;
 mod process_image;
 mod program;
 mod refused;
@@ -57,4 +58,4 @@ pub use process_image::JointImage;
 pub use program::{NotConfigured, Program};
 pub use set_points::impedance_frame;
 pub use shared::{DEFAULT_RANGES, Shared};
-pub use stored::{RECORD, Stored};
+pub use stored::{Part, RECORD, Stored, Update};

@@ -134,7 +134,7 @@ impl ProcessImage for JointImage<'_> {
     fn transmit(&mut self, object: MappedObject) -> u64 {
         match table::find(object.index(), object.sub_index()).map(|object| object.field) {
             Some(Field::Actual(actual)) => self.observed.actual(actual, self.shared),
-            Some(Field::Constant(number)) => super::observed::signed(number),
+            Some(Field::Constant(constant)) => super::observed::signed(constant.number()),
             _ => 0,
         }
     }

@@ -1,10 +1,10 @@
 //! What the objects need done at once by the program around them; the task.
 
 use crate::canopen::Event;
-use crate::joint::configuration::{Configuration, ConfigurationError};
+use crate::hardware::Hardware;
+use crate::joint::configuration::{BridgeConfiguration, Configuration, ConfigurationError};
 use crate::joint::history::History;
-use crate::motor::calibration::Progress;
-use crate::motor::setting::SettingError;
+use crate::motor::open_loop::Window;
 use crate::parameters::authentication::Key;
 use crate::parameters::slots::SlotError;
 use crate::reset_record::LastReset;
@@ -23,14 +23,14 @@ pub trait Program {
     /// Prepares a configuration, with the friction model in use, and has the control step swap it in.
     fn configure(&mut self, configuration: &Configuration) -> Result<(), NotConfigured>;
 
-    /// Begins a calibration of the motor by a current, A, in the control step, which gives it up unless the joint is off.
-    fn calibrate(&mut self, configuration: &Configuration, current: f32) -> Result<(), SettingError>;
+    /// The open loop's last window.
+    fn window(&self) -> Window;
 
-    /// Gives up the calibration that runs, if one does.
-    fn abort_calibration(&mut self);
+    /// The board's part of a configuration.
+    fn bridge(&self) -> &BridgeConfiguration;
 
-    /// Where the calibration is that runs or ran last: from [`Program::calibrate`] on, never where the one before had ended.
-    fn calibration(&self) -> Option<Progress>;
+    /// Reads the record that is stored, or none.
+    fn record<R>(&self, read: impl FnOnce(Option<&[u8]>) -> R) -> R;
 
     /// Makes a record outlast a loss of power. At start it goes to [`Stored::decode`](super::Stored::decode).
     fn store(&mut self, record: &[u8]) -> Result<(), SlotError>;
@@ -50,6 +50,17 @@ pub trait Program {
 
     /// Why the program started; the same until the next start, but for the stops in a row.
     fn last_reset(&self) -> LastReset;
+
+    /// What the board tells of its hardware. Where there is none, all zero.
+    fn hardware(&self) -> Hardware {
+        Hardware::default()
+    }
+
+    /// Sets the chip's option bytes as they are needed, once the client has been answered, and resets the chip; the joint is off. False where there
+    /// are none.
+    fn set_options(&mut self) -> bool {
+        false
+    }
 
     /// The network tells something. Of a transition the objects know already.
     fn event(&mut self, event: Event);

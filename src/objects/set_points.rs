@@ -4,6 +4,7 @@ use super::field::{Range, SetPoint};
 use super::shared::Shared;
 use crate::joint::state_machine::Controlword;
 use crate::joint::{Command, Mode};
+use crate::motor::open_loop::Frame;
 
 /// Set-points as they came.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,6 +19,7 @@ pub(super) struct SetPoints {
     impedance: Option<u64>,
     /// mrad/s.
     pub(super) coupled: i32,
+    open_loop: Frame,
 }
 
 impl SetPoints {
@@ -32,6 +34,7 @@ impl SetPoints {
             velocity: 0,
             impedance: None,
             coupled: 0,
+            open_loop: Frame { voltage: 0, speed: 0, along: 0, across: 0 },
         }
     }
 
@@ -46,6 +49,7 @@ impl SetPoints {
             SetPoint::TargetVelocity => self.velocity = value as i32,
             SetPoint::ImpedanceFrame => self.impedance = Some(value),
             SetPoint::CoupledVelocity => self.coupled = value as i32,
+            SetPoint::OpenLoop => self.open_loop = Frame::from_bits(value),
         }
     }
 
@@ -60,6 +64,7 @@ impl SetPoints {
             (SetPoint::TargetVelocity, self.velocity as u64),
             (SetPoint::ImpedanceFrame, self.impedance.unwrap_or(0)),
             (SetPoint::CoupledVelocity, self.coupled as u64),
+            (SetPoint::OpenLoop, self.open_loop.to_bits()),
         ] {
             shared.copy(set_point, value);
         }
@@ -71,6 +76,7 @@ impl SetPoints {
         let plain = Command { mode: self.mode, torque, ..Command::default() };
         match (self.mode, self.position, self.impedance) {
             (Mode::Torque, ..) => plain,
+            (Mode::OpenLoop, ..) => Command { mode: self.mode, open_loop: self.open_loop, ..Command::default() },
             (Mode::Velocity, ..) => Command { velocity: 1e-3 * self.velocity as f32, ..plain },
             (Mode::Position, Some(position), _) => Command { position: 1e-6 * position as f32, ..plain },
             (Mode::Impedance, _, Some(frame)) => impedance(frame, |range| shared.range(range)),
@@ -91,6 +97,7 @@ pub(super) const fn mode(number: i8) -> Option<Mode> {
         9 => Mode::Velocity,
         10 => Mode::Torque,
         -1 => Mode::Impedance,
+        -2 => Mode::OpenLoop,
         _ => return None,
     })
 }
@@ -102,6 +109,7 @@ pub(super) const fn mode_number(mode: Mode) -> i8 {
         Mode::Velocity => 9,
         Mode::Torque => 10,
         Mode::Impedance => -1,
+        Mode::OpenLoop => -2,
     }
 }
 
@@ -122,6 +130,7 @@ fn impedance(frame: u64, range: impl Fn(Range) -> f32) -> Command {
         stiffness: above(range(Range::Stiffness), part(24, 0xFFF)),
         damping: above(range(Range::Damping), part(12, 0xFFF)),
         torque: both(range(Range::Torque), part(0, 0xFFF), 4_095.0),
+        ..Command::NOTHING
     }
 }
 

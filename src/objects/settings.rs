@@ -34,6 +34,7 @@ settings! {
     InductanceQ => motor.inductance_q,
     TorqueConstant => motor.torque_constant,
     CurrentLimit => motor.current_limit,
+    LossCurrent => motor.loss_current,
     EncoderLatency => motor.encoder_latency,
     GearRatio => gear.ratio,
     JointZero => gear.zero,
@@ -42,12 +43,14 @@ settings! {
     LowestPosition => limits.position[0],
     HighestPosition => limits.position[1],
     PositionMargin => limits.position_margin,
+    LimitDamping => limits.damping,
     OverCurrent => limits.over_current,
     LowestBusVoltage => limits.bus_voltage[0],
     HighestBusVoltage => limits.bus_voltage[1],
     BridgeTemperature => limits.bridge_temperature,
     WindingTemperature => limits.winding_temperature,
     CommandDeadline => limits.command_deadline,
+    RegenerationBand => limits.regeneration_band,
     CurrentBandwidth => gains.current_bandwidth,
     ObserverBandwidth => gains.observer_bandwidth,
     Stiffness => gains.stiffness,
@@ -67,6 +70,7 @@ settings! {
     Ambient => thermal.ambient,
     ;
     PolePairs,
+    EncoderCounts,
     Direction,
     ElectricalZero,
     Request,
@@ -83,6 +87,7 @@ impl Setting {
         }
         match self {
             Self::PolePairs => copy.motor.alignment.pole_pairs,
+            Self::EncoderCounts => copy.motor.encoder_counts,
             Self::Direction => (copy.motor.alignment.direction == Direction::Reverse).into(),
             Self::ElectricalZero => copy.motor.alignment.electrical_zero.0,
             Self::Request => copy.compensation.request as u32,
@@ -100,6 +105,7 @@ impl Setting {
         }
         match (self, number) {
             (Self::PolePairs, _) => configuration.motor.alignment.pole_pairs = number,
+            (Self::EncoderCounts, _) => configuration.motor.encoder_counts = number,
             (Self::Direction, 0) => configuration.motor.alignment.direction = Direction::Forward,
             (Self::Direction, 1) => configuration.motor.alignment.direction = Direction::Reverse,
             (Self::ElectricalZero, _) => configuration.motor.alignment.electrical_zero.0 = number,

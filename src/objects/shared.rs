@@ -99,6 +99,7 @@ impl Shared {
             4 => SetPoint::TargetPosition,
             5 => SetPoint::TargetVelocity,
             6 => SetPoint::ImpedanceFrame,
+            8 => SetPoint::OpenLoop,
             _ => SetPoint::CoupledVelocity,
         };
         let value = self.value.get();

@@ -8,7 +8,7 @@
 //! | 3 | 7 each | index (2 bytes), sub-index (1), value (4), all little-endian, for every object that is stored |
 //!
 //! Objects that a program does not know are skipped, objects that are missing keep their defaults: a record survives a change of
-//! program both ways. Length and damage are the business of the [slots](crate::parameters::slots) that it lies in.
+//! program both ways. A limit damping that is missing, in records of programs that had none, is the least that its limits permit. Length and damage are the business of the [slots](crate::parameters::slots) that it lies in.
 
 use super::communication;
 use super::field::{Field, RANGES, Range};
@@ -17,21 +17,69 @@ use super::table::OBJECTS;
 use crate::canopen::{CommunicationParameters, NO_NODE_ID};
 use crate::joint::configuration::Configuration;
 
-/// Longest record: what all objects take, 1,088 bytes, and nine more. A page of flash would hold 2,016; the stack has to, too.
+/// Longest record: what all objects take, 1,116 bytes, and 36 more. A page of flash would hold 2,016; the stack has to, too.
 pub const RECORD: usize = 1_152;
 const _: () = assert!(RECORD <= crate::parameters::slots::PAGE - crate::parameters::slots::OVERHEAD);
 const FORMAT: u8 = 1;
 const ITEM: usize = 7;
 
-/// A record's content.
+/// A record's content but for the communication parameters, which are read from it when they are wanted (`communication_parameters`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stored {
     /// 1 to 127, or 255 for none: what LSS stored. Defaults are restored without it.
     pub node_id: u8,
     /// 2101h to 2106h and 2200h, and 2012h.
     pub application: Option<(Configuration, [f32; RANGES])>,
+}
+
+/// A part of a new record.
+#[derive(Clone, Copy, Debug)]
+pub enum Part<T> {
+    /// As in the record before.
+    Kept,
+    /// Left out: defaults.
+    Removed,
+    /// With these values.
+    New(T),
+}
+
+/// A new record in place of one before. What both hold is copied item by item, so that nobody has to hold a whole record's values.
+#[derive(Clone, Copy, Debug)]
+pub struct Update<'a> {
+    /// The node id that LSS stored, or none for the one before.
+    pub node_id: Option<u8>,
+    /// 2101h to 2106h and 2200h, and 2012h.
+    pub application: Part<(&'a Configuration, [f32; RANGES])>,
     /// 1000h to 1FFFh, and the node id that they are for: another node id gets the defaults.
-    pub communication: Option<(u8, CommunicationParameters)>,
+    pub communication: Part<(u8, &'a CommunicationParameters)>,
+}
+
+/// A record's two node ids and its items; none for another format.
+fn parse(record: &[u8]) -> Option<(u8, u8, impl Iterator<Item = (u16, u8, u32)>)> {
+    let (&[FORMAT, node_id, of], items) = record.split_first_chunk()? else { return None };
+    let items = items.chunks_exact(ITEM).filter_map(|item| {
+        let &[low, high, sub_index, a, b, c, d] = item else { return None };
+        Some((u16::from_le_bytes([low, high]), sub_index, u32::from_le_bytes([a, b, c, d])))
+    });
+    Some((if matches!(node_id, 1..=127) { node_id } else { NO_NODE_ID }, of, items))
+}
+
+/// Whether an index is one of the server's objects.
+const fn is_communication(index: u16) -> bool {
+    index < 0x2000
+}
+
+/// The communication parameters for a node id: those of a record that holds some for it, or the defaults.
+pub(super) fn communication_parameters(record: Option<&[u8]>, node_id: u8) -> CommunicationParameters {
+    let mut parameters = super::default_communication(node_id);
+    if let Some((_, of, items)) = record.and_then(parse)
+        && of == node_id
+    {
+        for (index, sub_index, value) in items.filter(|(index, ..)| is_communication(*index)) {
+            communication::set(&mut parameters, index, sub_index, value);
+        }
+    }
+    parameters
 }
 
 /// Fills a record.
@@ -55,11 +103,20 @@ impl Writer<'_> {
         self.put(&[sub_index])?;
         self.put(&value.to_le_bytes())
     }
+
+    /// The items of another record that are wanted.
+    fn copy(&mut self, record: &[u8], wanted: impl Fn(u16, u8) -> bool) -> Option<()> {
+        let (_, _, items) = parse(record)?;
+        for (index, sub_index, value) in items.filter(|(index, sub_index, _)| wanted(*index, *sub_index)) {
+            self.item(index, sub_index, value)?;
+        }
+        Some(())
+    }
 }
 
 impl Stored {
     /// What there is without a record.
-    pub const NOTHING: Self = Self { node_id: NO_NODE_ID, application: None, communication: None };
+    pub const NOTHING: Self = Self { node_id: NO_NODE_ID, application: None };
 
     /// The configuration to start with, where `defaults` are the board's. It may hold values out of their ranges, if those have
     /// changed: [`Configuration::prepare`] decides.
@@ -75,16 +132,11 @@ impl Stored {
 
     /// Reads a record; what it lacks comes from `defaults`, the board's. None for another format.
     pub fn decode(record: &[u8], defaults: &Configuration) -> Option<Self> {
-        let (&[FORMAT, node_id, of], items) = record.split_first_chunk()? else { return None };
+        let (node_id, _, items) = parse(record)?;
         let (mut configuration, mut ranges, mut application) = (*defaults, DEFAULT_RANGES, false);
-        let mut parameters = super::default_communication(of);
-        for item in items.chunks_exact(ITEM) {
-            let &[low, high, sub_index, a, b, c, d] = item else { continue };
-            let (index, value) = (u16::from_le_bytes([low, high]), u32::from_le_bytes([a, b, c, d]));
-            let Some(object) = super::table::find(index, sub_index) else {
-                communication::set(&mut parameters, index, sub_index, value);
-                continue;
-            };
+        configuration.limits.damping = 0.0;
+        for (index, sub_index, value) in items {
+            let Some(object) = super::table::find(index, sub_index) else { continue };
             application = true;
             match object.field {
                 Field::Setting(setting) | Field::Compensation(setting) => {
@@ -99,30 +151,45 @@ impl Stored {
                 _ => {}
             }
         }
-        let node_id = if matches!(node_id, 1..=127) { node_id } else { NO_NODE_ID };
-        Some(Self {
-            node_id,
-            application: application.then_some((configuration, ranges)),
-            communication: (of != 0).then_some((of, parameters)),
-        })
+        if configuration.limits.damping == 0.0 {
+            configuration.limits.damping = configuration.limits.least_damping();
+        }
+        Some(Self { node_id, application: application.then_some((configuration, ranges)) })
     }
+}
 
-    /// The record's length. None where it does not fit, which a test rules out.
-    pub fn encode(&self, record: &mut [u8; RECORD]) -> Option<usize> {
+impl Update<'_> {
+    /// Writes the new record; its length. None where it does not fit, which a test rules out.
+    pub fn encode(&self, before: Option<&[u8]>, record: &mut [u8; RECORD]) -> Option<usize> {
+        let old = before.filter(|before| parse(before).is_some()).unwrap_or(&[FORMAT, NO_NODE_ID, 0]);
+        let (node_id, old_of, _) = parse(old)?;
+        let of = match self.communication {
+            Part::Kept => old_of,
+            Part::Removed => 0,
+            Part::New((of, _)) => of,
+        };
         let mut writer = Writer { record, length: 0 };
-        writer.put(&[FORMAT, self.node_id, self.communication.map_or(0, |(node_id, _)| node_id)])?;
-        if let Some((configuration, ranges)) = &self.application {
-            for object in &OBJECTS {
-                let value = match object.field {
-                    Field::Setting(setting) | Field::Compensation(setting) => setting.get(configuration),
-                    Field::Range(range) => ranges.get(range as usize).map_or(0, |value| value.to_bits()),
-                    _ => continue,
-                };
-                writer.item(object.index, object.sub_index, value)?;
+        writer.put(&[FORMAT, self.node_id.unwrap_or(node_id), of])?;
+        match &self.application {
+            Part::Kept => writer.copy(old, |index, sub_index| super::table::find(index, sub_index).is_some())?,
+            Part::Removed => {}
+            Part::New((configuration, ranges)) => {
+                for object in &OBJECTS {
+                    let value = match object.field {
+                        Field::Setting(setting) | Field::Compensation(setting) => setting.get(configuration),
+                        Field::Range(range) => ranges.get(range as usize).map_or(0, |value| value.to_bits()),
+                        _ => continue,
+                    };
+                    writer.item(object.index, object.sub_index, value)?;
+                }
             }
         }
-        if let Some((_, parameters)) = &self.communication {
-            communication::store(parameters, |index, sub_index, value| writer.item(index, sub_index, value))?;
+        match self.communication {
+            Part::Kept => writer.copy(old, |index, _| is_communication(index))?,
+            Part::Removed => {}
+            Part::New((_, parameters)) => {
+                communication::store(parameters, |index, sub_index, value| writer.item(index, sub_index, value))?;
+            }
         }
         Some(writer.length)
     }

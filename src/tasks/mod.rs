@@ -10,7 +10,7 @@ mod standalone;
 use standalone as connection;
 
 use crate::board::watchdog::{self, Watchdog};
-use crate::board::{self, Led, Peripherals, StartError, control, faults};
+use crate::board::{self, Led, Peripherals, StartError, control, faults, options};
 use connection::Watching;
 use embassy_executor::{SendSpawner, Spawner};
 use embassy_stm32::gpio::Input;
@@ -24,8 +24,6 @@ use joint_firmware::motor::setting::SettingError;
 use joint_firmware::motor::thermal::{PLAUSIBLE_SENSOR, ThermalSettings, WindingTemperature};
 use joint_firmware::parameters::slots::WriteError;
 
-/// Counts a turn of the incremental encoder, on boards that have one: 1,000 lines, until a configuration says otherwise.
-const ENCODER_COUNTS: u16 = 4_000;
 /// A program that has run for so long forgets why it stopped before.
 const HEALTHY: Duration = Duration::from_secs(10);
 /// A button counts as pressed after so many milliseconds: contacts bounce.
@@ -60,10 +58,19 @@ impl From<ConfigurationError> for NotStarted {
     }
 }
 
+/// What of the first configuration is needed besides the control step.
+pub struct Started {
+    /// For the thermal model.
+    thermal: ThermalSettings,
+    /// Counts a turn of an incremental encoder.
+    encoder_counts: u32,
+}
+
 /// Starts everything; called once in thread mode. `medium` starts the interrupt executor. A function of its own: its stack is free again for the tasks.
 #[inline(never)]
 pub fn start(slow: Spawner, medium: impl FnOnce() -> SendSpawner, peripherals: Peripherals) {
     faults::report();
+    options::report();
     match begin(slow, medium, peripherals) {
         Ok(()) => defmt::info!("{}: control steps at {} Hz", board::NAME, board::CONTROL_HZ),
         Err(NotStarted::Board(error)) => defmt::error!("{} does not start: {}", board::NAME, error),
@@ -71,33 +78,40 @@ pub fn start(slow: Spawner, medium: impl FnOnce() -> SendSpawner, peripherals: P
             defmt::error!("{} does not start: the flash refuses to write double word {}", board::NAME, word);
         }
         Err(NotStarted::Configuration(error)) => {
+            // As object 2100h:3 would say.
             let what = match error {
-                ConfigurationError::Setting(SettingError { name, .. }) => name,
-                ConfigurationError::Compensation(_) => "compensation",
-                ConfigurationError::NodeId(_) => "node id",
-                ConfigurationError::PolePairs(_) => "pole pairs",
+                ConfigurationError::Setting(SettingError { name, .. }) => name.code(),
+                ConfigurationError::Compensation(_) => 0x2200_0000,
+                ConfigurationError::NodeId(_) => 0,
+                ConfigurationError::PolePairs(_) => 0x2101_0600,
+                ConfigurationError::EncoderCounts(_) => 0x2101_0A00,
             };
-            defmt::error!("{} does not start: {} out of range in its configuration", board::NAME, what);
+            defmt::error!("{} does not start: setting {:#010x} out of range in its configuration", board::NAME, what);
         }
     }
 }
 
 fn begin(slow: Spawner, medium: impl FnOnce() -> SendSpawner, peripherals: Peripherals) -> Result<(), NotStarted> {
-    let parts = board::start(peripherals, ENCODER_COUNTS)?;
+    let parts = board::start(peripherals)?;
     // Started once, so the exchange is new and empty.
     let (commands, ends) = defmt::unwrap!(control::exchange());
     #[cfg(feature = "bus")]
     let of_the_bus = connection::Parts { can: parts.can, flash: parts.flash };
     #[cfg(not(feature = "bus"))]
     let of_the_bus = connection::Parts;
-    let (connection, thermal) = connection::start(commands, of_the_bus)?;
+    let (connection, Started { thermal, encoder_counts }) = connection::start(commands, of_the_bus)?;
     let winding = winding(&thermal)?;
-    control::start(parts.sensors, ends);
+    if let Some(mut sensors) = parts.sensors {
+        sensors.set_encoder_counts(encoder_counts);
+        control::start(sensors, ends);
+    }
     let medium = medium();
     let watching = connection.spawn(slow);
     // Each task is spawned once, so its only place is free.
     medium.spawn(defmt::unwrap!(supervise(parts.button, watching, watchdog::new(parts.watchdog))));
     medium.spawn(defmt::unwrap!(keep_cool(winding)));
+    #[cfg(feature = "moteus-r4")]
+    medium.spawn(defmt::unwrap!(mind_gate_driver(parts.gate)));
     slow.spawn(defmt::unwrap!(log()));
     slow.spawn(defmt::unwrap!(show(parts.led)));
     Ok(())
@@ -156,6 +170,13 @@ async fn supervise(button: Option<Input<'static>>, mut watching: Watching, watch
     }
 }
 
+/// Sets the gate driver up, and clears its faults.
+#[cfg(feature = "moteus-r4")]
+#[embassy_executor::task]
+async fn mind_gate_driver(parts: board::gate::Parts) {
+    board::gate::supervise(parts).await;
+}
+
 /// Logs the control steps once a second.
 #[embassy_executor::task]
 async fn log() {
@@ -206,6 +227,7 @@ fn state_name(state: State) -> defmt::Str {
         State::QuickStopActive => defmt::intern!("quick stop active"),
         State::FaultReactionActive => defmt::intern!("fault reaction active"),
         State::Fault => defmt::intern!("fault"),
+        State::OpenLoop => defmt::intern!("open loop"),
     }
 }
 

@@ -1,12 +1,11 @@
 //! A joint without a bus: the board's own configuration, and nobody who commands; the bridge stays off.
 
-use super::NotStarted;
+use super::{NotStarted, Started};
 use crate::board::control::Commands;
 use crate::board::{self, BoardConfiguration, Publisher};
 use embassy_executor::Spawner;
 use joint_firmware::joint::Demand;
 use joint_firmware::joint::state_machine::Controlword;
-use joint_firmware::motor::thermal::ThermalSettings;
 
 /// Nothing of the board belongs to a bus.
 pub struct Parts;
@@ -16,14 +15,14 @@ pub struct Connection {
     demand: Publisher<Demand>,
 }
 
-/// Offers the board's own configuration. Returns what the thermal model needs, too.
-pub fn start(mut commands: Commands, _parts: Parts) -> Result<(Connection, ThermalSettings), NotStarted> {
+/// Offers the board's own configuration.
+pub fn start(mut commands: Commands, _parts: Parts) -> Result<(Connection, Started), NotStarted> {
     let BoardConfiguration { bridge, joint, .. } = &board::CONFIGURATION;
     // Nothing has been offered, so there is a place.
     let prepared = defmt::unwrap!(commands.active.prepare(|place| joint.prepare_in(bridge, place), |_, _| ()))?;
     let thermal = prepared.value().thermal;
     prepared.offer();
-    Ok((Connection { demand: commands.demand }, thermal))
+    Ok((Connection { demand: commands.demand }, Started { thermal, encoder_counts: joint.motor.encoder_counts }))
 }
 
 impl Connection {

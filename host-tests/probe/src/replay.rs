@@ -9,7 +9,9 @@ use joint_firmware::default_configuration::B_G431B_ESC1;
 use joint_firmware::friction::FrictionModel;
 use joint_firmware::joint::configuration::{BridgeConfiguration, Configuration, VelocitySource};
 use joint_firmware::joint::state_machine::Controlword;
-use joint_firmware::joint::{Active, Bridge, Command, Demand, Joint, Measurements, Mode, OFFSET_STEPS, Slow};
+use joint_firmware::joint::{
+    Active, BoardLimits, Bridge, Command, Demand, Joint, Measurements, Mode, OFFSET_STEPS, Slow,
+};
 use joint_firmware::motor::phases::Phases;
 use joint_firmware::parameters::image::Image;
 
@@ -50,7 +52,9 @@ pub fn configuration(scenario: &Scenario) -> (Configuration, BridgeConfiguration
     (joint.motor.torque_constant, joint.motor.current_limit) = (0.09, 20.0);
     joint.gear.ratio = 50.0;
     (joint.limits.torque, joint.limits.velocity, joint.limits.over_current) = (80.0, 8.0, 28.0);
+    joint.limits.damping = joint.limits.least_damping();
     (joint.limits.position, joint.limits.bus_voltage) = ((-3.0, 3.0), (20.0, 48.0));
+    joint.limits.regeneration_band = 7.2;
     (joint.limits.bridge_temperature, joint.limits.winding_temperature) = (110.0, 130.0);
     (joint.gains.current_bandwidth, joint.gains.observer_bandwidth) = (800.0, 200.0);
     (joint.gains.stiffness, joint.gains.damping, joint.gains.integral) = (1000.0, 60.0, 2000.0);
@@ -66,6 +70,15 @@ pub fn configuration(scenario: &Scenario) -> (Configuration, BridgeConfiguration
         dead_time_band: 0.3,
         has_bridge_sensor: true,
         has_winding_sensor: true,
+        counts_an_encoder: false,
+        limits: BoardLimits {
+            supply: 60.0,
+            over_current: 60.0,
+            bridge_temperature: 110.0,
+            current_range: (-60.0, 60.0),
+            supply_end: 72.0,
+            ..B_G431B_ESC1.bridge.limits
+        },
     };
     (joint, bridge)
 }
@@ -102,6 +115,7 @@ pub fn demand(scenario: &Scenario, n: u32) -> Demand {
         torque: if impedance { 0.0 } else { 6.0 * sign },
         stiffness: 200.0,
         damping: 60.0,
+        ..Command::NOTHING
     };
     let controlword = Controlword::ENABLE_OPERATION;
     Demand { controlword, command, sequence: 1 + n / COMMAND_STEPS, ..Demand::default() }

@@ -1,7 +1,7 @@
 //! A board with its program, on a bench supply.
 
 use crate::bare_metal::build;
-use emulator::board::{Drivetrain, Wired};
+use emulator::board::{Drivetrain, Encoder, Wired};
 use emulator::chip::time::Instant;
 use emulator::cpu::{End, Watch};
 use emulator::emulation::Emulation;
@@ -52,7 +52,7 @@ impl<W: Wired> Bench<W> {
         Self::with(board, &actuator(), program)
     }
 
-    /// The same with another actuator.
+    /// The same with another actuator; its encoder has the counts that are usual on the board.
     ///
     /// # Errors
     /// What plant or emulation refuse.
@@ -61,7 +61,24 @@ impl<W: Wired> Bench<W> {
         actuator: &ActuatorParameters,
         program: &Program,
     ) -> Result<Self, Failed> {
-        let emulation = Emulation::new(board(Drivetrain::new(*actuator, 25.0, 1)?), program)?;
+        Self::of(board(Drivetrain::new(*actuator, 25.0, 1)?), program)
+    }
+
+    /// The same with an encoder of its own.
+    ///
+    /// # Errors
+    /// What board, plant or emulation refuse.
+    pub fn with_encoder(
+        board: impl FnOnce(Drivetrain) -> W,
+        actuator: &ActuatorParameters,
+        encoder: Encoder,
+        program: &Program,
+    ) -> Result<Self, Failed> {
+        Self::of(board(Drivetrain::new(*actuator, 25.0, 1)?).with_encoder(encoder)?, program)
+    }
+
+    fn of(board: W, program: &Program) -> Result<Self, Failed> {
+        let emulation = Emulation::new(board, program)?;
         let messages = Messages::of(program)?.ok_or("the program logs without defmt")?;
         let messages = Arc::new(messages);
         Ok(Self { emulation, messages, bytes: Vec::new() })

@@ -7,7 +7,7 @@ use emulator::emulation::Emulation;
 use emulator::program::Program;
 use joint_firmware::compensation::Request;
 use joint_firmware::joint::configuration::Configuration;
-use joint_firmware::objects::{RECORD, Stored};
+use joint_firmware::objects::{DEFAULT_RANGES, Part, RECORD, Update};
 use joint_firmware::parameters::slots::{BLANK, Layout, PAGE_WORDS, SlotFlash, Slots};
 use libtest_mimic::Failed;
 use node::flash::Flash;
@@ -19,6 +19,7 @@ pub fn configuration<W: Observed>(actuator: &ActuatorParameters, node: u8, reque
     let board = W::CONFIGURATION;
     let mut configuration = Setup::of(actuator).compensating(request).configuration;
     configuration.node_id = node;
+    configuration.limits.bridge_temperature = board.bridge.limits.bridge_temperature;
     configuration.motor.encoder_latency = board.joint.motor.encoder_latency;
     configuration
 }
@@ -50,11 +51,13 @@ impl Kept<'_> {
         if !self.image.is_empty() {
             store(0, 1, self.image)?;
         }
-        let node_id = self.configuration.node_id;
-        let application = Some((*self.configuration, Stored::NOTHING.ranges()));
         let mut record = [0; RECORD];
-        let stored = Stored { node_id, application, communication: None };
-        let length = stored.encode(&mut record).ok_or("the record does not fit")?;
+        let update = Update {
+            node_id: Some(self.configuration.node_id),
+            application: Part::New((self.configuration, DEFAULT_RANGES)),
+            communication: Part::Removed,
+        };
+        let length = update.encode(None, &mut record).ok_or("the record does not fit")?;
         store(2, 2, &record[..length])?;
 
         let start = program.symbol("__parameters_start").ok_or("the program names no parameters")?.address;

@@ -4,7 +4,7 @@ use super::Bench;
 use bus::client::Object;
 use bus::client::cob_id::{HEARTBEAT, LSS_MASTER, LSS_SLAVE, SDO_RECEIVE, SDO_TRANSMIT};
 use bus::client::lss::request;
-use bus::client::sdo::{Method, Settings, Transfer};
+use bus::client::sdo::{Failure, Method, Settings, Transfer};
 use emulator::board::Wired;
 use emulator::chip::fdcan::line::CanFrame;
 use emulator::emulation::Emulation;
@@ -82,7 +82,7 @@ impl<W: Wired> Bench<W> {
     /// The joint refuses or is silent.
     pub fn upload(&mut self, node: u8, index: u16, sub_index: u8) -> Result<Vec<u8>, Failed> {
         let object = Object { node, index, sub_index };
-        self.transfer(Transfer::upload(object, Method::Automatic, Settings::default()))
+        self.done(Transfer::upload(object, Method::Automatic, Settings::default()))
     }
 
     /// Reads an object in blocks.
@@ -91,7 +91,7 @@ impl<W: Wired> Bench<W> {
     /// The joint refuses or is silent.
     pub fn upload_in_blocks(&mut self, node: u8, index: u16, sub_index: u8) -> Result<Vec<u8>, Failed> {
         let object = Object { node, index, sub_index };
-        self.transfer(Transfer::upload(object, Method::Block, Settings::default()))
+        self.done(Transfer::upload(object, Method::Block, Settings::default()))
     }
 
     /// Writes an object.
@@ -100,7 +100,7 @@ impl<W: Wired> Bench<W> {
     /// The joint refuses or is silent.
     pub fn download(&mut self, node: u8, index: u16, sub_index: u8, data: &[u8]) -> Result<(), Failed> {
         let object = Object { node, index, sub_index };
-        self.transfer(Transfer::download(object, data, Method::Automatic, Settings::default())).map(drop)
+        self.done(Transfer::download(object, data, Method::Automatic, Settings::default())).map(drop)
     }
 
     /// Reads a number of up to four bytes.
@@ -114,7 +114,16 @@ impl<W: Wired> Bench<W> {
         Ok(u32::from_le_bytes(bytes))
     }
 
-    fn transfer(&mut self, mut transfer: Transfer) -> Result<Vec<u8>, Failed> {
+    fn done(&mut self, transfer: Transfer) -> Result<Vec<u8>, Failed> {
+        let object = transfer.object();
+        Ok(self.transfer(transfer)?.map_err(|failure| format!("{object:?}: {failure:?}"))?)
+    }
+
+    /// Carries out a transfer; what came of it.
+    ///
+    /// # Errors
+    /// The run ended.
+    pub fn transfer(&mut self, mut transfer: Transfer) -> Result<Result<Vec<u8>, Failure>, Failed> {
         let node = u16::from(transfer.object().node);
         loop {
             let now = Duration::from_secs_f64(self.emulation.now().seconds());
@@ -122,8 +131,7 @@ impl<W: Wired> Bench<W> {
                 send(&mut self.emulation, SDO_RECEIVE + node, &message)?;
             }
             if let Some(outcome) = transfer.outcome() {
-                let outcome = outcome.clone();
-                return Ok(outcome.map_err(|failure| format!("{:?}: {failure:?}", transfer.object()))?);
+                return Ok(outcome.clone());
             }
             self.run(TICK)?;
             let now = Duration::from_secs_f64(self.emulation.now().seconds());

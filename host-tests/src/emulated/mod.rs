@@ -2,12 +2,14 @@
 //! control step.
 
 pub mod bench;
+pub mod commissioned;
 pub mod kept;
 pub mod master;
 pub mod motion;
 pub mod observed;
 pub mod power;
 pub mod stack;
+pub mod taken;
 pub mod twin;
 
 pub use bench::Bench;

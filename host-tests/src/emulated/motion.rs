@@ -4,24 +4,25 @@ use super::Bench;
 use super::kept::{Kept, configuration};
 use super::master::{Heard, heard, send};
 use super::observed::Observed;
-use crate::image_bytes::encoded;
-use crate::parameters;
+use crate::control_steps::image_bytes;
 use emulator::board::{Drivetrain, MoteusR4, Wired};
 use emulator::chip::time::Instant;
+use emulator::emulation::Emulation;
 use emulator::program::Program;
 use joint_firmware::compensation::Request;
-use joint_firmware::friction::state::Signal;
 use joint_firmware::joint::configuration::Configuration;
 use libtest_mimic::Failed;
 use plant::ActuatorParameters;
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
 
 /// Its node id.
 pub const NODE: u8 = 5;
 /// Between two set-points, s.
 pub const SET_POINT: f64 = 0.005;
+/// Usual amplitude of the velocity at the link, rad/s; its sine has 1 Hz.
+pub const AMPLITUDE: f64 = 2.0;
+/// How long the joint moves where the control interrupt is measured, s.
+pub const MOTION: f64 = 2.0;
 /// Between two heartbeats of the joint, ms.
 const HEARTBEAT: u16 = 10;
 /// Cyclic synchronous velocity, of object 6060h.
@@ -31,12 +32,9 @@ const ENABLING: [u16; 3] = [0x06, 0x07, 0x0F];
 /// Up to here the joint is enabled, s.
 const ENABLED: f64 = 0.3;
 
-/// An image whose physical model and network act on the bench, at room temperature.
+/// An image whose physical model and network act in all that [`Moving`] does: every term, a network in each of four sets, and a trained box that is not left.
 pub fn acting_image() -> Vec<u8> {
-    let mut random = ChaCha8Rng::seed_from_u64(0);
-    let mut friction = parameters::tame(&mut random);
-    friction.domain.ranges[Signal::Temperature as usize] = parameters::range(10.0, 40.0);
-    encoded(&parameters::image(&mut random, friction, 1))
+    image_bytes()
 }
 
 /// A joint that somebody moves. A clone is a snapshot.
@@ -50,6 +48,8 @@ pub struct Moving<W: Wired = MoteusR4> {
     pub amplitude: f64,
     /// Nobody sends set-points.
     pub silent: bool,
+    /// Controlword instead of those that enable the joint.
+    pub controlword: Option<u16>,
     /// What it is configured for.
     pub configuration: Configuration,
     /// Frames of the joint.
@@ -74,7 +74,15 @@ impl<W: Observed> Moving<W> {
         if W::INDEX {
             bench.turn_by_hand(|_| Ok(()))?;
         }
-        let mut moving = Self { bench, period: 0, amplitude: 2.0, silent: false, configuration, heard: Vec::new() };
+        let mut moving = Self {
+            bench,
+            period: 0,
+            amplitude: AMPLITUDE,
+            silent: false,
+            controlword: None,
+            configuration,
+            heard: Vec::new(),
+        };
         // Operational.
         send(&mut moving.bench.emulation, 0x000, &[0x01, NODE])?;
         // A heartbeat, so that it always has something to send.
@@ -91,21 +99,34 @@ impl<W: Observed> Moving<W> {
     /// # Errors
     /// The run ended.
     pub fn run(&mut self, seconds: f64) -> Result<(), Failed> {
+        self.run_with(seconds, |_| Ok(()))
+    }
+
+    /// The same; `reached` as in [`Bench::run_with`].
+    ///
+    /// # Errors
+    /// The run ended, or what `reached` says.
+    pub fn run_with(
+        &mut self,
+        seconds: f64,
+        mut reached: impl FnMut(&mut Emulation<W>) -> Result<(), Failed>,
+    ) -> Result<(), Failed> {
         for _ in 0..(seconds / SET_POINT).round() as u32 {
-            self.set_point()?;
+            self.set_point(&mut reached)?;
         }
         Ok(())
     }
 
     /// A set-point, and the time up to the next.
-    fn set_point(&mut self) -> Result<(), Failed> {
+    fn set_point(&mut self, reached: impl FnMut(&mut Emulation<W>) -> Result<(), Failed>) -> Result<(), Failed> {
         // The joint measures its currents' zeros first.
         let [shutdown, switch_on, enable] = ENABLING;
-        let controlword = match self.period {
+        let enabling = match self.period {
             0..24 => shutdown,
             24..28 => switch_on,
             _ => enable,
         };
+        let controlword = self.controlword.unwrap_or(enabling);
         let time = f64::from(self.period) * SET_POINT;
         let velocity = self.amplitude * (TAU * time).sin();
         let mut frame = controlword.to_le_bytes().to_vec();
@@ -115,7 +136,7 @@ impl<W: Observed> Moving<W> {
         if !self.silent {
             send(&mut self.bench.emulation, 0x300 + u16::from(NODE), &frame)?;
         }
-        self.bench.run(SET_POINT)?;
+        self.bench.run_with(SET_POINT, reached)?;
         self.heard.extend(heard(&mut self.bench.emulation));
         Ok(())
     }
@@ -138,14 +159,18 @@ impl<W: Observed> Moving<W> {
             if self.now().0 >= end {
                 return Ok(None);
             }
-            self.set_point()?;
+            self.set_point(|_| Ok(()))?;
         }
+    }
+
+    /// The EMCYs so far.
+    pub fn emergency_messages(&self) -> impl Iterator<Item = &[u8]> {
+        let own = 0x80 + u16::from(NODE);
+        self.heard.iter().filter(move |(id, _)| *id == own).map(|(_, data)| data.as_slice())
     }
 
     /// Codes of the EMCYs so far.
     pub fn emergencies(&self) -> Vec<u16> {
-        let own = 0x80 + u16::from(NODE);
-        let codes = self.heard.iter().filter(|(id, _)| *id == own);
-        codes.filter_map(|(_, data)| Some(u16::from_le_bytes(*data.first_chunk()?))).collect()
+        self.emergency_messages().filter_map(|data| Some(u16::from_le_bytes(*data.first_chunk()?))).collect()
     }
 }

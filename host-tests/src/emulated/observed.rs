@@ -18,6 +18,8 @@ pub trait Observed: Wired + Sized {
     const WINDING_SENSOR: bool;
     /// Whether the encoder has to meet its index before the joint can be enabled.
     const INDEX: bool;
+    /// Variable that tells whether the gate driver is ready, 1, or has not been since the start, 0; none where there is nothing to get ready.
+    const GATE: Option<&'static str>;
     /// Variables of the control interrupt that [`Observed::encoder`] and [`Observed::encoder_taken`] read.
     const ENCODER: &'static [&'static str];
 
@@ -61,6 +63,7 @@ impl Observed for MoteusR4 {
     const CODES: [u32; 4] = [0x5000_0480, 0x5000_0080, 0x5000_0180, 0x5000_0084];
     const WINDING_SENSOR: bool = true;
     const INDEX: bool = false;
+    const GATE: Option<&'static str> = Some("gate::STATE");
     const ENCODER: &'static [&'static str] = &["sensors.answer"];
 
     fn bridge_fault(memory: &mut Memory<'_, Self>) -> Result<bool, Failed> {
@@ -84,6 +87,7 @@ impl Observed for BG431BEsc1 {
     const CODES: [u32; 4] = [0x5000_0080, 0x5000_0180, 0x5000_0184, 0x5000_0084];
     const WINDING_SENSOR: bool = false;
     const INDEX: bool = true;
+    const GATE: Option<&'static str> = None;
     const ENCODER: &'static [&'static str] = &[
         "joint.encoder",
         "sensors.counts_kept",

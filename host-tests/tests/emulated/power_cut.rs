@@ -236,7 +236,7 @@ impl Case<'_> {
         self.tally.second_cuts += 1;
         // A start has six operations at most, and none where nothing is to be decided.
         let operation = random.random_range(1..=4);
-        self.bench.emulation.power_up();
+        self.bench.power_up();
         if !self.bench.cut(operation, self.torn, 0.02)? {
             self.bench.booted(NODE)?;
             let found = self.find(&[old, new])?;

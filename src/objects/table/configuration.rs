@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::objects::field::{
-    CalibrationField, ConfigurationField as C, Field::Calibration as K, Field::Configuration as Control,
-    Field::Setting as S,
+    ConfigurationField as C, Field::Configuration as Control, Field::OpenLoop as W, Field::SetPoint as Set,
+    Field::Setting as S, OpenLoopField as Window, SetPoint,
 };
 use crate::objects::settings::Setting;
 
@@ -13,8 +13,8 @@ room! {
             "1: check what is staged as a whole and take it, with the motor off; 2: forget it. What is taken is stored by 1010h"
         2, "result", U8, RO, UNMAPPED, Control(C::Result); "", 1.0, ANY;
             "Of the last command: 0 done, 1 a setting was refused, 2 the control step has not taken the configuration before"
-        3, "refused setting", Text, RO, UNMAPPED, Control(C::RefusedSetting); "", 1.0, ANY;
-            "Name of the setting that was refused; empty where none was"
+        3, "refused setting", U32, RO, UNMAPPED, Control(C::RefusedSetting); "", 1.0, ANY;
+            "The setting that was refused, 0 where none was: index of its object in bits 16 to 31, sub-index in bits 8 to 15, both 0 where it has none, number of its name in bits 0 to 7"
         4, "refused value", F32, RO, UNMAPPED, Control(C::RefusedValue); "", 1.0, ANY;
             "Value of that setting, in its unit"
         5, "lowest possible value", F32, RO, UNMAPPED, Control(C::Lowest); "", 1.0, ANY;
@@ -34,7 +34,7 @@ room! {
         4, "torque constant", F32, RW, UNMAPPED, S(Setting::TorqueConstant); "Nm/A", 1.0, within(0.001, 5.0);
             "Torque at the rotor by q current"
         5, "current limit", F32, RW, UNMAPPED, S(Setting::CurrentLimit); "A", 1.0, within(0.1, 200.0);
-            "Largest current"
+            "Largest current; at most the board's, docs/boards.md"
         6, "pole pairs", U32, RW, UNMAPPED, S(Setting::PolePairs); "", 1.0, within(1.0, 64.0);
             "Electrical turns in a turn of the rotor"
         7, "encoder reversed", U8, RW, UNMAPPED, S(Setting::Direction); "", 1.0, within(0.0, 1.0);
@@ -43,6 +43,12 @@ room! {
             "Electrical angle of the encoder where the d axis lies on phase A"
         9, "encoder latency", F32, RW, UNMAPPED, S(Setting::EncoderLatency); "s", 1.0, within(0.0, 1e-3);
             "Age of an encoder sample when the control step sees it"
+        10, "encoder counts", U32, RW, UNMAPPED, S(Setting::EncoderCounts); "", 1.0, within(16.0, 65_535.0);
+            "Counts a turn of an incremental encoder, four times its lines; stored by 1010h, it acts from the next start on"
+        11, "encoder kind", U8, RO, UNMAPPED, W(Window::EncoderKind); "", 1.0, ANY;
+            "0 absolute, 1 incremental with an index, which it has to meet after each start"
+        12, "loss current", F32, RW, UNMAPPED, S(Setting::LossCurrent); "A", 1.0, within(0.0, 200.0);
+            "Largest d current that turns braking energy which the supply does not take into heat of the winding; 0: none; at most the current limit"
     }
     0x2102 "gear" {
         1, "gear ratio", F32, RW, UNMAPPED, S(Setting::GearRatio); "", 1.0, within(-500.0, 500.0);
@@ -62,17 +68,21 @@ room! {
         5, "position margin", F32, RW, UNMAPPED, S(Setting::PositionMargin); "rad", 1.0, within(1e-3, 10.0);
             "Margin beyond the position limits"
         6, "over-current limit", F32, RW, UNMAPPED, S(Setting::OverCurrent); "A", 1.0, within(0.0, 500.0);
-            "Phase current at which the bridge switches off; at least 5 % above the current limit"
+            "Phase current at which the bridge switches off; at least 5 % above the current limit, at most the board's"
         7, "lowest bus voltage", F32, RW, UNMAPPED, S(Setting::LowestBusVoltage); "V", 1.0, within(5.0, 100.0);
             "A fault below it"
         8, "highest bus voltage", F32, RW, UNMAPPED, S(Setting::HighestBusVoltage); "V", 1.0, within(5.0, 100.0);
-            "A fault above it; at least 1 V above the lowest"
+            "A fault above it; at least 1 V above the lowest, at most the board's"
         9, "bridge temperature limit", F32, RW, UNMAPPED, S(Setting::BridgeTemperature); "°C", 1.0, within(40.0, 150.0);
-            "A fault above it"
+            "A fault at it, at most the board's; the current is derated over the last 20 K"
         10, "winding temperature limit", F32, RW, UNMAPPED, S(Setting::WindingTemperature); "°C", 1.0, within(60.0, 200.0);
             "A fault at it; the current is derated over the last 20 K"
         11, "command deadline", F32, RW, UNMAPPED, S(Setting::CommandDeadline); "s", 1.0, within(1e-3, 10.0);
-            "Time without a set-point after which the joint brakes"
+            "Time without a set-point after which the joint brakes; at most the board's"
+        12, "limit damping", F32, RW, UNMAPPED, S(Setting::LimitDamping); "Nm s/rad", 1.0, within(0.0, 1e6);
+            "With which torque fades towards velocity and position limits, and with which the joint brakes; at least 5 times the torque limit over the velocity limit"
+        13, "regeneration band", F32, RW, UNMAPPED, S(Setting::RegenerationBand); "V", 1.0, within(0.1, 95.0);
+            "Span below the highest bus voltage over which a braking current that feeds the supply fades to nothing"
     }
     0x2104 "gains" {
         1, "current bandwidth", F32, RW, UNMAPPED, S(Setting::CurrentBandwidth); "Hz", 1.0, within(10.0, 100e3);
@@ -104,23 +114,43 @@ room! {
         5, "ambient temperature", F32, RW, UNMAPPED, S(Setting::Ambient); "°C", 1.0, within(-40.0, 85.0);
             "Temperature of the surroundings"
     }
-    0x2107 "calibration" {
-        1, "calibration current", F32, RW, UNMAPPED, K(CalibrationField::Current); "A", 1.0, within(0.0, 100.0);
-            "Writing a current, 0.1 A or more, measures the motor with it: the joint, which must be switched off, turns by itself there and back. 0 gives it up, and so does any command. \
-             What was found goes into 2101h:1, 2, 3, 6, 7 and 8, in use and staged; 1010h stores it"
-        2, "calibration progress", U8, RO, UNMAPPED, K(CalibrationField::Progress); "", 1.0, ANY;
-            "0 none yet, 1 offsets, 2 resistance, 3 inductance, 4 alignment, 5 ending, 6 done, 7 given up"
-        3, "calibration failure", U8, RO, UNMAPPED, K(CalibrationField::Failure); "", 1.0, ANY;
-            "Why it was given up: 0 it was not, 1 asked to, 2 too long, 3 supply too low, 4 over-current, 5 encoder lost, 6 rotor moves, 7 offset too large, 8 phase open, \
-             9 current not reached, 10 currents do not add up, 11 resistance implausible, 12 ripple too small, 13 not inductive, 14 rotor did not move, 15 rotor slipped, \
-             16 and 17 pole pairs unclear or others, 18 lag too large, 19 rotor beside the field"
-        4, "calibration failure's value", F32, RO, UNMAPPED, K(CalibrationField::Value); "", 1.0, ANY;
-            "What was measured when it was given up, in the failure's unit"
-        5, "calibration failure's limit", F32, RO, UNMAPPED, K(CalibrationField::Limit); "", 1.0, ANY;
-            "What that was held against"
-        6, "lag of the rotor", F32, RO, UNMAPPED, K(CalibrationField::Lag); "turns", 1.0, ANY;
-            "How far the rotor lagged behind the field, electrical turns: friction against the current"
-        7, "lost voltage", F32, RO, UNMAPPED, K(CalibrationField::LostVoltage); "V", 1.0, ANY;
-            "Voltage that a leg loses beyond what dead-time compensation makes up for"
+    0x2107 "open loop" {
+        1, "open-loop frame", U64, RW, RECEIVE, Set(SetPoint::OpenLoop); "", 1.0, ANY;
+            "Mode -2. Four numbers of 16 bits, the lowest first: voltage along the field, mV, phase amplitude; speed of the field, signed, 0.01 electrical turns/s, 50 turns/s at most; \
+             amplitudes of a voltage that alternates with an eighth of 2108h:16 along the field and across it, mV. Slewed at 50 V/s; lowered beyond 2101h:5. Each one renews a deadline of 0.1 s"
+    }
+    0x2108 "open-loop window" {
+        1, "window number", U32, RO, UNMAPPED, W(Window::Number); "", 1.0, ANY;
+            "Windows of 128 control steps since the start; 0 none yet. Reading it holds the others, which are means of that window"
+        2, "window's current along", F32, RO, UNMAPPED, W(Window::CurrentAlong); "A", 1.0, ANY;
+            "Current along the field"
+        3, "window's current across", F32, RO, UNMAPPED, W(Window::CurrentAcross); "A", 1.0, ANY;
+            "Current across the field"
+        4, "window's voltage along", F32, RO, UNMAPPED, W(Window::VoltageAlong); "V", 1.0, ANY;
+            "Voltage along the field, without what dead-time compensation adds"
+        5, "window's voltage across", F32, RO, UNMAPPED, W(Window::VoltageAcross); "V", 1.0, ANY;
+            "Voltage across the field"
+        6, "in-phase current along", F32, RO, UNMAPPED, W(Window::InPhaseAlong); "A", 1.0, ANY;
+            "Amplitude of the current along the field, in phase with sin(2 pi n / 8) of the window's step n, as the alternating voltage that is computed in that step"
+        7, "quadrature current along", F32, RO, UNMAPPED, W(Window::QuadratureAlong); "A", 1.0, ANY;
+            "The same with cos(2 pi n / 8)"
+        8, "in-phase current across", F32, RO, UNMAPPED, W(Window::InPhaseAcross); "A", 1.0, ANY;
+            "As sub-index 6, across the field"
+        9, "quadrature current across", F32, RO, UNMAPPED, W(Window::QuadratureAcross); "A", 1.0, ANY;
+            "As sub-index 7, across the field"
+        10, "alternating voltage along", F32, RO, UNMAPPED, W(Window::AlternatingAlong); "V", 1.0, ANY;
+            "Amplitude of the alternating voltage along the field"
+        11, "alternating voltage across", F32, RO, UNMAPPED, W(Window::AlternatingAcross); "V", 1.0, ANY;
+            "Amplitude of the alternating voltage across the field"
+        12, "window's encoder", U32, RO, UNMAPPED, W(Window::Encoder); "turns", 1.0 / 4_294_967_296.0, ANY;
+            "Encoder in the window's last step"
+        13, "window's field", U32, RO, UNMAPPED, W(Window::Field); "turns", 1.0 / 4_294_967_296.0, ANY;
+            "Angle of the field in the window's last step, electrical turns from phase A; 0 when the state begins"
+        14, "window's supply", F32, RO, UNMAPPED, W(Window::BusVoltage); "V", 1.0, ANY;
+            "Supply"
+        15, "encoder referenced", Bool, RO, UNMAPPED, W(Window::Referenced); "", 1.0, ANY;
+            "1 where the encoder's zero is known: always with an absolute one, from the index on with an incremental one"
+        16, "control rate", U32, RO, UNMAPPED, W(Window::ControlRate); "Hz", 1.0, ANY;
+            "Control steps a second"
     }
 }

@@ -1,11 +1,12 @@
 //! 6000h to 67FFh: what CiA 402-2 has an object for.
 
 use super::*;
+use crate::objects::field::Constant::{AbortConnectionOption, QuickStopOption, SupportedModes};
 use crate::objects::field::{Actual, Field::Actual as A, Field::Constant, Field::SetPoint as Set, SetPoint};
 
 room! {
     0x6007 "abort connection option code" {
-        0, "abort connection option code", I16, RO, UNMAPPED, Constant(3); "", 1.0, ANY;
+        0, "abort connection option code", I16, RO, UNMAPPED, Constant(AbortConnectionOption); "", 1.0, ANY;
             "3: outside OPERATIONAL the joint makes a quick stop"
     }
     0x603F "error code" {
@@ -18,15 +19,15 @@ room! {
     }
     0x6041 "statusword" {
         0, "statusword", U16, RO, TRANSMIT, A(Actual::Statusword); "", 1.0, ANY;
-            "State of the state machine, voltage present (bit 4), remote (bit 9)"
+            "State of the state machine, voltage present (bit 4), remote (bit 9); operation enabled with bit 14 is the open loop"
     }
     0x605A "quick stop option code" {
-        0, "quick stop option code", I16, RO, UNMAPPED, Constant(2); "", 1.0, ANY;
+        0, "quick stop option code", I16, RO, UNMAPPED, Constant(QuickStopOption); "", 1.0, ANY;
             "2: brake along the quick-stop ramp, then switch on disabled"
     }
     0x6060 "modes of operation" {
-        0, "modes of operation", I8, RW, RECEIVE, Set(SetPoint::Mode); "", 1.0, within(-1.0, 10.0);
-            "8 position (CSP), 9 velocity (CSV), 10 torque (CST), -1 impedance; in a PDO any other number changes nothing"
+        0, "modes of operation", I8, RW, RECEIVE, Set(SetPoint::Mode); "", 1.0, within(-2.0, 10.0);
+            "8 position (CSP), 9 velocity (CSV), 10 torque (CST), -1 impedance, -2 open loop (2107h); in a PDO any other number changes nothing"
     }
     0x6061 "modes of operation display" {
         0, "modes of operation display", I8, RO, TRANSMIT, A(Actual::Mode); "", 1.0, ANY;
@@ -54,7 +55,7 @@ room! {
     }
     0x6077 "torque actual value" {
         0, "torque actual value", I16, RO, TRANSMIT, A(Actual::Torque); "of 6076h", 1e-3, ANY;
-            "Torque of the measured current at the joint"
+            "Torque of the measured current at the joint; in the open loop the most that it can make"
     }
     0x607A "target position" {
         0, "target position", I32, RW, RECEIVE, Set(SetPoint::TargetPosition); "rad", 1e-6, ANY;
@@ -65,7 +66,7 @@ room! {
             "Velocity mode"
     }
     0x6502 "supported drive modes" {
-        0, "supported drive modes", U32, RO, TRANSMIT, Constant(0x0001_0380); "", 1.0, ANY;
-            "Position, velocity and torque (bits 7 to 9), impedance (bit 16)"
+        0, "supported drive modes", U32, RO, TRANSMIT, Constant(SupportedModes); "", 1.0, ANY;
+            "Position, velocity and torque (bits 7 to 9), impedance (bit 16), open loop (bit 17)"
     }
 }

@@ -1,6 +1,6 @@
-//! 2300h, 2301h: what is left of a fault, and of what stopped the program.
+//! 2300h to 2303h: what is left of a fault, and of what stopped the program; what the board tells of its hardware.
 
-use super::super::field::ResetField;
+use super::super::field::{HardwareField as H, ResetField};
 use super::*;
 
 room! {
@@ -21,5 +21,29 @@ room! {
             "The last included; 0 where nothing stopped the program, or once it has run for 10 s since"
         6, "stop place", Text, RO, UNMAPPED, Field::Reset(ResetField::Place); "", 1.0, ANY;
             "End of the name of a panic's source file"
+    }
+    0x2302 "gate driver" {
+        1, "gate driver status 1", U16, RO, UNMAPPED, Field::Hardware(H::DriverStatus1); "", 1.0, ANY;
+            "Of the fault that has not been cleared, 0 without one. Of a DRV8353, bits: 0 to 5 over-current of the transistors low C, high C, low B, high B, low A, high A, 6 thermal shutdown, \
+             7 under-voltage lock-out, 8 gate drive, 9 over-current, 10 any fault; 7FFh in both words: it does not answer"
+        2, "gate driver status 2", U16, RO, UNMAPPED, Field::Hardware(H::DriverStatus2); "", 1.0, ANY;
+            "Bits: 0 to 5 gates of low C, high C, low B, high B, low A, high A, 6 under-voltage of the gates' supply, 7 thermal warning, 8 to 10 over-current of the shunts C, B, A"
+        3, "gate driver faults", U16, RO, UNMAPPED, Field::Hardware(H::DriverFaults); "", 1.0, ANY;
+            "Since the start; at 65535 it stays"
+        4, "gate driver set-up", U8, RO, UNMAPPED, Field::Hardware(H::DriverSetup); "", 1.0, ANY;
+            "What is missing before the bridge may switch: 0 nothing, 1 the driver wakes up, 2 it does not answer (no supply, or its bus), 3 it does not keep what is written, \
+             4 a fault that is not cleared: by a fault reset, 5 another board than the program is for, 6 a converter of the chip. What can be tried again is, every 2 ms"
+        5, "board revision", U8, RO, UNMAPPED, Field::Hardware(H::Revision); "", 1.0, ANY;
+            "By the board's pins, 0 where it has none. Of a moteus r4: 0 r4.1 to r4.3, 1 r4.4, 2 r4.5, 3 r4.5b to r4.8, 4 r4.10 and r4.11; bit 7: another family"
+    }
+    0x2303 "chip options" {
+        1, "chip options found", U32, RO, UNMAPPED, Field::Hardware(H::OptionsFound); "", 1.0, ANY;
+            "FLASH_OPTR (RM0440), 0 where there is no chip"
+        2, "chip options needed", U32, RO, UNMAPPED, Field::Hardware(H::OptionsNeeded); "", 1.0, ANY;
+            "The same with SRAM_PE 0, nSWBOOT0 0 and nBOOT0 1"
+        3, "chip options wrong", U8, RO, UNMAPPED, Field::Hardware(H::OptionsWrong); "", 1.0, ANY;
+            "Bits: 0 SRAM_PE (parity of the SRAM is not checked), 1 nSWBOOT0 (a pin can start the bootloader), 2 nBOOT0"
+        4, "set chip options", U32, WO, UNMAPPED, Field::Hardware(H::SetOptions); "", 1.0, ANY;
+            "4254504Fh (\"OPTB\") sets them as they are needed and resets the chip; the joint must be switched off"
     }
 }

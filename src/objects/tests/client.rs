@@ -70,7 +70,7 @@ impl Node {
 #[test]
 fn a_wanted_start_says_why_and_reports_nothing() {
     for reset in [LastReset::POWER_UP, LastReset::REQUESTED] {
-        let mut node = Node::started(Stored::NOTHING, false, reset);
+        let mut node = Node::started(None, false, reset);
         assert_eq!((node.number(0x2301, 1), node.number(0x2301, 2)), (reset.causes.into(), 0));
         assert_eq!((node.number(0x2301, 5), node.upload(0x2301, 6)), (0, Ok(Vec::new())));
         assert_eq!(node.number(0x1003, 0), 0);
@@ -82,7 +82,7 @@ fn what_stopped_the_program_is_read_after_the_reset() {
     let record = Record::new(Cause::Panic, 0, 42).at("src/main.rs");
     let record = record.after(Some(&Record::new(Cause::HardFault, 0x0800_1234, 1)));
     let reset = LastReset { causes: LastReset::SOFTWARE, stop: Some(record) };
-    let mut node = Node::started(Stored::NOTHING, false, reset);
+    let mut node = Node::started(None, false, reset);
     node.task();
     assert_eq!([1, 2, 3, 4, 5].map(|sub_index| node.number(0x2301, sub_index)), [8, 1, 0, 42, 2]);
     assert_eq!(node.upload(0x2301, 6), Ok(b"src/main.rs".to_vec()));
@@ -94,7 +94,7 @@ fn what_stopped_the_program_is_read_after_the_reset() {
 #[test]
 fn a_watchdog_s_reset_is_an_emcy() {
     let reset = LastReset { causes: LastReset::WATCHDOG | 2, stop: None };
-    let mut node = Node::started(Stored::NOTHING, false, reset);
+    let mut node = Node::started(None, false, reset);
     // Behind the boot-up message, and once: not with the next reset of communication.
     assert_eq!(node.task(), [Frame::new(0x85, &[0x10, 0x60, 0, 0x12, 0, 0, 0, 0]).unwrap()]);
     assert_eq!(node.number(0x1003, 1), u64::from(emergency::WATCHDOG) | 0x12 << 16);

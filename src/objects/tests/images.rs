@@ -176,7 +176,7 @@ fn a_refusal_is_an_abort_a_number_and_an_emcy() {
 
 #[test]
 fn one_bank_of_flash_takes_a_commit_only_with_the_motor_off() {
-    let mut node = Node::with(Stored::NOTHING, true);
+    let mut node = Node::with(None, true);
     node.download(0x2210, 0, &image(1)).unwrap();
     command(&mut node, VERIFY).unwrap();
     node.observed.telemetry.state = State::OperationEnabled;

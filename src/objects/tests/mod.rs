@@ -1,10 +1,11 @@
 //! The objects behind the real server: a client by SDO, a master by PDO, a hostile bus; the host.
 
-mod calibration;
 mod client;
 mod documentation;
+mod hardware;
 mod hostile;
 mod images;
+mod open_loop;
 mod process_data;
 mod settings;
 mod table;
@@ -12,11 +13,10 @@ mod table;
 use super::*;
 use crate::canopen::{self, Event, Frame, Identity, NmtState, Receiver, Route, SdoSettings, Server};
 use crate::default_configuration::{B_G431B_ESC1, BoardConfiguration};
-use crate::joint::commissioning::calibration_settings;
-use crate::joint::configuration::Configuration;
+use crate::hardware::Hardware;
+use crate::joint::configuration::{BridgeConfiguration, Configuration};
 use crate::joint::history::History;
-use crate::motor::calibration::{Failure, Progress};
-use crate::motor::setting::SettingError;
+use crate::motor::open_loop::Window;
 use crate::parameters::authentication::{Key, STAGING};
 use crate::parameters::certificate::Limits;
 use crate::parameters::image::{Effort, Target};
@@ -47,10 +47,12 @@ pub struct Memory {
     pub key: Option<[u8; 32]>,
     pub image: Vec<u8>,
     pub history: Option<History>,
-    pub calibrations: Vec<f32>,
-    pub calibration: Option<Progress>,
+    pub window: Window,
     pub fails: Option<SlotError>,
     pub reset: LastReset,
+    pub hardware: Hardware,
+    /// How often the chip's options were set.
+    pub options_set: u32,
 }
 
 impl Default for Memory {
@@ -63,10 +65,11 @@ impl Default for Memory {
             key: None,
             image: Vec::new(),
             history: None,
-            calibrations: Vec::new(),
-            calibration: None,
+            window: Window::NOTHING,
             fails: None,
             reset: LastReset::POWER_UP,
+            hardware: Hardware::default(),
+            options_set: 0,
         }
     }
 }
@@ -81,21 +84,16 @@ impl Program for Memory {
         Ok(())
     }
 
-    fn calibrate(&mut self, configuration: &Configuration, current: f32) -> Result<(), SettingError> {
-        calibration_settings(configuration, &BOARD.bridge, current)?;
-        self.calibrations.push(current);
-        self.calibration = Some(Progress::Offsets);
-        Ok(())
+    fn window(&self) -> Window {
+        self.window
     }
 
-    fn abort_calibration(&mut self) {
-        if !matches!(self.calibration, None | Some(Progress::Done(_))) {
-            self.calibration = Some(Progress::Failed(Failure::Aborted));
-        }
+    fn bridge(&self) -> &BridgeConfiguration {
+        &BOARD.bridge
     }
 
-    fn calibration(&self) -> Option<Progress> {
-        self.calibration
+    fn record<R>(&self, read: impl FnOnce(Option<&[u8]>) -> R) -> R {
+        read(self.record.as_deref())
     }
 
     fn store(&mut self, record: &[u8]) -> Result<(), SlotError> {
@@ -127,6 +125,15 @@ impl Program for Memory {
         self.reset
     }
 
+    fn hardware(&self) -> Hardware {
+        self.hardware
+    }
+
+    fn set_options(&mut self) -> bool {
+        self.options_set += 1;
+        true
+    }
+
     fn event(&mut self, _event: Event) {}
 }
 
@@ -146,14 +153,14 @@ pub struct Node {
 impl Node {
     /// In PRE-OPERATIONAL.
     pub fn new() -> Self {
-        Self::with(Stored::NOTHING, false)
+        Self::with(None, false)
     }
 
-    pub fn with(stored: Stored, single_bank: bool) -> Self {
-        Self::started(stored, single_bank, LastReset::POWER_UP)
+    pub fn with(record: Option<Vec<u8>>, single_bank: bool) -> Self {
+        Self::started(record, single_bank, LastReset::POWER_UP)
     }
 
-    pub fn started(stored: Stored, single_bank: bool, reset: LastReset) -> Self {
+    pub fn started(record: Option<Vec<u8>>, single_bank: bool, reset: LastReset) -> Self {
         let bus: &canopen::Shared = Box::leak(Box::new(canopen::Shared::new()));
         let shared: &Shared = Box::leak(Box::new(Shared::new()));
         let requirements = Requirements {
@@ -163,14 +170,16 @@ impl Node {
         };
         let staging = Box::leak(Box::new([0; STAGING]));
         let images = Images::new(staging, LifeCycle::new(requirements, 0, 0, 0), None, StoredImages::default());
-        let start = Start { configuration: stored.configuration(&BOARD.joint), stored, single_bank };
+        let stored = record.as_deref().and_then(|record| Stored::decode(record, &BOARD.joint));
+        let stored = stored.unwrap_or(Stored::NOTHING);
+        let start = Start { configuration: stored.configuration(&BOARD.joint), ranges: stored.ranges(), single_bank };
         let mut node = Self {
             shared,
             bus,
             server: Server::new(bus, &IDENTITY, SdoSettings::default(), NODE),
             receiver: Receiver::new(bus),
             image: JointImage::new(shared),
-            objects: Objects::new(shared, Memory { reset, ..Memory::default() }, images, &start),
+            objects: Objects::new(shared, Memory { record, reset, ..Memory::default() }, images, &start),
             observed: Observed::default(),
             queue: VecDeque::new(),
             now: 0,

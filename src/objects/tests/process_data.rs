@@ -55,7 +55,8 @@ fn the_impedance_frame_is_the_mini_cheetahs() {
     set_mode(&mut node, -1);
     node.receive(0x405, &[0xFF, 0xFF, 0, 0x0F, 0xFF, 0, 0x0F, 0xFF]);
     let [position, velocity, stiffness, _, torque] = DEFAULT_RANGES;
-    let expected = Command { mode: Mode::Impedance, position, velocity: -velocity, stiffness, damping: 0.0, torque };
+    let expected =
+        Command { mode: Mode::Impedance, position, velocity: -velocity, stiffness, torque, ..Command::NOTHING };
     assert_eq!(node.image.demand().command, expected);
     for command in [expected, Command { position: -1.25, velocity: 3.0, damping: 2.5, torque: -4.5, ..expected }] {
         node.receive(0x405, &impedance_frame(&command, DEFAULT_RANGES).to_le_bytes());

@@ -2,7 +2,9 @@
 
 use super::*;
 use crate::joint::state_machine::State;
+use crate::motor::setting::Name;
 use crate::objects::field::{Field, Range};
+use crate::objects::stored::communication_parameters;
 use crate::objects::table::{DataType, described};
 
 const TAKE: (u16, u8) = (0x2100, 1);
@@ -29,11 +31,12 @@ fn a_refused_configuration_says_which_setting_and_why() {
     node.set_real(0x2101, 4, 7.0).unwrap();
     assert_eq!(take(&mut node), Err(0x0609_0030));
     assert_eq!(node.number(0x2100, 2), 1);
-    assert_eq!(node.upload(0x2100, 3).unwrap(), b"torque constant");
+    let refused = node.number(0x2100, 3) as u32;
+    assert_eq!((refused >> 8, Name::from_code(refused).text()), (0x21_0104, "torque constant"));
     assert_eq!((node.real(0x2100, 4), node.real(0x2100, 5), node.real(0x2100, 6)), (7.0, 1e-3, 5.0));
     assert!(node.objects.program().configured.is_empty());
     node.download(TAKE.0, TAKE.1, &[2]).unwrap();
-    assert_eq!((node.real(0x2101, 4), node.upload(0x2100, 3)), (BOARD.joint.motor.torque_constant, Ok(vec![])));
+    assert_eq!((node.real(0x2101, 4), node.number(0x2100, 3)), (BOARD.joint.motor.torque_constant, 0));
 }
 
 #[test]
@@ -82,7 +85,7 @@ fn compensation_acts_at_once_also_under_way_and_the_rest_does_not() {
     node.download(0x2200, 1, &[2]).unwrap();
     assert_eq!(node.objects.program().configured.last().unwrap().compensation.gain, 0.8);
     assert_eq!(node.set_real(0x2200, 3, 1.5), Err(0x0609_0030));
-    assert_eq!(node.upload(0x2200 - 0x100, 3).unwrap(), b"compensation gain");
+    assert_eq!(node.number(0x2100, 3) >> 8, 0x22_0003, "index and sub-index of the compensation gain");
     assert_eq!(node.real(0x2200, 3), 0.8);
     assert_eq!(node.download(0x2200, 1, &[4]), Err(0x0609_0030));
     node.set_real(0x2103, 1, 0.03).unwrap();
@@ -125,7 +128,7 @@ fn what_is_stored_is_there_after_a_reset_and_restored_it_is_not() {
     node.download(0x1010, 1, b"save").unwrap();
     let again = |node: &mut Node| {
         let record = node.objects.program().record.clone().unwrap();
-        Node::with(Stored::decode(&record, &BOARD.joint).unwrap(), false)
+        Node::with(Some(record), false)
     };
     let mut node = again(&mut node);
     assert_eq!((node.real(0x2104, 3), node.real(0x2012, 5), node.real(0x2200, 3)), (0.5, 9.0, 0.25));
@@ -142,26 +145,83 @@ fn what_is_stored_is_there_after_a_reset_and_restored_it_is_not() {
     assert_eq!(again(&mut node).number(0x1017, 0), 0);
 }
 
-#[test]
-fn the_whole_record_comes_back_and_fits() {
-    let stored = Stored {
-        node_id: 17,
-        application: Some((crate::default_configuration::MOTEUS_R4.joint, [1.0, 2.0, 3.0, 4.0, 5.0])),
-        communication: Some((9, default_communication(9))),
+/// A record with everything in it.
+fn whole() -> Vec<u8> {
+    let mut communication = default_communication(9);
+    communication.heartbeat = 50;
+    let joint = crate::default_configuration::MOTEUS_R4.joint;
+    let update = Update {
+        node_id: Some(17),
+        application: Part::New((&joint, [1.0, 2.0, 3.0, 4.0, 5.0])),
+        communication: Part::New((9, &communication)),
     };
     let mut record = [0; RECORD];
-    let length = stored.encode(&mut record).unwrap();
-    assert_eq!(length, 1_088);
-    assert_eq!(Stored::decode(&record[..length], &BOARD.joint), Some(stored));
+    let length = update.encode(None, &mut record).unwrap();
+    record[..length].to_vec()
+}
+
+#[test]
+fn the_whole_record_comes_back_and_fits() {
+    let record = whole();
+    assert_eq!(record.len(), 1_116);
+    let configuration = Configuration { node_id: 17, ..crate::default_configuration::MOTEUS_R4.joint };
+    let stored = Stored::decode(&record, &BOARD.joint).unwrap();
+    assert_eq!((stored.configuration(&BOARD.joint), stored.ranges()), (configuration, [1.0, 2.0, 3.0, 4.0, 5.0]));
+    assert_eq!(communication_parameters(Some(&record), 9).heartbeat, 50);
+    assert_eq!(communication_parameters(Some(&record), 10), default_communication(10), "for another node id");
+    assert_eq!(communication_parameters(None, 9), default_communication(9));
     assert_eq!(Stored::decode(&[2], &BOARD.joint), None);
     assert_eq!(Stored::decode(&[2, 255, 0], &BOARD.joint), None);
     assert_eq!(Stored::decode(&[1, 255, 0], &BOARD.joint), Some(Stored::NOTHING));
 }
 
 #[test]
+fn what_an_update_keeps_of_a_record_are_the_same_bytes_but_for_objects_that_nobody_knows() {
+    let before = whole();
+    let update = |node_id, application, communication, before: &[u8]| {
+        let mut record = [0; RECORD];
+        let length = Update { node_id, application, communication }.encode(Some(before), &mut record).unwrap();
+        record[..length].to_vec()
+    };
+    assert_eq!(update(None, Part::Kept, Part::Kept, &before), before);
+    let other = update(Some(18), Part::Kept, Part::Kept, &before);
+    assert_eq!((other[1], &other[2..]), (18, &before[2..]));
+
+    let (application, communication) =
+        (update(None, Part::Kept, Part::Removed, &before), update(None, Part::Removed, Part::Kept, &before));
+    assert_eq!((application[2], communication[2]), (0, 9));
+    assert_eq!([&before[..3], &application[3..], &communication[3..]].concat(), before);
+    assert_eq!(update(None, Part::Removed, Part::Removed, &before), [1, 17, 0]);
+
+    let unknown = [&before[..], &[0xFF, 0x2F, 1, 1, 2, 3, 4]].concat();
+    assert_eq!(update(None, Part::Kept, Part::Kept, &unknown), before);
+    // Nothing of a record in another format is kept.
+    assert_eq!(update(None, Part::Kept, Part::Kept, &[2, 17, 9]), [1, 255, 0]);
+}
+
+#[test]
+fn a_record_without_limit_damping_gets_the_least_that_its_limits_permit() {
+    let mut node = Node::new();
+    for (sub_index, value) in [(1, 90.0), (2, 6.0), (12, 200.0)] {
+        node.set_real(0x2103, sub_index, value).unwrap();
+    }
+    take(&mut node).unwrap();
+    node.download(0x1010, 1, b"save").unwrap();
+    let record = node.objects.program().record.clone().unwrap();
+    let damping = |record: &[u8]| {
+        let (configuration, _) = Stored::decode(record, &BOARD.joint).unwrap().application.unwrap();
+        configuration.prepare(&BOARD.bridge).unwrap().limits.damping
+    };
+    assert_eq!(damping(&record), 200.0);
+    let items = record[3..].chunks(7).filter(|item| item[..3] != [0x03, 0x21, 12]);
+    let older: Vec<u8> = record[..3].iter().chain(items.flatten()).copied().collect();
+    assert_eq!((older.len(), damping(&older)), (record.len() - 7, 75.0));
+}
+
+#[test]
 fn a_joint_of_one_bank_stores_only_with_its_motor_off() {
     for (single_bank, expected) in [(true, Err(0x0800_0022)), (false, Ok(()))] {
-        let mut node = Node::with(Stored::NOTHING, single_bank);
+        let mut node = Node::with(None, single_bank);
         node.observed.telemetry.state = State::SwitchedOn;
         assert_eq!(node.download(0x1010, 1, b"save"), expected);
         node.observed.telemetry.state = State::Fault;
@@ -180,7 +240,7 @@ fn a_joint_of_one_bank_stores_only_where_no_turn_of_its_encoder_is_lost_meanwhil
         (true, f32::NAN, Err(0x0800_0022)),
         (false, 1.01 * limit, Ok(())),
     ] {
-        let mut node = Node::with(Stored::NOTHING, single_bank);
+        let mut node = Node::with(None, single_bank);
         node.observed.telemetry.motion.velocity = velocity;
         assert_eq!(node.download(0x1010, 1, b"save"), expected, "{velocity} rad/s");
     }
@@ -190,7 +250,7 @@ fn a_joint_of_one_bank_stores_only_where_no_turn_of_its_encoder_is_lost_meanwhil
 fn a_joint_of_one_bank_takes_a_key_only_with_its_motor_off() {
     let key: [u8; 32] = core::array::from_fn(|place| place as u8);
     for (single_bank, expected) in [(true, Err(0x0800_0022)), (false, Ok(()))] {
-        let mut node = Node::with(Stored::NOTHING, single_bank);
+        let mut node = Node::with(None, single_bank);
         node.observed.telemetry.state = State::OperationEnabled;
         assert_eq!(node.download(0x2215, 6, &key), expected);
         assert_eq!(node.objects.program().key.is_some(), expected.is_ok());

@@ -1,11 +1,11 @@
 //! The joint on the bus: what the receive interrupt leaves, SDO, LSS, heartbeats, EMCYs, the life of images; thread mode.
 //!
-//! The proof of an image takes up to 21 million instructions (in emulation; 0.12 s at one a cycle), and writing one stalls for the flash. Neither has been
+//! The proof of an image may take up to 21 million instructions (0.12 s at one a cycle), and writing one stalls for the flash. Neither has been
 //! measured on a board. Meanwhile this task sends no heartbeat; NMT, SYNC and RPDOs act in the interrupt all the same.
 
 use super::program::BoardProgram;
 use crate::board::can::{self, Condition};
-use crate::board::{control, faults, shadow};
+use crate::board::{control, faults, options, shadow};
 use embassy_time::{Duration, Instant, with_timeout};
 use joint_firmware::canopen::{self, Frame, Server};
 use joint_firmware::joint::state_machine::State;
@@ -41,7 +41,12 @@ pub async fn serve(node: &'static mut Node) {
         // Whatever it has written to flash is written.
         control::release();
         // The transition stopped the joint; a start in the middle of that would let it fall.
-        if node.objects.program().restart && control::report().is_none_or(|report| is_off(report.telemetry.state)) {
+        let (restart, set_options) = (node.objects.program().restart, node.objects.program().set_options);
+        if (restart || set_options) && control::report().is_none_or(|report| is_off(report.telemetry.state)) {
+            if set_options {
+                // The answer leaves the controller meanwhile.
+                options::set();
+            }
             faults::restart();
         }
     }

@@ -5,7 +5,7 @@ mod node;
 mod program;
 mod store;
 
-use super::NotStarted;
+use super::{NotStarted, Started};
 use crate::board::control::{Commands, Report};
 use crate::board::flash::Parameters;
 use crate::board::{can, control, shadow};
@@ -15,7 +15,6 @@ use embassy_stm32::Peri;
 use embassy_stm32::can::CanConfigurator;
 use embassy_stm32::peripherals::FLASH;
 use joint_firmware::friction::regime::Memory;
-use joint_firmware::motor::thermal::ThermalSettings;
 use joint_firmware::objects::{FrictionStatistics, Observed};
 use program::BoardProgram;
 use store::Store;
@@ -33,17 +32,16 @@ pub struct Connection {
     node: &'static mut Node,
 }
 
-/// Offers the first configuration and starts the receive interrupt. Returns what the thermal model needs, too.
+/// Offers the first configuration and starts the receive interrupt.
 #[inline(never)]
-pub fn start(commands: Commands, parts: Parts) -> Result<(Connection, ThermalSettings), NotStarted> {
-    let mut program =
-        BoardProgram::new(commands.active, commands.calibration, Store::open(Parameters::new(parts.flash))?);
-    let configuration = program.configuration();
-    let thermal = program.begin(&configuration)?;
+pub fn start(commands: Commands, parts: Parts) -> Result<(Connection, Started), NotStarted> {
+    let mut program = BoardProgram::new(commands.active, commands.window, Store::open(Parameters::new(parts.flash))?);
+    let start = program.start();
+    let thermal = program.begin(&start.configuration)?;
     // What a loss of power left undecided in flash is decided.
     control::release();
-    let node = node::start(program, &configuration, commands.demand, parts.can);
-    Ok((Connection { node }, thermal))
+    let node = node::start(program, &start, commands.demand, parts.can);
+    Ok((Connection { node }, Started { thermal, encoder_counts: start.configuration.motor.encoder_counts }))
 }
 
 impl Connection {

@@ -6,13 +6,12 @@ use crate::board::{self, Publisher, can};
 use embassy_stm32::can::CanConfigurator;
 use joint_firmware::canopen::{self, Identity, SdoSettings, Server};
 use joint_firmware::joint::Demand;
-use joint_firmware::joint::configuration::Configuration;
-use joint_firmware::objects::{Images, JointImage, Objects, Shared, Start};
+use joint_firmware::objects::{Images, JointImage, Objects, Shared, Start, StoredImages};
 use joint_firmware::parameters::authentication::STAGING;
 use joint_firmware::parameters::certificate::Limits;
 use joint_firmware::parameters::image::{Effort, Target};
 use joint_firmware::parameters::life_cycle::{LifeCycle, Requirements};
-use static_cell::StaticCell;
+use static_cell::{ConstStaticCell, StaticCell};
 
 /// Device profile 402, a servo drive.
 const DEVICE_TYPE: u32 = 0x0002_0192;
@@ -27,15 +26,23 @@ static OBJECTS: Shared = Shared::new();
 #[inline(never)]
 pub fn start(
     mut program: BoardProgram,
-    configuration: &Configuration,
+    start: &Start,
     demand: Publisher<Demand>,
     controller: CanConfigurator<'static>,
 ) -> &'static mut Node {
-    static IDENTITY: StaticCell<Identity> = StaticCell::new();
-    static BUFFER: StaticCell<[u8; STAGING]> = StaticCell::new();
-    static NODE: StaticCell<Node> = StaticCell::new();
+    let identity = identity();
+    let stored = program.store.stored_images();
+    let images = images(&program, &stored, identity, start);
+    let objects = objects(program, images, start);
+    let node = node(identity, start.configuration.node_id, objects, stored);
+    can::start(controller, &BUS, JointImage::new(&OBJECTS), demand);
+    node
+}
 
-    let identity = IDENTITY.init(Identity {
+#[inline(never)]
+fn identity() -> &'static Identity<'static> {
+    static IDENTITY: StaticCell<Identity> = StaticCell::new();
+    IDENTITY.init(Identity {
         device_type: DEVICE_TYPE,
         device_name: board::NAME,
         hardware_version: board::NAME,
@@ -45,30 +52,43 @@ pub fn start(
         product: board::PRODUCT,
         revision: 1,
         serial: CRC.checksum(&embassy_stm32::uid::uid()),
-    });
-    let images = program.store.stored_images();
+    })
+}
+
+/// The life of images.
+#[inline(never)]
+fn images(program: &BoardProgram, stored: &StoredImages, identity: &Identity, start: &Start) -> Images<'static> {
+    static BUFFER: ConstStaticCell<[u8; STAGING]> = ConstStaticCell::new([0; STAGING]);
+
     let kept = program.guard.floor;
-    let floor = [images.active, images.previous].iter().flatten().map(|(image, _)| image.version).fold(kept, u32::max);
+    let floor = [stored.active, stored.previous].iter().flatten().map(|(image, _)| image.version).fold(kept, u32::max);
     let requirements = Requirements {
         target: Target { product: identity.product, serial: identity.serial },
         effort: Effort::NewtonMetre,
         // The image's own limits hold as well.
         limits: Limits {
-            output: (configuration.limits.torque * 65_536.0) as u32,
+            output: (start.configuration.limits.torque * 65_536.0) as u32,
             torque_gain: 1 << 16,
             velocity_slope: u32::MAX,
         },
     };
     let life = LifeCycle::new(requirements, floor, program.guard.failures, 0);
     let key = program.guard.key.clone();
-    let images_of_client = Images::new(BUFFER.init([0; STAGING]), life, key, images);
-    let start = Start { configuration: *configuration, stored: program.stored(), single_bank: board::SINGLE_BANK };
+    Images::new(BUFFER.take(), life, key, *stored)
+}
+
+/// The task's part of the node.
+#[inline(never)]
+fn node(
+    identity: &'static Identity<'static>,
+    node_id: u8,
+    objects: &'static mut Objects<'static, BoardProgram>,
+    stored: StoredImages,
+) -> &'static mut Node {
+    static NODE: StaticCell<Node> = StaticCell::new();
+
     let settings = SdoSettings { block_size: can::BLOCK, ..SdoSettings::default() };
-    let server = Server::new(&BUS, identity, settings, configuration.node_id);
-    let objects = objects(program, images_of_client, &start);
-    let node = NODE.init(Node::new(&BUS, server, objects, images));
-    can::start(controller, &BUS, JointImage::new(&OBJECTS), demand);
-    node
+    NODE.init(Node::new(&BUS, Server::new(&BUS, identity, settings, node_id), objects, stored))
 }
 
 /// A function of its own, because the stack bears the objects twice in it.

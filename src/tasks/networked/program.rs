@@ -1,18 +1,16 @@
 //! What the board does for the objects: configurations and friction models to the control step, records to flash. Thread mode.
 
 use super::store::{Guard, Store};
-use crate::board::control::Calibration;
-use crate::board::{self, BoardConfiguration, Offering, Prepared, shadow};
+use crate::board::{self, BoardConfiguration, Offering, Prepared, Subscriber, shadow};
 use core::cell::RefCell;
 use joint_firmware::canopen::{Event, Reset};
+use joint_firmware::hardware::Hardware;
 use joint_firmware::joint::Active;
-use joint_firmware::joint::commissioning::calibration_settings;
-use joint_firmware::joint::configuration::{Configuration, ConfigurationError};
+use joint_firmware::joint::configuration::{BridgeConfiguration, Configuration, ConfigurationError};
 use joint_firmware::joint::history::History;
-use joint_firmware::motor::calibration::Progress;
-use joint_firmware::motor::setting::SettingError;
+use joint_firmware::motor::open_loop::Window;
 use joint_firmware::motor::thermal::ThermalSettings;
-use joint_firmware::objects::{NotConfigured, Program, Stored};
+use joint_firmware::objects::{NotConfigured, Program, Start, Stored};
 use joint_firmware::parameters::authentication::Key;
 use joint_firmware::parameters::image::Image;
 use joint_firmware::parameters::slots::SlotError;
@@ -22,39 +20,37 @@ use joint_firmware::reset_record::LastReset;
 pub struct BoardProgram {
     /// To the control step.
     pub active: Offering<Active>,
-    calibration: RefCell<Calibration>,
+    window: RefCell<Subscriber<Window>>,
     /// The flash.
     pub store: Store,
     /// As kept in flash.
     pub guard: Guard,
     /// The master asked for a start of the whole program.
     pub restart: bool,
+    /// The master asked for the chip's option bytes to be set.
+    pub set_options: bool,
 }
 
 impl BoardProgram {
     /// With what the flash holds.
-    pub fn new(active: Offering<Active>, calibration: Calibration, mut store: Store) -> Self {
+    pub fn new(active: Offering<Active>, window: Subscriber<Window>, mut store: Store) -> Self {
         let guard = store.guard();
-        Self { active, calibration: RefCell::new(calibration), store, guard, restart: false }
+        Self { active, window: RefCell::new(window), store, guard, restart: false, set_options: false }
     }
 
-    /// The stored record, or none.
+    /// What the objects start with: the board's own configuration where none is stored, or where the stored one is refused.
     #[inline(never)]
-    pub fn stored(&mut self) -> Stored {
-        let joint = &board::CONFIGURATION.joint;
-        self.store.record().and_then(|record| Stored::decode(record, joint)).unwrap_or(Stored::NOTHING)
-    }
-
-    /// The configuration to start with: the board's own where none is stored, or where the stored one is refused.
-    #[inline(never)]
-    pub fn configuration(&mut self) -> Configuration {
+    pub fn start(&mut self) -> Start {
         let BoardConfiguration { bridge, joint, .. } = &board::CONFIGURATION;
-        let configuration = self.stored().configuration(joint);
-        if configuration.verify(bridge).is_ok() {
-            return configuration;
+        let record = self.store.usable_record();
+        let stored = record.and_then(|record| Stored::decode(record, joint)).unwrap_or(Stored::NOTHING);
+        let (ranges, single_bank) = (stored.ranges(), board::SINGLE_BANK);
+        let mut configuration = stored.configuration(joint);
+        if configuration.verify(bridge).is_err() {
+            defmt::error!("the stored configuration is refused: the board's own is in use");
+            configuration = Configuration { node_id: stored.node_id, ..*joint };
         }
-        defmt::error!("the stored configuration is refused: the board's own is in use");
-        Configuration { node_id: configuration.node_id, ..*joint }
+        Start { configuration, ranges, single_bank }
     }
 
     /// Offers the first configuration, with the friction model in flash. Returns what the thermal model needs.
@@ -122,19 +118,17 @@ impl Program for BoardProgram {
         Ok(())
     }
 
-    fn calibrate(&mut self, configuration: &Configuration, current: f32) -> Result<(), SettingError> {
-        let settings = calibration_settings(configuration, &board::CONFIGURATION.bridge, current)?;
-        self.calibration.get_mut().ask(Some(&settings));
-        Ok(())
-    }
-
-    fn abort_calibration(&mut self) {
-        self.calibration.get_mut().ask(None);
-    }
-
-    fn calibration(&self) -> Option<Progress> {
+    fn window(&self) -> Window {
         // Borrowed for the length of this call only.
-        self.calibration.try_borrow_mut().ok().and_then(|mut calibration| calibration.progress())
+        self.window.try_borrow_mut().map_or(Window::NOTHING, |mut window| *window.newest())
+    }
+
+    fn bridge(&self) -> &BridgeConfiguration {
+        &board::CONFIGURATION.bridge
+    }
+
+    fn record<R>(&self, read: impl FnOnce(Option<&[u8]>) -> R) -> R {
+        read(self.store.record())
     }
 
     fn store(&mut self, record: &[u8]) -> Result<(), SlotError> {
@@ -166,6 +160,15 @@ impl Program for BoardProgram {
 
     fn last_reset(&self) -> LastReset {
         board::faults::last_reset()
+    }
+
+    fn hardware(&self) -> Hardware {
+        board::hardware()
+    }
+
+    fn set_options(&mut self) -> bool {
+        self.set_options = true;
+        true
     }
 
     fn event(&mut self, event: Event) {

@@ -106,10 +106,15 @@ impl Store {
         self.images.roll_back(&mut self.flash, buffer)
     }
 
-    /// The stored record; none where there is none.
-    pub fn record(&mut self) -> Option<&[u8]> {
+    /// The stored record; none where there is none. For the start: what is damaged falls back to what was stored before.
+    pub fn usable_record(&mut self) -> Option<&[u8]> {
         let slot = self.records.usable(&mut self.flash).ok()??;
         self.flash.bytes().get(self.records.range(slot)?)
+    }
+
+    /// The stored record as it is since then; none where there is none.
+    pub fn record(&self) -> Option<&[u8]> {
+        self.flash.bytes().get(self.records.range(self.records.active()?)?)
     }
 
     /// Stores a record.

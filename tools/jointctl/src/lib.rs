@@ -13,6 +13,7 @@ pub mod certificate_search;
 pub mod classify;
 pub mod clean;
 pub mod commands;
+pub mod commission;
 pub mod dataset;
 pub mod describe;
 pub mod differentiate;

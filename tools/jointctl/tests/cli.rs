@@ -280,3 +280,40 @@ fn a_virtual_joint_on_a_bus_is_found_and_a_bus_without_one_is_an_error() {
     let refused = jointctl(folder.path(), &["sim", "--bus", "virtual:x", "--node", "200"]);
     assert!(!refused.status.success() && stderr(&refused).contains("node id 200"), "{}", stderr(&refused));
 }
+
+#[test]
+fn an_emulated_board_that_cannot_be_set_up_says_what_is_wrong() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    std::fs::write(path("no.elf"), b"a letter").unwrap();
+    let mut plant = plant::ActuatorParameters::reference();
+    plant.sensors.encoder.counts_per_turn = 4_096;
+    std::fs::write(path("plant.toml"), toml::to_string(&plant).unwrap()).unwrap();
+    let board = ["sim", "--bus", "virtual:elf", "--elf", "no.elf", "--board", "moteus-r4"];
+    for (arguments, problem) in [
+        (&[][..], "no.elf: "),
+        (&["--commands", "missing"][..], "missing: "),
+        (&["--plant", "plant.toml"][..], "moteus-r4's encoder: encoder.counts = 4096 is outside 16384..=16384"),
+    ] {
+        let refused = jointctl(folder.path(), &[&board, arguments].concat());
+        assert!(!refused.status.success() && stderr(&refused).contains(problem), "{}", stderr(&refused));
+    }
+    let refused = jointctl(folder.path(), &["sim", "--bus", "virtual:elf", "--commands", "-"]);
+    assert!(!refused.status.success() && stderr(&refused).contains("--elf <ELF>"), "{}", stderr(&refused));
+}
+
+#[test]
+fn a_commissioning_that_nobody_can_agree_to_is_refused_before_the_bus_is_opened() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |more: &[&str]| {
+        let asked = ["commission", "--bus", "socketcan:none", "--node", "5", "--current", "8"];
+        jointctl(folder.path(), &[&asked, more].concat())
+    };
+    let refused = run(&[]);
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(stderr(&refused).contains("no terminal") && stderr(&refused).contains("--yes"), "{}", stderr(&refused));
+    let refused = stderr(&run(&["--yes", "--counts", "15"]));
+    assert!(refused.contains("--counts is 15") && refused.contains("16 to 65535"), "{refused}");
+    let refused = stderr(&run(&["--yes"]));
+    assert!(refused.contains("none"), "the bus comes after both: {refused}");
+}

@@ -12,6 +12,8 @@
 //! - [`VirtualNode`]: the whole node; frames and time passed in, so that tests run it faster than real time
 //! - [`serve`]: the node on a bus, in real time
 //! - [`EmulatedNode`]: a board's own program, as it is flashed, in its place
+//! - [`FlashFile`]: the emulated board's parameters in a file
+//! - [`Workbench`]: what somebody at the bench does to an emulated board, by lines of text
 //! - [`PacedNodes`]: several nodes on one modelled wire, in simulated time
 //! - [`Storage`]: what outlasts a loss of power, in memory or in files
 //! - [`flash`]: a flash with the rules of the STM32G4's
@@ -30,7 +32,7 @@ mod serve;
 mod storage;
 mod virtual_node;
 
-pub use emulated::EmulatedNode;
+pub use emulated::{Command, EmulatedNode, FlashFile, FlashFileError, Workbench};
 pub use images::SlotImages;
 pub use paced::{PacedEvent, PacedNodes, REACTION, TASK};
 pub use sample_image::SampleImage;

@@ -3,11 +3,9 @@
 use crate::storage::Storage;
 use joint_firmware::canopen::{Event, Reset};
 use joint_firmware::joint::Active;
-use joint_firmware::joint::commissioning::calibration_settings;
 use joint_firmware::joint::configuration::{BridgeConfiguration, Configuration};
 use joint_firmware::joint::history::History;
-use joint_firmware::motor::calibration::{CalibrationSettings, Progress};
-use joint_firmware::motor::setting::SettingError;
+use joint_firmware::motor::open_loop::Window;
 use joint_firmware::objects::{NotConfigured, Program, Stored};
 use joint_firmware::parameters::authentication::Key;
 use joint_firmware::parameters::slots::SlotError;
@@ -20,10 +18,8 @@ pub struct VirtualProgram {
     /// Prepared, for the next control step.
     pub next: Option<Active>,
     pub storage: Storage,
-    /// What is asked of the joint's calibration, for the next control step.
-    pub asked: Option<Option<CalibrationSettings>>,
-    /// Where the joint's calibration is.
-    pub calibration: Option<Progress>,
+    /// The open loop's last window.
+    pub window: Window,
     /// The steps before the latched fault.
     pub history: Option<History>,
     /// The network asked for a reset of the node.
@@ -37,8 +33,7 @@ impl VirtualProgram {
         Self {
             bridge,
             next: None,
-            asked: None,
-            calibration: None,
+            window: Window::NOTHING,
             storage,
             history: None,
             reset: false,
@@ -68,18 +63,16 @@ impl Program for VirtualProgram {
         Ok(())
     }
 
-    fn calibrate(&mut self, configuration: &Configuration, current: f32) -> Result<(), SettingError> {
-        self.asked = Some(Some(calibration_settings(configuration, &self.bridge, current)?));
-        self.calibration = Some(Progress::Offsets);
-        Ok(())
+    fn window(&self) -> Window {
+        self.window
     }
 
-    fn abort_calibration(&mut self) {
-        self.asked = Some(None);
+    fn bridge(&self) -> &BridgeConfiguration {
+        &self.bridge
     }
 
-    fn calibration(&self) -> Option<Progress> {
-        self.calibration
+    fn record<R>(&self, read: impl FnOnce(Option<&[u8]>) -> R) -> R {
+        read(self.storage.clone().configuration().as_deref())
     }
 
     fn store(&mut self, record: &[u8]) -> Result<(), SlotError> {

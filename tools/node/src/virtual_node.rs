@@ -159,7 +159,7 @@ impl VirtualNode {
         let (life, stored_images) = life(requirements, &mut program.storage, 0);
         let key = program.storage.key();
         let images = Images::new(Box::leak(Box::new([0; STAGING])), life, key, stored_images);
-        let start = Start { configuration, stored, single_bank: true };
+        let start = Start { configuration, ranges: stored.ranges(), single_bank: true };
         let node_id = if stored.node_id == NO_NODE_ID { options.node_id } else { stored.node_id };
         Ok(Self {
             joint,
@@ -344,18 +344,15 @@ impl VirtualNode {
         let model = program.storage.images.model(self.motion_rate);
         // Refused only where even the defaults are, with which the joint began.
         program.next = configuration.prepare(&self.setup.bridge).ok();
-        self.objects.restart(life, stored_images, &Start { configuration, stored, single_bank: true });
+        let start = Start { configuration, ranges: stored.ranges(), single_bank: true };
+        self.objects.restart(life, stored_images, &start);
         self.joint.set_friction(model);
         self.shadow = None;
         self.statistics = FrictionStatistics::default();
     }
 
-    /// Swaps a prepared configuration in, and begins or ends a calibration: here is always between two control steps.
+    /// Swaps a prepared configuration in: here is always between two control steps.
     fn swap(&mut self) {
-        if let Some(asked) = self.objects.program().asked.take() {
-            // Checked when it was asked for.
-            let _ = self.joint.calibrate(asked.as_ref());
-        }
         if let Some(active) = self.objects.program().next.take() {
             self.joint.set_active(active);
         }
@@ -408,12 +405,10 @@ impl VirtualNode {
             friction: self.statistics,
         };
         let history = if latched.is_empty() { None } else { Some(*joint.history()) };
-        let calibration = joint.calibration();
+        let window = *joint.window();
         let program = self.objects.program();
         program.history = history;
-        if program.asked.is_none() {
-            program.calibration = calibration;
-        }
+        program.window = window;
     }
 
     /// Does what the life cycle asks for, until it asks for nothing.

@@ -8,6 +8,7 @@ use joint_firmware::joint::state_machine::{Controlword, State};
 use joint_firmware::joint::{
     Active, Bridge, BridgeState, Command, Demand, Joint, Measurements, Mode, OFFSET_STEPS, Slow,
 };
+use joint_firmware::motor::open_loop::Frame;
 use joint_firmware::motor::phases::Phases;
 use plant::virtual_joint::Setup;
 use proptest::prelude::*;
@@ -52,23 +53,29 @@ fn measurements() -> impl Strategy<Value = Measurements> {
     )
 }
 
-fn command() -> impl Strategy<Value = Command> {
-    let mode = prop_oneof![Just(Mode::Torque), Just(Mode::Velocity), Just(Mode::Position), Just(Mode::Impedance)];
-    (mode, number(), number(), number(), number(), number()).prop_map(
-        |(mode, position, velocity, torque, stiffness, damping)| Command {
+/// A mode with a torque.
+fn mode() -> impl Strategy<Value = Mode> {
+    prop_oneof![Just(Mode::Torque), Just(Mode::Velocity), Just(Mode::Position), Just(Mode::Impedance)]
+}
+
+fn command(mode: impl Strategy<Value = Mode>) -> impl Strategy<Value = Command> {
+    (mode, number(), number(), number(), number(), number(), any::<u64>()).prop_map(
+        |(mode, position, velocity, torque, stiffness, damping, frame)| Command {
             mode,
             position,
             velocity,
             torque,
             stiffness,
             damping,
+            open_loop: Frame::from_bits(frame),
         },
     )
 }
 
 fn demand() -> impl Strategy<Value = Demand> {
     let word = prop_oneof![any::<u16>(), Just(0x06), Just(0x07), Just(0x0f), Just(0x0f), Just(0x0f), Just(0x80)];
-    (word, command(), any::<u32>()).prop_map(|(word, command, sequence)| Demand {
+    let mode = prop_oneof![4 => mode(), 1 => Just(Mode::OpenLoop)];
+    (word, command(mode), any::<u32>()).prop_map(|(word, command, sequence)| Demand {
         controlword: Controlword(word),
         command,
         sequence,
@@ -103,10 +110,12 @@ fn prepared() -> Active {
 
 fn keeps_its_promises(joint: &Joint, active: &Active, bridge: &Bridge) -> Result<(), TestCaseError> {
     let telemetry = joint.telemetry();
-    let switching =
-        matches!(telemetry.state, State::OperationEnabled | State::QuickStopActive | State::FaultReactionActive);
+    let switching = matches!(
+        telemetry.state,
+        State::OperationEnabled | State::QuickStopActive | State::FaultReactionActive | State::OpenLoop
+    );
     prop_assert_eq!(bridge.state == BridgeState::Switching, switching, "{:?}", telemetry.state);
-    let (least, greatest) = active.bridge.duty;
+    let (least, greatest) = Setup::of(&reference()).bridge.duty;
     for duty in [bridge.duties.a, bridge.duties.b, bridge.duties.c] {
         prop_assert!(duty >= least && duty <= greatest, "{bridge:?}");
     }
@@ -166,7 +175,7 @@ proptest! {
     /// a fault soon: the steps stay below that.
     #[test]
     fn whatever_is_commanded_the_torque_stays_within_its_limit(
-        commands in prop::collection::vec((command(), slow()), 1..UNEXPLAINED_STEPS as usize),
+        commands in prop::collection::vec((command(mode()), slow()), 1..UNEXPLAINED_STEPS as usize),
     ) {
         let active = prepared();
         let mut joint = Joint::new();

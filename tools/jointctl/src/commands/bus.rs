@@ -10,7 +10,7 @@ use node::{Options, Storage, VirtualNode, serve};
 use plant::ActuatorParameters;
 use plant::virtual_joint::Setup;
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -34,7 +34,8 @@ pub struct OnBus {
     /// Serial number of the first joint, the others count up [default: the node id; without one, 1000 and up]
     #[arg(long, value_name = "N", requires = "bus")]
     serial: Option<u32>,
-    /// Keep what the joints store in this folder, one below it for each serial number; without it they forget everything when they leave
+    /// Keep what the joints store in this folder, one below it for each serial number, and what an emulated board's program stores in a file for the board;
+    /// without it they forget everything when they leave
     #[arg(long, value_name = "DIR", requires = "bus")]
     storage: Option<PathBuf>,
     /// Leave the bus after this time, s
@@ -46,6 +47,11 @@ impl OnBus {
     /// The bus, where one is named.
     pub fn bus(&self) -> Option<&str> {
         self.bus.as_deref()
+    }
+
+    /// The folder of what is stored, where one is named.
+    pub fn storage(&self) -> Option<&Path> {
+        self.storage.as_deref()
     }
 
     fn duration(&self) -> Result<Option<Duration>, CommandError> {

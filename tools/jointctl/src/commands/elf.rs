@@ -7,10 +7,13 @@ use emulator::chip::time::Instant;
 use emulator::emulation::Emulation;
 use emulator::program::Program;
 use emulator::rtt::Messages;
-use node::{EmulatedNode, serve};
+use node::{EmulatedNode, FlashFile, Workbench, serve};
 use plant::ActuatorParameters;
-use std::path::PathBuf;
+use std::fs::File;
+use std::io::{BufRead, BufReader, stdin};
+use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
+use std::sync::mpsc::{Receiver, channel};
 
 /// Supply of an actuator that nobody described, V: within what both boards permit until they are commissioned.
 const SUPPLY: f64 = 18.0;
@@ -20,13 +23,17 @@ const AMBIENT: f64 = 25.0;
 /// Arguments of `sim` that put a board's program on the bus.
 #[derive(Debug, Args)]
 pub struct OnBoard {
-    /// Run this program of a board, as probe-rs would flash it, on an emulated board instead of a virtual joint; its log goes to the terminal. What it
-    /// stores is forgotten when it ends
-    #[arg(long, value_name = "ELF", requires_all = ["bus", "board"], conflicts_with_all = ["node", "serial", "storage", "image", "config"])]
+    /// Run this program of a board, as probe-rs would flash it, on an emulated board instead of a virtual joint; its log goes to the terminal. Without
+    /// --storage what it stores is forgotten when it ends
+    #[arg(long, value_name = "ELF", requires_all = ["bus", "board"], conflicts_with_all = ["node", "serial", "image", "config"])]
     elf: Option<PathBuf>,
     /// The board that the program is for
     #[arg(long, value_name = "BOARD", value_enum, requires = "elf")]
     board: Option<Board>,
+    /// What somebody does to the board, a command a line, from this file, or from the terminal with "-"; "help" lists the commands. Each is answered
+    /// in one line
+    #[arg(long, value_name = "FILE", requires = "elf")]
+    commands: Option<PathBuf>,
 }
 
 /// The boards.
@@ -38,46 +45,120 @@ enum Board {
     MoteusR4,
 }
 
+/// What is behind a board.
+#[derive(Debug)]
+pub enum Behind {
+    /// The reference actuator at a low voltage, aligned, with the board's usual encoder.
+    Reference,
+    /// An actuator with the board's usual encoder, as it is mounted there.
+    Actuator(Box<ActuatorParameters>),
+    /// An actuator with its encoder's counts too.
+    Described(Box<ActuatorParameters>),
+}
+
+/// What keeps a board busy on a bus.
+struct Session<'a> {
+    elf: &'a Path,
+    bus: &'a str,
+    storage: Option<&'a Path>,
+    lines: Option<Receiver<String>>,
+    stop: &'a AtomicBool,
+}
+
 impl OnBoard {
     /// Whether a program is named.
     pub const fn is_named(&self) -> bool {
         self.elf.is_some()
     }
 
-    /// Runs the program on the bus until `stop`, behind an actuator: as it was described, or the reference one at a low voltage. What the machine was too
-    /// slow for, s.
-    pub fn run(&self, name: &str, plant: Option<&ActuatorParameters>, stop: &AtomicBool) -> Result<f64, CommandError> {
+    /// Runs the program on the bus until `stop`, with its parameters in a folder where one is named. What the machine was too slow for, s.
+    pub fn run(
+        &self,
+        bus: &str,
+        behind: &Behind,
+        storage: Option<&Path>,
+        stop: &AtomicBool,
+    ) -> Result<f64, CommandError> {
         let (Some(path), Some(board)) = (&self.elf, self.board) else { return Ok(0.0) };
-        let failed = |error: String| CommandError::Bus(format!("{}: {error}", path.display()));
-        let elf = std::fs::read(path).map_err(|source| CommandError::Read { path: path.clone(), source })?;
-        let program = Program::parse(elf).map_err(|error| failed(error.to_string()))?;
-        let mut parameters = plant.copied().unwrap_or_else(|| ActuatorParameters::reference().aligned());
-        if plant.is_none() {
-            parameters.bus.source_voltage = SUPPLY;
-        }
-        let drivetrain = Drivetrain::new(parameters, AMBIENT, 1).map_err(|error| failed(error.to_string()))?;
+        let lines = self.commands.as_deref().map(lines).transpose()?;
+        let session = Session { elf: path, bus, storage, lines, stop };
         match board {
-            Board::BG431BEsc1 => served(BG431BEsc1::new(drivetrain), &program, name, stop).map_err(failed),
-            Board::MoteusR4 => served(MoteusR4::new(drivetrain), &program, name, stop).map_err(failed),
+            Board::BG431BEsc1 => session.run(wired(behind, BG431BEsc1::new)?),
+            Board::MoteusR4 => session.run(wired(behind, MoteusR4::new)?),
         }
     }
 }
 
-fn served<W: Wired>(board: W, program: &Program, bus: &str, stop: &AtomicBool) -> Result<f64, String> {
-    let emulation = Emulation::new(board, program).map_err(|error| error.to_string())?;
-    let transport = bus::open(bus).map_err(|error| error.to_string())?;
-    let messages = Messages::of(program)?;
-    let mut decoder = messages.as_ref().map(Messages::decoder);
-    eprintln!("{} on {bus}, emulated", W::NAME);
-    let mut node = EmulatedNode::new(emulation, |emulation: &mut Emulation<W>, until: Instant| {
-        let ended = emulation.run_until(until);
-        let log = emulation.log();
-        if let Some(decoder) = &mut decoder {
-            for message in decoder.decode(&log) {
-                eprintln!("{:9.3} s  {}", emulation.now().seconds(), message.text);
-            }
+/// Lines of a file or of the terminal as they come.
+fn lines(path: &Path) -> Result<Receiver<String>, CommandError> {
+    let reader: Box<dyn BufRead + Send> = match path.to_str() {
+        Some("-") => Box::new(BufReader::new(stdin())),
+        _ => Box::new(BufReader::new(
+            File::open(path).map_err(|source| CommandError::Read { path: path.to_owned(), source })?,
+        )),
+    };
+    let (sender, receiver) = channel();
+    // It ends with its input, or with the program.
+    std::thread::spawn(move || reader.lines().map_while(Result::ok).try_for_each(|line| sender.send(line)));
+    Ok(receiver)
+}
+
+/// A board with what is behind it.
+fn wired<W: Wired>(behind: &Behind, board: fn(Drivetrain) -> W) -> Result<W, CommandError> {
+    let parameters = match behind {
+        Behind::Actuator(parameters) | Behind::Described(parameters) => **parameters,
+        Behind::Reference => {
+            let mut parameters = ActuatorParameters::reference().aligned();
+            parameters.bus.source_voltage = SUPPLY;
+            parameters
         }
-        ended.map_or(Ok(()), |end| Err(format!("after {:.6} s: {end}", emulation.now().seconds())))
-    });
-    serve(&mut node, &*transport, stop).map_err(|error| error.to_string())
+    };
+    let drivetrain = Drivetrain::new(parameters, AMBIENT, 1)?;
+    let encoder = drivetrain.encoder();
+    let board = board(drivetrain);
+    match behind {
+        Behind::Described(_) => {
+            let refused = |error| CommandError::Arguments(format!("--plant: the {}'s encoder: {error}", W::NAME));
+            board.with_encoder(encoder).map_err(refused)
+        }
+        _ => Ok(board),
+    }
+}
+
+impl Session<'_> {
+    fn run<W: Wired>(self, board: W) -> Result<f64, CommandError> {
+        let path = self.elf;
+        let failed = |error: String| CommandError::Bus(format!("{}: {error}", path.display()));
+        let elf = std::fs::read(path).map_err(|source| CommandError::Read { path: path.to_owned(), source })?;
+        let program = Program::parse(elf).map_err(|error| failed(error.to_string()))?;
+        self.serve(board, &program).map_err(failed)
+    }
+
+    fn serve<W: Wired>(self, board: W, program: &Program) -> Result<f64, String> {
+        let Self { bus, storage, lines, stop, .. } = self;
+        let mut emulation = Emulation::new(board, program).map_err(|error| error.to_string())?;
+        let kept = storage.map(|folder| FlashFile::open(folder, &mut emulation, program)).transpose();
+        let mut kept = kept.map_err(|error| error.to_string())?;
+        let transport = bus::open(bus).map_err(|error| error.to_string())?;
+        let messages = Messages::of(program)?;
+        let mut decoder = messages.as_ref().map(Messages::decoder);
+        let mut workbench = Workbench::new();
+        eprintln!("{} on {bus}, emulated", W::NAME);
+        let mut node = EmulatedNode::new(emulation, |emulation: &mut Emulation<W>, until: Instant| {
+            lines.iter().flat_map(Receiver::try_iter).for_each(|line| workbench.tell(&line));
+            let ended = workbench.run_until(emulation, until);
+            workbench.take_answers().iter().for_each(|answer| println!("{answer}"));
+            if let Some(kept) = &mut kept {
+                kept.keep(emulation).map_err(|error| error.to_string())?;
+            }
+            let log = emulation.log();
+            if let Some(decoder) = &mut decoder {
+                for message in decoder.decode(&log) {
+                    eprintln!("{:9.3} s  {}", emulation.now().seconds(), message.text);
+                }
+            }
+            ended.map_or(Ok(()), |end| Err(format!("after {:.6} s: {end}", emulation.now().seconds())))
+        });
+        serve(&mut node, &*transport, stop).map_err(|error| error.to_string())
+    }
 }

@@ -1,6 +1,7 @@
 //! The arguments that say which joint a command works on: its configuration, and the actuator that stands for it.
 
 use super::CommandError;
+use super::elf::Behind;
 use crate::joint_text;
 use clap::Args;
 use plant::ActuatorParameters;
@@ -22,9 +23,13 @@ pub struct JointChoice {
 }
 
 impl JointChoice {
-    /// Whether an actuator is named.
-    pub const fn names_plant(&self) -> bool {
-        self.plant.is_some() || self.joint.is_some()
+    /// What is behind an emulated board: what is named, as its motor is wired and its encoder mounted.
+    pub fn behind(&self) -> Result<Behind, CommandError> {
+        Ok(match (&self.plant, self.joint) {
+            (Some(path), _) => Behind::Described(Box::new(read_plant(path)?)),
+            (None, Some(seed)) => Behind::Actuator(Box::new(ActuatorParameters::randomised(seed))),
+            (None, None) => Behind::Reference,
+        })
     }
 
     /// Reads what is named. Without a configuration, the encoder is taken as aligned; with one, what it says of the

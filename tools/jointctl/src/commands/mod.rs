@@ -1,7 +1,7 @@
 //! The commands of `jointctl`, one file each: arguments in, files and a few lines of text out; host.
 
 pub mod bus;
-mod calibrate;
+pub mod commission;
 pub mod demo;
 pub mod describe;
 pub mod drive;
@@ -68,8 +68,8 @@ pub enum Command {
     Disable(drive::Disable),
     /// Enable a joint, move it for a time, disable it
     Move(drive::Move),
-    /// Have a joint measure its motor and align its encoder; it turns by itself
-    Calibrate(calibrate::Calibrate),
+    /// From a new board to a turning motor: measure motor and encoder of a joint, set and store them; the joint turns
+    Commission(commission::Commission),
     /// Watch a joint in the terminal: curves, state, faults
     Monitor(monitor::Monitor),
     /// Record what a joint does, as a data set for `fit`
@@ -171,6 +171,9 @@ pub enum CommandError {
     /// A joint over a bus.
     #[error(transparent)]
     Remote(#[from] crate::remote::RemoteError),
+    /// A commissioning.
+    #[error(transparent)]
+    Commission(#[from] crate::commission::Failure),
     /// A round of learning on a joint.
     #[error(transparent)]
     Retrain(#[from] crate::remote::retrain::RetrainError),
@@ -197,7 +200,7 @@ pub fn run(arguments: Arguments) -> Result<(), CommandError> {
         Command::Enable(enable) => enable.run(),
         Command::Disable(disable) => disable.run(),
         Command::Move(motion) => motion.run(),
-        Command::Calibrate(calibrate) => calibrate.run(),
+        Command::Commission(commission) => commission.run(),
         Command::Monitor(monitor) => monitor.run(),
         Command::Record(record) => record.run(),
         Command::Retrain(retrain) => retrain.run(),

@@ -74,11 +74,11 @@ impl Sim {
             let text = format!("--sample-period is {} s, must lie in 0.0001 to 0.1 s", self.sample_period);
             return Err(CommandError::Arguments(text));
         }
-        let (plant, setup) = self.joint.read()?;
         if let (Some(bus), true) = (self.on_bus.bus(), self.on_board.is_named()) {
-            let plant = Some(&plant).filter(|_| self.joint.names_plant());
-            return self.on_bus.until_the_end(|stop| self.on_board.run(bus, plant, stop));
+            let (behind, storage) = (self.joint.behind()?, self.on_bus.storage());
+            return self.on_bus.until_the_end(|stop| self.on_board.run(bus, &behind, storage, stop));
         }
+        let (plant, setup) = self.joint.read()?;
         if let Some(bus) = self.on_bus.bus() {
             let image = self.image.as_deref().map(read).transpose()?;
             if let (Some(image), Some(path)) = (&image, &self.image) {

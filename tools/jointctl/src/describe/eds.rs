@@ -145,7 +145,7 @@ fn default(entry: &Entry, defaults: &CommunicationParameters) -> Option<String> 
     let by_node = |cob_id: u32| Some(format!("$NODEID+0x{cob_id:X}"));
     let number = |number: u32| Some(format!("0x{number:X}"));
     match (object.field, object.index, object.sub_index) {
-        (Field::Constant(value), ..) => Some(value.to_string()),
+        (Field::Constant(constant), ..) => Some(constant.number().to_string()),
         (Field::Highest(highest), ..) => number(highest.into()),
         (Field::Server, 0x1000, 0) => number(crate::remote::joint::DEVICE_TYPE),
         (Field::Server, 0x1005, 0) => number(defaults.sync_cob_id),
@@ -234,6 +234,6 @@ mod tests {
         assert!(of("1A00sub3").contains("DefaultValue=0x60640020"), "{}", of("1A00sub3"));
         assert!(of("1403sub1").contains("DefaultValue=$NODEID+0x80000500"), "{}", of("1403sub1"));
         assert!(of("2212sub7").contains("LowLimit=1\nHighLimit=3600000\nUnit=s\nFactor=1e-3"), "{}", of("2212sub7"));
-        assert!(of("6060").contains("AccessType=rww\nPDOMapping=1\nLowLimit=-1\nHighLimit=10"), "{}", of("6060"));
+        assert!(of("6060").contains("AccessType=rww\nPDOMapping=1\nLowLimit=-2\nHighLimit=10"), "{}", of("6060"));
     }
 }

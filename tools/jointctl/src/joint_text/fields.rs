@@ -42,14 +42,28 @@ const fn field(
 }
 
 /// All keys.
-pub const FIELDS: [Field; 40] = [
+pub const FIELDS: [Field; 44] = [
     field("", "node_id", "", None, "Node on the CAN bus, 1 to 127; 255 where none is assigned yet"),
     field("motor", "resistance", "Ohm", Some((1e-3, 100.0)), "Resistance of a phase at 25 °C"),
     field("motor", "inductance_d", "H", Some((1e-6, 0.1)), "Inductance along the magnet's flux"),
     field("motor", "inductance_q", "H", Some((1e-6, 0.1)), "Inductance across the magnet's flux"),
     field("motor", "torque_constant", "Nm/A", Some((1e-3, 5.0)), "Torque at the rotor by q current"),
-    field("motor", "current_limit", "A", Some((0.1, 200.0)), "Largest current"),
+    field("motor", "current_limit", "A", Some((0.1, 200.0)), "Largest current; at most the board's"),
+    field(
+        "motor",
+        "loss_current",
+        "A",
+        None,
+        "Largest d current that burns braking energy which the supply does not take; 0 (none) to the current limit",
+    ),
     field("motor", "encoder_latency", "s", Some((0.0, 1e-3)), "Age of an encoder sample when it is used"),
+    field(
+        "motor",
+        "encoder_counts",
+        "",
+        Some((16.0, 65_535.0)),
+        "Counts a turn of an incremental encoder, four times its lines",
+    ),
     field("motor.alignment", "pole_pairs", "", Some((1.0, 64.0)), "Electrical turns in a mechanical one"),
     field("motor.alignment", "direction", "", None, "The encoder counts \"forward\" with the field, or in \"reverse\""),
     field(
@@ -85,13 +99,33 @@ pub const FIELDS: [Field; 40] = [
     ),
     field(
         "limits",
+        "damping",
+        "Nm s/rad",
+        None,
+        "Torque fades with it towards the limits, and the joint brakes with it; 5 times the torque limit over the velocity limit to 1e6",
+    ),
+    field(
+        "limits",
         "over_current",
         "A",
         None,
-        "Phase current that switches the bridge off; 1.05 times the current limit to 500",
+        "Phase current that switches the bridge off; 1.05 times the current limit to the board's",
     ),
-    field("limits", "bus_voltage", "V", Some((5.0, 100.0)), "Lowest and highest supply"),
-    field("limits", "bridge_temperature", "°C", Some((40.0, 150.0)), "Highest temperature of the bridge"),
+    field("limits", "bus_voltage", "V", Some((5.0, 100.0)), "Lowest and highest supply; at most the board's"),
+    field(
+        "limits",
+        "regeneration_band",
+        "V",
+        None,
+        "Span below the highest supply over which braking current fades; 0.1 to highest less lowest",
+    ),
+    field(
+        "limits",
+        "bridge_temperature",
+        "°C",
+        Some((40.0, 150.0)),
+        "Highest temperature of the bridge, at most the board's; derated over the last 20 K",
+    ),
     field(
         "limits",
         "winding_temperature",
@@ -99,7 +133,13 @@ pub const FIELDS: [Field; 40] = [
         Some((60.0, 200.0)),
         "Highest temperature of the winding; derated over the last 20 K",
     ),
-    field("limits", "command_deadline", "s", Some((1e-3, 10.0)), "Time without a command after which the joint brakes"),
+    field(
+        "limits",
+        "command_deadline",
+        "s",
+        Some((1e-3, 10.0)),
+        "Time without a command after which the joint brakes; at most the board's",
+    ),
     field(
         "gains",
         "current_bandwidth",

@@ -42,9 +42,17 @@ struct MotorText {
     inductance_q: f32,
     torque_constant: f32,
     current_limit: f32,
+    loss_current: f32,
     #[serde(with = "AlignmentText")]
     alignment: EncoderAlignment,
     encoder_latency: f32,
+    #[serde(default = "encoder_counts")]
+    encoder_counts: u32,
+}
+
+/// Of a file that says nothing of it.
+fn encoder_counts() -> u32 {
+    4_000
 }
 
 #[derive(Serialize, Deserialize)]
@@ -78,8 +86,10 @@ struct LimitsText {
     velocity: f32,
     position: (f32, f32),
     position_margin: f32,
+    damping: f32,
     over_current: f32,
     bus_voltage: (f32, f32),
+    regeneration_band: f32,
     bridge_temperature: f32,
     winding_temperature: f32,
     command_deadline: f32,

@@ -69,6 +69,8 @@ fn what_lies_outside_a_stated_range_is_refused() {
             let value = match field.key {
                 "pole_pairs" if value < low => "0".to_owned(),
                 "pole_pairs" => "65".to_owned(),
+                "encoder_counts" if value < low => "15".to_owned(),
+                "encoder_counts" => "65536".to_owned(),
                 "position" | "bus_voltage" if value < low => format!("[{value}, 50.0]"),
                 "position" | "bus_voltage" => format!("[10.0, {value}]"),
                 _ => format!("{value:?}"),
@@ -106,4 +108,13 @@ fn limits_that_contradict_each_other_are_refused_with_what_is_possible() {
     configuration.limits.over_current = configuration.motor.current_limit;
     let shown = refusal(&to_text(&configuration).unwrap());
     assert!(shown.contains("over-current limit is") && shown.contains("must lie in"), "{shown}");
+}
+
+/// Files of before there was one: the message has to say in which table, because `gains` has a `damping`, too.
+#[test]
+fn a_file_without_limit_damping_is_refused_by_name() {
+    let good = to_text(&setup(1).configuration).unwrap();
+    let damping = good.lines().find(|line| line.starts_with("damping = ")).unwrap();
+    let message = refusal(&good.replacen(damping, "", 1));
+    assert!(message.contains("[limits]") && message.contains("missing field `damping`"), "{message}");
 }

@@ -9,6 +9,7 @@ use super::joint::RemoteJoint;
 use super::value::Value;
 use bus::client::{Abort, ClientError};
 use joint_firmware::canopen::{Access, Group};
+use joint_firmware::motor::setting::Name;
 use joint_firmware::objects::field::{ConfigurationField, Field, ImageField};
 
 /// Commands of object 2100h:1.
@@ -68,17 +69,20 @@ pub(super) fn explained(joint: &RemoteJoint, error: RemoteError) -> RemoteError 
     }
     let details = || -> Result<RemoteError, RemoteError> {
         let number = |part| joint.number(Field::Configuration(part));
-        let name = joint.read(Entry::of(Field::Configuration(ConfigurationField::RefusedSetting)))?;
-        match name {
-            Value::Text(setting) if !setting.is_empty() => Ok(RemoteError::Setting {
-                node: joint.id(),
-                setting,
-                value: number(ConfigurationField::RefusedValue)?,
-                low: number(ConfigurationField::Lowest)?,
-                high: number(ConfigurationField::Highest)?,
-            }),
-            _ => Ok(error.clone()),
-        }
+        let code = joint.raw(Field::Configuration(ConfigurationField::RefusedSetting))? as u32;
+        let setting = match Name::from_code(code).text() {
+            _ if code == 0 => return Ok(error.clone()),
+            // A newer program's.
+            "" => format!("{:04X}h:{}", code >> 16, (code >> 8) as u8),
+            name => name.to_owned(),
+        };
+        Ok(RemoteError::Setting {
+            node: joint.id(),
+            setting,
+            value: number(ConfigurationField::RefusedValue)?,
+            low: number(ConfigurationField::Lowest)?,
+            high: number(ConfigurationField::Highest)?,
+        })
     };
     details().unwrap_or(error)
 }

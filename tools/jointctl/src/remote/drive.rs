@@ -15,7 +15,7 @@ pub(super) const BRAKING: Duration = Duration::from_secs(11);
 /// Between two looks at a node.
 pub(super) const LOOK: Duration = Duration::from_millis(5);
 
-const STATES: [State; 8] = [
+const STATES: [State; 9] = [
     State::NotReadyToSwitchOn,
     State::SwitchOnDisabled,
     State::ReadyToSwitchOn,
@@ -24,6 +24,7 @@ const STATES: [State; 8] = [
     State::QuickStopActive,
     State::FaultReactionActive,
     State::Fault,
+    State::OpenLoop,
 ];
 
 /// The profile's words for a state.
@@ -37,6 +38,7 @@ pub fn name(state: State) -> &'static str {
         State::QuickStopActive => "braking (quick stop active)",
         State::FaultReactionActive => "braking because of a fault",
         State::Fault => "in a fault",
+        State::OpenLoop => "under an open-loop voltage",
     }
 }
 
@@ -53,7 +55,7 @@ pub fn state_of(statusword: u16) -> State {
         State::NotReadyToSwitchOn | State::SwitchOnDisabled | State::FaultReactionActive | State::Fault => {
             statusword & 0x4F == state.statusword() & 0x4F
         }
-        _ => statusword & 0x6F == state.statusword(),
+        _ => statusword & 0x406F == state.statusword(),
     };
     STATES.into_iter().find(tells).unwrap_or_default()
 }
@@ -165,7 +167,7 @@ mod tests {
     #[test]
     fn every_state_is_told_by_its_statusword_whatever_the_other_bits_are() {
         for state in STATES {
-            for others in [0, 0x0210, 0xFF90] {
+            for others in [0, 0x0210, 0xBF90] {
                 assert_eq!(state_of(state.statusword() | others), state);
             }
         }

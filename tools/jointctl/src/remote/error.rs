@@ -95,14 +95,6 @@ pub enum RemoteError {
         /// The joint's state.
         state: State,
     },
-    /// A calibration that was given up.
-    #[error("node {node}: the calibration was given up, and nothing was changed: {problem}")]
-    Calibration {
-        /// Node id.
-        node: u8,
-        /// Why.
-        problem: String,
-    },
     /// A fault has to be acknowledged.
     #[error(
         "node {node} is in a fault: {}. Once its cause is gone, `jointctl enable --reset` acknowledges it",

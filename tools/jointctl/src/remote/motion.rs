@@ -73,7 +73,7 @@ impl Motion {
         if joint.raw(Field::Configuration(ConfigurationField::Changed))? != 0 {
             return Err(RemoteError::Staged { node: joint.id() });
         }
-        let Command { mode, position, velocity, torque, stiffness, damping } = self.command;
+        let Command { mode, position, velocity, torque, stiffness, damping, open_loop: _ } = self.command;
         let both = |what, value: f32, unit, setting| {
             let high = joint.number(Field::Setting(setting))?;
             within(joint, what, value.into(), [-high, high], unit, &[Field::Setting(setting)])
@@ -81,6 +81,7 @@ impl Motion {
         both("a torque", torque, "Nm", Setting::TorqueLimit)?;
         match mode {
             Mode::Torque => return Ok(()),
+            Mode::OpenLoop => return Err(super::stream::no_set_points()),
             Mode::Velocity => return both("a velocity", velocity, "rad/s", Setting::VelocityLimit),
             Mode::Position | Mode::Impedance => {}
         }

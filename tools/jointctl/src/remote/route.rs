@@ -92,6 +92,7 @@ impl Way {
             torque: self.route.rigid.effort(&state) as f32,
             stiffness: self.stiffness as f32,
             damping: self.damping as f32,
+            ..Command::NOTHING
         }
     }
 }

@@ -39,7 +39,14 @@ fn mode_number(mode: Mode) -> i8 {
         Mode::Velocity => 9,
         Mode::Torque => 10,
         Mode::Impedance => -1,
+        Mode::OpenLoop => -2,
     }
+}
+
+/// The open loop is a bench's, not a master's.
+pub(super) fn no_set_points() -> RemoteError {
+    let object = Entry::of(Field::SetPoint(SetPoint::Mode)).described();
+    RemoteError::Value { object, problem: "the open loop has no set-points; `jointctl commission` uses it".into() }
 }
 
 /// What is sent, as a function of the time since it began.
@@ -150,6 +157,7 @@ impl Stream {
             Mode::Torque | Mode::Position => &[DRIVE],
             Mode::Velocity => &[VELOCITY],
             Mode::Impedance => &[DRIVE, IMPEDANCE],
+            Mode::OpenLoop => return Err(no_set_points()),
         };
         for pdo in Pdo::all(Direction::Receive).into_iter().filter(|pdo| needed.contains(&pdo.number)) {
             if let Some(wanted) = defaults.get(usize::from(pdo.number)) {

@@ -194,6 +194,7 @@ impl Motion {
             torque: torque as f32,
             stiffness: controller.stiffness as f32,
             damping: controller.damping as f32,
+            ..Command::NOTHING
         }
     }
 }

@@ -3,8 +3,8 @@
 //!
 //! Most of their time these wait: more of them run at once than there are cores.
 
-mod calibration;
 mod commands;
+mod commission;
 mod configuration;
 mod images;
 mod motion;
@@ -32,15 +32,14 @@ fn main() {
     let mut arguments = Arguments::from_args();
     arguments.test_threads.get_or_insert(AT_ONCE);
     let trials = trials! {
-        calibration {
-            a_joint_finds_the_motor_that_it_has,
-            a_calibration_ends_with_its_client_and_with_the_network_and_changes_nothing_then,
-        }
         commands {
             a_joint_is_looked_at_set_moved_and_fed_from_the_command_line,
             what_goes_wrong_ends_in_one_line_and_exit_code_1,
             #[cfg(unix)] ctrl_c_and_termination_leave_the_joint_disabled,
             an_adapter_that_goes_away_while_the_joint_is_enabled_is_reported,
+        }
+        commission {
+            a_joint_is_commissioned_with_the_motor_that_it_has_and_stopped_at_once_when_asked,
         }
         configuration {
             settings_are_taken_together_or_not_at_all,

@@ -25,7 +25,7 @@ use joint_firmware::canopen::{self, Identity, NO_NODE_ID, NmtState, Receiver, Ro
 use joint_firmware::default_configuration::B_G431B_ESC1;
 use joint_firmware::joint::state_machine::{Controlword, State};
 use joint_firmware::joint::{Command, Demand};
-use joint_firmware::objects::{Images, JointImage, Objects, Observed, Shared, Start, Stored};
+use joint_firmware::objects::{DEFAULT_RANGES, Images, JointImage, Objects, Observed, Shared, Start};
 use joint_firmware::parameters::Summary;
 use joint_firmware::parameters::authentication::{Key, STAGING, TAG};
 use joint_firmware::parameters::certificate::Limits;
@@ -158,7 +158,7 @@ impl<'a> HostileNode<'a> {
         let Statics { bus, shared, staging } = statics;
         let (bus, shared) = (&*bus, &*shared);
         let images = Images::new(staging, LifeCycle::new(requirements, 3, 0, 0), key.cloned(), stored_images);
-        let start = Start { configuration: board.joint, stored: Stored::NOTHING, single_bank: true };
+        let start = Start { configuration: board.joint, ranges: DEFAULT_RANGES, single_bank: true };
         let mut node = Self {
             bus,
             receiver: Receiver::new(bus),

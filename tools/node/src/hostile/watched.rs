@@ -2,11 +2,9 @@
 
 use crate::storage::Storage;
 use joint_firmware::canopen::Event;
-use joint_firmware::joint::commissioning::calibration_settings;
 use joint_firmware::joint::configuration::{BridgeConfiguration, Configuration};
 use joint_firmware::joint::history::History;
-use joint_firmware::motor::calibration::Progress;
-use joint_firmware::motor::setting::SettingError;
+use joint_firmware::motor::open_loop::Window;
 use joint_firmware::objects::{NotConfigured, Program};
 use joint_firmware::parameters::authentication::Key;
 use joint_firmware::parameters::slots::SlotError;
@@ -41,18 +39,16 @@ impl Program for Watched {
         Ok(())
     }
 
-    fn calibrate(&mut self, configuration: &Configuration, current: f32) -> Result<(), SettingError> {
-        calibration_settings(configuration, &self.bridge, current)?;
-        if self.armed {
-            self.problem = Some("a calibration is begun under current");
-        }
-        Ok(())
+    fn window(&self) -> Window {
+        Window::NOTHING
     }
 
-    fn abort_calibration(&mut self) {}
+    fn bridge(&self) -> &BridgeConfiguration {
+        &self.bridge
+    }
 
-    fn calibration(&self) -> Option<Progress> {
-        None
+    fn record<R>(&self, read: impl FnOnce(Option<&[u8]>) -> R) -> R {
+        read(self.storage.clone().configuration().as_deref())
     }
 
     fn store(&mut self, record: &[u8]) -> Result<(), SlotError> {

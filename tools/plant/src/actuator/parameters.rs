@@ -90,7 +90,7 @@ impl ActuatorParameters {
     }
 
     /// The same actuator whose rotor, encoder and phases agree from the start: electrical zero and encoder zero at rotor
-    /// angle zero, all counting forward. What a drive has after its calibration.
+    /// angle zero, all counting forward. What a commissioned drive has.
     #[must_use]
     pub fn aligned(mut self) -> Self {
         self.windings.electrical_zero = 0.0;

@@ -13,8 +13,6 @@ use joint_firmware::joint::active::SLOW_RATE;
 use joint_firmware::joint::configuration::ConfigurationError;
 use joint_firmware::joint::state_machine::{Controlword, State};
 use joint_firmware::joint::{Active, Bridge, BridgeState, Demand, Joint, Measurements, Slow, Telemetry};
-use joint_firmware::motor::calibration::CalibrationSettings;
-use joint_firmware::motor::setting::SettingError;
 use joint_firmware::motor::thermal::WindingTemperature;
 pub use setup::Setup;
 
@@ -127,20 +125,6 @@ impl VirtualJoint {
     /// Replaces everything prepared between two control steps; the friction model stays.
     pub fn set_active(&mut self, active: Active) {
         self.active = active.with_friction(self.active.friction.take());
-    }
-
-    /// Begins a calibration, or gives up the one that runs.
-    ///
-    /// # Errors
-    /// A setting out of its range.
-    pub fn calibrate(&mut self, settings: Option<&CalibrationSettings>) -> Result<(), SettingError> {
-        match settings {
-            Some(settings) => self.joint.calibrate(settings),
-            None => {
-                self.joint.abort_calibration();
-                Ok(())
-            }
-        }
     }
 
     /// What the control step reads.

@@ -3,6 +3,7 @@
 
 use crate::actuator::ActuatorParameters;
 use joint_firmware::compensation::Request;
+use joint_firmware::joint::BoardLimits;
 use joint_firmware::joint::configuration::{
     BridgeConfiguration, CompensationConfiguration, Configuration, Gains, GearConfiguration, Limits,
     MotorConfiguration, ThermalConfiguration, VelocitySource,
@@ -16,6 +17,23 @@ pub const RATE: f32 = 20_000.0;
 pub const POSITION_BANDWIDTH: f64 = 6.0;
 /// Damping ratio of the position loop.
 const DAMPING_RATIO: f64 = 1.0;
+
+/// A board for every joint of the plant: it bears whatever may be asked of it, and sees as far as its sensors do.
+fn board_limits(parameters: &ActuatorParameters) -> BoardLimits {
+    let (currents, bus) = (&parameters.sensors.currents, &parameters.sensors.bus);
+    // Without counts, so little of the range.
+    let half_a_count = |resolution: f64, span: f64| 0.5 * resolution.max(1e-3 * span);
+    let of_current = half_a_count(currents.resolution, currents.highest - currents.lowest);
+    BoardLimits {
+        supply: 100.0,
+        over_current: 500.0,
+        current: 200.0,
+        bridge_temperature: 150.0,
+        command_deadline: 10.0,
+        current_range: ((currents.lowest + of_current) as f32, (currents.highest - of_current) as f32),
+        supply_end: (bus.highest - half_a_count(bus.resolution, bus.highest)) as f32,
+    }
+}
 
 /// A joint's configuration and its bridge's.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,17 +55,24 @@ impl Setup {
         let stiffness = inertia * bandwidth * bandwidth;
         let damping = 2.0 * DAMPING_RATIO * inertia * bandwidth;
         let torque = motor.torque_limit();
-        let limits = Limits {
+        let deceleration = joint.usable_acceleration();
+        let mut limits = Limits {
             torque: torque as f32,
             velocity: (1.5 * joint.limits.speed) as f32,
             position: (-(joint.limits.travel + 0.5) as f32, (joint.limits.travel + 0.5) as f32),
             position_margin: 0.3,
+            damping: 0.0,
             over_current: (1.4 * motor.current_limit) as f32,
             bus_voltage: ((0.6 * parameters.bus.source_voltage) as f32, (1.3 * parameters.bus.source_voltage) as f32),
+            // Two thirds of the way up from the supply's own voltage: the rest is for its rise before the current follows.
+            regeneration_band: (0.2 * parameters.bus.source_voltage) as f32,
             bridge_temperature: 110.0,
             winding_temperature: 130.0,
             command_deadline: 0.1,
         };
+        // As little as permitted, and enough for the margin where the quick stop's deceleration takes half the torque.
+        let stopping = torque / (deceleration * f64::from(limits.position_margin)).sqrt();
+        limits.damping = limits.least_damping().max(stopping as f32);
         let phase_resistance = motor.resistance / 1.5;
         Self {
             configuration: Configuration {
@@ -58,12 +83,14 @@ impl Setup {
                     inductance_q: parameters.windings.inductance_q as f32,
                     torque_constant: motor.torque_constant as f32,
                     current_limit: motor.current_limit as f32,
+                    loss_current: 0.0,
                     alignment: EncoderAlignment {
                         pole_pairs: parameters.windings.pole_pairs as u32,
                         direction: Direction::Forward,
                         electrical_zero: ElectricalAngle(0),
                     },
                     encoder_latency: parameters.sensors.encoder.delay as f32 / RATE,
+                    encoder_counts: 4_000,
                 },
                 gear: GearConfiguration { ratio: motor.gear_ratio as f32, zero: 0.0 },
                 limits,
@@ -74,7 +101,7 @@ impl Setup {
                     damping: damping as f32,
                     integral: (2.0 * stiffness) as f32,
                     acceleration: (0.5 * joint.usable_acceleration()) as f32,
-                    quick_stop_deceleration: joint.usable_acceleration() as f32,
+                    quick_stop_deceleration: deceleration as f32,
                     braking_time: 1.0,
                 },
                 compensation: CompensationConfiguration {
@@ -100,6 +127,8 @@ impl Setup {
                 dead_time_band: (3.0 * parameters.inverter.clamping_current) as f32,
                 has_bridge_sensor: parameters.sensors.bridge.fitted,
                 has_winding_sensor: parameters.sensors.winding.fitted,
+                counts_an_encoder: false,
+                limits: board_limits(parameters),
             },
         }
     }

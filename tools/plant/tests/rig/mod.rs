@@ -13,7 +13,7 @@ use plant::virtual_joint::Setup;
 /// Control steps between two set-points: 1 ms.
 const SET_POINT_STEPS: u32 = 20;
 
-/// The reference actuator after its calibration.
+/// The reference actuator, commissioned.
 pub fn reference() -> ActuatorParameters {
     ActuatorParameters::reference().aligned()
 }
@@ -30,8 +30,7 @@ pub const fn torque(torque: f32) -> Command {
     Command { mode: Mode::Torque, torque, ..NOTHING }
 }
 
-const NOTHING: Command =
-    Command { mode: Mode::Torque, position: 0.0, velocity: 0.0, torque: 0.0, stiffness: 0.0, damping: 0.0 };
+const NOTHING: Command = Command::NOTHING;
 
 /// A virtual joint, what it is told, and the largest motor torque since [`Rig::forget`].
 #[derive(Clone)]

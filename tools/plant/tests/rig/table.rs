@@ -11,6 +11,8 @@ pub enum Reset {
     OnceGone,
     /// Once its cause is gone, where that is soon; later only by a restart of the joint.
     Restart,
+    /// Once its cause is gone; a reset waits for that a while.
+    Waits,
     /// At any time: with the bridge off the cause does not show.
     AnyTime,
 }
@@ -58,6 +60,7 @@ pub fn documented(fault: Fault) -> FaultRow {
         reset: match reset {
             "once gone" => Reset::OnceGone,
             "once gone, or restart" => Reset::Restart,
+            "once gone, waits" => Reset::Waits,
             "any time" => Reset::AnyTime,
             other => panic!("{name}: {other:?}"),
         },

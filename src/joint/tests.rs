@@ -1,0 +1,146 @@
+//! The joint as a whole, a few control steps at a time.
+
+use super::rig::{at_rest, enabled, started};
+use super::state_machine::Controlword;
+use super::*;
+use crate::motor::angle::TAU;
+
+#[test]
+fn a_joint_is_not_ready_before_its_encoder_knows_its_zero_and_then_begins_there() {
+    let board = crate::default_configuration::B_G431B_ESC1;
+    let active = board.joint.prepare(&board.bridge).unwrap();
+    let mut joint = Joint::new();
+    let mut step = |encoder, referenced| {
+        joint.control_step(
+            &active,
+            &Demand::default(),
+            &Slow::default(),
+            &Measurements { encoder, encoder_referenced: referenced, ..at_rest(18.0) },
+        );
+        (joint.telemetry().state, joint.latched_faults().is_empty(), joint.telemetry().motion.position)
+    };
+    for _ in 0..2 * OFFSET_STEPS {
+        assert_eq!(step(1 << 30, false), (State::NotReadyToSwitchOn, true, TAU / 4.0));
+    }
+    // The index lies an eighth of a turn back from here: no jump, but where the joint is.
+    for _ in 0..100 {
+        let (state, healthy, position) = step(1 << 29, true);
+        assert!(state == State::SwitchOnDisabled && healthy && (position - TAU / 8.0).abs() < 1e-6, "{position}");
+    }
+}
+
+#[test]
+fn a_joint_looks_for_its_encoders_zero_in_the_open_loop_and_is_ready_for_nothing_else_before() {
+    let board = crate::default_configuration::B_G431B_ESC1;
+    let active = board.joint.prepare(&board.bridge).unwrap();
+    let mut joint = Joint::new();
+    let mut step = |word, mode, encoder, referenced| {
+        let command = Command { mode, ..Command::default() };
+        let demand = Demand { controlword: word, command, ..Demand::default() };
+        joint.control_step(
+            &active,
+            &demand,
+            &Slow::default(),
+            &Measurements { encoder, encoder_referenced: referenced, ..at_rest(18.0) },
+        );
+        assert!(joint.latched_faults().is_empty());
+        joint.telemetry().state
+    };
+    let off = Controlword::DISABLE_VOLTAGE;
+    for _ in 0..2 * OFFSET_STEPS {
+        assert_eq!(step(off, Mode::Position, 1 << 30, false), State::NotReadyToSwitchOn);
+    }
+    for (word, state) in [
+        (off, State::SwitchOnDisabled),
+        (Controlword::SHUTDOWN, State::ReadyToSwitchOn),
+        (Controlword::SWITCH_ON, State::SwitchedOn),
+        (Controlword::ENABLE_OPERATION, State::OpenLoop),
+    ] {
+        assert_eq!(step(word, Mode::OpenLoop, 1 << 30, false), state);
+    }
+    // The encoder's zero comes with a jump of its angle, which is none of the rotor.
+    assert_eq!(step(Controlword::ENABLE_OPERATION, Mode::OpenLoop, 1 << 29, true), State::OpenLoop);
+    assert_eq!(step(off, Mode::OpenLoop, 1 << 29, true), State::SwitchOnDisabled);
+    assert_eq!(step(off, Mode::Position, 1 << 29, true), State::SwitchOnDisabled);
+    // Without it the joint would not be ready again.
+    let mut unknown = Joint::new();
+    let demand = Demand { command: Command { mode: Mode::OpenLoop, ..Command::default() }, ..Demand::default() };
+    for demand in [demand, Demand::default()] {
+        for _ in 0..=OFFSET_STEPS {
+            unknown.control_step(
+                &active,
+                &demand,
+                &Slow::default(),
+                &Measurements { encoder: 1 << 30, encoder_referenced: false, ..at_rest(18.0) },
+            );
+        }
+    }
+    assert_eq!(unknown.telemetry().state, State::NotReadyToSwitchOn);
+}
+
+#[test]
+fn a_coupled_joint_that_falls_silent_counts_as_standing_after_the_command_deadline() {
+    let board = crate::default_configuration::B_G431B_ESC1;
+    let active = board.joint.prepare(&board.bridge).unwrap();
+    let mut joint = Joint::new();
+    let mut demand = Demand::default();
+    assert_eq!(joint.coupled(&active, &demand), 0.0);
+    demand.coupled = Coupled { velocity: -2.5, sequence: 1 };
+    for _ in 0..=active.deadline_steps {
+        assert_eq!(joint.coupled(&active, &demand), -2.5);
+    }
+    assert_eq!(joint.coupled(&active, &demand), 0.0);
+    demand.coupled.sequence = 2;
+    assert_eq!(joint.coupled(&active, &demand), -2.5);
+}
+
+/// Wanted current as a part of the current limit at a temperature of the bridge, and faults, in "operation enabled" and while braking.
+fn derated(bridge_temperature: f32, winding: f32, sensor: bool) -> (f32, Faults) {
+    let mut board = crate::default_configuration::B_G431B_ESC1;
+    board.bridge.has_bridge_sensor = sensor;
+    let active = board.joint.prepare(&board.bridge).unwrap();
+    let mut joint = started(&active);
+    let demand = enabled(&mut joint, &active, 1.0, &at_rest(18.0));
+    let measured = Measurements { bridge_temperature, ..at_rest(18.0) };
+    let slow = Slow { derating: winding, ..Slow::default() };
+    // A round of the motion loop: in it the torque is bounded anew.
+    for _ in 0..10 {
+        joint.control_step(&active, &demand, &slow, &measured);
+        if !joint.latched_faults().is_empty() {
+            break;
+        }
+    }
+    (joint.telemetry().reference.q / active.current_limit, joint.telemetry().faults)
+}
+
+#[test]
+fn the_current_falls_in_a_line_over_the_last_20_k_of_the_bridge() {
+    let limit = crate::default_configuration::B_G431B_ESC1.joint.limits.bridge_temperature;
+    for (below, expected) in
+        [(100.0, 1.0), (20.01, 1.0), (20.0, 1.0), (19.8, 0.99), (10.0, 0.5), (1.0, 0.05), (0.01, 0.000_5)]
+    {
+        let (part, faults) = derated(limit - below, 1.0, true);
+        assert!((part - expected).abs() < 1e-4 && faults.is_empty(), "{below} K below: {part}, {faults:?}");
+    }
+    for above in [0.0, 0.01, 50.0] {
+        let (_, faults) = derated(limit + above, 1.0, true);
+        assert!(faults.iter().eq([Fault::BridgeTemperature]), "{above} K above: {faults:?}");
+    }
+}
+
+#[test]
+fn of_winding_and_bridge_the_hotter_counts_and_only_the_winding_is_called_so() {
+    let limit = crate::default_configuration::B_G431B_ESC1.joint.limits.bridge_temperature;
+    for (below, winding, expected) in [(10.0, 0.25, 0.25), (5.0, 0.5, 0.25), (30.0, 0.75, 0.75)] {
+        let (part, faults) = derated(limit - below, winding, true);
+        assert!((part - expected).abs() < 1e-4 && faults.is_empty(), "{below} K, {winding}: {part}, {faults:?}");
+    }
+    let (_, faults) = derated(25.0, 0.0, true);
+    assert!(faults.iter().eq([Fault::WindingTemperature]), "{faults:?}");
+}
+
+#[test]
+fn a_bridge_without_a_sensor_does_not_derate() {
+    assert_eq!(derated(f32::NAN, 1.0, false), (1.0, Faults::NONE));
+    assert_eq!(derated(f32::NAN, 0.5, false), (0.5, Faults::NONE));
+}

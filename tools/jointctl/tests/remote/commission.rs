@@ -1,0 +1,90 @@
+//! A joint is commissioned over a bus.
+
+use crate::served::{NODE, Served};
+use joint_firmware::objects::field::Field;
+use joint_firmware::objects::settings::Setting;
+use jointctl::commission::joint::Joint;
+use jointctl::commission::{Failure, Guide, Plan, Stage, Stopped, commission, page};
+use jointctl::remote::commission::RemoteObjects;
+use jointctl::remote::configuration::set;
+use jointctl::remote::{Entry, RemoteJoint};
+use plant::ActuatorParameters;
+use std::cell::Cell;
+
+/// What a commissioning finds, made wrong.
+fn forget(joint: &RemoteJoint) {
+    let wrong = [("resistance", "1.0"), ("pole-pairs", "3"), ("electrical-zero", "0.1")];
+    let pairs = wrong.map(|(name, text)| {
+        let entry = Entry::one(name).unwrap();
+        (entry, entry.parse(text).unwrap())
+    });
+    set(joint, &pairs).unwrap();
+}
+
+struct Yes<'y> {
+    told: Vec<String>,
+    stage: &'y Cell<Option<Stage>>,
+}
+
+impl Guide for Yes<'_> {
+    fn stage(&mut self, stage: Stage) {
+        self.stage.set(Some(stage));
+    }
+
+    fn found(&mut self, text: &str) {
+        self.told.push(text.into());
+    }
+
+    fn agrees(&mut self, _: &str) -> bool {
+        true
+    }
+}
+
+/// Little travel, so that it does not take long; the payload-free link of the virtual joint is free to.
+fn plan() -> Plan {
+    Plan { travel: 0.4, turn: false, ..Plan::new(8.0) }
+}
+
+pub fn a_joint_is_commissioned_with_the_motor_that_it_has_and_stopped_at_once_when_asked() {
+    let served = Served::joints(&[NODE]);
+    let joint = served.joint();
+    forget(&joint);
+    let stage = Cell::new(None);
+
+    // The user has enough of it in the middle of the first sweep.
+    let running = || stage.get() != Some(Stage::Inductance);
+    let mut bench = Joint::new(RemoteObjects::new(joint.clone(), &running));
+    let stopped = commission(&mut bench, &plan(), &mut Yes { told: Vec::new(), stage: &stage });
+    assert_eq!(stopped.unwrap_err(), Failure::Stopped(Stopped::Interrupted));
+    drop(bench);
+    joint.require_off("what follows").unwrap();
+    assert_eq!(joint.raw(Field::Setting(Setting::PolePairs)).unwrap(), 3, "nothing was changed");
+
+    stage.set(None);
+    let mut bench = Joint::new(RemoteObjects::new(joint.clone(), &|| true));
+    let mut yes = Yes { told: Vec::new(), stage: &stage };
+    let mut found = commission(&mut bench, &plan(), &mut yes);
+    // A machine with much else to do may be late more often than a commissioning bears.
+    for _ in 0..5 {
+        if found != Err(Failure::Stopped(Stopped::Late)) {
+            break;
+        }
+        found = commission(&mut bench, &Plan { acknowledge: true, ..plan() }, &mut yes);
+    }
+    let found = found.unwrap_or_else(|failure| panic!("{failure}\n{}", yes.told.join("\n")));
+    let parameters = ActuatorParameters::reference().aligned();
+    let resistance = parameters.joint.motor.resistance / 1.5 + parameters.inverter.on_resistance;
+    let measured = found.resistance.resistance.value;
+    assert!((measured / resistance - 1.0).abs() < 0.05, "{measured} of {resistance} Ohm");
+    let kept = |setting| joint.number(Field::Setting(setting)).unwrap();
+    assert_eq!(kept(Setting::PolePairs) as usize, parameters.windings.pole_pairs);
+    let zero = kept(Setting::ElectricalZero);
+    assert!((zero - zero.round()).abs() < 5.0 / 360.0, "{zero} turns");
+    joint.require_off("what follows").unwrap();
+
+    let files = page::files(&found, NODE).unwrap();
+    let text = |number: usize| String::from_utf8(files[number].contents.clone()).unwrap();
+    assert!(text(0).contains("Commissioning of node 5") && text(0).contains("pole pairs"));
+    let values: toml::Table = text(1).parse().unwrap();
+    assert_eq!(values["motor"]["pole-pairs"].as_integer(), Some(7), "{}", text(1));
+}

@@ -1,0 +1,250 @@
+//! Velocity and position limits of the virtual joint: torque up to them, holding torque at them, and no way through them, whatever the modes' gains are.
+
+mod rig;
+
+use joint_firmware::joint::fault::Fault;
+use joint_firmware::joint::state_machine::{Controlword, State};
+use joint_firmware::joint::{Command, Mode};
+use plant::actuator::{ActuatorParameters, Fault as Broken};
+use plant::virtual_joint::Setup;
+use rig::{Rig, break_down, position, reference, torque};
+
+/// Actuators drawn at random that each law is tried on.
+const JOINTS: u64 = 100;
+
+/// The same inertia without gravity: nothing but friction is against the motor.
+fn weightless(mut parameters: ActuatorParameters) -> ActuatorParameters {
+    let load = &mut parameters.joint.load;
+    (load.inertia, load.mass, load.length) = (load.total_inertia(), 0.0, 0.0);
+    parameters
+}
+
+/// Inertia, kg m².
+fn inertia(parameters: &ActuatorParameters) -> f64 {
+    parameters.joint.inertia()
+}
+
+/// All gains of the modes are zero.
+fn without_gains(setup: &mut Setup) {
+    let gains = &mut setup.configuration.gains;
+    (gains.stiffness, gains.damping, gains.integral) = (0.0, 0.0, 0.0);
+}
+
+/// Part of the margin by which the joint has passed its upper limit.
+fn passed(rig: &Rig) -> f64 {
+    let limits = rig.joint.active().limits;
+    (rig.position() - f64::from(limits.position.1)) / f64::from(limits.position_margin)
+}
+
+/// Commands for `time` s; the largest of what `of` sees meanwhile.
+fn largest(rig: &mut Rig, command: Command, time: f64, of: impl Fn(&Rig) -> f64) -> f64 {
+    rig.demand.command = command;
+    (0..rig.steps_in(time)).fold(f64::MIN, |most, _| {
+        rig.step();
+        most.max(of(rig))
+    })
+}
+
+/// The reference joint without gravity between narrow position limits.
+fn narrow(change: impl Fn(&mut Setup)) -> Rig {
+    let parameters = weightless(reference());
+    let mut setup = Setup::of(&parameters);
+    setup.configuration.limits.position = (-0.5, 0.5);
+    change(&mut setup);
+    Rig::enabled(parameters, &setup)
+}
+
+/// A load pulls away from the limit or pushes against it: 90 % of the torque limit, which is announced, or 80 %, which position mode's integral finds in
+/// some 5 s, because friction takes most of the rest.
+#[test]
+fn a_load_is_held_at_each_position_limit_by_position_and_by_impedance() {
+    for (side, away) in [(-1.0f32, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)] {
+        for (mode, load, known, time) in
+            [(Mode::Position, 0.9, 1.0, 1.5), (Mode::Position, 0.8, 0.0, 25.0), (Mode::Impedance, 0.9, 1.0, 1.5)]
+        {
+            let mut rig = narrow(|_| {});
+            rig.follow(position(0.5 * side), 1.0);
+            let push = away * side * load * rig.joint.active().limits.torque;
+            let gains = rig.joint.active().motion;
+            break_down(&mut rig, Broken::ExternalTorque(f64::from(push)));
+            let (stiffness, damping) = (gains.stiffness, gains.damping);
+            let torque = -push * known;
+            rig.follow(Command { mode, position: 0.5 * side, torque, stiffness, damping, ..Command::NOTHING }, time);
+            let sag = (rig.position() - f64::from(0.5 * side)).abs();
+            println!("{mode:?}, {push} Nm at {side}: {:.2} mrad", 1e3 * sag);
+            assert!(sag < 4e-3, "{mode:?}, load of {push} Nm at {side}: {sag} rad");
+            assert!(rig.velocity().abs() < 0.01);
+        }
+    }
+}
+
+#[test]
+fn a_torque_outwards_ends_within_half_the_margin() {
+    for part in [0.9, 1.0] {
+        let mut rig = narrow(without_gains);
+        let command = torque(part * rig.joint.active().limits.torque);
+        let farthest = largest(&mut rig, command, 2.0, passed);
+        println!("{part}: {farthest:.3} of the margin");
+        assert!(rig.latched().is_empty(), "{:?}", rig.latched());
+        assert!((0.4..0.51).contains(&farthest) && rig.velocity().abs() < 1e-3, "{farthest}");
+    }
+}
+
+/// Faults that a joint with a coarse encoder can have at a limit: the noise of its velocity times the limit damping is a torque.
+fn coarse(rig: &Rig, parameters: &ActuatorParameters) -> bool {
+    rig.latched() == [Fault::EncoderImplausible] && parameters.sensors.encoder.counts_per_turn == 1 << 12
+}
+
+#[test]
+fn random_joints_driven_outwards_with_all_they_have_stop_within_the_margin() {
+    let (mut noisy, mut worst) = (0, 0.0f64);
+    for seed in 0..JOINTS {
+        let parameters = ActuatorParameters::randomised(seed).aligned();
+        let mut setup = Setup::of(&parameters);
+        without_gains(&mut setup);
+        let mut rig = Rig::enabled(parameters, &setup);
+        let limit = rig.joint.active().limits.torque;
+        let farthest = largest(&mut rig, torque(limit), 2.0, passed);
+        worst = worst.max(farthest);
+        if coarse(&rig, &parameters) {
+            noisy += 1;
+            continue;
+        }
+        assert!(rig.latched().is_empty(), "{seed}: {:?} at {farthest} of the margin", rig.latched());
+        assert!(farthest < 0.75, "{seed}: {farthest} of the margin");
+    }
+    println!("{worst:.3} of the margin at the most, {noisy} coarse encoders");
+    assert!(noisy <= 3, "{noisy}");
+}
+
+/// The quick stop's deceleration has to be possible: then the torque limit decides how far a joint gets, not the law.
+#[test]
+fn a_deceleration_beyond_the_torque_is_where_a_position_limit_is_passed() {
+    let parameters = weightless(reference());
+    let possible = Setup::of(&parameters).configuration.limits.torque / inertia(&parameters) as f32;
+    for (part, holds) in [(0.5, true), (0.9, true), (10.0, false)] {
+        let mut rig = narrow(|setup| {
+            let limits = &mut setup.configuration.limits;
+            (limits.position, limits.position_margin) = ((-1.5, 1.5), 0.06);
+            setup.configuration.gains.quick_stop_deceleration = part * possible;
+        });
+        let limit = rig.joint.active().limits.torque;
+        let farthest = largest(&mut rig, torque(limit), 2.0, passed);
+        println!("{part}: {farthest:.3} of the margin, {:?}", rig.latched());
+        assert_eq!(rig.latched().is_empty(), holds, "{part}: {:?}", rig.latched());
+        assert!(holds || rig.latched() == [Fault::PositionLimit]);
+    }
+}
+
+/// The setup of a joint that may turn for as long as a test takes.
+fn endless(parameters: &ActuatorParameters) -> Setup {
+    let mut setup = Setup::of(parameters);
+    without_gains(&mut setup);
+    setup.configuration.limits.position = (-900.0, 900.0);
+    setup
+}
+
+/// The speed that a joint without load is driven to by its whole torque, as a part of the velocity limit.
+fn fastest(parameters: ActuatorParameters, setup: &Setup, direction: f32) -> (f64, Rig) {
+    let mut rig = Rig::enabled(parameters, setup);
+    let limits = rig.joint.active().limits;
+    let speed = |rig: &Rig| rig.velocity().abs() / f64::from(limits.velocity);
+    (largest(&mut rig, torque(direction * limits.torque), 0.7, speed), rig)
+}
+
+#[test]
+fn random_joints_without_load_are_held_at_the_velocity_limit() {
+    let (mut noisy, mut slow) = (0, 0);
+    let mut most = 0.0f64;
+    for seed in 0..JOINTS {
+        let parameters = weightless(ActuatorParameters::randomised(seed).aligned());
+        let (speed, rig) = fastest(parameters, &endless(&parameters), if seed % 2 == 0 { 1.0 } else { -1.0 });
+        most = most.max(speed);
+        assert!(speed < 1.05, "{seed}: {speed} of the velocity limit");
+        if coarse(&rig, &parameters) {
+            noisy += 1;
+            continue;
+        }
+        assert!(rig.latched().is_empty(), "{seed}: {:?}", rig.latched());
+        slow += u32::from(speed < 0.95);
+    }
+    println!("{most:.3} of the velocity limit at the most, {slow} do not come near it, {noisy} coarse encoders");
+    assert!(noisy <= 3 && slow <= 10, "{noisy} {slow}");
+}
+
+/// What stands in `limit_law` on stability: how much of the torque limit the torque ripples by (RMS) at the velocity limit.
+#[test]
+fn an_inertia_over_damping_of_a_millisecond_is_enough_for_the_loops_delays() {
+    let parameters = weightless(reference());
+    for (milliseconds, low, high) in [(10.0, 0.0, 0.07), (1.0, 0.0, 0.07), (0.3, 0.1, 1.0)] {
+        let mut setup = endless(&parameters);
+        setup.configuration.limits.damping = (inertia(&parameters) / (milliseconds * 1e-3)) as f32;
+        let (speed, mut rig) = fastest(parameters, &setup, 1.0);
+        let torques: Vec<f64> = (0..4000)
+            .map(|_| {
+                rig.step();
+                rig.motor_torque() / rig.torque_limit()
+            })
+            .collect();
+        let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / torques.len() as f64;
+        let middle = mean(&mut torques.iter().copied());
+        let ripple = mean(&mut torques.iter().map(|torque| (torque - middle).powi(2))).sqrt();
+        println!("{milliseconds} ms: {speed:.3} of the velocity limit, ripple {ripple:.3}");
+        assert!(speed < 1.05 && rig.latched().is_empty(), "{milliseconds} ms: {speed} {:?}", rig.latched());
+        assert!((low..high).contains(&ripple), "{milliseconds} ms: {ripple}");
+    }
+}
+
+/// Brakes until the bridge is off, which it is when the joint stands, or, where a coarse encoder does not let it see that, after the braking time:
+/// the joint's speed then as a part of the velocity limit.
+fn speed_after_braking(rig: &mut Rig) -> f64 {
+    let limits = rig.joint.active().limits;
+    let most = rig.joint.active().motion.braking_steps + 2;
+    let needed = (1..=most).find(|_| {
+        rig.step();
+        !rig.is_switching()
+    });
+    assert!(needed.is_some());
+    rig.velocity().abs() / f64::from(limits.velocity)
+}
+
+#[test]
+fn joints_whose_gains_are_zero_brake_to_a_stop() {
+    let mut noisy = 0;
+    for seed in 0..JOINTS / 4 {
+        let parameters = match seed {
+            0 => reference(),
+            seed => ActuatorParameters::randomised(seed).aligned(),
+        };
+        let mut setup = Setup::of(&parameters);
+        without_gains(&mut setup);
+        let mut moving = Rig::enabled(parameters, &setup);
+        let limits = moving.joint.active().limits;
+        moving.demand.command = torque(0.6 * limits.torque);
+        let most = moving.steps_in(1.0);
+        let fast = |rig: &Rig| rig.velocity() > f64::from(0.3 * limits.velocity);
+        let moves = (0..most).any(|_| {
+            moving.step();
+            fast(&moving)
+        });
+        assert!(moves, "{seed}: {}", moving.velocity());
+        let mut stopping = moving.clone();
+        stopping.demand.controlword = Controlword::QUICK_STOP;
+        let speed = speed_after_braking(&mut stopping);
+        assert!(speed < 0.02, "{seed}: {speed} after a quick stop");
+        if coarse(&stopping, &parameters) {
+            noisy += 1;
+            continue;
+        }
+        assert_eq!((stopping.state(), stopping.latched()), (State::SwitchOnDisabled, vec![]), "{seed}");
+        // From here on the joint is driven by nothing but the torque of its last set-point.
+        moving.silent = true;
+        while moving.state() == State::OperationEnabled {
+            moving.step();
+        }
+        let speed = speed_after_braking(&mut moving);
+        assert!(speed < 0.02, "{seed}: {speed} after a fault");
+        assert_eq!((moving.state(), moving.latched()), (State::Fault, vec![Fault::StaleCommand]), "{seed}");
+    }
+    assert!(noisy <= 1, "{noisy}");
+}
