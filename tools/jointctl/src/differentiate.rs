@@ -16,12 +16,6 @@ pub fn central_difference(values: &[f64], period: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Backward difference `(x[i] - x[i-1]) / T`, zero at the start: what is known at the instant itself, half a period late.
-pub fn backward_difference(values: &[f64], period: f64) -> Vec<f64> {
-    let before = values.first().into_iter().chain(values);
-    values.iter().zip(before).map(|(now, before)| (now - before) / period).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -44,15 +38,6 @@ mod tests {
         for (i, v) in v.iter().enumerate().take(399).skip(1) {
             assert!((v - gain * w * (w * period * i as f64).cos()).abs() < 1e-9);
         }
-    }
-
-    #[test]
-    fn the_backward_difference_uses_no_later_value() {
-        let mut x = vec![0.0, 1.0, 4.0, 9.0];
-        let before = backward_difference(&x, 0.5);
-        assert_eq!(before, [0.0, 2.0, 6.0, 10.0]);
-        x[3] = -50.0;
-        assert_eq!(backward_difference(&x, 0.5)[..3], before[..3]);
     }
 
     #[test]

@@ -1,15 +1,13 @@
 //! Models judged on test samples: their predictions of the effort, and the tables of their errors; host.
 
 use crate::joint_model::{FloatFriction, rigid_state};
-use crate::metrics::{MetricsError, metrics_by_state, relative_floor};
+use crate::metrics::{MetricsError, RELATIVE_FLOOR, metrics_by_state, relative_floor};
 use crate::report::{ErrorRow, ErrorTable, FixedPointDifference, Role};
 use crate::rigid::{RigidModel, RigidParameters};
 use crate::samples::{Part, Samples};
 use crate::split::TestSet;
+use crate::torque_error::{Lost, torque_error};
 use nalgebra::{DMatrix, DVector};
-
-/// Efforts below this fraction of their RMS have no relative torque error (001 leaves out "data that are too small").
-pub const RELATIVE_FLOOR: f64 = 0.1;
 
 /// A model's predicted effort for every sample.
 pub struct Prediction {
@@ -46,19 +44,45 @@ pub fn error_tables(
     test_sets: &[TestSet],
     predictions: &[Prediction],
 ) -> Result<Vec<ErrorTable>, MetricsError> {
+    let rigid = predictions.iter().find(|prediction| prediction.role == Role::Nothing);
     let table = |set: &TestSet| {
+        let mut counts = vec![false; samples.len()];
+        set.indices.iter().for_each(|&i| counts[i] = true);
         let pick = |column: &[f64]| set.indices.iter().map(|&i| column[i]).collect::<Vec<_>>();
         let measured = pick(&samples.effort);
         let states: Vec<_> = set.indices.iter().map(|&i| samples.state[i]).collect();
         let floor = relative_floor(&measured, RELATIVE_FLOOR);
         let row = |prediction: &Prediction| {
             let errors = metrics_by_state(&measured, &pick(&prediction.effort), &states, floor)?;
-            Ok(ErrorRow { model: prediction.model.clone(), role: prediction.role, errors })
+            let torque_error = rigid.and_then(|rigid| torque_error(&lost(samples, prediction, rigid, &counts)));
+            Ok(ErrorRow { model: prediction.model.clone(), role: prediction.role, errors, torque_error })
         };
         let rows = predictions.iter().map(row).collect::<Result<_, MetricsError>>()?;
         Ok(ErrorTable { test_set: set.name.clone(), rows })
     };
     test_sets.iter().map(table).collect()
+}
+
+/// What a prediction leaves of the effort, and what the rigid part alone leaves, for every continuous recording.
+fn lost(samples: &Samples, prediction: &Prediction, rigid: &Prediction, counts: &[bool]) -> Vec<Lost> {
+    let left = |i: usize, predicted: &Prediction| samples.effort[i] - predicted.effort[i];
+    let mut recordings = Vec::new();
+    let mut begin = 0;
+    for stretch in samples.run.chunk_by(|a, b| a == b) {
+        let rows = begin..begin + stretch.len();
+        begin = rows.end;
+        if !counts[rows.clone()].contains(&true) {
+            continue;
+        }
+        let elapsed = samples.time[rows.end - 1] - samples.time[rows.start];
+        recordings.push(Lost {
+            period: elapsed / (rows.len() - 1).max(1) as f64,
+            lost: rows.clone().map(|i| left(i, prediction)).collect(),
+            friction: rows.clone().map(|i| left(i, rigid)).collect(),
+            counts: counts[rows].to_vec(),
+        });
+    }
+    recordings
 }
 
 /// The difference between the firmware's friction and the same model in f64 over the test samples.

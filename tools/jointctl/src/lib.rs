@@ -42,4 +42,5 @@ pub mod rigid;
 pub mod samples;
 pub mod simulation;
 pub mod split;
+pub mod torque_error;
 pub mod train;

@@ -24,6 +24,15 @@ pub struct MotionState {
     pub fast: bool,
 }
 
+/// Position and velocity of each sample, on another way than those of the samples.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Track {
+    /// Position, rad or m.
+    pub position: Vec<f64>,
+    /// Velocity, rad/s or m/s.
+    pub velocity: Vec<f64>,
+}
+
 /// One joint's recording. All columns have the same length; rows of one `run` are contiguous and ordered in time.
 ///
 /// Units are those of the joint: rad (or m), Nm (or N, A, V); the data set's description names them.

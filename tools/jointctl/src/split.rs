@@ -35,6 +35,8 @@ pub struct Assignment {
     pub part: Vec<Part>,
     /// The test sets, in the order described.
     pub test_sets: Vec<TestSet>,
+    /// Names of described test sets that no sample belongs to.
+    pub empty: Vec<String>,
 }
 
 /// What a split looks at; all columns are of equal length, samples of one run are contiguous.
@@ -71,16 +73,20 @@ pub fn split(
     let test = if description.test.is_empty() { &default_test[..] } else { &description.test };
 
     let mut part: Vec<Part> = usable.iter().map(|&usable| if usable { Part::Train } else { Part::Unused }).collect();
-    let mut test_sets = Vec::new();
+    let (mut test_sets, mut empty) = (Vec::new(), Vec::new());
     for rule in test {
         let name = rule.name.clone().unwrap_or_default();
         let taken = members(rule, recorded, usable, &matches(rule));
         let indices: Vec<usize> = (0..count).filter(|&i| taken[i]).collect();
         if indices.is_empty() {
-            return Err(EmptyPart { part: format!("test set {name:?}") });
+            empty.push(name);
+            continue;
         }
         indices.iter().for_each(|&i| part[i] = Part::Test);
         test_sets.push(TestSet { name, indices });
+    }
+    if let (true, Some(name)) = (test_sets.is_empty(), empty.first()) {
+        return Err(EmptyPart { part: format!("test set {name:?}") });
     }
 
     let left: Vec<bool> = part.iter().map(|&part| part == Part::Train).collect();
@@ -95,7 +101,7 @@ pub fn split(
             return Err(EmptyPart { part: name.to_owned() });
         }
     }
-    Ok(Assignment { part, test_sets })
+    Ok(Assignment { part, test_sets, empty })
 }
 
 fn share(of: f64) -> Fraction {

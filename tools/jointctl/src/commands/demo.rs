@@ -47,7 +47,10 @@ impl Demo {
         write_directory(&self.out, &[OutputFile::new("log.csv", log), OutputFile::new("dataset.toml", DESCRIPTION)])?;
         progress.stage("load and clean");
         let mut prepared = prepare(&self.out.join("dataset.toml"))?;
-        let fitted = fit(&mut prepared, &options, &progress)?;
+        let mut fitted = fit(&mut prepared, &options, &progress)?;
+        for parameter in &mut fitted.report.parameters {
+            parameter.truth = truth(&plant, &parameter.symbol);
+        }
         progress.stage("move without and with the image");
         let model = FrictionModel::new(&fitted.image.friction, setup.bridge.motion_rate());
         let moved = moved(&plant, &setup, &model, options.seed)?;
@@ -63,6 +66,24 @@ impl Demo {
         print!("{}", table(&lines));
         println!("Written: {}", self.out.join("loop.html").display());
         Ok(())
+    }
+}
+
+/// The true value of an identified parameter, where the plant has one that means the same: its dry friction at 25 °C,
+/// without the gear's load and the ripple over position.
+fn truth(plant: &ActuatorParameters, symbol: &str) -> Option<f64> {
+    let joint = &plant.joint;
+    let friction = &joint.friction;
+    match symbol {
+        "I" => Some(joint.inertia()),
+        "g_s" => Some(joint.load.gravity_amplitude()),
+        "F_c+" => Some(friction.coulomb.forward),
+        "F_c-" => Some(friction.coulomb.backward),
+        "F_brk+" => Some(friction.breakaway.forward),
+        "F_brk-" => Some(friction.breakaway.backward),
+        "1/v_st" => Some(1.0 / friction.stribeck_velocity),
+        "f_v" => Some(0.5 * (friction.viscous.forward + friction.viscous.backward)),
+        _ => None,
     }
 }
 

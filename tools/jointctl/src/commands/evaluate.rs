@@ -1,10 +1,11 @@
-//! `jointctl evaluate`: an image judged on a recorded joint, beside every preset that is fitted to the same recording.
+//! `jointctl evaluate`: an image judged on a recorded joint, beside every preset, refitted to the same recording.
 
 use super::CommandError;
+use super::fit::print_warnings;
 use super::image::{read, verify};
-use crate::dataset::{Description, prepare_as};
+use crate::dataset::prepare;
 use crate::evaluate::{Prediction, error_tables, fixed_point_difference, rigid_beside};
-use crate::fit::{FitError, rigid_model, units};
+use crate::fit::{FitError, image_on_other_motion, rigid_model, units};
 use crate::identify::{self, identify};
 use crate::joint_model::{FloatFriction, firmware_states, fixed_point, regimes, replay, rigid_efforts};
 use crate::presets::Preset;
@@ -13,6 +14,11 @@ use crate::report::{Role, console};
 use clap::Args;
 use std::path::PathBuf;
 
+/// A note below the tables.
+const REFITTED: &str = "Rows \"refitted\" were identified anew from this recording's training samples, and so was the rigid part beside the image: \
+                        they show what could be reached here. The image itself is as it was. \"image, joint's observer\" sees the recording through \
+                        the joint's observer, \"image, compensation\" with regimes and fades as in the joint.";
+
 /// Arguments of `evaluate`.
 #[derive(Debug, Args)]
 pub struct Evaluate {
@@ -20,10 +26,6 @@ pub struct Evaluate {
     image: PathBuf,
     /// Description of the data set
     dataset: PathBuf,
-    /// Filter position and velocity forwards only and replay the log sample by sample through the joint's own compensation
-    /// (regimes, fades, full gain), as the joint would meet it; the effort to be predicted stays filtered as described
-    #[arg(long)]
-    causal: bool,
     /// Print the tables as JSON
     #[arg(long)]
     json: bool,
@@ -36,10 +38,8 @@ impl Evaluate {
         progress.stage("load and clean");
         let image = read(&self.image)?;
         verify(&image, &self.image)?;
-        let causal = self.causal;
-        let mut prepared = prepare_as(&self.dataset, |description: &mut Description| {
-            description.filter.causal_motion |= causal;
-        })?;
+        let mut prepared = prepare(&self.dataset)?;
+        print_warnings(&prepared.warnings);
         let unit = prepared.description.columns.effort.unit.symbol();
         if unit != image.effort.symbol() {
             let text = format!("the image speaks of {}, the data set of {unit}", image.effort.symbol());
@@ -55,7 +55,9 @@ impl Evaluate {
             let identified = identify(samples, &rigid_model, preset, &choices)
                 .map_err(|source| FitError::Identify { preset, source })?;
             let rigid = rigid_efforts(&identified.rigid, samples);
-            predictions.push(Prediction::new(preset.name(), Role::Preset, &rigid, |i| identified.friction(samples, i)));
+            predictions.push(Prediction::new(format!("{preset}, refitted"), Role::Preset, &rigid, |i| {
+                identified.friction(samples, i)
+            }));
         }
         progress.stage("judge");
         let samples = &prepared.samples;
@@ -64,17 +66,19 @@ impl Evaluate {
         let fixed = fixed_point(&image.friction, &states, &sets);
         let float = FloatFriction::of_image(&image.friction).map_err(FitError::from)?;
         let friction: Vec<f64> = fixed.iter().map(|(physical, network)| physical + network).collect();
-        let rigid = rigid_efforts(&rigid_beside(&friction, &rigid_model, samples), samples);
+        let beside = rigid_beside(&friction, &rigid_model, samples);
+        let rigid = rigid_efforts(&beside, samples);
         predictions.insert(0, Prediction::new("nothing", Role::Nothing, &rigid, |_| 0.0));
         predictions.push(Prediction::new("image's model, f64", Role::PhysicalAndNetwork, &rigid, |i| {
             let (physical, network) = float.parts(sets[i], samples, i);
             physical + network
         }));
         predictions.push(Prediction::new("image, fixed point", Role::FixedPoint, &rigid, |i| friction[i]));
-        if self.causal {
-            let torque = replay(&image.friction, &states, samples);
-            predictions.push(Prediction::new("image, compensation", Role::FixedPoint, &rigid, |i| torque[i]));
+        if let Some((name, other)) = prepared.on_other_motion() {
+            predictions.push(image_on_other_motion(name, &other, &beside, &image.friction)?);
         }
+        let torque = replay(&image.friction, &states, samples);
+        predictions.push(Prediction::new("image, compensation", Role::OtherMotion, &rigid, |i| torque[i]));
         let tables = error_tables(samples, &prepared.test_sets, &predictions).map_err(FitError::from)?;
         let difference = fixed_point_difference(&float, &fixed, &sets, samples);
         progress.finish();
@@ -85,6 +89,7 @@ impl Evaluate {
         for table in &tables {
             println!("{}", console::error_table(table, unit));
         }
+        println!("{REFITTED}");
         println!(
             "Fixed point against the same model in f64: RMS {:.2e} {unit}, largest {:.2e} {unit}.",
             difference.rms, difference.max

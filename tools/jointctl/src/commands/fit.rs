@@ -1,7 +1,7 @@
 //! `jointctl fit`: from a described data set to an image, its TOML twin and a report.
 
 use super::CommandError;
-use crate::dataset::{Prepared, prepare};
+use crate::dataset::{Prepared, Warning, prepare};
 use crate::fit::{Fitted, Options, Trainer, fit};
 use crate::image_text;
 use crate::output::{OutputFile, write_directory};
@@ -208,9 +208,18 @@ pub fn bytes(image: &Image, path: &Path) -> Result<Vec<u8>, CommandError> {
     Ok(buffer[..length].to_vec())
 }
 
+/// Suspected defects of the data on standard error.
+pub fn print_warnings(warnings: &[Warning]) {
+    warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
+}
+
 /// Tables and verdict on standard output.
 pub fn print_summary(prepared: &Prepared, fitted: &Fitted, out: &Path) {
     let report = &fitted.report;
+    print_warnings(&report.warnings);
+    if let Some(stage) = report.stages.iter().find(|stage| stage.stage == "lag") {
+        println!("Lag: {}.", stage.note);
+    }
     for table in &report.errors {
         println!("{}", console::error_table(table, &report.units.effort));
     }

@@ -215,6 +215,48 @@ pub enum DatasetError {
         /// Largest accepted magnitude.
         limit: f64,
     },
+    /// Friction drives the joint, which it cannot.
+    #[error(
+        "effort (column {column:?}) has the wrong sign: friction at the mean speed of {speed:.3} comes out as {friction:.4} +- {error:.4} \
+         {unit} and drives the joint; give columns.effort.scale the value {}", -scale
+    )]
+    EffortSign {
+        /// The column or columns that it is made from.
+        column: String,
+        /// Coulomb and viscous friction of the simplest model at the mean speed, unit of effort.
+        friction: f64,
+        /// Its standard error.
+        error: f64,
+        /// Unit of the effort.
+        unit: &'static str,
+        /// Mean speed, rad/s or m/s.
+        speed: f64,
+        /// The scale as described.
+        scale: f64,
+    },
+    /// The recorded velocity runs against the recorded position.
+    #[error(
+        "velocity (column {velocity:?}) runs against position (column {position:?}): correlation {correlation:.2} with its derivative; \
+         give columns.velocity.scale or columns.position.scale the other sign"
+    )]
+    VelocitySign {
+        /// The column of the position.
+        position: String,
+        /// The column of the velocity.
+        velocity: String,
+        /// Correlation of integrated velocity and way.
+        correlation: f64,
+    },
+    /// The observer of the joint cannot be applied.
+    #[error("filter.observer_hz = {bandwidth_hz} in run {run:?}: {error}")]
+    Observer {
+        /// The run's label.
+        run: String,
+        /// Bandwidth, Hz.
+        bandwidth_hz: f64,
+        /// The reason.
+        error: joint_firmware::motor::setting::SettingError,
+    },
     /// The split leaves nothing to train with, to validate with, or to judge by.
     #[error("the split leaves {part} without samples ({usable} usable samples in all): {hint}")]
     EmptyPart {

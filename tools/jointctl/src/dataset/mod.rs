@@ -2,22 +2,29 @@
 //!
 //! `prepare` is the whole way. The keys of the description are documented in `docs/dataset.md`.
 
+pub mod checks;
 mod condition;
 pub mod condition_keys;
 pub mod description;
 mod error;
+pub mod lag;
 pub mod load;
+mod observed;
 mod prepare;
 pub mod recordings;
 mod signals;
+pub mod simple_model;
 mod treat;
 pub mod treatment;
 mod validate;
+mod warning;
 
 pub use description::{Description, EffortUnit, Gravity, PositionUnit, RigidDescription};
 pub use error::DatasetError;
+pub use lag::Lag;
 pub use prepare::{MINIMUM_SAMPLES, Note, Prepared, Recording, SIGNAL_LIMIT, prepare, prepare_as, prepare_with};
 pub use validate::parse;
+pub use warning::Warning;
 
 #[cfg(test)]
 mod tests;

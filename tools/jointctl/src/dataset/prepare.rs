@@ -1,17 +1,21 @@
 //! The way from a description to samples: load, clean, filter, differentiate, split, classify; host.
 
+use super::checks;
 use super::condition::all_hold;
 use super::description::{Description, Rule};
 use super::error::DatasetError;
+use super::lag::{self, Lag};
 use super::load::Environment;
 use super::recordings::Recordings;
 use super::signals::{Extracted, Findings, Layout, extract};
 use super::treat::{Motion, minimum_samples, treat};
 use super::treatment::VelocityFrom;
 use super::validate;
+use super::warning::Warning;
 use crate::classify::{Thresholds, classify};
 use crate::clean::{Repairs, stretches};
-use crate::samples::{MotionState, Part, Samples};
+use crate::fit::rigid_model;
+use crate::samples::{MotionState, Part, Samples, Track};
 use crate::split::{Recorded, TestSet, split};
 use std::fmt;
 use std::path::Path;
@@ -36,8 +40,24 @@ pub struct Prepared {
     pub thresholds: Thresholds,
     /// What each stage did.
     pub notes: Vec<Note>,
+    /// Position and velocity as the joint's observer sees them; where `samples` has those (`filter.causal_motion`), as
+    /// filtered. None where nothing is filtered zero-phase.
+    pub other: Option<Track>,
+    /// Delay of the effort, where it was identified.
+    pub lag: Option<Lag>,
+    /// Suspected defects of the recording.
+    pub warnings: Vec<Warning>,
     /// SHA-256 over the bytes of the description, of the files in the order listed and of the table of runs.
     pub sha256: [u8; 32],
+}
+
+impl Prepared {
+    /// The samples on the other motion, and its name: as the joint's observer sees it, or without delay.
+    pub fn on_other_motion(&self) -> Option<(&'static str, Samples)> {
+        let Track { position, velocity } = self.other.clone()?;
+        let name = if self.description.filter.causal_motion { "zero-phase motion" } else { "joint's observer" };
+        Some((name, Samples { position, velocity, ..self.samples.clone() }))
+    }
 }
 
 /// One continuous recording.
@@ -95,10 +115,11 @@ fn prepare_changed(
     let recordings = Recordings::load(&description, path, &text, environment)?;
     let layout = Layout::of(&description, uses_velocity_column(&description));
     let extracted = extract(&recordings, &description, layout)?;
-    let (motions, repairs) = motions(&recordings, &extracted, &description, layout)?;
-    let assembled = assemble(&motions, &recordings, &extracted, &description);
-    drop(motions);
-    let Assembled { mut samples, row, parent, usable, recordings: continuous, slow } = assembled;
+    let (treated, repairs) = motions(&recordings, &extracted, &description, layout)?;
+    let assembled = assemble(&treated, &recordings, &extracted, &description);
+    drop(treated);
+    let Assembled { mut samples, seen, row, parent, usable, recordings: continuous, slow } = assembled;
+    let mut warnings = checks::columns::check(&recordings, &extracted, &description, layout)?;
 
     enough(usable.iter().filter(|usable| **usable).count(), "after cleaning and selection")?;
     let recorded = Recorded { time: &samples.time, run: &parent, usable: &usable };
@@ -112,19 +133,76 @@ fn prepare_changed(
         hint: "compare [split] with the files, runs and columns of the recordings".to_owned(),
     })?;
     samples.part = assignment.part;
+    warnings.extend(assignment.empty.iter().map(|name| empty_test_set(name)));
+    let rigid = rigid_model(&description.rigid);
+    let lag = match (description.filter.effort_lag, description.filter.lag_limit) {
+        (None, limit) if limit > 0.0 => lag::identify(&samples, &rigid, &parent, period(&continuous), limit),
+        _ => None,
+    };
+    if let Some(found) = lag.filter(Lag::applies) {
+        description.filter.effort_lag = Some(found.lag);
+        let (moved, _) = motions(&recordings, &extracted, &description, layout)?;
+        samples.effort = moved.into_iter().flat_map(|(_, motion)| motion.effort).collect();
+    }
+    warnings.extend(lag.filter(|lag| lag.beyond && lag.significant()).map(|lag| lag_warning(&lag, &description)));
+    let label = |run: u32| recordings.runs[run as usize].label.clone();
+    warnings.extend(checks::model::check(&samples, &rigid, &description, &parent, &label)?);
     in_range(&samples, &continuous, &description)?;
     let thresholds = Thresholds::of(&samples, &description.classify);
     classify(&mut samples, thresholds);
     let notes = notes(&recordings, &extracted.findings, repairs, slow, &samples, continuous.len());
+    let other = match description.filter.causal_motion {
+        true => seen.map(|seen| Track {
+            position: std::mem::replace(&mut samples.position, seen.position),
+            velocity: std::mem::replace(&mut samples.velocity, seen.velocity),
+        }),
+        false => seen,
+    };
     Ok(Prepared {
         description,
         samples,
+        other,
+        lag,
+        warnings,
         recordings: continuous,
         test_sets: assignment.test_sets,
         thresholds,
         notes,
         sha256: recordings.sha256,
     })
+}
+
+/// The middle one of the sampling periods, s.
+fn period(continuous: &[Recording]) -> f64 {
+    let mut periods: Vec<f64> = continuous.iter().map(|recording| recording.period).collect();
+    periods.sort_by(f64::total_cmp);
+    periods.get(periods.len() / 2).copied().unwrap_or(1.0)
+}
+
+fn empty_test_set(name: &str) -> Warning {
+    Warning {
+        check: "split",
+        column: format!("split.test {name:?}"),
+        rows: "no row".to_owned(),
+        finding: "no usable sample belongs to it; it is skipped".to_owned(),
+        remedy: "compare it with the files, runs and columns of the recordings".to_owned(),
+    }
+}
+
+fn lag_warning(lag: &Lag, description: &Description) -> Warning {
+    Warning {
+        check: "lag",
+        column: format!("effort ({:?})", description.columns.effort.factors().join(" x ")),
+        rows: "training rows".to_owned(),
+        finding: format!(
+            "it fits the position best when moved by {:.1} ms or more, limit {:.1} ms; it is not moved",
+            1e3 * lag.lag,
+            1e3 * lag.limit
+        ),
+        remedy:
+            "check the clocks of both signals; filter.lag_limit widens the search, filter.effort_lag sets a known delay"
+                .to_owned(),
+    }
 }
 
 fn uses_velocity_column(description: &Description) -> bool {
@@ -199,6 +277,8 @@ fn column_of(signal: &str, description: &Description) -> String {
 /// All motions one after the other.
 struct Assembled {
     samples: Samples,
+    /// Position and velocity as the joint's observer sees them.
+    seen: Option<Track>,
     /// For each sample its row of the table.
     row: Vec<usize>,
     /// For each sample the run as recorded (gaps do not count).
@@ -217,6 +297,7 @@ fn assemble(
 ) -> Assembled {
     let mut samples = Samples::default();
     let (mut row, mut parent, mut continuous) = (Vec::new(), Vec::new(), Vec::new());
+    let mut seen = Track::default();
     for (number, (index, motion)) in motions.iter().enumerate() {
         let run = &extracted.runs[*index];
         let recorded = &recordings.runs[run.run];
@@ -226,6 +307,10 @@ fn assemble(
         samples.velocity.extend(&motion.velocity);
         samples.acceleration.extend(&motion.acceleration);
         samples.effort.extend(&motion.effort);
+        if let Some(observed) = &motion.seen {
+            seen.position.extend(&observed.position);
+            seen.velocity.extend(&observed.velocity);
+        }
         match &motion.temperature {
             Some(temperature) => samples.temperature.extend(temperature),
             None => samples.temperature.resize(samples.time.len(), description.reference_temperature),
@@ -254,7 +339,8 @@ fn assemble(
     }
     samples.part = vec![Part::Unused; samples.time.len()];
     samples.state = vec![MotionState::default(); samples.time.len()];
-    Assembled { samples, row, parent, usable, recordings: continuous, slow }
+    let seen = (!seen.position.is_empty()).then_some(seen);
+    Assembled { samples, seen, row, parent, usable, recordings: continuous, slow }
 }
 
 /// For each row of the table whether the tests of a rule on files, runs and columns hold.

@@ -128,7 +128,9 @@ fn want_condition(wanted: &mut Wanted, condition: &Condition) {
     if c.inside.is_some() || c.outside.is_some() || values().any(|value| matches!(value, Value::Number(_))) {
         wanted.numbers.insert(c.column.clone());
     }
-    if c.starts_with.is_some() || values().any(|value| matches!(value, Value::Text(_))) {
+    // An empty list compares with nothing, but its column must exist.
+    let empty = c.one_of.iter().chain(&c.not_in).any(Vec::is_empty);
+    if empty || c.starts_with.is_some() || values().any(|value| matches!(value, Value::Text(_))) {
         wanted.texts.insert(c.column.clone());
     }
 }

@@ -1,15 +1,18 @@
 //! One continuous recording through filters, differentiation, trimming and decimation; host.
 //!
-//! The order is fixed: lag, low-pass, velocity, acceleration, trimming, decimation. Trimming comes after the filters, so that it
+//! The order is fixed: lag, low-pass, velocity, acceleration, the observer's view, trimming, decimation. Trimming comes
+//! after the filters, so that it
 //! can remove what they do at the ends, and before decimation, as in the EMPS benchmark's protocol.
 
 use super::description::Description;
 use super::error::DatasetError;
+use super::observed::observe;
 use super::signals::Layout;
 use super::treatment::{Keep, LowPass};
 use crate::clean::Stretch;
-use crate::differentiate::{backward_difference, central_difference};
+use crate::differentiate::central_difference;
 use crate::filter::{FilterError, LowPassFilter, advance};
+use crate::samples::Track;
 
 /// Filter before decimation: that of the `decimate` of MATLAB and SciPy.
 const ANTI_ALIAS_ORDER: usize = 8;
@@ -27,6 +30,8 @@ pub struct Motion {
     pub position: Vec<f64>,
     /// Velocity.
     pub velocity: Vec<f64>,
+    /// Position and velocity as the joint's observer sees them; none where the filters are causal themselves.
+    pub seen: Option<Track>,
     /// Acceleration.
     pub acceleration: Vec<f64>,
     /// Effort.
@@ -40,7 +45,7 @@ pub struct Motion {
 /// Fewest samples that a stretch needs: those of `clean.minimum_run` or of the longest filter.
 pub fn minimum_samples(description: &Description) -> usize {
     let filter = &description.filter;
-    let low_passes = [&filter.position, &filter.velocity, &filter.effort, &filter.temperature];
+    let low_passes = [&filter.position, &filter.velocity, &filter.acceleration, &filter.effort, &filter.temperature];
     // The number of samples depends on the order alone, so any cut-off serves here.
     let orders = low_passes.into_iter().flatten().filter(|_| filter.zero_phase).map(|low_pass| low_pass.order);
     let longest = orders
@@ -69,36 +74,62 @@ pub fn treat(
 ) -> Result<Option<Motion>, DatasetError> {
     let Stretch { period, time, signals, row } = stretch;
     let filter = &description.filter;
-    let low_pass = |signal: &'static str, setting: &Option<LowPass>, values: &[f64]| {
-        let zero_phase = filter.zero_phase && (signal == "effort" || !filter.causal_motion);
-        match setting {
-            Some(setting) => apply(setting, values, period, zero_phase, signal, run),
-            None => Ok(values.to_vec()),
-        }
+    let low_pass = |signal: &'static str, setting: &Option<LowPass>, values: &[f64]| match setting {
+        Some(setting) => apply(setting, values, period, filter.zero_phase, signal, run),
+        None => Ok(values.to_vec()),
     };
-    let difference = if filter.causal_motion { backward_difference } else { central_difference };
     let position = low_pass("position", &filter.position, &signals[Layout::POSITION])?;
     let effort = &signals[Layout::EFFORT];
     let effort = match filter.effort_lag {
-        0.0 => low_pass("effort", &filter.effort, effort)?,
-        lag => low_pass("effort", &filter.effort, &advance(effort, lag / period))?,
+        None | Some(0.0) => low_pass("effort", &filter.effort, effort)?,
+        Some(lag) => low_pass("effort", &filter.effort, &advance(effort, lag / period))?,
     };
     let velocity = match layout.velocity {
         Some(column) => low_pass("velocity", &filter.velocity, &signals[column])?,
-        None => low_pass("velocity", &filter.velocity, &difference(&position, period))?,
+        None => low_pass("velocity", &filter.velocity, &central_difference(&position, period))?,
     };
-    let acceleration = difference(&velocity, period);
+    let acceleration = low_pass("acceleration", &filter.acceleration, &central_difference(&velocity, period))?;
+    let seen = match filter.zero_phase {
+        true => Some(seen(&signals, description, layout, run, period)?),
+        false => None,
+    };
     let temperature = match layout.temperature {
         Some(column) => Some(low_pass("temperature", &filter.temperature, &signals[column])?),
         None => None,
     };
-    let mut motion = Motion { period, time, position, velocity, acceleration, effort, temperature, row };
+    let mut motion = Motion { period, time, position, velocity, seen, acceleration, effort, temperature, row };
     trim(&mut motion, description, last_time);
     if motion.time.len() < minimum_for_decimation(description) {
         return Ok(None);
     }
     decimate(&mut motion, description, run)?;
     Ok(Some(motion))
+}
+
+/// Position and velocity by the joint's observer: from the recorded position, the velocity from a recorded one where
+/// that is used.
+fn seen(
+    signals: &[Vec<f64>],
+    description: &Description,
+    layout: Layout,
+    run: &str,
+    period: f64,
+) -> Result<Track, DatasetError> {
+    let bandwidth_hz = description.filter.observer_hz;
+    let refused = |error| DatasetError::Observer { run: run.to_owned(), bandwidth_hz, error };
+    let mut seen = observe(&signals[Layout::POSITION], period, bandwidth_hz).map_err(refused)?;
+    if let Some(column) = layout.velocity {
+        let mut way = 0.0;
+        let ways: Vec<f64> = signals[column]
+            .iter()
+            .map(|velocity| {
+                way += velocity * period;
+                way
+            })
+            .collect();
+        seen.velocity = observe(&ways, period, bandwidth_hz).map_err(refused)?.velocity;
+    }
+    Ok(seen)
 }
 
 fn apply(
@@ -143,8 +174,10 @@ fn trim(motion: &mut Motion, description: &Description, last_time: f64) {
 }
 
 fn for_each_column(motion: &mut Motion, operation: impl Fn(&mut Vec<f64>)) {
-    let Motion { time, position, velocity, acceleration, effort, temperature, .. } = motion;
-    [time, position, velocity, acceleration, effort].into_iter().chain(temperature).for_each(operation);
+    let Motion { time, position, velocity, seen, acceleration, effort, temperature, .. } = motion;
+    let seen = seen.iter_mut().flat_map(|Track { position, velocity }| [position, velocity]);
+    let columns = [time, position, velocity, acceleration, effort].into_iter().chain(temperature).chain(seen);
+    columns.for_each(operation);
 }
 
 fn decimate(motion: &mut Motion, description: &Description, run: &str) -> Result<(), DatasetError> {
@@ -158,12 +191,9 @@ fn decimate(motion: &mut Motion, description: &Description, run: &str) -> Result
         let located = |error| located(error, "decimate", run, nyquist_hz);
         let filter = LowPassFilter::chebyshev(ANTI_ALIAS_ORDER, ANTI_ALIAS_RIPPLE, cutoff).map_err(located)?;
         let Motion { position, velocity, acceleration, effort, temperature, .. } = &mut *motion;
-        *effort = filter.zero_phase(effort).map_err(located)?;
-        // A joint has no decimation, so a motion as it knows it is only thinned.
-        if !description.filter.causal_motion {
-            for column in [position, velocity, acceleration].into_iter().chain(temperature) {
-                *column = filter.zero_phase(column).map_err(located)?;
-            }
+        // A joint has no decimation, so a motion as it sees it is only thinned.
+        for column in [position, velocity, acceleration, effort].into_iter().chain(temperature) {
+            *column = filter.zero_phase(column).map_err(located)?;
         }
     }
     let skip = match setting.keep {

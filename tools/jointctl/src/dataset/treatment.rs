@@ -1,4 +1,5 @@
-//! The keys of the description that say how signals are treated: cleaning, filters, differentiation, motion states; host.
+//! The keys of the description that say how signals are treated: cleaning, filters, differentiation, motion states;
+//! host.
 
 use super::condition_keys::Condition;
 use serde::Deserialize;
@@ -57,8 +58,8 @@ pub struct Jump {
     pub limit: f64,
 }
 
-/// A column that should be steady within a run (supply voltage, temperature) but is now and then misread; values farther
-/// from the run's median than `limit` take its value.
+/// A column that should be steady within a run (supply voltage, temperature) but is now and then misread; values
+/// farther from the run's median than `limit` take its value.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Steady {
@@ -110,19 +111,26 @@ pub enum Resample {
 pub struct Filter {
     /// Forward and backward (no delay, twice the attenuation); false: forward only, as the joint itself would filter.
     pub zero_phase: bool,
-    /// Position, velocity and temperature forwards only, and backward differences: the signals that a joint has at that instant.
-    /// The effort, which is to be predicted and not an input, stays as `zero_phase` says.
+    /// Friction is fitted on position and velocity as the joint's observer sees them in the recording, not on
+    /// zero-phase ones. Without effect where `zero_phase` is false. Models are judged on both.
     pub causal_motion: bool,
+    /// Bandwidth of the joint's observer, Hz; 1 to 2000.
+    pub observer_hz: f64,
     /// Filter of the position.
     pub position: Option<LowPass>,
     /// Filter of the velocity, recorded or differentiated.
     pub velocity: Option<LowPass>,
+    /// Filter of the acceleration, the difference of the filtered velocity.
+    pub acceleration: Option<LowPass>,
     /// Filter of the effort.
     pub effort: Option<LowPass>,
     /// Filter of the temperature.
     pub temperature: Option<LowPass>,
     /// Time by which the recorded effort lags behind the position, s; it is moved earlier by linear interpolation.
-    pub effort_lag: f64,
+    /// Absent: it is identified from the training samples, and applied where it is significant.
+    pub effort_lag: Option<f64>,
+    /// Largest magnitude of that time, s; 0 to 1. With 0 nothing is identified.
+    pub lag_limit: f64,
     /// Thinning after filtering, differentiation and trimming.
     pub decimate: Option<Decimate>,
 }
@@ -132,11 +140,14 @@ impl Default for Filter {
         Filter {
             zero_phase: true,
             causal_motion: false,
+            observer_hz: 100.0,
             position: None,
             velocity: None,
+            acceleration: None,
             effort: None,
             temperature: None,
-            effort_lag: 0.0,
+            effort_lag: None,
+            lag_limit: 0.05,
             decimate: None,
         }
     }

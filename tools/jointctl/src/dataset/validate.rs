@@ -11,6 +11,8 @@ use std::path::Path;
 
 /// Highest filter order: beyond it the poles of a low cut-off are lost in rounding.
 const MAX_ORDER: usize = 12;
+/// Longest delay of an effort that can be described, s.
+const LONGEST_LAG: f64 = 1.0;
 
 /// Parses the text of a description and checks its values. `file` is only named in errors.
 pub fn parse(text: &str, file: &Path) -> Result<Description, DatasetError> {
@@ -120,7 +122,7 @@ impl Check<'_> {
         self.require(tests, key, &c.column, "one of equals, in, not_in, starts_with, inside, outside")?;
         for list in c.one_of.iter().chain(&c.not_in) {
             let numbers = list.iter().filter(|value| matches!(value, Value::Number(_))).count();
-            let alike = !list.is_empty() && (numbers == 0 || numbers == list.len());
+            let alike = numbers == 0 || numbers == list.len();
             self.require(alike, key, format!("{list:?}"), "a list of numbers or a list of texts")?;
         }
         for [low, high] in c.inside.iter().chain(&c.outside) {
@@ -167,6 +169,7 @@ impl Check<'_> {
         let signals = [
             ("filter.position", &filter.position),
             ("filter.velocity", &filter.velocity),
+            ("filter.acceleration", &filter.acceleration),
             ("filter.effort", &filter.effort),
             ("filter.temperature", &filter.temperature),
         ];
@@ -181,7 +184,14 @@ impl Check<'_> {
             "given",
             "columns.temperature to be given too",
         )?;
-        self.require(filter.effort_lag.is_finite(), "filter.effort_lag", filter.effort_lag, "a finite time in s")?;
+        let limit = filter.lag_limit;
+        self.require((0.0..=LONGEST_LAG).contains(&limit), "filter.lag_limit", limit, "0 to 1 s")?;
+        if let Some(lag) = filter.effort_lag {
+            let expected = format!("a time within +-{limit} s; filter.lag_limit widens it, to {LONGEST_LAG} s at most");
+            self.require(lag.abs() <= limit, "filter.effort_lag", lag, &expected)?;
+        }
+        let expected = "1 to 2000 Hz";
+        self.require((1.0..=2000.0).contains(&filter.observer_hz), "filter.observer_hz", filter.observer_hz, expected)?;
         match &filter.decimate {
             Some(decimate) => {
                 let factor = decimate.factor;

@@ -18,16 +18,18 @@ pub use trainer::Trainer;
 use crate::augment::Augment;
 use crate::certificate_search::search;
 use crate::dataset::Prepared;
+use crate::dataset::checks::slope;
 use crate::dataset::description::{Gravity as DescribedGravity, PositionUnit, RigidDescription};
-use crate::evaluate::{error_tables, fixed_point_difference, rmse};
+use crate::evaluate::{Prediction, error_tables, fixed_point_difference, rmse};
 use crate::friction_parameter::Units;
 use crate::identify::{self, Identified, identify};
 use crate::joint_model::{firmware_states, fixed_point, regimes, rigid_efforts};
 use crate::presets::Preset;
 use crate::progress::Progress;
-use crate::report::{self, NetworkOutcome, Report};
-use crate::rigid::{Gravity, RigidModel};
+use crate::report::{self, NetworkOutcome, Report, Role};
+use crate::rigid::{Gravity, RigidModel, RigidParameters};
 use crate::samples::{Part, Samples};
+use joint_firmware::friction::FrictionParameters;
 use joint_firmware::friction::regime::Measure;
 use joint_firmware::parameters::certificate::Certificate;
 use joint_firmware::parameters::image::Image;
@@ -171,7 +173,12 @@ pub fn fit(prepared: &mut Prepared, options: &Options, progress: &dyn Progress) 
     let parameters = &built.image.friction;
     let sets = regimes(&parameters.selector, &states, samples);
     let fixed = fixed_point(parameters, &states, &sets);
-    let predictions = summary::predictions(samples, &identified, chosen, &learned, &sets, &fixed);
+    let mut predictions = summary::predictions(samples, &identified, chosen, &learned, &sets, &fixed);
+    prepared.warnings.extend(slope::check(&physical.friction, &prepared.samples));
+    if let Some((name, other)) = prepared.on_other_motion() {
+        predictions.push(image_on_other_motion(name, &other, &physical.rigid, parameters)?);
+    }
+    let samples = &prepared.samples;
     let errors = error_tables(samples, &prepared.test_sets, &predictions)?;
     let difference = fixed_point_difference(&learned.float, &fixed, &sets, samples);
     let worst = search(parameters, 20_000, options.seed);
@@ -197,6 +204,7 @@ pub fn fit(prepared: &mut Prepared, options: &Options, progress: &dyn Progress) 
                 options.created.to_string()
             },
         },
+        warnings: prepared.warnings.clone(),
         stages: summary::stages(prepared),
         parameters: physical.parameters.iter().map(summary::parameter).collect(),
         candidates: summary::candidates(&identified, chosen, &refused, &learned),
@@ -209,6 +217,21 @@ pub fn fit(prepared: &mut Prepared, options: &Options, progress: &dyn Progress) 
     };
     progress.stage("done");
     Ok(Fitted { image: built.image, certificate: built.certificate, report })
+}
+
+/// The image on another view of the same motion: the difference to its own row is what observer, sampling and noise
+/// cost.
+pub(crate) fn image_on_other_motion(
+    name: &str,
+    samples: &Samples,
+    rigid: &RigidParameters,
+    parameters: &FrictionParameters,
+) -> Result<Prediction, FitError> {
+    let states = firmware_states(samples)?;
+    let sets = regimes(&parameters.selector, &states, samples);
+    let fixed = fixed_point(parameters, &states, &sets);
+    let rigid = rigid_efforts(rigid, samples);
+    Ok(Prediction::new(format!("image, {name}"), Role::OtherMotion, &rigid, |i| fixed[i].0 + fixed[i].1))
 }
 
 /// Every preset, in the order asked for.

@@ -52,6 +52,7 @@ pub(super) fn parameter(estimated: &identify::Estimated) -> report::Parameter {
         unit: estimated.unit.clone(),
         standard_error: estimated.standard_error,
         at_bound: estimated.at_bound,
+        truth: None,
     }
 }
 
@@ -143,6 +144,19 @@ pub(super) fn stages(prepared: &Prepared) -> Vec<report::StageNote> {
                 counts: vec![count],
             }),
         }
+    }
+    if let Some(lag) = &prepared.lag {
+        let done = if lag.applies() { "moved by it" } else { "not significant, or beyond the limit: not moved" };
+        stages.push(report::StageNote {
+            stage: "lag".to_owned(),
+            note: format!(
+                "effort behind position by {:.2} +- {:.2} ms; left-out groups' residual falls by {:.2} %: {done}",
+                1e3 * lag.lag,
+                1e3 * lag.standard_error,
+                100.0 * lag.gain
+            ),
+            counts: vec![],
+        });
     }
     stages
 }

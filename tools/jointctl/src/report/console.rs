@@ -5,8 +5,14 @@ use super::number::{NONE, optional, percent};
 
 /// The table with a heading, ending in a line feed. Efforts in `unit`.
 pub fn error_table(table: &ErrorTable, unit: &str) -> String {
-    let heading =
-        ["model".to_owned(), format!("RMSE [{unit}]"), "% of RMS".into(), "R2".into(), "rel. torque error [%]".into()];
+    let heading = [
+        "model".to_owned(),
+        format!("RMSE [{unit}]"),
+        "% of RMS".into(),
+        "R2".into(),
+        "torque error [%]".into(),
+        "eq. 11 [%]".into(),
+    ];
     let mut lines = vec![heading];
     for row in &table.rows {
         let errors = row.errors.overall.as_ref();
@@ -15,11 +21,12 @@ pub fn error_table(table: &ErrorTable, unit: &str) -> String {
             optional(errors.map(|e| e.rmse)),
             percent(errors.and_then(|e| e.percent_of_rms)),
             errors.and_then(|e| e.r2).map_or_else(|| NONE.to_owned(), |r2| format!("{r2:.4}")),
+            percent(row.torque_error),
             percent(errors.and_then(|e| e.relative_torque_error)),
         ]);
     }
     let width = |column: usize| lines.iter().map(|line| line[column].chars().count()).max().unwrap_or(0);
-    let widths: [usize; 5] = std::array::from_fn(width);
+    let widths: [usize; 6] = std::array::from_fn(width);
     let mut text = format!("test set: {}\n", table.test_set);
     for (number, line) in lines.iter().enumerate() {
         text.push_str(&format!("{:<1$}", line[0], widths[0]));
@@ -47,19 +54,21 @@ mod tests {
             model: model.into(),
             role: Role::Nothing,
             errors: ByState { overall: metrics(&[1.0, -1.0], predicted, 0.0).unwrap(), ..ByState::default() },
+            torque_error: Some(12.345),
         };
-        let empty = ErrorRow { model: "no samples".into(), role: Role::Preset, errors: ByState::default() };
+        let empty =
+            ErrorRow { model: "no samples".into(), role: Role::Preset, errors: ByState::default(), torque_error: None };
         let table = ErrorTable {
             test_set: "pulses".into(),
             rows: vec![row("nothing", &[0.5, -0.5]), row("physical + network", &[0.9, -1.1]), empty],
         };
         let expected = "\
 test set: pulses
-model               RMSE [Nm]  % of RMS      R2  rel. torque error [%]
-----------------------------------------------------------------------
-nothing                0.5000      50.0  0.7500                   50.0
-physical + network     0.1000      10.0  0.9900                   10.0
-no samples                  –         –       –                      –
+model               RMSE [Nm]  % of RMS      R2  torque error [%]  eq. 11 [%]
+-----------------------------------------------------------------------------
+nothing                0.5000      50.0  0.7500              12.3        50.0
+physical + network     0.1000      10.0  0.9900              12.3        10.0
+no samples                  –         –       –                 –           –
 ";
         assert_eq!(error_table(&table, "Nm"), expected);
     }

@@ -14,6 +14,7 @@ pub fn report(samples: usize) -> Report {
         model: model.into(),
         role,
         errors: metrics_by_state(&test.effort, predicted, &states, floor).unwrap(),
+        torque_error: Some(12.5),
     };
     let between = |share: f64| -> Vec<f64> {
         test.physical.iter().zip(&test.rigid).map(|(physical, rigid)| physical + share * (rigid - physical)).collect()
@@ -40,6 +41,7 @@ pub fn report(samples: usize) -> Report {
             seed: 7,
             created: "2025-01-31T12:00:00Z".into(),
         },
+        warnings: vec![],
         stages: vec![
             StageNote {
                 stage: "clean".into(),
@@ -102,6 +104,7 @@ fn parameters() -> Vec<Parameter> {
         unit: unit.into(),
         standard_error,
         at_bound,
+        truth: None,
     };
     vec![
         parameter("Coulomb friction, forward", "F_c+", 1.0973, "Nm", Some(0.0041), false),

@@ -2,9 +2,9 @@
 //!
 //! All text goes through maud, which escapes it.
 
-use super::number::{count, optional, percent, significant};
-use super::summary::verdict;
-use super::{Figure, NetworkOutcome, Report, Role, style_sheet, tables};
+use super::number::{count, percent, significant};
+use super::summary::{headline, verdict};
+use super::{Figure, NetworkOutcome, Report, style_sheet, tables};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 const PAGE_STYLE: &str = include_str!("page.css");
@@ -69,6 +69,7 @@ fn sections(report: &Report, figures: &[Figure]) -> Vec<Option<Section>> {
     let models = pick(&["friction-velocity", "effort-time", "predicted-measured", "motion-states"]);
     let left = pick(&["error-histogram", "error-velocity", "error-position", "error-temperature"]);
     vec![
+        section(!report.warnings.is_empty(), "warnings", "Warnings", tables::warnings(report)),
         section(!report.errors.is_empty(), "errors", "Errors on test data", tables::errors(report)),
         section(!models.is_empty(), "prediction", "Measured and predicted", gallery(&models)),
         section(!left.is_empty(), "left", "What is left unexplained", gallery(&left)),
@@ -109,33 +110,23 @@ pub fn gallery(figures: &[&Figure]) -> Markup {
 /// The numbers that one looks for first.
 fn cards(report: &Report) -> Markup {
     let unit = &report.units.effort;
-    let table = report.errors.first();
-    let before = table.and_then(|table| table.row(Role::Nothing)?.errors.overall.as_ref());
-    let after = table.and_then(|table| table.compensated()?.errors.overall.as_ref());
     let mut cards: Vec<(&str, String, String)> = Vec::new();
-    if let (Some(before), Some(after)) = (before, after) {
+    if let Some(headline) = headline(report) {
         cards.push((
             "RMSE on test data",
-            format!("{} {unit}", significant(after.rmse, 4)),
-            format!("was {} {unit}", significant(before.rmse, 4)),
+            format!("{} {unit}", significant(headline.after.rmse, 4)),
+            format!("was {} {unit}", significant(headline.before.rmse, 4)),
         ));
         let of_rms = |p| format!("{} %", percent(p));
         cards.push((
             "of the effort's RMS",
-            of_rms(after.percent_of_rms),
-            format!("was {}", of_rms(before.percent_of_rms)),
+            of_rms(headline.after.percent_of_rms),
+            format!("was {}", of_rms(headline.before.percent_of_rms)),
         ));
-        cards.push(("R²", optional(after.r2), format!("was {}", optional(before.r2))));
-        cards.push((
-            "relative torque error",
-            of_rms(after.relative_torque_error),
-            format!("was {}", of_rms(before.relative_torque_error)),
-        ));
-        cards.push((
-            "test samples",
-            count(after.samples as u64),
-            table.map_or_else(String::new, |t| t.test_set.clone()),
-        ));
+        if let Some((worst, set)) = headline.worst_torque_error {
+            cards.push(("torque error, worst test set", format!("{} %", percent(Some(worst))), set.to_owned()));
+        }
+        cards.push(("test samples", count(headline.samples as u64), format!("{} test sets", report.errors.len())));
     }
     let network = match report.network {
         NetworkOutcome::Kept => "kept",

@@ -15,6 +15,7 @@ pub use figures::{Curve, Figure, FigureError, Ink, Plot, figures, over_time, sty
 pub(crate) use html::{document, gallery};
 pub use summary::{Verdict, verdict};
 
+use crate::dataset::Warning;
 use crate::metrics::{ByState, Metrics};
 use crate::output::{OutputError, OutputFile, write_directory};
 use serde::Serialize;
@@ -31,6 +32,8 @@ pub struct Report {
     pub units: Units,
     /// What the result was made from and with.
     pub provenance: Provenance,
+    /// Suspected defects of the data.
+    pub warnings: Vec<Warning>,
     /// What each stage did to the data, in order.
     pub stages: Vec<StageNote>,
     /// Identified physical parameters.
@@ -39,7 +42,7 @@ pub struct Report {
     pub candidates: Vec<Candidate>,
     /// What became of the network.
     pub network: NetworkOutcome,
-    /// Errors on test data, one table for each test set. The first one decides the verdict and is the one of `test`.
+    /// Errors on test data, one table for each test set. The verdict looks at all of them.
     pub errors: Vec<ErrorTable>,
     /// What fixed-point arithmetic costs. None where no image was made.
     pub fixed_point: Option<FixedPointDifference>,
@@ -47,7 +50,7 @@ pub struct Report {
     pub training: Vec<TrainingCurve>,
     /// The certificate of the image, item by item.
     pub certificate: Vec<CertificateItem>,
-    /// Samples of the first test set, for the figures. Not part of the JSON file.
+    /// Samples of all test sets, for the figures. Not part of the JSON file.
     #[serde(skip)]
     pub test: TestSamples,
 }
@@ -106,6 +109,8 @@ pub struct Parameter {
     pub standard_error: Option<f64>,
     /// The value lies at the bound of its range: the data would like to go further.
     pub at_bound: bool,
+    /// The true value, where it is known: of a virtual joint.
+    pub truth: Option<f64>,
 }
 
 /// One model that was compared on validation data.
@@ -153,6 +158,8 @@ pub enum Role {
     PhysicalAndNetwork,
     /// The image that the joint would run, in its own integers.
     FixedPoint,
+    /// The image on another view of the same motion: the joint's observer's, or the one without delay.
+    OtherMotion,
     /// A model of others, for comparison only.
     Reference,
 }
@@ -175,12 +182,22 @@ pub struct ErrorRow {
     pub role: Role,
     /// Errors for all samples and for each motion state.
     pub errors: ByState<Option<Metrics>>,
+    /// Torque error of all samples, % of the friction (see [`crate::torque_error`]). None where no row is without
+    /// friction.
+    pub torque_error: Option<f64>,
 }
 
 impl ErrorTable {
     /// The first row with this role.
     pub fn row(&self, role: Role) -> Option<&ErrorRow> {
         self.rows.iter().find(|row| row.role == role)
+    }
+
+    /// The physical model with the lowest error, whether it was chosen or not.
+    pub fn best_simple(&self) -> Option<(&ErrorRow, f64)> {
+        let simple = self.rows.iter().filter(|row| matches!(row.role, Role::Preset | Role::Physical));
+        let judged = simple.filter_map(|row| Some((row, row.errors.overall.as_ref()?.rmse)));
+        judged.min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
     /// The row of what the joint would run: the image, else the network, else the physical model.

@@ -208,3 +208,66 @@ fn the_verdict_says_what_compensation_removes_or_why_it_does_not() {
     report.errors.clear();
     assert!(verdict(&report).sentence.starts_with("Nothing was judged"));
 }
+
+fn overall(report: &mut Report, set: usize, row: usize) -> &mut crate::metrics::Metrics {
+    report.errors[set].rows[row].errors.overall.as_mut().unwrap()
+}
+
+#[test]
+fn a_simpler_model_of_the_same_table_that_is_better_takes_the_green_away() {
+    let with = |ratio: f64| {
+        let mut report = example::report(1000);
+        let image = overall(&mut report, 0, 5).rmse;
+        // The chosen physical model is out of the way: the row judged is that of Coulomb and viscous friction.
+        overall(&mut report, 0, 3).rmse = 2.0 * image;
+        overall(&mut report, 0, 2).rmse = image / ratio;
+        verdict(&report)
+    };
+    assert!(with(1.019).good, "{:?}", with(1.019));
+    let worse = with(1.021);
+    assert!(!worse.good && worse.sentence.contains("coulomb-viscous"), "{worse:?}");
+    assert!(with(2.0).sentence.contains("2.00 times as much"), "{:?}", with(2.0));
+}
+
+#[test]
+fn the_headline_is_of_all_test_sets_and_a_bad_one_is_named() {
+    let mut report = example::report(1000);
+    let one = verdict(&report);
+    let mut other = report.errors[0].clone();
+    other.test_set = "other motion".into();
+    report.errors.push(other);
+    assert_eq!(verdict(&report), one, "the same errors twice are the same errors");
+    let before = overall(&mut report, 1, 0).rmse;
+    let bad = overall(&mut report, 1, 5);
+    (bad.rmse, bad.mse) = (1.5 * before, 2.25 * before * before);
+    report.errors[1].rows[5].torque_error = Some(150.0);
+    let found = verdict(&report);
+    assert!(!found.good && found.sentence.contains("does not help on test set \"other motion\""), "{found:?}");
+    assert_ne!(found.sentence, one.sentence);
+    let files = render(&report).unwrap();
+    let page = text(&files, "report.html");
+    assert!(
+        page.contains("torque error, worst test set") && page.contains("150.0 %"),
+        "the worst test set is on a card"
+    );
+}
+
+#[test]
+fn warnings_and_true_values_are_on_the_page() {
+    let mut report = example::report(100);
+    let plain = render(&report).unwrap();
+    assert!(!text(&plain, "report.html").contains("id=\"warnings\"") && !text(&plain, "report.html").contains("truth"));
+    report.warnings.push(Warning {
+        check: "clipping",
+        column: "effort (\"u\")".into(),
+        rows: "12 of 100 rows".into(),
+        finding: "its extreme stands still".into(),
+        remedy: "leave them out".into(),
+    });
+    report.parameters[0].truth = Some(1.234);
+    let files = render(&report).unwrap();
+    let page = text(&files, "report.html");
+    assert!(page.contains("id=\"warnings\"") && page.contains("its extreme stands still") && page.contains("1.234"));
+    let json: serde_json::Value = serde_json::from_str(text(&files, "report.json")).unwrap();
+    assert_eq!((&json["warnings"][0]["check"], &json["parameters"][0]["truth"]), (&"clipping".into(), &1.234.into()));
+}

@@ -24,6 +24,8 @@ pub struct Row {
     pub compensation_torque: f64,
     /// Torque of the measured current at the joint, Nm.
     pub measured_torque: f64,
+    /// A signal lay outside the image's trained box: network or model were faded out.
+    pub faded: bool,
     /// Measured current along d, A.
     pub current_d: f64,
     /// Measured current along q, A.
@@ -66,7 +68,7 @@ impl Row {
 type Column = (&'static str, usize, fn(&Row) -> f64);
 
 /// The columns in the order of the table.
-const COLUMNS: [Column; 19] = [
+const COLUMNS: [Column; 20] = [
     ("time_s", 5, |r| r.time),
     ("reference_position_rad", 6, |r| r.reference_position),
     ("reference_velocity_rad_s", 5, |r| r.reference_velocity),
@@ -75,6 +77,7 @@ const COLUMNS: [Column; 19] = [
     ("commanded_torque_Nm", 4, |r| r.commanded_torque),
     ("compensation_torque_Nm", 4, |r| r.compensation_torque),
     ("measured_torque_Nm", 4, |r| r.measured_torque),
+    ("faded", 0, |r| f64::from(u8::from(r.faded))),
     ("current_d_A", 4, |r| r.current_d),
     ("current_q_A", 4, |r| r.current_q),
     ("bus_voltage_V", 3, |r| r.bus_voltage),

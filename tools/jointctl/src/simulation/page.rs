@@ -37,9 +37,10 @@ pub fn page(title: &str, lines: &[Line], speed: &str, scenarios: &[Shown]) -> Re
                     } } }
                 } }
                 @for stop in lines.iter().filter_map(Line::stop) { p.verdict.bad { (stop) } }
-                p { "Position error: reference less true position. Relative torque error: |asked - arrived| / |asked|, "
-                    "where \"asked\" is the torque before compensation and \"arrived\" what the motor gives less what "
-                    "friction takes; torques below a tenth of the RMS count in no quotient." }
+                @for faded in lines.iter().filter_map(Line::faded) { p { (faded) "." } }
+                p { "Position error: reference less true position. Torque error: RMS of the torque that did not arrive, in % of the "
+                    "friction's RMS, both below 20 Hz. 001 eq. 11: mean of |what did not arrive| / |motor torque|; motor torques below a "
+                    "tenth of their RMS count in no quotient." }
             }
             section { h2 { "Over time" } (gallery(&figures)) }
         }

@@ -7,6 +7,7 @@ use super::SimulationError;
 use super::log::{Log, Row};
 use super::motion::Controller;
 use super::scenario::Part;
+use joint_firmware::compensation::Reason;
 use joint_firmware::friction::FrictionModel;
 use joint_firmware::joint::Demand;
 use joint_firmware::joint::fault::{Fault, Faults};
@@ -164,6 +165,10 @@ fn row(joint: &VirtualJoint) -> Row {
         velocity: value(telemetry.motion.velocity),
         commanded_torque: value(telemetry.wanted.torque),
         compensation_torque: value(telemetry.compensated.torque),
+        faded: matches!(
+            telemetry.compensated.output.reason,
+            Reason::OutsideTrainedBox(_) | Reason::FarOutsideTrainedBox(_)
+        ),
         measured_torque: value(telemetry.measured_torque),
         current_d: value(telemetry.current.d),
         current_q: value(telemetry.current.q),

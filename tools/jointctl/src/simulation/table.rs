@@ -4,6 +4,9 @@
 use super::{Ending, Judgement};
 use crate::report::number::{optional, percent};
 
+/// Share of the samples in motion, %, from which a row says that the image was faded out.
+const TOLD_FADED: f64 = 5.0;
+
 /// One row: a part of a scenario, with or without compensation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Line {
@@ -32,6 +35,18 @@ impl Line {
         if self.compensated { "on" } else { "off" }
     }
 
+    /// Compensation was on, but a signal left the image's trained box, so that less or nothing of it acted.
+    #[must_use]
+    pub fn faded(&self) -> Option<String> {
+        (self.compensated && self.judgement.faded > TOLD_FADED).then(|| {
+            format!(
+                "{}, compensation on: outside the image's trained box in {:.0} % of the motion",
+                self.name(),
+                self.judgement.faded
+            )
+        })
+    }
+
     /// Why the run did not come to its end, in a sentence.
     #[must_use]
     pub fn stop(&self) -> Option<String> {
@@ -41,39 +56,40 @@ impl Line {
 
     /// The cells, in the order of [`HEADING`].
     #[must_use]
-    pub fn cells(&self) -> [String; 6] {
+    pub fn cells(&self) -> [String; 7] {
         let judged = &self.judgement;
         let milli = |value: Option<f64>| optional(value.map(|value| 1e3 * value));
-        let relative = |metrics: &Option<crate::metrics::Metrics>| {
-            percent(metrics.as_ref().and_then(|metrics| metrics.relative_torque_error))
-        };
+        let relative = judged.torque.as_ref().and_then(|metrics| metrics.relative_torque_error);
+        let compensation = if self.faded().is_some() { "faded" } else { self.compensation() };
         [
             self.name(),
-            self.compensation().to_owned(),
+            compensation.to_owned(),
             milli(judged.position_rms),
             milli(judged.position_max),
-            relative(&judged.torque),
-            relative(&judged.torque_in_motion),
+            percent(judged.torque_error),
+            percent(judged.torque_error_in_motion),
+            percent(relative),
         ]
     }
 }
 
 /// Names of the columns.
-pub const HEADING: [&str; 6] = [
+pub const HEADING: [&str; 7] = [
     "scenario",
     "compensation",
     "position error RMS [mrad]",
     "largest [mrad]",
-    "rel. torque error [%]",
+    "torque error [%]",
     "in motion [%]",
+    "001 eq. 11 [%]",
 ];
 
 /// The table, ending in a line feed; below it, what stopped on the way.
 #[must_use]
 pub fn table(lines: &[Line]) -> String {
-    let rows: Vec<[String; 6]> =
+    let rows: Vec<[String; 7]> =
         [HEADING.map(str::to_owned)].into_iter().chain(lines.iter().map(Line::cells)).collect();
-    let widths: [usize; 6] =
+    let widths: [usize; 7] =
         std::array::from_fn(|column| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0));
     let mut text = String::new();
     for (number, row) in rows.iter().enumerate() {
@@ -90,7 +106,7 @@ pub fn table(lines: &[Line]) -> String {
             text.push('\n');
         }
     }
-    for stop in lines.iter().filter_map(Line::stop) {
+    for stop in lines.iter().filter_map(Line::stop).chain(lines.iter().filter_map(Line::faded)) {
         text += &stop;
         text.push('\n');
     }

@@ -113,7 +113,7 @@ fn compensation_by_the_right_model_brings_the_joint_and_the_torque_closer() {
     };
     let off = judged(Request::Off, Some(&model));
     let on = judged(Request::Physical, Some(&model));
-    let torque = |judged: &Judgement| judged.torque_in_motion.as_ref().unwrap().relative_torque_error.unwrap();
+    let torque = |judged: &Judgement| judged.torque_error_in_motion.unwrap();
     println!("{off:?}\n{on:?}");
     assert!(on.position_rms.unwrap() < 0.5 * off.position_rms.unwrap(), "{off:?} {on:?}");
     assert!(torque(&on) < 0.5 * torque(&off), "{off:?} {on:?}");
@@ -168,4 +168,20 @@ fn the_table_has_a_row_without_and_one_with_compensation() {
     assert!(lines[2].starts_with("slow-reversal  off") && lines[2].contains("2.100"), "{shown}");
     assert!(lines[3].starts_with("slow-reversal  on") && lines[3].contains("0.4000"), "{shown}");
     assert!(lines[4].ends_with('–'), "{shown}");
+}
+
+#[test]
+fn a_row_that_was_outside_the_trained_box_says_so_and_one_just_inside_the_limit_does_not() {
+    let line = |compensated, faded| Line {
+        scenario: "hot-and-cold",
+        compensated,
+        judgement: Judgement { faded, ..Judgement::default() },
+        part: Some("hot"),
+        ending: Ending::Whole,
+    };
+    let shown = table(&[line(true, 83.0)]);
+    assert!(shown.contains("hot-and-cold/hot  faded"), "{shown}");
+    assert!(shown.contains("outside the image's trained box in 83 % of the motion"), "{shown}");
+    assert!(line(true, 5.1).faded().is_some() && line(true, 5.0).faded().is_none());
+    assert!(line(false, 83.0).faded().is_none());
 }

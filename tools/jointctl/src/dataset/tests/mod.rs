@@ -1,6 +1,8 @@
 //! A small synthetic joint as CSV and TOML, for the tests of the whole preparation.
 
+mod checks;
 mod defects;
+mod lag;
 mod pipeline;
 mod shipped;
 
