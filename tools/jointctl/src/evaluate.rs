@@ -12,6 +12,7 @@ use nalgebra::{DMatrix, DVector};
 pub const RELATIVE_FLOOR: f64 = 0.1;
 
 /// A model's predicted effort for every sample.
+#[derive(Clone, Debug)]
 pub struct Prediction {
     /// Name of the model.
     pub model: String,

@@ -19,7 +19,7 @@ use crate::augment::Augment;
 use crate::certificate_search::search;
 use crate::dataset::Prepared;
 use crate::dataset::description::{Gravity as DescribedGravity, PositionUnit, RigidDescription};
-use crate::evaluate::{error_tables, fixed_point_difference, rmse};
+use crate::evaluate::{Prediction, error_tables, fixed_point_difference, rmse};
 use crate::friction_parameter::Units;
 use crate::identify::{self, Identified, identify};
 use crate::joint_model::{firmware_states, fixed_point, regimes, rigid_efforts};
@@ -143,6 +143,8 @@ pub struct Fitted {
     pub certificate: Certificate,
     /// Everything worth knowing, for people.
     pub report: Report,
+    /// The effort of every sample as the image and every model beside it predict it, rigid part included.
+    pub predictions: Vec<Prediction>,
 }
 
 /// Runs the whole pipeline on a prepared data set.
@@ -208,7 +210,7 @@ pub fn fit(prepared: &mut Prepared, options: &Options, progress: &dyn Progress) 
         test: summary::test_samples(prepared, &rigid, physical, &learned, &fixed),
     };
     progress.stage("done");
-    Ok(Fitted { image: built.image, certificate: built.certificate, report })
+    Ok(Fitted { image: built.image, certificate: built.certificate, report, predictions })
 }
 
 /// Every preset, in the order asked for.
