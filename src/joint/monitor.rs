@@ -293,6 +293,29 @@ mod tests {
     }
 
     #[test]
+    fn a_bridge_that_has_not_switched_shows_no_fault_and_one_that_switches_again_is_checked_as_before() {
+        let board = crate::default_configuration::B_G431B_ESC1;
+        let active = board.joint.prepare(&board.bridge).unwrap();
+        let (duties, voltage) = (Phases::uniform(0.5), Dq { d: 0.0, q: 10.0 });
+        let output = FieldOrientedOutput { duties, current: Dq::ZERO, voltage, limited: false };
+        let found_after = |idle: u32| {
+            let mut monitor = Monitor::default();
+            for _ in 0..idle {
+                monitor.check_current_loop(&active);
+                assert!(monitor.found().is_empty());
+            }
+            // A voltage without a current: a phase is open.
+            (1..1000).find(|_| {
+                monitor.current_loop(Dq::ZERO, &output, 0.0);
+                monitor.check_current_loop(&active);
+                !monitor.found().is_empty()
+            })
+        };
+        assert!(found_after(0).is_some());
+        assert_eq!(found_after(1000), found_after(0));
+    }
+
+    #[test]
     fn a_lost_encoder_shows_at_the_step_after_those_that_are_bridged() {
         let mut monitor = Monitor::default();
         let lost = (1..100).find(|_| monitor.encoder_is_lost(false, 1000));
