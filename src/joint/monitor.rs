@@ -125,7 +125,8 @@ fn within(value: f32, low: f32, high: f32) -> bool {
     value >= low && value <= high
 }
 
-/// One round of a first-order filter. What is not a number stays, and is a fault: nothing explains it.
+/// One round of a first-order filter. Once not a number it finds nothing until the bridge goes off, which a current that is no number causes by its limit in the same
+/// step.
 #[inline(always)]
 fn filter(state: &mut Dq, value: Dq) {
     let step = |state: f32, value: f32| state + VOLTAGE_FILTER * (value - state);
