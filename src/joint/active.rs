@@ -4,6 +4,7 @@ use super::configuration::{
     BridgeConfiguration, Configuration, ConfigurationError, GearConfiguration, Limits, MOTION_STEPS, VelocitySource,
 };
 use super::limit_law::LimitGains;
+use super::monitor::OVER_SPEED;
 use crate::compensation::Settings;
 use crate::friction::FrictionModel;
 use crate::motor::angle::{Direction, EncoderAlignment, STEPS, TAU};
@@ -133,8 +134,6 @@ pub struct MotionGains {
     pub velocity_step: f32,
     /// rad/s².
     pub acceleration: f32,
-    /// The quick stop's, rad/s².
-    pub deceleration: f32,
     /// Change of the quick stop's ramp in a round, rad/s.
     pub quick_stop_step: f32,
     /// Control steps that braking may take.
@@ -194,6 +193,10 @@ pub struct Active {
     pub limits: Limits,
     /// How the torque fades towards them.
     pub limit_gains: LimitGains,
+    /// Velocity beyond which it is a fault, rad/s.
+    pub over_speed: f32,
+    /// Positions beyond which it is a fault, rad: the limits with their margin.
+    pub fault_position: (f32, f32),
     /// Largest offset of a current sensor, A.
     pub largest_offset: f32,
     /// Largest current, A.
@@ -361,6 +364,8 @@ impl Checked {
             alignment: motor.alignment,
             scales: Scales::new(gear, &motor.alignment, motor.torque_constant),
             limit_gains: LimitGains::new(&limits, gains, period),
+            over_speed: OVER_SPEED * limits.velocity,
+            fault_position: (limits.position.0 - limits.position_margin, limits.position.1 + limits.position_margin),
             limits,
             largest_offset: bridge.limits.largest_offset(limits.over_current),
             current_limit,
@@ -388,7 +393,6 @@ impl Checked {
                 position_integral: 0.1 * gains.integral * period,
                 velocity_step: gains.acceleration * period,
                 acceleration: gains.acceleration,
-                deceleration: gains.quick_stop_deceleration,
                 quick_stop_step: gains.quick_stop_deceleration * period,
                 braking_steps: (gains.braking_time * rate) as u32,
             },

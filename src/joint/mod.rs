@@ -226,7 +226,11 @@ impl Joint {
 
         let winding = within(slow.derating, 0.0, 1.0);
         let faults = self.watch(active, demand, winding, measured, currents, &observation, &motion);
-        let state = self.decide(active, demand, faults, &motion);
+        let open_loop = demand.command.mode == Mode::OpenLoop;
+        let state = match self.machine.stays_enabled(demand.controlword, !faults.is_empty(), open_loop) {
+            true => State::OperationEnabled,
+            false => self.decide(active, demand, faults, &motion),
+        };
 
         // No sensor is no number, and derates nothing.
         let bridge = (active.limits.bridge_temperature - measured.bridge_temperature) * (1.0 / DERATING);
@@ -457,7 +461,8 @@ impl Joint {
         if self.coupled_steps <= active.deadline_steps { demand.coupled.velocity } else { 0.0 }
     }
 
-    /// The state from now on. A fault that must not be braked against goes straight through the reaction to "fault".
+    /// The state from now on, where it may be another one. A fault that must not be braked against goes straight
+    /// through the reaction to "fault".
     #[inline(never)]
     fn decide(&mut self, active: &Active, demand: &Demand, faults: Faults, motion: &JointMotion) -> State {
         let before = self.machine.state();
@@ -474,8 +479,7 @@ impl Joint {
         if state == State::OpenLoop && before != state {
             self.open_loop.begin();
         }
-        let reaction = faults.union(self.latched).reaction();
-        if reaction != Some(Reaction::Brake) {
+        if state == State::FaultReactionActive && faults.union(self.latched).reaction() != Some(Reaction::Brake) {
             state = self.machine.end_reaction();
         }
         if !faults.is_empty() {
