@@ -249,15 +249,18 @@ impl Joint {
             };
             let wanted = limited(torque * active.scales.current_per_torque, limit);
             let speed = active.alignment.electrical_speed(observation.motion.velocity);
-            let reference = self.regeneration.step(active, wanted, speed, measured.bus_voltage, derating);
+            let bus_voltage = measured.bus_voltage;
+            let wanted = self.regeneration.step(active, wanted, speed, bus_voltage, derating);
+            let gains = &active.field_oriented;
+            let reference = self.field_oriented.reference(gains, wanted, speed, bus_voltage, limit);
             let input = FieldOrientedInput {
                 phase_currents: currents,
                 angle: active.alignment.electrical(observation.motion.angle()),
                 speed,
-                bus_voltage: measured.bus_voltage,
+                bus_voltage,
                 reference,
             };
-            let output = self.field_oriented.step(&active.field_oriented, &input);
+            let output = self.field_oriented.step(gains, &input);
             self.monitor.current_loop(reference, &output, way);
             self.mean_square.add(output.current);
             (Bridge { state: BridgeState::Switching, duties: output.duties }, reference, output.current)

@@ -166,8 +166,10 @@ impl Monitor {
         faults.set(Fault::CurrentSensor, self.current_sum.step(unbalanced, CURRENT_SUM_STEPS));
 
         let (lowest, highest) = limits.bus_voltage;
-        faults.set(Fault::OverVoltage, exceeds(measured.bus_voltage, highest) || measured.bus_voltage < 0.0);
-        faults.set(Fault::UnderVoltage, !within(measured.bus_voltage, lowest, f32::INFINITY));
+        // As integers, see `motor::number`: negative numbers and what is none come after all others.
+        let supply = measured.bus_voltage.to_bits();
+        faults.set(Fault::OverVoltage, supply > highest.to_bits());
+        faults.set(Fault::UnderVoltage, !(lowest.to_bits()..=f32::INFINITY.to_bits()).contains(&supply));
 
         let lost = self.encoder.full | self.adrift;
         faults.set(Fault::EncoderLost, lost);
