@@ -38,7 +38,7 @@ const MISSED_LIMIT: f32 = 0.02;
 /// ... this part of the reference.
 const MISSED_REFERENCE: f32 = 0.25;
 /// A velocity this much above its limit is a fault.
-const OVER_SPEED: f32 = 1.2;
+pub(super) const OVER_SPEED: f32 = 1.2;
 /// Temperatures outside these are an open or shorted sensor, °C.
 const SENSOR_RANGE: (f32, f32) = (-40.0, 180.0);
 
@@ -167,8 +167,10 @@ impl Monitor {
         faults.set(Fault::CurrentSensor, self.current_sum.step(unbalanced, CURRENT_SUM_STEPS));
 
         let (lowest, highest) = limits.bus_voltage;
-        faults.set(Fault::OverVoltage, exceeds(measured.bus_voltage, highest) || measured.bus_voltage < 0.0);
-        faults.set(Fault::UnderVoltage, !within(measured.bus_voltage, lowest, f32::INFINITY));
+        // As integers, see `motor::number`: negative numbers and what is none come after all others.
+        let supply = measured.bus_voltage.to_bits();
+        faults.set(Fault::OverVoltage, supply > highest.to_bits());
+        faults.set(Fault::UnderVoltage, !(lowest.to_bits()..=f32::INFINITY.to_bits()).contains(&supply));
 
         let lost = self.encoder.full | self.adrift;
         faults.set(Fault::EncoderLost, lost);
@@ -187,12 +189,10 @@ impl Monitor {
     /// Faults that only a joint in motion, or meant to be, can have. `winding` is the part of the current that the winding's temperature permits.
     #[inline(always)]
     pub fn motion(&mut self, active: &Active, motion: &JointMotion, stale_steps: u32, winding: f32) -> Faults {
-        let limits = &active.limits;
         let mut faults = Faults::NONE;
-        faults.set(Fault::OverSpeed, exceeds(motion.velocity, OVER_SPEED * limits.velocity));
-        let (low, high) = limits.position;
-        let margin = limits.position_margin;
-        faults.set(Fault::PositionLimit, !within(motion.position, low - margin, high + margin));
+        faults.set(Fault::OverSpeed, exceeds(motion.velocity, active.over_speed));
+        let (low, high) = active.fault_position;
+        faults.set(Fault::PositionLimit, !within(motion.position, low, high));
         faults.set(Fault::WindingTemperature, winding <= 0.0);
         faults.set(Fault::StaleCommand, stale_steps > active.deadline_steps);
         faults

@@ -126,6 +126,12 @@ impl CurrentControl {
         self.asked
     }
 
+    /// The voltage of the last step, V.
+    #[inline(always)]
+    pub(super) fn asked(&self) -> Dq {
+        self.asked
+    }
+
     /// Takes out of the integral what of the last step's voltage was not applied.
     #[inline(always)]
     pub fn settle(&mut self, gains: &CurrentGains, applied: Dq) {
