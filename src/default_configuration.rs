@@ -146,6 +146,7 @@ const fn uncommissioned(bus_voltage: (f32, f32), regeneration_band: f32, encoder
             torque_constant: 0.02,
             current_limit: 2.0,
             loss_current: 0.0,
+            field_weakening_current: 0.0,
             alignment: EncoderAlignment {
                 pole_pairs: 7,
                 direction: Direction::Forward,
@@ -175,6 +176,7 @@ const fn uncommissioned(bus_voltage: (f32, f32), regeneration_band: f32, encoder
         gains: Gains {
             current_bandwidth: 200.0,
             observer_bandwidth: 100.0,
+            voltage_fraction: 1.0,
             stiffness: 0.2,
             damping: 0.01,
             integral: 0.0,

@@ -276,8 +276,8 @@ struct Flashed {
     flash: u64,
     ram: u64,
     ccm: u64,
-    /// Room for the stack, and how much of it was used: by the stack pointer, and by what was painted before.
-    stack: [u64; 3],
+    /// Room for the stack, and how much of it was used.
+    stack: [u64; 2],
     /// Cycles of the control interrupt that are not the joint's: least, median, most.
     around: [u64; 3],
 }
@@ -306,8 +306,6 @@ fn run<W: Wired>(board: &'static Board, wired: impl FnOnce(Drivetrain) -> W) -> 
     let mut parameters = ActuatorParameters::reference().aligned().without_payload();
     parameters.bus.source_voltage = 18.0;
     let mut emulation = Emulation::new(wired(Drivetrain::new(parameters, 25.0, 1)?), &program)?;
-    // Memory is full of junk after power-up: what has another value later has been written.
-    let painted = emulation.cpu.bus.sram().to_vec();
     emulation.cpu.set_watch(Some(Watch::new()));
     for _ in 0..(RUN / 0.02).round() as u32 {
         if let Some(end) = emulation.run(0.02) {
@@ -316,11 +314,7 @@ fn run<W: Wired>(board: &'static Board, wired: impl FnOnce(Drivetrain) -> W) -> 
         emulation.log();
     }
     let lowest = emulation.cpu.watch().and_then(Watch::lowest_main_stack).ok_or("no stack")?;
-    let region = (end - 0x2000_0000) as usize..(start - 0x2000_0000) as usize;
-    let untouched =
-        emulation.cpu.bus.sram()[region.clone()].iter().zip(&painted[region]).take_while(|(now, then)| now == then);
-    let painted = u64::from(start - end) - untouched.count() as u64;
-    let stack = [u64::from(start - end), u64::from(start - lowest), painted];
+    let stack = [u64::from(start - end), u64::from(start - lowest)];
     Ok(Flashed { name: board.name, flash, ram, ccm, stack, around: around(&mut emulation, &path)? })
 }
 
@@ -378,10 +372,10 @@ fn belongs(loader: &addr2line::Loader, address: u32) -> Option<bool> {
 fn memories(boards: &[Flashed]) {
     println!(
         "\n## Memories\n\nBytes, from each program's headers; RAM includes the whole stack region. Stack: the most that {RUN} s from power-up took, by the stack \
-         pointer after every\ninstruction, and by what was overwritten of the junk that memory is full of after power-up.\n"
+         pointer after every\ninstruction.\n"
     );
-    println!("| | flash | RAM | CCM SRAM | stack region | stack used | overwritten |\n|---|---|---|---|---|---|---|");
-    for Flashed { name, flash, ram, ccm, stack: [room, used, painted], .. } in boards {
-        println!("| {name} | {flash} | {ram} | {ccm} | {room} | {used} | {painted} |");
+    println!("| | flash | RAM | CCM SRAM | stack region | stack used |\n|---|---|---|---|---|---|");
+    for Flashed { name, flash, ram, ccm, stack: [room, used], .. } in boards {
+        println!("| {name} | {flash} | {ram} | {ccm} | {room} | {used} |");
     }
 }

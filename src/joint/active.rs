@@ -1,18 +1,22 @@
 //! A configuration as the control step uses it: gains, limits and scales prepared, nothing left to divide; task, host.
 
 use super::configuration::{
-    BridgeConfiguration, Configuration, ConfigurationError, GearConfiguration, Limits, MOTION_STEPS, VelocitySource,
+    BridgeConfiguration, Configuration, ConfigurationError, GearConfiguration, Limits, MOTION_STEPS,
+    MotorConfiguration, VelocitySource,
 };
 use super::limit_law::LimitGains;
+use super::monitor::OVER_SPEED;
 use crate::compensation::Settings;
 use crate::friction::FrictionModel;
 use crate::motor::angle::{Direction, EncoderAlignment, STEPS, TAU};
 use crate::motor::current::{CurrentSettings, MotorConstants};
 use crate::motor::field_oriented::FieldOrientedGains;
+use crate::motor::field_weakening::{WeakeningGains, WeakeningSettings};
 use crate::motor::modulation::ModulationSettings;
 use crate::motor::number::{greater, lesser, within};
 use crate::motor::observer::{Motion, ObserverGains, ObserverSettings};
 use crate::motor::open_loop::OpenLoopGains;
+use crate::motor::setting::{SettingError, in_range};
 use crate::motor::thermal::{ThermalSettings, WindingTemperature};
 use crate::motor::transform::Dq;
 use crate::quantity::Torque;
@@ -27,6 +31,8 @@ pub const DERATING: f32 = 20.0;
 /// Part of the regeneration band in which braking current fades. In the rest nothing feeds the supply: the board takes so little that its voltage comes to
 /// rest where almost all is withheld, and there noise would find the limit.
 const FADE: f32 = 0.8;
+/// Peak of the voltage between two phases over that of one.
+const SQRT_3: f32 = 1.732_050_8;
 /// Fastest rotor that the observer follows, beyond the velocity limit.
 const OBSERVER_RESERVE: f32 = 2.0;
 /// Highest rotor acceleration, rad/s²: a rotor of 1e-6 kg m² under 1 Nm.
@@ -133,8 +139,6 @@ pub struct MotionGains {
     pub velocity_step: f32,
     /// rad/s².
     pub acceleration: f32,
-    /// The quick stop's, rad/s².
-    pub deceleration: f32,
     /// Change of the quick stop's ramp in a round, rad/s.
     pub quick_stop_step: f32,
     /// Control steps that braking may take.
@@ -194,6 +198,10 @@ pub struct Active {
     pub limits: Limits,
     /// How the torque fades towards them.
     pub limit_gains: LimitGains,
+    /// Velocity beyond which it is a fault, rad/s.
+    pub over_speed: f32,
+    /// Positions beyond which it is a fault, rad: the limits with their margin.
+    pub fault_position: (f32, f32),
     /// Largest offset of a current sensor, A.
     pub largest_offset: f32,
     /// Largest current, A.
@@ -275,6 +283,32 @@ struct Checked {
     rotor_velocity: f32,
 }
 
+/// Field weakening up to an electrical speed, rad/s, on a highest supply, V. Refused are a d current that would raise the voltage again, and a speed
+/// at which the diodes would bring the supply above its limit once the bridge is off: the peak between two phases is sqrt 3 of that of a phase.
+#[inline(never)]
+fn weakening(
+    motor: &MotorConfiguration,
+    current: &CurrentSettings,
+    gains: &FieldOrientedGains,
+    supply: f32,
+    speed: f32,
+) -> Result<WeakeningGains, SettingError> {
+    let MotorConstants { flux_linkage, inductance_d, .. } = current.motor;
+    let most = motor.field_weakening_current;
+    in_range!("field-weakening current", "A", most, 0.0, flux_linkage / inductance_d)?;
+    in_range!("voltage induced where over-speed is a fault", "V", SQRT_3 * flux_linkage * speed, 0.0, supply)?;
+    Ok(WeakeningGains::new(&WeakeningSettings {
+        current: most,
+        bandwidth: current.bandwidth,
+        rate: current.rate,
+        resistance: current.motor.resistance,
+        inductance_d,
+        flux_linkage,
+        highest_reach: gains.modulator.reach(supply),
+        highest_speed: speed,
+    }))
+}
+
 impl Checked {
     #[inline(never)]
     fn of(configuration: &Configuration, bridge: &BridgeConfiguration) -> Result<Self, ConfigurationError> {
@@ -294,6 +328,24 @@ impl Checked {
         let magnitude = if gear.ratio < 0.0 { -gear.ratio } else { gear.ratio };
         let rotor_velocity = OBSERVER_RESERVE * limits.velocity * magnitude;
         let torque = |value: f32| Torque::from_bits((value * 65536.0) as i32);
+        let current_settings =
+            CurrentSettings { motor: constants, bandwidth: gains.current_bandwidth, rate, highest_voltage };
+        let mut field_oriented = FieldOrientedGains::new(
+            &current_settings,
+            &ModulationSettings {
+                voltage_fraction: gains.voltage_fraction,
+                minimum_duty: bridge.duty.0,
+                maximum_duty: bridge.duty.1,
+                dead_time: bridge.dead_time * rate,
+                dead_time_band: bridge.dead_time_band,
+                minimum_bus_voltage: 0.5 * lowest_voltage,
+            },
+        )?;
+        if motor.field_weakening_current > 0.0 {
+            let supply = bridge.limits.hold(limits).bus_voltage.1;
+            let speed = OVER_SPEED * limits.velocity * magnitude * pole_pairs;
+            field_oriented.weakening = weakening(motor, &current_settings, &field_oriented, supply, speed)?;
+        }
         let heat = ThermalSettings {
             resistance: motor.resistance,
             winding_capacity: thermal.winding_capacity,
@@ -308,17 +360,7 @@ impl Checked {
         };
         WindingTemperature::new(&heat, REFERENCE_TEMPERATURE)?;
         Ok(Self {
-            field_oriented: FieldOrientedGains::new(
-                &CurrentSettings { motor: constants, bandwidth: gains.current_bandwidth, rate, highest_voltage },
-                &ModulationSettings {
-                    voltage_fraction: 1.0,
-                    minimum_duty: bridge.duty.0,
-                    maximum_duty: bridge.duty.1,
-                    dead_time: bridge.dead_time * rate,
-                    dead_time_band: bridge.dead_time_band,
-                    minimum_bus_voltage: 0.5 * lowest_voltage,
-                },
-            )?,
+            field_oriented,
             observer: ObserverGains::new(&ObserverSettings {
                 bandwidth: gains.observer_bandwidth,
                 rate,
@@ -361,6 +403,8 @@ impl Checked {
             alignment: motor.alignment,
             scales: Scales::new(gear, &motor.alignment, motor.torque_constant),
             limit_gains: LimitGains::new(&limits, gains, period),
+            over_speed: OVER_SPEED * limits.velocity,
+            fault_position: (limits.position.0 - limits.position_margin, limits.position.1 + limits.position_margin),
             limits,
             largest_offset: bridge.limits.largest_offset(limits.over_current),
             current_limit,
@@ -388,7 +432,6 @@ impl Checked {
                 position_integral: 0.1 * gains.integral * period,
                 velocity_step: gains.acceleration * period,
                 acceleration: gains.acceleration,
-                deceleration: gains.quick_stop_deceleration,
                 quick_stop_step: gains.quick_stop_deceleration * period,
                 braking_steps: (gains.braking_time * rate) as u32,
             },

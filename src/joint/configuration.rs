@@ -26,6 +26,9 @@ pub struct MotorConfiguration {
     pub current_limit: f32,
     /// Largest d current that makes loss of braking energy which the supply does not take, A; 0 (none) to the current limit.
     pub loss_current: f32,
+    /// Largest d current that weakens the field, A; 0 (off) to the current limit, and to flux linkage over inductance. See
+    /// [`crate::motor::field_weakening`].
+    pub field_weakening_current: f32,
     /// How the encoder sits on the motor.
     pub alignment: EncoderAlignment,
     /// Age of an encoder sample when the control step sees it, s; 0 to 1 ms.
@@ -88,6 +91,8 @@ pub struct Gains {
     pub current_bandwidth: f32,
     /// Bandwidth of the tracking observer, Hz; 1 to a tenth of the control rate.
     pub observer_bandwidth: f32,
+    /// Longest voltage vector, over the longest one that fits at any angle; 0.1 to 2 / sqrt 3, where it reaches the corners of the hexagon.
+    pub voltage_fraction: f32,
     /// Stiffness of the position mode, Nm/rad; 0 to 1e5.
     pub stiffness: f32,
     /// Damping of position and velocity mode, Nm s/rad; 0 to 1e4.
@@ -306,6 +311,7 @@ impl Configuration {
         in_range!("highest supply voltage", "V", highest_supply, lowest_supply + 1.0, board.supply)?;
         in_range!("regeneration band", "V", limits.regeneration_band, 0.1, highest_supply - lowest_supply)?;
         in_range!("loss current", "A", motor.loss_current, 0.0, motor.current_limit)?;
+        in_range!("field-weakening current", "A", motor.field_weakening_current, 0.0, motor.current_limit)?;
         in_range!("bridge temperature limit", "°C", limits.bridge_temperature, 40.0, board.bridge_temperature)?;
         in_range!("command deadline", "s", limits.command_deadline, 1e-3, board.command_deadline)?;
         in_range!("limit damping", "Nm s/rad", limits.damping, limits.least_damping(), 1e6)?;

@@ -226,7 +226,11 @@ impl Joint {
 
         let winding = within(slow.derating, 0.0, 1.0);
         let faults = self.watch(active, demand, winding, measured, currents, &observation, &motion);
-        let state = self.decide(active, demand, faults, &motion);
+        let open_loop = demand.command.mode == Mode::OpenLoop;
+        let state = match self.machine.stays_enabled(demand.controlword, !faults.is_empty(), open_loop) {
+            true => State::OperationEnabled,
+            false => self.decide(active, demand, faults, &motion),
+        };
 
         // No sensor is no number, and derates nothing.
         let bridge = (active.limits.bridge_temperature - measured.bridge_temperature) * (1.0 / DERATING);
@@ -245,15 +249,18 @@ impl Joint {
             };
             let wanted = limited(torque * active.scales.current_per_torque, limit);
             let speed = active.alignment.electrical_speed(observation.motion.velocity);
-            let reference = self.regeneration.step(active, wanted, speed, measured.bus_voltage, derating);
+            let bus_voltage = measured.bus_voltage;
+            let wanted = self.regeneration.step(active, wanted, speed, bus_voltage, derating);
+            let gains = &active.field_oriented;
+            let reference = self.field_oriented.reference(gains, wanted, speed, bus_voltage, limit);
             let input = FieldOrientedInput {
                 phase_currents: currents,
                 angle: active.alignment.electrical(observation.motion.angle()),
                 speed,
-                bus_voltage: measured.bus_voltage,
+                bus_voltage,
                 reference,
             };
-            let output = self.field_oriented.step(&active.field_oriented, &input);
+            let output = self.field_oriented.step(gains, &input);
             self.monitor.current_loop(reference, &output, way);
             self.mean_square.add(output.current);
             (Bridge { state: BridgeState::Switching, duties: output.duties }, reference, output.current)
@@ -457,7 +464,8 @@ impl Joint {
         if self.coupled_steps <= active.deadline_steps { demand.coupled.velocity } else { 0.0 }
     }
 
-    /// The state from now on. A fault that must not be braked against goes straight through the reaction to "fault".
+    /// The state from now on, where it may be another one. A fault that must not be braked against goes straight
+    /// through the reaction to "fault".
     #[inline(never)]
     fn decide(&mut self, active: &Active, demand: &Demand, faults: Faults, motion: &JointMotion) -> State {
         let before = self.machine.state();
@@ -474,8 +482,7 @@ impl Joint {
         if state == State::OpenLoop && before != state {
             self.open_loop.begin();
         }
-        let reaction = faults.union(self.latched).reaction();
-        if reaction != Some(Reaction::Brake) {
+        if state == State::FaultReactionActive && faults.union(self.latched).reaction() != Some(Reaction::Brake) {
             state = self.machine.end_reaction();
         }
         if !faults.is_empty() {

@@ -38,7 +38,7 @@ const MISSED_LIMIT: f32 = 0.02;
 /// ... this part of the reference.
 const MISSED_REFERENCE: f32 = 0.25;
 /// A velocity this much above its limit is a fault.
-const OVER_SPEED: f32 = 1.2;
+pub(super) const OVER_SPEED: f32 = 1.2;
 /// Temperatures outside these are an open or shorted sensor, °C.
 const SENSOR_RANGE: (f32, f32) = (-40.0, 180.0);
 
@@ -125,7 +125,8 @@ fn within(value: f32, low: f32, high: f32) -> bool {
     value >= low && value <= high
 }
 
-/// One round of a first-order filter. What is not a number stays, and is a fault: nothing explains it.
+/// One round of a first-order filter. Once not a number it finds nothing until the bridge goes off, which a current that is no number causes by its limit in the same
+/// step.
 #[inline(always)]
 fn filter(state: &mut Dq, value: Dq) {
     let step = |state: f32, value: f32| state + VOLTAGE_FILTER * (value - state);
@@ -166,8 +167,10 @@ impl Monitor {
         faults.set(Fault::CurrentSensor, self.current_sum.step(unbalanced, CURRENT_SUM_STEPS));
 
         let (lowest, highest) = limits.bus_voltage;
-        faults.set(Fault::OverVoltage, exceeds(measured.bus_voltage, highest) || measured.bus_voltage < 0.0);
-        faults.set(Fault::UnderVoltage, !within(measured.bus_voltage, lowest, f32::INFINITY));
+        // As integers, see `motor::number`: negative numbers and what is none come after all others.
+        let supply = measured.bus_voltage.to_bits();
+        faults.set(Fault::OverVoltage, supply > highest.to_bits());
+        faults.set(Fault::UnderVoltage, !(lowest.to_bits()..=f32::INFINITY.to_bits()).contains(&supply));
 
         let lost = self.encoder.full | self.adrift;
         faults.set(Fault::EncoderLost, lost);
@@ -186,12 +189,10 @@ impl Monitor {
     /// Faults that only a joint in motion, or meant to be, can have. `winding` is the part of the current that the winding's temperature permits.
     #[inline(always)]
     pub fn motion(&mut self, active: &Active, motion: &JointMotion, stale_steps: u32, winding: f32) -> Faults {
-        let limits = &active.limits;
         let mut faults = Faults::NONE;
-        faults.set(Fault::OverSpeed, exceeds(motion.velocity, OVER_SPEED * limits.velocity));
-        let (low, high) = limits.position;
-        let margin = limits.position_margin;
-        faults.set(Fault::PositionLimit, !within(motion.position, low - margin, high + margin));
+        faults.set(Fault::OverSpeed, exceeds(motion.velocity, active.over_speed));
+        let (low, high) = active.fault_position;
+        faults.set(Fault::PositionLimit, !within(motion.position, low, high));
         faults.set(Fault::WindingTemperature, winding <= 0.0);
         faults.set(Fault::StaleCommand, stale_steps > active.deadline_steps);
         faults
@@ -290,6 +291,29 @@ mod tests {
         assert_eq!(found, Some(9));
         let mut rare = Bucket::default();
         assert!((1..1000).all(|n| !rare.step(n % 3 == 0, 3)), "one in three is not enough");
+    }
+
+    #[test]
+    fn a_bridge_that_has_not_switched_shows_no_fault_and_one_that_switches_again_is_checked_as_before() {
+        let board = crate::default_configuration::B_G431B_ESC1;
+        let active = board.joint.prepare(&board.bridge).unwrap();
+        let (duties, voltage) = (Phases::uniform(0.5), Dq { d: 0.0, q: 10.0 });
+        let output = FieldOrientedOutput { duties, current: Dq::ZERO, voltage, limited: false };
+        let found_after = |idle: u32| {
+            let mut monitor = Monitor::default();
+            for _ in 0..idle {
+                monitor.check_current_loop(&active);
+                assert!(monitor.found().is_empty());
+            }
+            // A voltage without a current: a phase is open.
+            (1..1000).find(|_| {
+                monitor.current_loop(Dq::ZERO, &output, 0.0);
+                monitor.check_current_loop(&active);
+                !monitor.found().is_empty()
+            })
+        };
+        assert!(found_after(0).is_some());
+        assert_eq!(found_after(1000), found_after(0));
     }
 
     #[test]

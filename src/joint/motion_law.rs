@@ -5,7 +5,7 @@
 use super::active::{Active, JointMotion};
 use super::command::{Command, Mode};
 use super::limit_law::Bounds;
-use crate::motor::number::{greater, lesser, limited, or_zero, square_root};
+use crate::motor::number::{greater, lesser, limited, or_zero};
 
 /// What a command wants in this round.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -127,9 +127,9 @@ impl MotionLaw {
         let way = or_zero(target - self.position);
         let distance = if way < 0.0 { -way } else { way };
         // Of the way that the next round needs anyway, nothing is left to brake on.
-        let speed = square_root(2.0 * gains.acceleration * distance);
-        let arrival = distance * gains.rate;
-        let speed = lesser(lesser(speed, arrival), active.limits.velocity);
+        let speed =
+            lesser(active.limit_gains.speed(2.0 * gains.acceleration * distance, active), distance * gains.rate);
+        let speed = lesser(speed, active.limits.velocity);
         let wanted = if way < 0.0 { -speed } else { speed };
         self.ramp(wanted, gains.velocity_step);
         self.position += self.velocity * gains.period;

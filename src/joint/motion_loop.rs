@@ -152,6 +152,7 @@ impl MotionLoop {
 
 #[cfg(test)]
 mod tests {
+    use super::super::command::Mode;
     use super::super::configuration::MOTION_STEPS;
     use super::*;
 
@@ -180,6 +181,25 @@ mod tests {
                 assert_eq!(step(&mut motion_loop, &active, State::OperationEnabled, 0.01), 0.01);
             }
         }
+    }
+
+    #[test]
+    fn a_joint_whose_bridge_is_off_wants_no_torque_and_forgets_what_its_integral_held() {
+        let active = active();
+        let surroundings = Surroundings { temperature: 25.0, coupled_velocity: 0.0 };
+        let motion = JointMotion { velocity: 0.3, ..JointMotion::default() };
+        let seen = Seen { motion: &motion, derating: 1.0, measured_torque: 0.0, surroundings };
+        let command = Command { mode: Mode::Velocity, velocity: 0.31, ..Command::default() };
+        let mut motion_loop = MotionLoop::default();
+        let mut step = |state| (motion_loop.step::<false>(&active, state, &command, &seen), *motion_loop.wanted());
+        let (first, _) = step(State::OperationEnabled);
+        let (last, _) = (1..1000).map(|_| step(State::OperationEnabled)).last().unwrap();
+        assert!(last > 1.1 * first && first > 0.0, "the integral adds to the torque: {first} Nm, then {last} Nm");
+        for _ in 0..2 * MOTION_STEPS {
+            // Turned by hand.
+            assert_eq!(step(State::SwitchedOn), (0.0, Wanted::default()));
+        }
+        assert_eq!(step(State::OperationEnabled).0, first);
     }
 
     #[test]

@@ -147,6 +147,19 @@ impl StateMachine {
         self.state
     }
 
+    /// A control step in which nothing asks for another state than "operation enabled": most of those in which the
+    /// bridge switches, the longest among them. False where [`step`](Self::step) has to look; it never contradicts it.
+    #[inline(always)]
+    pub fn stays_enabled(&mut self, word: Controlword, fault: bool, open_loop: bool) -> bool {
+        const ENABLED: u16 = Controlword::ENABLE_OPERATION.0;
+        const COUNTS: u16 = ENABLED | Controlword::FAULT_RESET.0;
+        let stays = self.state == State::OperationEnabled && word.0 & COUNTS == ENABLED && !(fault | open_loop);
+        if stays {
+            self.reset = false;
+        }
+        stays
+    }
+
     /// One control step; the state from now on. A fault has precedence over whatever is asked; one transition a step.
     #[inline(always)]
     pub fn step(&mut self, word: Controlword, events: Events) -> State {
@@ -430,6 +443,27 @@ mod tests {
             (Fault, 0x4f, 0x08),
         ] {
             assert_eq!(state.statusword() & mask, value, "{state:?}");
+        }
+    }
+
+    #[test]
+    fn staying_enabled_is_what_a_whole_step_would_do() {
+        let states = [SwitchOnDisabled, ReadyToSwitchOn, SwitchedOn, OperationEnabled, QuickStopActive];
+        for state in states.into_iter().chain([FaultReactionActive, Fault]) {
+            for before in [0x0f, 0x8f] {
+                let mut machine = in_state(state);
+                machine.step(Controlword(before), QUIET);
+                for word in 0..=0xff {
+                    for (fault, open_loop) in [(false, false), (true, false), (false, true), (true, true)] {
+                        let (mut one, mut other) = (machine, machine);
+                        let stays = one.stays_enabled(Controlword(word), fault, open_loop);
+                        other.step(Controlword(word), Events { fault, open_loop, ..QUIET });
+                        assert!(!stays || one == other, "{word:#x} in {machine:?}: {one:?}, not {other:?}");
+                        let plain = machine.state == OperationEnabled && word & 0x8f == 0x0f && !fault && !open_loop;
+                        assert_eq!(stays, plain, "{word:#x} in {machine:?}");
+                    }
+                }
+            }
         }
     }
 

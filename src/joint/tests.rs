@@ -94,6 +94,12 @@ fn a_coupled_joint_that_falls_silent_counts_as_standing_after_the_command_deadli
     assert_eq!(joint.coupled(&active, &demand), -2.5);
 }
 
+#[test]
+fn before_the_first_step_telemetry_tells_nothing() {
+    assert_eq!(Joint::new().telemetry(), Telemetry::NOTHING);
+    assert_eq!(Telemetry::NOTHING.motion, JointMotion::default());
+}
+
 /// Wanted current as a part of the current limit at a temperature of the bridge, and faults, in "operation enabled" and while braking.
 fn derated(bridge_temperature: f32, winding: f32, sensor: bool) -> (f32, Faults) {
     let mut board = crate::default_configuration::B_G431B_ESC1;

@@ -126,6 +126,12 @@ impl CurrentControl {
         self.asked
     }
 
+    /// The voltage of the last step, V.
+    #[inline(always)]
+    pub(super) fn asked(&self) -> Dq {
+        self.asked
+    }
+
     /// Takes out of the integral what of the last step's voltage was not applied.
     #[inline(always)]
     pub fn settle(&mut self, gains: &CurrentGains, applied: Dq) {
@@ -243,6 +249,20 @@ mod tests {
         }
         assert!(highest < 10.9, "{highest}");
         assert!((machine.measured().q - 10.0).abs() < 0.05, "{:?}", machine.measured());
+    }
+
+    #[test]
+    fn after_a_reset_the_first_voltage_is_that_of_a_controller_that_never_ran() {
+        let gains = CurrentGains::new(&SETTINGS).unwrap();
+        let wanted = Dq { d: 1.0, q: 10.0 };
+        let first = |mut controller: CurrentControl| controller.step(&gains, wanted, Dq::ZERO, 0.0);
+        let (mut controller, mut machine) = (CurrentControl::default(), Machine::at(0.0));
+        for _ in 0..100 {
+            control(&mut controller, &gains, &mut machine, wanted, 60.0);
+        }
+        assert_ne!(first(controller), first(CurrentControl::default()));
+        controller.reset();
+        assert_eq!(first(controller), first(CurrentControl::default()));
     }
 
     /// Largest d current while q steps to 10 A at a speed, with the flux and inductances that are fed forward scaled.

@@ -7,6 +7,7 @@
 
 use super::angle::{ElectricalAngle, TAU};
 use super::current::{CurrentControl, CurrentGains, CurrentSettings, DELAY_PERIODS};
+use super::field_weakening::{FieldWeakening, WeakeningGains};
 use super::modulation::{Modulated, ModulationSettings, Modulator};
 use super::phases::Phases;
 use super::setting::SettingError;
@@ -19,6 +20,8 @@ pub struct FieldOrientedGains {
     pub current: CurrentGains,
     /// Modulation.
     pub modulator: Modulator,
+    /// Field weakening; off unless it is set.
+    pub weakening: WeakeningGains,
     /// Electrical turns that the rotor moves on in the delay at 1 rad/s.
     advance: f32,
 }
@@ -29,6 +32,7 @@ impl FieldOrientedGains {
         Ok(Self {
             current: CurrentGains::new(current)?,
             modulator: Modulator::new(modulation)?,
+            weakening: WeakeningGains::default(),
             advance: DELAY_PERIODS / current.rate / TAU,
         })
     }
@@ -66,9 +70,28 @@ pub struct FieldOrientedOutput {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FieldOriented {
     control: CurrentControl,
+    weakening: FieldWeakening,
 }
 
 impl FieldOriented {
+    /// The current to be made in this control step, A, where `wanted` is the one without [field weakening](super::field_weakening): the same where that is
+    /// off. `speed` is the electrical speed, rad/s, `limit` the current limit, A. [`step`](Self::step) must follow.
+    #[inline(always)]
+    pub fn reference(
+        &mut self,
+        gains: &FieldOrientedGains,
+        wanted: Dq,
+        speed: f32,
+        bus_voltage: f32,
+        limit: f32,
+    ) -> Dq {
+        if !gains.weakening.is_on() {
+            return wanted;
+        }
+        let reach = gains.modulator.reach(bus_voltage);
+        self.weakening.step(&gains.weakening, wanted, self.control.asked(), reach, speed, limit)
+    }
+
     /// One control step.
     #[inline(always)]
     pub fn step(&mut self, gains: &FieldOrientedGains, input: &FieldOrientedInput) -> FieldOrientedOutput {
@@ -90,6 +113,7 @@ impl FieldOriented {
     /// Forgets the past: for the first step after the bridge was off.
     pub fn reset(&mut self) {
         self.control.reset();
+        self.weakening.reset();
     }
 }
 

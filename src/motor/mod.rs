@@ -22,6 +22,7 @@
 pub mod angle;
 pub mod current;
 pub mod field_oriented;
+pub mod field_weakening;
 pub mod modulation;
 pub mod number;
 pub mod observer;

@@ -3,7 +3,8 @@
 //! Half the sum of the largest and the smallest phase voltage is taken from all phases. This centres them between the rails, which
 //! is what space-vector modulation does with its zero vectors (Holmes and Lipo, Pulse Width Modulation for Power Converters,
 //! section 6.2), and a vector of any angle fits up to V_bus / sqrt 3. Beyond that the duties reach their limits one after the
-//! other; the corners of the hexagon lie at 2/3 V_bus.
+//! other; the corners of the hexagon lie at 2/3 V_bus. A vector that leaves it is shortened until the span of its phase voltages, largest less
+//! smallest, fits: its angle is kept, and a torque stays smoother than with duties that are cut off one by one.
 //!
 //! While a leg's two transistors are both off, its current chooses the rail. A current out of the leg costs the dead time's
 //! part of the period times V_bus, a current into it gains as much. Compensation adds that back by the sign of the current; within a
@@ -63,6 +64,8 @@ pub struct Modulator {
     maximum_duty: f32,
     /// Longest vector as a fraction of the supply.
     reach: f32,
+    /// Widest span of the phase voltages as a fraction of the supply; infinite where no permitted vector has a wider one.
+    span: f32,
     dead_time: f32,
     dead_time_per_ampere: f32,
     minimum_bus_voltage: f32,
@@ -92,6 +95,7 @@ impl Modulator {
             minimum_duty,
             maximum_duty,
             reach: fraction * span * FRAC_1_SQRT_3,
+            span: if fraction > 1.0 { span } else { f32::INFINITY },
             dead_time,
             dead_time_per_ampere: dead_time / band,
             minimum_bus_voltage,
@@ -134,15 +138,19 @@ impl Modulator {
         let wanted = Phases { a: limited(wanted.a, 2.0), b: limited(wanted.b, 2.0), c: limited(wanted.c, 2.0) };
         let largest = greater(wanted.a, greater(wanted.b, wanted.c));
         let smallest = lesser(wanted.a, lesser(wanted.b, wanted.c));
-        let middle = self.centre - 0.5 * (largest + smallest);
+        // A product with one changes no bit, and takes less than a branch around four.
+        let span = largest - smallest;
+        let beyond = span > self.span;
+        let part = if beyond { self.span / span } else { 1.0 };
+        let middle = self.centre - 0.5 * (part * (largest + smallest));
 
-        let a = self.leg(middle + wanted.a, currents.a);
-        let b = self.leg(middle + wanted.b, currents.b);
-        let c = self.leg(middle + wanted.c, currents.c);
+        let a = self.leg(middle + part * wanted.a, currents.a);
+        let b = self.leg(middle + part * wanted.b, currents.b);
+        let c = self.leg(middle + part * wanted.c, currents.c);
         Modulated {
             duties: Phases { a: a.duty, b: b.duty, c: c.duty },
             applied: AlphaBeta::from_phases(Phases { a: a.applied, b: b.applied, c: c.applied }) * bus_voltage,
-            limited: a.limited | b.limited | c.limited,
+            limited: a.limited | b.limited | c.limited | beyond,
         }
     }
 
@@ -238,6 +246,23 @@ mod tests {
         assert!((corner.applied.alpha - 15.999).abs() < 1e-3, "the corner of the hexagon is reached: {corner:?}");
         let edge = full.modulate(vector(16.0, 1 << 30), 24.0, Phases::default());
         assert!((edge.applied.beta - 24.0 / 3f32.sqrt()).abs() < 1e-3, "between corners the edge ends it: {edge:?}");
+    }
+
+    proptest! {
+        #[test]
+        fn beyond_the_hexagon_the_angle_is_kept_and_the_edge_is_reached(length in 13.9f32..40.0, angle: u32) {
+            let full = ModulationSettings { maximum_duty: 1.0, voltage_fraction: HIGHEST_VOLTAGE_FRACTION, ..SETTINGS };
+            let wanted = vector(length, angle);
+            let modulated = Modulator::new(&full).unwrap().modulate(wanted, 24.0, Phases::default());
+            let Modulated { duties: Phases { a, b, c }, applied, limited } = modulated;
+            let phases = wanted.to_phases();
+            let most = phases.a.max(phases.b).max(phases.c) - phases.a.min(phases.b).min(phases.c);
+            prop_assert_eq!(limited, most > 24.0 * 0.98);
+            prop_assert!((applied.alpha * wanted.beta - applied.beta * wanted.alpha).abs() < 1e-3 * length, "{applied:?}");
+            if limited {
+                prop_assert!((a.max(b).max(c) - a.min(b).min(c) - 0.98).abs() < 1e-5, "{modulated:?}");
+            }
+        }
     }
 
     #[test]

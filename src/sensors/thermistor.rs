@@ -69,6 +69,17 @@ mod tests {
     }
 
     #[test]
+    fn the_logarithm_is_exact_to_the_rounding_of_single_precision() {
+        let mut worst = 0f64;
+        for step in -20_000..=20_000 {
+            let x = (f64::from(step) / 2_000.0).exp() as f32;
+            let exact = f64::from(x).ln();
+            worst = worst.max((f64::from(logarithm(x)) - exact).abs() / exact.abs().max(1.0));
+        }
+        assert!(worst < 2e-7, "{worst}");
+    }
+
+    #[test]
     fn an_open_and_a_shorted_wire_are_no_temperature() {
         for fraction in [0.0, 0.004, 0.996, 1.0, -1.0, 2.0, f32::NAN] {
             assert!(NTC.temperature(fraction).is_nan(), "{fraction}");

@@ -84,6 +84,8 @@ fn seldom_or_operating(name: &str) -> bool {
         "9limit_law5bound",
         "5joint7offsets",
         "5joint12regeneration",
+        "5motor15field_weakening",
+        "19FrictionFeedforward5reset",
         // Of what clears the current loop's memory in them.
         "LongThunk___aeabi_memclr",
     ]

@@ -49,6 +49,8 @@ room! {
             "0 absolute, 1 incremental with an index, which it has to meet after each start"
         12, "loss current", F32, RW, UNMAPPED, S(Setting::LossCurrent); "A", 1.0, within(0.0, 200.0);
             "Largest d current that turns braking energy which the supply does not take into heat of the winding; 0: none; at most the current limit"
+        13, "field-weakening current", F32, RW, UNMAPPED, S(Setting::FieldWeakeningCurrent); "A", 1.0, within(0.0, 200.0);
+            "Largest d current against the magnet's flux, for speeds at which the supply's voltage is used up; 0: none; at most the current limit and flux linkage over inductance d"
     }
     0x2102 "gear" {
         1, "gear ratio", F32, RW, UNMAPPED, S(Setting::GearRatio); "", 1.0, within(-500.0, 500.0);
@@ -101,6 +103,8 @@ room! {
             "Of quick stop and fault reaction"
         8, "braking time", F32, RW, UNMAPPED, S(Setting::BrakingTime); "s", 1.0, within(0.01, 10.0);
             "Longest time that braking may take before the bridge switches off"
+        9, "voltage fraction", F32, RW, UNMAPPED, S(Setting::VoltageFraction); "", 1.0, within(0.1, 1.1547005);
+            "Longest voltage vector over the longest one that fits at any angle; above 1 the currents are no sines at the limit, at 2 / sqrt 3 it is the whole hexagon"
     }
     0x2106 "heat" {
         1, "winding heat capacity", F32, RW, UNMAPPED, S(Setting::WindingCapacity); "J/K", 1.0, within(0.1, 10_000.0);

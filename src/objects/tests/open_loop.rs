@@ -61,6 +61,9 @@ fn outside_operational_no_voltage_is_asked_for() {
 fn the_number_holds_the_window_that_the_rest_is_read_of() {
     let mut node = Node::operational();
     assert_eq!(node.number(0x2108, 1), 0);
+    for sub_index in (2..=11).chain([14]) {
+        assert_eq!(node.real(0x2108, sub_index), 0.0, "before the first window, sub-index {sub_index}");
+    }
     node.objects.program().window = window(7);
     assert_eq!(node.real(0x2108, 2), 0.0, "nothing before the number is read");
     assert_eq!(node.number(0x2108, 1), 7);

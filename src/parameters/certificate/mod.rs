@@ -311,6 +311,27 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_bisection_comes_down_to_the_finest_cells_and_visits_each_of_them() {
+        let visited = core::cell::Cell::new(0u32);
+        let widest = bisect(
+            (0u32, 1u32 << MAX_DEPTH),
+            MAX_DEPTH,
+            &|(low, high)| {
+                visited.set(visited.get() + 1);
+                high - low
+            },
+            &|a, b| a.max(b),
+            &|_, _| false,
+            &|&(low, high)| {
+                let middle = (low + high) / 2;
+                Some(((low, middle), (middle, high)))
+            },
+        );
+        // A waiting cell that found no place would have counted whole.
+        assert_eq!((widest, visited.get()), (1, (2 << MAX_DEPTH) - 1));
+    }
+
+    #[test]
     fn a_refusal_tells_a_bound_from_a_limit_one_unit_below_and_keeps_its_sign() {
         let output = Refusal::Output { bound: 65_537, limit: 65_536 }.to_string();
         assert_eq!(output, "friction can reach 1.00001, limit 1.00000 Nm");

@@ -245,3 +245,30 @@ impl Inputs {
         self.scales().each_ref().map(InputScale::interval)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slope_on_one_side_of_zero_is_bounded_by_zero_on_the_other() {
+        let per_unit = |low, high| per_signal(Interval { low, high }, 1 << 16, 1 << 16, 16);
+        assert_eq!(per_unit(0, 0), Interval::ZERO);
+        let one = 1 << slopes::FRACTION_BITS;
+        // Outwards by one unit of Q16.16.
+        assert_eq!(per_unit(-one, -1), Interval { low: -(1 << 16) - 1, high: 0 });
+        assert_eq!(per_unit(1, one), Interval { low: 0, high: (1 << 16) + 1 });
+    }
+
+    #[test]
+    fn a_network_is_short_by_what_its_roundings_cut_and_the_bound_is_hardly_more() {
+        let mut parameters = NetworkParameters { scale: 128 << 16, ..NetworkParameters::default() };
+        assert!(resolution(&parameters) <= 4, "nothing but its last roundings: {}", resolution(&parameters));
+        // The output is one activation of the last layer: cut to Q15, of a sum that a fraction of 12 bits cuts by 2^-17.
+        parameters.output.weights[0] = 1 << 14;
+        parameters.output.fraction = 14;
+        let cut = (1.0 / 32_768.0 + 1.0 / 131_072.0) * parameters.scale as f64;
+        let bound = resolution(&parameters) as f64;
+        assert!(cut <= bound && bound <= 1.02 * cut, "{bound} units for {cut}");
+    }
+}

@@ -324,6 +324,16 @@ mod tests {
     }
 
     #[test]
+    fn the_slope_of_the_arc_tangent_is_bounded_by_a_sixteenth_more_than_it_is() {
+        for step in -40_000i64..=40_000 {
+            let x = step << 7;
+            let exact = 65_536.0 * core::f64::consts::FRAC_2_PI / (1.0 + (x as f64 / 65_536.0).powi(2));
+            let bound = atan_slopes(Interval::point(x)).high as f64;
+            assert!(exact <= bound && bound <= exact * (1.0 + 1.0 / 16.0) + 65.0, "{x}: {bound}, exact {exact}");
+        }
+    }
+
+    #[test]
     fn sines_exceed_one_by_less_than_is_allowed_for() {
         let largest = (0..u32::MAX).step_by(9_973).flat_map(odd_sines).map(|sine| sine.unsigned_abs()).max();
         let largest = largest.unwrap_or(0);

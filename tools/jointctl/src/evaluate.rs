@@ -10,6 +10,7 @@ use crate::torque_error::{Lost, torque_error};
 use nalgebra::{DMatrix, DVector};
 
 /// A model's predicted effort for every sample.
+#[derive(Clone, Debug)]
 pub struct Prediction {
     /// Name of the model.
     pub model: String,

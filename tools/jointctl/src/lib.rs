@@ -39,6 +39,7 @@ pub mod quantize;
 pub mod remote;
 pub mod report;
 pub mod rigid;
+pub mod sample_table;
 pub mod samples;
 pub mod simulation;
 pub mod split;

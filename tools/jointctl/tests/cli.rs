@@ -98,6 +98,65 @@ fn an_image_survives_the_way_to_toml_and_back_and_a_damaged_one_is_refused() {
     assert!(run(&["image", "convert", "edited.toml", "edited.img", "--recompute-golden"]).status.success());
 }
 
+/// Named columns of a table that `--export` wrote.
+fn exported(path: &Path) -> std::collections::BTreeMap<String, Vec<String>> {
+    let bytes = std::fs::read(path).unwrap();
+    let mut text = Vec::new();
+    match path.extension().is_some_and(|extension| extension == "gz") {
+        true => std::io::copy(&mut flate2::read::GzDecoder::new(&bytes[..]), &mut text).map(drop).unwrap(),
+        false => text = bytes,
+    }
+    let mut reader = csv::Reader::from_reader(&text[..]);
+    let names: Vec<String> = reader.headers().unwrap().iter().map(str::to_owned).collect();
+    let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
+    let column = |at: usize| rows.iter().map(|row| row[at].to_owned()).collect();
+    names.into_iter().enumerate().map(|(at, name)| (name, column(at))).collect()
+}
+
+#[test]
+fn the_exported_table_holds_every_sample_and_gives_the_reported_errors() {
+    let folder = tempfile::tempdir().unwrap();
+    assert!(demo(folder.path(), "demo").status.success());
+    let run = |arguments: &[&str]| jointctl(folder.path(), arguments);
+    let fit = ["fit", "demo/dataset.toml", "--out", "out", "--trainer", "none", "--export", "fit.csv.gz"];
+    assert!(run(&fit).status.success());
+    let evaluate = ["evaluate", "out/friction.img", "demo/dataset.toml", "--json", "--export", "evaluate.csv"];
+    let evaluated = run(&evaluate);
+    assert!(evaluated.status.success(), "{}", stderr(&evaluated));
+    let report = std::fs::read(folder.path().join("out/report.json")).unwrap();
+    for (file, json) in [("fit.csv.gz", &report), ("evaluate.csv", &evaluated.stdout)] {
+        let json: serde_json::Value = serde_json::from_slice(json).unwrap();
+        let table = exported(&folder.path().join(file));
+        let number = |name: &str| table[name].iter().map(|text| text.parse::<f64>().unwrap()).collect::<Vec<_>>();
+        let set = &json["errors"][0];
+        let member = &table[&format!("test {}", set["test_set"].as_str().unwrap())];
+        let effort = number("effort_Nm");
+        let rows = set["rows"].as_array().unwrap();
+        for row in rows {
+            let predicted = number(&format!("predicted {}", row["model"].as_str().unwrap()));
+            let errors: Vec<f64> =
+                (0..effort.len()).filter(|&i| member[i] == "1").map(|i| effort[i] - predicted[i]).collect();
+            let rmse = (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt();
+            let reported = &row["errors"]["overall"];
+            assert_eq!(Some(errors.len() as u64), reported["samples"].as_u64());
+            let reported = reported["rmse"].as_f64().unwrap();
+            assert!((rmse - reported).abs() <= 1e-9 * reported, "{row}: {rmse}");
+        }
+        assert!(rows.iter().any(|row| row["model"] == "image, fixed point"));
+        for part in ["train", "validation", "test"] {
+            let found = table["part"].iter().filter(|text| *text == part).count();
+            assert!(found > 300, "{found} samples of {part}");
+        }
+        // The regressors are those of the very sample.
+        let (position, sine) = (number("position_rad"), number("rigid gravity_sine"));
+        assert!(position.iter().zip(sine).all(|(position, sine)| position.sin() == sine));
+        assert_eq!(number("acceleration_rad_s2"), number("rigid inertia"));
+    }
+    std::fs::create_dir(folder.path().join("taken.csv")).unwrap();
+    let refused = run(&["evaluate", "out/friction.img", "demo/dataset.toml", "--export", "taken.csv"]);
+    assert!(!refused.status.success() && stderr(&refused).contains("taken.csv"), "{}", stderr(&refused));
+}
+
 #[test]
 fn a_fit_that_fails_says_why_and_leaves_earlier_results_as_they_were() {
     let folder = tempfile::tempdir().unwrap();

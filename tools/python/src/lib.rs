@@ -1,5 +1,7 @@
 //! Python with packages of others, for the tests that drive this project's programs from it.
 
+pub mod baselines;
+
 use std::path::{Path, PathBuf};
 use std::process::Command;
 

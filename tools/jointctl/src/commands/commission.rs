@@ -51,6 +51,9 @@ pub struct Commission {
     /// At the end the joint holds a load of this torque, Nm, to check the torque constant by
     #[arg(long, value_name = "NM", allow_negative_numbers = true)]
     load: Option<f64>,
+    /// At the end the joint swings this inertia, kg m^2 at the joint with the rotor's, to check the torque constant by; balanced, no load
+    #[arg(long, value_name = "KG_M2")]
+    inertia: Option<f64>,
     /// Do not turn the motor with the new configuration at the end
     #[arg(long)]
     no_turn: bool,
@@ -90,6 +93,7 @@ impl Commission {
             zero: self.zero,
             travel: self.travel,
             load: self.load,
+            inertia: self.inertia,
             turn: !self.no_turn,
             acknowledge: self.reset,
         };

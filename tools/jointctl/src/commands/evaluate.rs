@@ -11,6 +11,7 @@ use crate::joint_model::{FloatFriction, firmware_states, fixed_point, regimes, r
 use crate::presets::Preset;
 use crate::progress::{Progress, Terminal};
 use crate::report::{Role, console};
+use crate::sample_table::write_sample_table;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -26,6 +27,10 @@ pub struct Evaluate {
     image: PathBuf,
     /// Description of the data set
     dataset: PathBuf,
+    /// Table of the prepared samples with their part and every model's prediction, for other programs (docs/baselines.md);
+    /// FILE.gz is compressed
+    #[arg(long, value_name = "FILE")]
+    export: Option<PathBuf>,
     /// Print the tables as JSON
     #[arg(long)]
     json: bool,
@@ -81,6 +86,9 @@ impl Evaluate {
         predictions.push(Prediction::new("image, compensation", Role::OtherMotion, &rigid, |i| torque[i]));
         let tables = error_tables(samples, &prepared.test_sets, &predictions).map_err(FitError::from)?;
         let difference = fixed_point_difference(&float, &fixed, &sets, samples);
+        if let Some(path) = &self.export {
+            write_sample_table(&prepared, &predictions, path)?;
+        }
         progress.finish();
         if self.json {
             println!("{}", serde_json::json!({ "errors": tables, "fixed_point": difference }));

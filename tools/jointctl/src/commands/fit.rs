@@ -8,6 +8,7 @@ use crate::output::{OutputFile, write_directory};
 use crate::presets::Preset;
 use crate::progress::{Progress, Terminal};
 use crate::report::{NetworkOutcome, console, render, verdict};
+use crate::sample_table::write_sample_table;
 use clap::{Args, ValueEnum};
 use joint_firmware::friction::regime::Measure;
 use joint_firmware::parameters::image::{Image, MAX_LENGTH};
@@ -21,6 +22,10 @@ pub struct Fit {
     /// Folder for image, report and figures; files of the same names are replaced, others are left alone
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Table of the prepared samples with their part and every model's prediction, for other programs (docs/baselines.md);
+    /// FILE.gz is compressed
+    #[arg(long, value_name = "FILE")]
+    export: Option<PathBuf>,
     /// Choices of the fit.
     #[command(flatten)]
     choices: Choices,
@@ -184,6 +189,9 @@ impl Fit {
         let fitted = fit(&mut prepared, &options, &progress)?;
         progress.stage("write");
         write(&fitted, &out)?;
+        if let Some(path) = &self.export {
+            write_sample_table(&prepared, &fitted.predictions, path)?;
+        }
         progress.finish();
         print_summary(&prepared, &fitted, &out);
         Ok(())

@@ -185,6 +185,15 @@ pub enum Failure {
         /// rad/s.
         wanted: f64,
     },
+    /// Torque over acceleration gives no inertia.
+    InertiaUnclear {
+        /// kg m^2; NaN of too few samples.
+        inertia: f64,
+        /// Standard error, kg m^2.
+        error: f64,
+        /// Largest error, as a part of the inertia.
+        limit: f64,
+    },
     /// The user said no.
     Declined,
 }
@@ -325,6 +334,12 @@ impl std::fmt::Display for Failure {
                 f,
                 "the joint turned at {velocity:.3} rad/s instead of {wanted:.3} rad/s with the new configuration: it is disabled. \
                  What was measured is kept; look at gains and limits (`jointctl get gains limits`)"
+            ),
+            Self::InertiaUnclear { inertia, error, limit } => write!(
+                f,
+                "the joint's torque gives an inertia of {inertia:.5} +- {error:.5} kg m^2, more than {:.0} % unclear: give it more way \
+                 (lowest-position, highest-position) or acceleration, or check the torque constant by --load. What was commissioned is stored",
+                percent(limit)
             ),
             Self::Declined => f.write_str("not confirmed; nothing was done further"),
         }

@@ -8,7 +8,7 @@
 //!  - [`alignment`]: a first short sweep, then a turn of the rotor there and back, then with less current: pole pairs, direction, electrical zero, flux
 //!    linkage; before the second the [`index`] of an incremental encoder
 //!  - `settings`: what the joint gets of it; position zero
-//!  - [`turning`]: the motor turns with it; [`load`]: the torque constant against a known load
+//!  - [`turning`]: the motor turns with it; [`load`], [`inertia`]: the torque constant against a known load, or inertia
 //!
 //! [`commission`] leads through them, [`joint`] is the joint on a bus by its objects, [`page`] what is written. The bridge is off before every
 //! question, and after every error.
@@ -21,6 +21,7 @@ pub mod estimate;
 pub mod failure;
 pub mod index;
 pub mod inductance;
+pub mod inertia;
 pub mod joint;
 pub mod load;
 pub mod page;
@@ -38,6 +39,7 @@ pub use checks::Checked;
 pub use failure::Failure;
 pub use index::Index;
 pub use inductance::Inductance;
+pub use inertia::Inertia;
 pub use load::Load;
 pub use plan::Plan;
 pub use resistance::Resistance;
@@ -71,6 +73,8 @@ pub enum Stage {
     Turning,
     /// The joint holds a load.
     Load,
+    /// The joint swings an inertia.
+    Inertia,
 }
 
 impl Stage {
@@ -90,6 +94,7 @@ impl Stage {
             Self::Settings => "settings",
             Self::Turning => "turning with the new settings",
             Self::Load => "known load",
+            Self::Inertia => "known inertia",
         }
     }
 }
@@ -129,6 +134,8 @@ pub struct Found {
     pub turned: Option<Turned>,
     /// What it measured of a known load.
     pub load: Option<Load>,
+    /// What it measured of a known inertia.
+    pub inertia: Option<Inertia>,
 }
 
 /// Commissions a joint. What the joint had before is back where this fails before the new settings are complete.
@@ -181,6 +188,19 @@ pub fn commission<B: Bench>(bench: &mut B, plan: &Plan, guide: &mut impl Guide) 
             load.measured.value, load.measured.error, load.torque_constant
         ));
         found.load = Some(load);
+    }
+    if let Some(known) = plan.inertia {
+        agreed(
+            guide,
+            "The joint will swing by up to three quarters of a turn of the rotor to each side, ten times. Is it free to, and balanced?",
+        )?;
+        guide.stage(Stage::Inertia);
+        let inertia = inertia::swing(bench, known)?;
+        guide.found(&format!(
+            "{:.5} kg m^2 measured of {known:.5}, standard error {:.5}: both agree with a torque constant of {:.5} Nm/A",
+            inertia.measured.value, inertia.measured.error, inertia.torque_constant
+        ));
+        found.inertia = Some(inertia);
     }
     Ok(found)
 }
@@ -337,6 +357,7 @@ fn measure<B: Bench>(
         settings: Vec::new(),
         turned: None,
         load: None,
+        inertia: None,
     })
 }
 

@@ -168,6 +168,20 @@ fn measured(found: &Found) -> Markup {
         ));
         rows.push(("torque constant by it", format!("{:.5}", load.torque_constant), "Nm/A", "with which both agree"));
     }
+    if let Some(inertia) = &found.inertia {
+        rows.push((
+            "known inertia",
+            format!("{} of {:.5}", number(inertia.measured, 1.0, 5), inertia.known),
+            "kg m²",
+            "work over the way, both directions",
+        ));
+        rows.push((
+            "torque constant by it",
+            format!("{:.5}", inertia.torque_constant),
+            "Nm/A",
+            "with which both agree",
+        ));
+    }
     html! {
         div.scroll { table {
             thead { tr { th { "what" } th.number { "value" } th { "unit" } th { "by" } } }

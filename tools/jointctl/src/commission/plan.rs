@@ -23,6 +23,8 @@ pub struct Plan {
     pub travel: f64,
     /// Torque of a load, Nm, that the joint holds still at the end, to check the torque constant by.
     pub load: Option<f64>,
+    /// Inertia at the joint, kg m^2, the rotor's included, to check the torque constant by.
+    pub inertia: Option<f64>,
     /// The motor is turned with the new configuration at the end.
     pub turn: bool,
     /// A fault whose cause is gone is acknowledged first.
@@ -42,6 +44,7 @@ impl Plan {
             zero: None,
             travel: 1.0,
             load: None,
+            inertia: None,
             turn: true,
             acknowledge: false,
         }
@@ -63,6 +66,7 @@ impl Plan {
             ("--zero", self.zero, [-1000.0, 1000.0], "rad"),
             ("--travel", Some(self.travel), [0.05, 1.0], "turns of the rotor"),
             ("the magnitude of --load", self.load.map(f64::abs), [0.001, 2000.0], "Nm"),
+            ("--inertia", self.inertia, [1e-7, 1000.0], "kg m^2"),
         ] {
             match value {
                 Some(value) if !(limits[0]..=limits[1]).contains(&value) => {
@@ -89,6 +93,8 @@ mod tests {
             (Plan { pole_pairs: Some(64), ..plan }, Plan { pole_pairs: Some(65), ..plan }, "--pole-pairs"),
             (Plan { gear: Some(-1.0), ..plan }, Plan { gear: Some(-0.99), ..plan }, "--gear"),
             (Plan { travel: 0.05, ..plan }, Plan { travel: 0.049, ..plan }, "--travel"),
+            (Plan { inertia: Some(1e-7), ..plan }, Plan { inertia: Some(0.9e-7), ..plan }, "--inertia"),
+            (Plan { inertia: Some(1000.0), ..plan }, Plan { inertia: Some(1000.1), ..plan }, "--inertia"),
             (Plan { current: 0.1, ..plan }, Plan { current: f64::NAN, ..plan }, "--current"),
         ] {
             assert_eq!(good.check(), Ok(()), "{good:?}");

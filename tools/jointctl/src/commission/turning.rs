@@ -30,8 +30,19 @@ pub struct Turned {
     pub samples: Vec<[f64; 3]>,
 }
 
-/// Turns the motor a little, there and back, and leaves the joint disabled.
-pub(super) fn turn<B: Bench>(bench: &mut B) -> Result<Turned, Failure> {
+/// How far and how fast a joint may turn here.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Reach {
+    /// rad/s.
+    pub velocity: f64,
+    /// rad to one side; a ramp adds half of it at most.
+    pub way: f64,
+    /// rad/s^2, of the ramps.
+    pub acceleration: f64,
+}
+
+/// Within the joint's limits of position and velocity.
+pub(super) fn reach<B: Bench>(bench: &mut B) -> Result<Reach, Failure> {
     let gear = bench.setting(Setting::GearRatio)?.abs();
     let limits = [bench.setting(Setting::LowestPosition)?, bench.setting(Setting::HighestPosition)?];
     let fastest = bench.setting(Setting::VelocityLimit)?;
@@ -49,6 +60,12 @@ pub(super) fn turn<B: Bench>(bench: &mut B) -> Result<Turned, Failure> {
         ))
         .into());
     }
+    Ok(Reach { velocity, way, acceleration })
+}
+
+/// Turns the motor a little, there and back, and leaves the joint disabled.
+pub(super) fn turn<B: Bench>(bench: &mut B) -> Result<Turned, Failure> {
+    let Reach { velocity, way, acceleration } = reach(bench)?;
     bench.begin_motion(Motion::Velocity)?;
     let turned = there_and_back(bench, velocity, way, acceleration);
     let off = bench.off();
@@ -88,12 +105,17 @@ fn there_and_back<B: Bench>(bench: &mut B, wanted: f64, way: f64, acceleration: 
         }
         *mean = sum / f64::from(taken.max(1));
     }
-    // Down before the joint is told to stop: what brakes for longer than its command deadline has a fault.
-    let mut left = REST + wanted / acceleration;
+    rest(bench, wanted / acceleration)?;
+    Ok(Turned { wanted, velocity, samples })
+}
+
+/// Down by a ramp of some seconds before the joint is told to stop: what brakes for longer than its command deadline has a fault.
+pub(super) fn rest<B: Bench>(bench: &mut B, ramp: f64) -> Result<(), Failure> {
+    let mut left = REST + ramp;
     while left > 0.0 {
         bench.move_to(0.0)?;
         bench.pass(PERIOD)?;
         left -= PERIOD;
     }
-    Ok(Turned { wanted, velocity, samples })
+    Ok(())
 }

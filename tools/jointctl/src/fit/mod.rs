@@ -145,6 +145,8 @@ pub struct Fitted {
     pub certificate: Certificate,
     /// Everything worth knowing, for people.
     pub report: Report,
+    /// The effort of every sample as the image and every model beside it predict it, rigid part included.
+    pub predictions: Vec<Prediction>,
 }
 
 /// Runs the whole pipeline on a prepared data set.
@@ -216,7 +218,7 @@ pub fn fit(prepared: &mut Prepared, options: &Options, progress: &dyn Progress) 
         test: summary::test_samples(prepared, &rigid, physical, &learned, &fixed),
     };
     progress.stage("done");
-    Ok(Fitted { image: built.image, certificate: built.certificate, report })
+    Ok(Fitted { image: built.image, certificate: built.certificate, report, predictions })
 }
 
 /// The image on another view of the same motion: the difference to its own row is what observer, sampling and noise

@@ -42,7 +42,7 @@ const fn field(
 }
 
 /// All keys.
-pub const FIELDS: [Field; 44] = [
+pub const FIELDS: [Field; 46] = [
     field("", "node_id", "", None, "Node on the CAN bus, 1 to 127; 255 where none is assigned yet"),
     field("motor", "resistance", "Ohm", Some((1e-3, 100.0)), "Resistance of a phase at 25 °C"),
     field("motor", "inductance_d", "H", Some((1e-6, 0.1)), "Inductance along the magnet's flux"),
@@ -55,6 +55,13 @@ pub const FIELDS: [Field; 44] = [
         "A",
         None,
         "Largest d current that burns braking energy which the supply does not take; 0 (none) to the current limit",
+    ),
+    field(
+        "motor",
+        "field_weakening_current",
+        "A",
+        None,
+        "Largest d current against the magnet's flux; 0 (none) to the current limit and flux linkage over inductance",
     ),
     field("motor", "encoder_latency", "s", Some((0.0, 1e-3)), "Age of an encoder sample when it is used"),
     field(
@@ -153,6 +160,13 @@ pub const FIELDS: [Field; 44] = [
         "Hz",
         None,
         "Bandwidth of the tracking observer; 1 to a tenth of the control rate",
+    ),
+    field(
+        "gains",
+        "voltage_fraction",
+        "",
+        Some((0.1, 1.154_700_5)),
+        "Longest voltage vector over the longest one that fits at any angle; 1.1547 uses the whole hexagon",
     ),
     field("gains", "stiffness", "Nm/rad", Some((0.0, 1e5)), "Stiffness of the position mode"),
     field("gains", "damping", "Nm s/rad", Some((0.0, 1e4)), "Damping of position and velocity mode"),

@@ -43,6 +43,8 @@ struct MotorText {
     torque_constant: f32,
     current_limit: f32,
     loss_current: f32,
+    #[serde(default)]
+    field_weakening_current: f32,
     #[serde(with = "AlignmentText")]
     alignment: EncoderAlignment,
     encoder_latency: f32,
@@ -53,6 +55,11 @@ struct MotorText {
 /// Of a file that says nothing of it.
 fn encoder_counts() -> u32 {
     4_000
+}
+
+/// Of a file that says nothing of it.
+fn voltage_fraction() -> f32 {
+    1.0
 }
 
 #[derive(Serialize, Deserialize)]
@@ -100,6 +107,8 @@ struct LimitsText {
 struct GainsText {
     current_bandwidth: f32,
     observer_bandwidth: f32,
+    #[serde(default = "voltage_fraction")]
+    voltage_fraction: f32,
     stiffness: f32,
     damping: f32,
     integral: f32,

@@ -84,6 +84,7 @@ impl Setup {
                     torque_constant: motor.torque_constant as f32,
                     current_limit: motor.current_limit as f32,
                     loss_current: 0.0,
+                    field_weakening_current: 0.0,
                     alignment: EncoderAlignment {
                         pole_pairs: parameters.windings.pole_pairs as u32,
                         direction: Direction::Forward,
@@ -97,6 +98,7 @@ impl Setup {
                 gains: Gains {
                     current_bandwidth: 800.0,
                     observer_bandwidth: 200.0,
+                    voltage_fraction: 1.0,
                     stiffness: stiffness as f32,
                     damping: damping as f32,
                     integral: (2.0 * stiffness) as f32,

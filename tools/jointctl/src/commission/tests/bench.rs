@@ -27,6 +27,8 @@ pub struct Simulated {
     /// Torque of a load at the joint, Nm, and what friction adds to it on the way up.
     pub load: [f64; 2],
     pub torque_gain: f64,
+    /// Inertia at the joint, kg m^2, that a motion in velocity mode speeds up, Coulomb friction, Nm, and viscous friction, Nm s/rad.
+    pub swung: [f64; 3],
     /// Control steps so far.
     pub step: u32,
     /// Of these with the bridge on.
@@ -46,6 +48,7 @@ pub struct Simulated {
     raw: u32,
     motion: Option<(Motion, f64)>,
     joint: [f64; 2],
+    swing: f64,
 }
 
 impl Simulated {
@@ -91,6 +94,7 @@ impl Simulated {
             follows: 1.0,
             load: [0.0; 2],
             torque_gain: 1.0,
+            swung: [0.0; 3],
             step: 0,
             on: false,
             fault: None,
@@ -107,6 +111,7 @@ impl Simulated {
             raw: 0,
             motion: None,
             joint: [0.3, 0.0],
+            swing: 0.0,
         }
     }
 
@@ -230,7 +235,11 @@ impl Bench for Simulated {
         for _ in 0..steps + late {
             self.control_step();
             if let Some((Motion::Velocity, velocity)) = self.motion {
-                self.joint[1] = self.follows * velocity;
+                let (ramp, last) = (self.setting(Setting::Acceleration)? / RATE, self.joint[1]);
+                self.joint[1] += (self.follows * velocity - last).clamp(-ramp, ramp);
+                self.swing = self.swung[0] * (self.joint[1] - last) * RATE
+                    + self.swung[1] * self.joint[1].signum()
+                    + self.swung[2] * self.joint[1];
                 self.joint[0] += self.joint[1] / RATE;
             }
         }
@@ -297,6 +306,6 @@ impl Bench for Simulated {
 
     fn motion(&mut self) -> Result<[f64; 3], Stopped> {
         let zero = self.setting(Setting::JointZero)?;
-        Ok([self.joint[0] + zero, self.joint[1], self.torque_gain * (self.load[0] + self.load[1])])
+        Ok([self.joint[0] + zero, self.joint[1], self.torque_gain * (self.load[0] + self.load[1] + self.swing)])
     }
 }

@@ -353,6 +353,28 @@ fn a_known_load_gives_the_torque_constant_with_which_it_agrees_whatever_friction
 }
 
 #[test]
+fn a_known_inertia_gives_the_torque_constant_with_which_it_agrees_beside_friction() {
+    let mut bench = Simulated::new(parameters());
+    // Friction is forty times what the inertia takes.
+    (bench.swung, bench.torque_gain) = ([0.02, 0.8, 0.5], 1.1);
+    let plan = Plan { inertia: Some(0.02), torque_constant: Some(0.1), ..plan() };
+    let inertia = found(&mut bench, &plan).inertia.unwrap();
+    assert!((inertia.torque_constant / (0.1 / 1.1) - 1.0).abs() < 0.03, "{inertia:?}");
+    assert!(inertia.measured.relative() < 0.1, "{inertia:?}");
+    assert!(!bench.on);
+}
+
+#[test]
+fn an_inertia_that_the_torque_does_not_tell_is_no_result() {
+    let mut bench = Simulated::new(parameters());
+    bench.swung = [0.0, 0.8, 0.5];
+    let plan = Plan { inertia: Some(0.02), torque_constant: Some(0.1), ..plan() };
+    let failure = commission(&mut bench, &plan, &mut Yes::default()).unwrap_err();
+    assert!(matches!(failure, Failure::InertiaUnclear { .. }), "{failure}");
+    assert!(!bench.on && bench.stored);
+}
+
+#[test]
 fn the_present_position_becomes_what_the_user_says_and_zero_on_a_new_joint() {
     let mut bench = Simulated::new(parameters());
     found(&mut bench, &Plan { zero: Some(0.2), turn: false, ..plan() });
