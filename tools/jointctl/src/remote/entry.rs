@@ -208,7 +208,7 @@ mod tests {
         assert_eq!(Entry::one("joint's zero").unwrap().place(), "2102h:2");
         assert_eq!(Entry::one("6064").unwrap().place(), "6064h:0");
         assert_eq!(Entry::find("gear").unwrap().len(), 2);
-        assert_eq!(Entry::find("2104").unwrap().len(), 8);
+        assert_eq!(Entry::find("2104").unwrap().len(), 9);
     }
 
     #[test]
