@@ -82,7 +82,7 @@ fn inertia(samples: &[[f64; 3]], fastest: f64) -> Estimate {
         let points: Vec<(f64, f64)> = samples
             .chunks_exact(STRETCH)
             .filter(|stretch| stretch.iter().all(|[_, velocity, _]| velocity * direction > LEAST_SPEED * fastest))
-            .filter_map(|stretch| work(stretch))
+            .filter_map(work)
             .collect();
         line(&points).0
     };
