@@ -67,7 +67,7 @@ impl<W: Wired> Bench<W> {
     /// The same with an encoder of its own.
     ///
     /// # Errors
-    /// What board, plant or emulation refuse.
+    /// A refusal of board, plant or emulation.
     pub fn with_encoder(
         board: impl FnOnce(Drivetrain) -> W,
         actuator: &ActuatorParameters,

@@ -21,7 +21,7 @@ pub const NODE: u8 = 5;
 pub const SET_POINT: f64 = 0.005;
 /// Usual amplitude of the velocity at the link, rad/s; its sine has 1 Hz.
 pub const AMPLITUDE: f64 = 2.0;
-/// How long the joint moves where the control interrupt is measured, s.
+/// Time for which the joint moves where the control interrupt is measured, s.
 pub const MOTION: f64 = 2.0;
 /// Between two heartbeats of the joint, ms.
 const HEARTBEAT: u16 = 10;
@@ -32,7 +32,8 @@ const ENABLING: [u16; 3] = [0x06, 0x07, 0x0F];
 /// Up to here the joint is enabled, s.
 const ENABLED: f64 = 0.3;
 
-/// An image whose physical model and network act in all that [`Moving`] does: every term, a network in each of four sets, and a trained box that is not left.
+/// An image whose physical model and network act in all that [`Moving`] does: every term, a network in each of four sets,
+/// and a trained box that is not left.
 pub fn acting_image() -> Vec<u8> {
     image_bytes()
 }

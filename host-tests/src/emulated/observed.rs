@@ -18,7 +18,8 @@ pub trait Observed: Wired + Sized {
     const WINDING_SENSOR: bool;
     /// Whether the encoder has to meet its index before the joint can be enabled.
     const INDEX: bool;
-    /// Variable that tells whether the gate driver is ready, 1, or has not been since the start, 0; none where there is nothing to get ready.
+    /// Variable that tells whether the gate driver is ready, 1, or has not been since the start, 0; none where there is
+    /// nothing to get ready.
     const GATE: Option<&'static str>;
     /// Variables of the control interrupt that [`Observed::encoder`] and [`Observed::encoder_taken`] read.
     const ENCODER: &'static [&'static str];

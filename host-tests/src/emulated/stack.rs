@@ -1,5 +1,5 @@
-//! How deep the stack of a program on an emulated board has got: it is painted when the startup code, which clears it, has come to `main`, and what is not painted
-//! any more was used.
+//! Depth of the stack of a program on an emulated board: it is painted when the startup code, which clears it, has come
+//! to `main`, and what is not painted any more was used.
 
 use emulator::board::Wired;
 use emulator::bus::{Bus as _, Width};
@@ -37,7 +37,8 @@ impl PaintedStack {
         Ok(Self(stack))
     }
 
-    /// Bytes that were ever written to since the last start, and bytes that there are. A start after the first leaves zeros instead of paint.
+    /// Bytes that were ever written to since the last start, and bytes that there are. A start after the first leaves zeros
+    /// instead of paint.
     ///
     /// # Errors
     /// The stack cannot be read.

@@ -1,4 +1,4 @@
-//! What the control interrupt of a flashed program takes while its joint moves and the friction model's network acts.
+//! Cycles of a flashed program's control interrupt while its joint moves and the friction model's network acts.
 
 use super::motion::Moving;
 use super::observed::Observed;
@@ -53,7 +53,8 @@ impl Taken {
     }
 }
 
-/// Moves a joint on for so many seconds, with wait states as chosen. Where the network is in the program is told by line tables, which its file has.
+/// Moves a joint on for so many seconds, with wait states as chosen. Where the network is in the program is told by line
+/// tables, which its file has.
 ///
 /// # Errors
 /// The run ended, a fault was reported, or the bridge is off at its end.

@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 
 /// Time that is waited for a frame, and simulated at once.
 const TICK: Duration = Duration::from_millis(1);
-/// Time that is simulated at most before the bus is looked at again: a machine that is behind still answers, and a client that reads a dozen objects one behind the
-/// other does not meet the joint's command deadline of 100 ms meanwhile.
+/// Time that is simulated at most before the bus is looked at again: a machine that is behind still answers, and a client
+/// that reads a dozen objects one behind the other does not meet the joint's command deadline of 100 ms meanwhile.
 const LONGEST: Duration = Duration::from_millis(2);
 /// Frames that are taken at most before the node lives on: as many of the shortest, 47 bits, as a bus of 1 Mbit/s carries in that time.
 const MOST: u32 = 42;
