@@ -70,11 +70,24 @@ pub enum ServeError {
 /// # Errors
 /// A bus that is gone, a node that ended.
 pub fn serve(node: &mut impl Served, bus: &dyn Transport, stop: &AtomicBool) -> Result<f64, ServeError> {
+    let start = Instant::now();
+    serve_by(&|| start.elapsed(), node, bus, stop)
+}
+
+/// The same by another clock.
+fn serve_by(
+    clock: &impl Fn() -> Duration,
+    node: &mut impl Served,
+    bus: &dyn Transport,
+    stop: &AtomicBool,
+) -> Result<f64, ServeError> {
     let origin = node.now();
-    let (mut start, mut lost) = (Instant::now(), Duration::ZERO);
+    let (start, mut lost) = (clock(), Duration::ZERO);
+    // Where the node would be if it were as fast as the clock.
+    let target = |lost| origin + clock().saturating_sub(start + lost);
     while !stop.load(Ordering::Relaxed) {
         // Frames do not wait for a machine that is behind to catch up, and it does not wait for them.
-        let is_behind = origin + start.elapsed() > node.now() + TICK;
+        let is_behind = target(lost) > node.now() + TICK;
         let mut wait = if is_behind { Duration::ZERO } else { TICK };
         for _ in 0..MOST {
             let Some(frame) = bus.receive(wait)? else { break };
@@ -82,13 +95,12 @@ pub fn serve(node: &mut impl Served, bus: &dyn Transport, stop: &AtomicBool) -> 
             send(node, bus)?;
             wait = Duration::ZERO;
         }
-        let target = origin + start.elapsed();
-        let behind = target.saturating_sub(node.now());
+        let now = target(lost);
+        let behind = now.saturating_sub(node.now());
         if behind > LOST {
-            start += behind;
             lost += behind;
         } else {
-            node.live_until(target.min(node.now() + LONGEST)).map_err(ServeError::Ended)?;
+            node.live_until(now.min(node.now() + LONGEST)).map_err(ServeError::Ended)?;
             send(node, bus)?;
         }
     }
@@ -105,33 +117,34 @@ fn send(node: &mut impl Served, bus: &dyn Transport) -> Result<(), BusError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use joint_firmware::default_configuration::{B_G431B_ESC1, MOTEUS_R4};
+    use std::cell::Cell;
 
-    /// Simulates at half of the speed of time, and is sent much meanwhile.
-    struct Slow<'a> {
-        other: &'a dyn Transport,
+    /// Takes twice as long as what it simulates, by a clock that only it moves on, while others on the bus do something.
+    struct Slow<'a, F> {
         now: Duration,
-        sent: u32,
+        clock: &'a Cell<Duration>,
         received: u32,
-        stop: &'a AtomicBool,
+        others: F,
     }
 
-    impl Served for Slow<'_> {
+    impl<'a, F: FnMut(u32, Duration) -> Result<(), String>> Slow<'a, F> {
+        /// `others` is given the frames received and the node's time, after each piece of its life.
+        fn new(clock: &'a Cell<Duration>, others: F) -> Self {
+            Self { now: Duration::ZERO, clock, received: 0, others }
+        }
+    }
+
+    impl<F: FnMut(u32, Duration) -> Result<(), String>> Served for Slow<'_, F> {
         fn now(&self) -> Duration {
             self.now
         }
 
         fn live_until(&mut self, instant: Duration) -> Result<(), String> {
-            if self.received != self.sent {
-                return Err(format!("{} of {} frames received", self.received, self.sent));
-            }
-            std::thread::sleep(2 * (instant - self.now));
+            // Whatever is simulated, looking at the clock takes time as well.
+            self.clock.set(self.clock.get() + 2 * (instant - self.now) + Duration::from_micros(100));
             self.now = instant;
-            for _ in 0..MOST {
-                self.other.send(&Frame::new(0x305, &[0; 8]).unwrap()).unwrap();
-                self.sent += 1;
-            }
-            self.stop.store(self.sent > 4_000, Ordering::Relaxed);
-            Ok(())
+            (self.others)(self.received, self.now)
         }
 
         fn receive(&mut self, _: &Frame) {
@@ -143,12 +156,53 @@ mod tests {
         }
     }
 
+    fn frame() -> Frame {
+        Frame::new(0x305, &[0; 8]).unwrap()
+    }
+
     #[test]
     fn a_node_that_is_behind_hears_what_was_sent_before_it_lives_on() {
         let [own, other] = ["virtual:slow", "virtual:slow"].map(|bus| bus::open(bus).unwrap());
-        let stop = AtomicBool::new(false);
-        let mut node = Slow { other: &*other, now: Duration::ZERO, sent: 0, received: 0, stop: &stop };
-        let given_up = serve(&mut node, &*own, &stop).unwrap();
-        assert!(node.sent > 4_000 && given_up > 0.0);
+        let (stop, clock) = (AtomicBool::new(false), Cell::new(Duration::ZERO));
+        let mut sent = 0;
+        let mut node = Slow::new(&clock, |received, _| {
+            if received != sent {
+                return Err(format!("{received} of {sent} frames received"));
+            }
+            for _ in 0..MOST {
+                other.send(&frame()).unwrap();
+                sent += 1;
+            }
+            stop.store(sent > 4_000, Ordering::Relaxed);
+            Ok(())
+        });
+        let given_up = serve_by(&|| clock.get(), &mut node, &*own, &stop).unwrap();
+        assert!(given_up > 0.0 && node.received + MOST > 4_000);
+    }
+
+    /// A client that asks one thing after the other between two of its set-points, each as soon as the one before has been answered.
+    #[test]
+    fn a_dozen_reads_of_a_node_that_is_behind_take_less_than_half_of_the_command_deadline() {
+        let [own, other] = ["virtual:reads", "virtual:reads"].map(|bus| bus::open(bus).unwrap());
+        let (stop, clock) = (AtomicBool::new(false), Cell::new(Duration::ZERO));
+        // The first piece of its life in which it was as far behind as it may be, and the one with the last answer.
+        let (mut first, mut asked, mut took) = (None, 0, Duration::ZERO);
+        let mut node = Slow::new(&clock, |received, now| {
+            // By then it has been behind for a second.
+            if now > Duration::from_secs(1) && received == asked {
+                let first = *first.get_or_insert(now);
+                took = now - first;
+                stop.store(asked == 12, Ordering::Relaxed);
+                asked += 1;
+                other.send(&frame()).unwrap();
+            }
+            Ok(())
+        });
+        let given_up = serve_by(&|| clock.get(), &mut node, &*own, &stop).unwrap();
+        assert!(given_up > 0.0);
+        for board in [B_G431B_ESC1, MOTEUS_R4] {
+            let half = Duration::from_secs_f32(0.5 * board.joint.limits.command_deadline);
+            assert!(took < half, "{took:?} of {half:?}");
+        }
     }
 }
