@@ -43,11 +43,7 @@ pub(super) fn bounds(parameters: &PhysicalParameters, domain: &Domain, depth: u3
         &|cell: &Interval| cell_bounds(physical, &box_, *cell),
         &|a, b| CellBounds { sum: a.sum.union(b.sum), slope: a.slope.union(b.slope) },
         &|found, new| found.sum.contains(new.sum) && found.slope.contains(new.slope),
-        &|cell: &Interval| {
-            let middle = (cell.low + cell.high) >> 1;
-            let halves = (Interval { low: cell.low, high: middle }, Interval { low: middle, high: cell.high });
-            (cell.high - cell.low > 1).then_some(halves)
-        },
+        &halves,
     );
     // Partial sums may wrap and come back; the whole sum must fit, and its rounding too.
     let fits = Interval::symmetric((1 << 62) - (1 << 31));
@@ -57,6 +53,13 @@ pub(super) fn bounds(parameters: &PhysicalParameters, domain: &Domain, depth: u3
         slope: found.slope.union(Interval::ZERO),
         resolution: resolution(physical, &box_),
     })
+}
+
+/// A range of velocities in two, which meet; none where nothing lies between its ends.
+fn halves(cell: &Interval) -> Option<(Interval, Interval)> {
+    let middle = (cell.low + cell.high) >> 1;
+    let halves = (Interval { low: cell.low, high: middle }, Interval { low: middle, high: cell.high });
+    (cell.high - cell.low > 1).then_some(halves)
 }
 
 /// The widened box in Q31 of full scale.
@@ -263,6 +266,18 @@ mod tests {
     use super::*;
     use crate::friction::smooth::odd_sines;
     use proptest::prelude::*;
+
+    #[test]
+    fn a_range_of_velocities_is_halved_down_to_its_last_unit() {
+        for low in [-3, -2, -1, 0, 1] {
+            assert_eq!(halves(&Interval { low, high: low + 1 }), None);
+            for width in 2..6 {
+                let (first, second) = halves(&Interval { low, high: low + width }).unwrap();
+                assert_eq!((first.low, first.high, second.high), (low, second.low, low + width));
+                assert!(first.high > first.low && second.high > second.low, "{low} {width}");
+            }
+        }
+    }
 
     /// Every interval of whole steps of a table, with the hull of a property of its steps.
     fn for_every_interval(of_step: impl Fn(i64) -> Interval, mut check: impl FnMut(Interval, Interval)) {
