@@ -8,7 +8,7 @@
 use crate::compensation::Request;
 use crate::joint::BoardLimits;
 use crate::joint::configuration::{
-    BridgeConfiguration, CompensationConfiguration, Configuration, Gains, GearConfiguration, Limits,
+    BridgeConfiguration, CompensationConfiguration, Configuration, FACTORY_TRIM, Gains, GearConfiguration, Limits,
     MotorConfiguration, ThermalConfiguration, VelocitySource,
 };
 use crate::motor::angle::{Direction, ElectricalAngle, EncoderAlignment};
@@ -139,6 +139,7 @@ const fn settled(settling: f32, bridge: BridgeConfiguration) -> BridgeConfigurat
 const fn uncommissioned(bus_voltage: (f32, f32), regeneration_band: f32, encoder_latency: f32) -> Configuration {
     Configuration {
         node_id: 255,
+        oscillator_trim: FACTORY_TRIM,
         motor: MotorConfiguration {
             resistance: 0.1,
             inductance_d: 20e-6,

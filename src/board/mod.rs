@@ -24,6 +24,8 @@ pub mod faults;
 pub mod flash;
 pub mod memory;
 pub mod options;
+#[cfg(feature = "bus")]
+pub mod oscillator;
 pub mod pwm;
 #[cfg(feature = "bus")]
 pub mod shadow;

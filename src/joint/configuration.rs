@@ -178,11 +178,18 @@ pub struct ThermalConfiguration {
     pub ambient: f32,
 }
 
+/// Trim of the oscillator as the chip comes from the factory (RM0440, 7.4.2: reset value of HSITRIM).
+pub const FACTORY_TRIM: u8 = 64;
+/// Steps to either side of it: at least 2 % by the smallest step of the data sheet, which is what the oscillator may be off by at any temperature.
+const TRIM_STEPS: f32 = 10.0;
+
 /// Everything that a joint is and may do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Configuration {
     /// Node on the CAN bus, 1 to 127; 255 where none is assigned yet.
     pub node_id: u8,
+    /// Trim of the board's oscillator, steps of some 0.3 %; 54 to 74, from the factory 64.
+    pub oscillator_trim: u8,
     /// Motor and encoder.
     pub motor: MotorConfiguration,
     /// Gear.
@@ -316,6 +323,9 @@ impl Configuration {
         in_range!("command deadline", "s", limits.command_deadline, 1e-3, board.command_deadline)?;
         in_range!("limit damping", "Nm s/rad", limits.damping, limits.least_damping(), 1e6)?;
         in_range!("compensation clamp", "Nm", compensation.clamp, 0.0, limits.torque)?;
+        let factory = f32::from(FACTORY_TRIM);
+        let trim = f32::from(self.oscillator_trim);
+        in_range!("oscillator trim", "", trim, factory - TRIM_STEPS, factory + TRIM_STEPS)?;
         Ok(())
     }
 }

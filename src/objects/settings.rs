@@ -77,6 +77,7 @@ settings! {
     ElectricalZero,
     Request,
     VelocitySource,
+    OscillatorTrim,
 }
 
 impl Setting {
@@ -93,6 +94,7 @@ impl Setting {
             Self::Direction => (copy.motor.alignment.direction == Direction::Reverse).into(),
             Self::ElectricalZero => copy.motor.alignment.electrical_zero.0,
             Self::Request => copy.compensation.request as u32,
+            Self::OscillatorTrim => copy.oscillator_trim.into(),
             _ => (copy.compensation.velocity_source == VelocitySource::Measured).into(),
         }
     }
@@ -108,6 +110,7 @@ impl Setting {
         match (self, number) {
             (Self::PolePairs, _) => configuration.motor.alignment.pole_pairs = number,
             (Self::EncoderCounts, _) => configuration.motor.encoder_counts = number,
+            (Self::OscillatorTrim, _) => configuration.oscillator_trim = number as u8,
             (Self::Direction, 0) => configuration.motor.alignment.direction = Direction::Forward,
             (Self::Direction, 1) => configuration.motor.alignment.direction = Direction::Reverse,
             (Self::ElectricalZero, _) => configuration.motor.alignment.electrical_zero.0 = number,

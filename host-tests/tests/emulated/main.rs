@@ -9,6 +9,7 @@ mod faults;
 mod full_bus;
 mod gate_driver;
 mod images;
+mod oscillator;
 mod power_cut;
 mod same_run;
 mod settling;
@@ -30,6 +31,7 @@ fn main() {
         gate_driver::trials(),
         boards::trials(),
         images::trials(),
+        oscillator::trials(),
         same_run::trials(),
         settling::trials(),
         workbench::trials(),

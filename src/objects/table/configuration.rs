@@ -106,6 +106,10 @@ room! {
         9, "voltage fraction", F32, RW, UNMAPPED, S(Setting::VoltageFraction); "", 1.0, within(0.1, 1.1547005);
             "Longest voltage vector over the longest one that fits at any angle; above 1 the currents are no sines at the limit, at 2 / sqrt 3 it is the whole hexagon"
     }
+    0x2105 "oscillator" {
+        1, "oscillator trim", U8, RW, UNMAPPED, S(Setting::OscillatorTrim); "", 1.0, within(54.0, 74.0);
+            "Trim of the board's oscillator, steps of some 0.3 %, more is faster; from the factory 64. It acts as soon as it is taken: store it once the bus has borne it"
+    }
     0x2106 "heat" {
         1, "winding heat capacity", F32, RW, UNMAPPED, S(Setting::WindingCapacity); "J/K", 1.0, within(0.1, 10_000.0);
             "Heat capacity of the winding"

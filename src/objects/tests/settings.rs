@@ -115,6 +115,19 @@ fn ranges_are_positive_and_no_wider_than_a_command_may_be() {
 }
 
 #[test]
+fn the_oscillator_is_trimmed_by_ten_steps_to_either_side_and_no_further() {
+    for (trim, taken) in [(53, false), (54, true), (64, true), (74, true), (75, false)] {
+        let mut node = Node::new();
+        node.download(0x2105, 1, &[trim]).unwrap();
+        assert_eq!(take(&mut node).is_ok(), taken, "{trim}");
+        let refused = Name::from_code(node.number(0x2100, 3) as u32).text();
+        assert_eq!(refused, if taken { "" } else { "oscillator trim" });
+        let low_and_high = if taken { (0.0, 0.0) } else { (54.0, 74.0) };
+        assert_eq!((node.real(0x2100, 5), node.real(0x2100, 6)), low_and_high);
+    }
+}
+
+#[test]
 fn what_is_stored_is_there_after_a_reset_and_restored_it_is_not() {
     let mut node = Node::new();
     node.set_real(0x2104, 3, 0.5).unwrap();
@@ -163,7 +176,7 @@ fn whole() -> Vec<u8> {
 #[test]
 fn the_whole_record_comes_back_and_fits() {
     let record = whole();
-    assert_eq!(record.len(), 1_130);
+    assert_eq!(record.len(), 1_137);
     let configuration = Configuration { node_id: 17, ..crate::default_configuration::MOTEUS_R4.joint };
     let stored = Stored::decode(&record, &BOARD.joint).unwrap();
     assert_eq!((stored.configuration(&BOARD.joint), stored.ranges()), (configuration, [1.0, 2.0, 3.0, 4.0, 5.0]));

@@ -8,7 +8,7 @@ mod store;
 use super::{NotStarted, Started};
 use crate::board::control::{Commands, Report};
 use crate::board::flash::Parameters;
-use crate::board::{can, control, shadow};
+use crate::board::{can, control, oscillator, shadow};
 use bus::Node;
 use embassy_executor::Spawner;
 use embassy_stm32::Peri;
@@ -37,6 +37,7 @@ pub struct Connection {
 pub fn start(commands: Commands, parts: Parts) -> Result<(Connection, Started), NotStarted> {
     let mut program = BoardProgram::new(commands.active, commands.window, Store::open(Parameters::new(parts.flash))?);
     let start = program.start();
+    oscillator::trim(start.configuration.oscillator_trim);
     let thermal = program.begin(&start.configuration)?;
     // What a loss of power left undecided in flash is decided.
     control::release();

@@ -1,7 +1,7 @@
 //! What the board does for the objects: configurations and friction models to the control step, records to flash. Thread mode.
 
 use super::store::{Guard, Store};
-use crate::board::{self, BoardConfiguration, Offering, Prepared, Subscriber, shadow};
+use crate::board::{self, BoardConfiguration, Offering, Prepared, Subscriber, oscillator, shadow};
 use core::cell::RefCell;
 use joint_firmware::canopen::{Event, Reset};
 use joint_firmware::hardware::Hardware;
@@ -115,6 +115,7 @@ impl Program for BoardProgram {
             },
         );
         prepared.ok_or(NotConfigured::Busy)?.map_err(NotConfigured::Refused)?.offer();
+        oscillator::trim(configuration.oscillator_trim);
         Ok(())
     }
 

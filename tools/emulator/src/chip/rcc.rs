@@ -22,6 +22,7 @@ const LSI_START_NS: u64 = 80_000;
 const PLL_LOCK_NS: u64 = 15_000;
 
 const CR: u32 = 0x00;
+const ICSCR: u32 = 0x04;
 const CFGR: u32 = 0x08;
 const PLLCFGR: u32 = 0x0c;
 const CCIPR: u32 = 0x88;
@@ -35,13 +36,15 @@ const PLLON: u32 = 1 << 24;
 const PLLRDY: u32 = 1 << 25;
 const BDRST: u32 = 1 << 16;
 const RMVF: u32 = 1 << 23;
+/// HSI's calibration by the factory, without HSITRIM: each chip has its own.
+const CALIBRATION: u32 = 0x2c;
 /// Enables of the PLL's outputs, which may change while it runs.
 const OUTPUTS: u32 = 1 << 16 | 1 << 20 | 1 << 24;
 
 const REGISTERS: &[Register] = &[
     // HSEON and CSSON: no crystal is fitted.
     register(CR, "CR", 0x0000_0500, 0x0104_0300, 0x0009_0000),
-    register(0x04, "ICSCR", 0x4000_0000, 0x7f00_0000, 0),
+    register(ICSCR, "ICSCR", 0x4000_0000, 0x7f00_0000, 0),
     // PPRE1, PPRE2: see above. MCOSEL: no clock leaves the chip.
     register(CFGR, "CFGR", 0x0000_0001, 0x7f00_3ff3, 0x0f00_3f00),
     register(PLLCFGR, "PLLCFGR", 0x0000_1000, 0xff73_7ff3, 0),
@@ -175,6 +178,8 @@ impl Rcc {
         let value = self.block.read(offset)?;
         let ready = |since: Instant, bit: u32| if at.instant() >= since { bit } else { 0 };
         Ok(match offset {
+            // HSICAL is the sum of HSITRIM and the factory's calibration (7.4.2). The oscillator is exact whatever they are.
+            ICSCR => value | ((value >> 24) + CALIBRATION & 0xff) << 16,
             CR => value & !(HSIRDY | PLLRDY) | ready(self.hsi, HSIRDY) | ready(self.pll, PLLRDY),
             // The switch is done at once: only ready clocks are accepted.
             CFGR => value & !0xc | (value & 3) << 2,

@@ -42,8 +42,9 @@ const fn field(
 }
 
 /// All keys.
-pub const FIELDS: [Field; 46] = [
+pub const FIELDS: [Field; 47] = [
     field("", "node_id", "", None, "Node on the CAN bus, 1 to 127; 255 where none is assigned yet"),
+    field("", "oscillator_trim", "", Some((54.0, 74.0)), "Trim of the board's oscillator, steps of some 0.3 %"),
     field("motor", "resistance", "Ohm", Some((1e-3, 100.0)), "Resistance of a phase at 25 °C"),
     field("motor", "inductance_d", "H", Some((1e-6, 0.1)), "Inductance along the magnet's flux"),
     field("motor", "inductance_q", "H", Some((1e-6, 0.1)), "Inductance across the magnet's flux"),

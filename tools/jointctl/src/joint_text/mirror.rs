@@ -5,7 +5,7 @@
 
 use joint_firmware::compensation::Request;
 use joint_firmware::joint::configuration::{
-    CompensationConfiguration, Configuration, Gains, GearConfiguration, Limits, MotorConfiguration,
+    CompensationConfiguration, Configuration, FACTORY_TRIM, Gains, GearConfiguration, Limits, MotorConfiguration,
     ThermalConfiguration, VelocitySource,
 };
 use joint_firmware::motor::angle::{Direction, ElectricalAngle, EncoderAlignment};
@@ -20,6 +20,8 @@ pub(super) struct Text(#[serde(with = "ConfigurationText")] pub Configuration);
 #[serde(remote = "Configuration", deny_unknown_fields)]
 struct ConfigurationText {
     node_id: u8,
+    #[serde(default = "oscillator_trim")]
+    oscillator_trim: u8,
     #[serde(with = "MotorText")]
     motor: MotorConfiguration,
     #[serde(with = "GearText")]
@@ -50,6 +52,11 @@ struct MotorText {
     encoder_latency: f32,
     #[serde(default = "encoder_counts")]
     encoder_counts: u32,
+}
+
+/// Of a file that says nothing of it.
+fn oscillator_trim() -> u8 {
+    FACTORY_TRIM
 }
 
 /// Of a file that says nothing of it.

@@ -71,6 +71,8 @@ fn what_lies_outside_a_stated_range_is_refused() {
                 "pole_pairs" => "65".to_owned(),
                 "encoder_counts" if value < low => "15".to_owned(),
                 "encoder_counts" => "65536".to_owned(),
+                "oscillator_trim" if value < low => "53".to_owned(),
+                "oscillator_trim" => "75".to_owned(),
                 "position" | "bus_voltage" if value < low => format!("[{value}, 50.0]"),
                 "position" | "bus_voltage" => format!("[10.0, {value}]"),
                 _ => format!("{value:?}"),

@@ -5,7 +5,7 @@ use crate::actuator::ActuatorParameters;
 use joint_firmware::compensation::Request;
 use joint_firmware::joint::BoardLimits;
 use joint_firmware::joint::configuration::{
-    BridgeConfiguration, CompensationConfiguration, Configuration, Gains, GearConfiguration, Limits,
+    BridgeConfiguration, CompensationConfiguration, Configuration, FACTORY_TRIM, Gains, GearConfiguration, Limits,
     MotorConfiguration, ThermalConfiguration, VelocitySource,
 };
 use joint_firmware::motor::angle::{Direction, ElectricalAngle, EncoderAlignment};
@@ -77,6 +77,7 @@ impl Setup {
         Self {
             configuration: Configuration {
                 node_id: 1,
+                oscillator_trim: FACTORY_TRIM,
                 motor: MotorConfiguration {
                     resistance: phase_resistance as f32,
                     inductance_d: parameters.windings.inductance_d as f32,

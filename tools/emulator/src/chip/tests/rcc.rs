@@ -18,6 +18,20 @@ fn after_power_up_the_core_runs_from_hsi_at_16_mhz() {
 }
 
 #[test]
+fn the_trim_of_hsi_is_added_to_its_calibration_and_nothing_else_is_kept() {
+    const ICSCR: u32 = RCC + 0x04;
+    let mut bench = Bench::new(&variant::STM32G431CB);
+    let factory = bench.get(ICSCR);
+    assert_eq!(factory >> 24, 64, "7.4.2");
+    for trim in [0, 54, 64, 74, 127] {
+        bench.set(ICSCR, 0x80ff_ffff & !(0x7f << 24) | trim << 24);
+        assert_eq!(bench.get(ICSCR), trim << 24 | (factory & 0x00ff_0000) + (trim << 16) - (64 << 16), "{trim}");
+    }
+    bench.set(ICSCR, 70 << 24);
+    assert_eq!(bench.chip.frequency(), 16_000_000);
+}
+
+#[test]
 fn the_pll_is_ready_after_its_lock_time_and_makes_170_mhz() {
     let mut bench = Bench::new(&variant::STM32G431CB);
     bench.set(RCC + 0x58, 1 << 28);
