@@ -149,14 +149,16 @@ impl Motor {
             off(found.inductance.d.value, windings.inductance_d),
             off(found.inductance.q.value, windings.inductance_q),
         ];
-        let constant = off(alignment.torque_constant().value, joint.motor.torque_constant);
+        let by_emf = alignment.torque_constant();
+        let (constant, uncertain) = (off(by_emf.value, joint.motor.torque_constant), 100.0 * by_emf.relative());
         let [r, d, q] = parts;
         let told = format!(
-            "R {r:+.2} %, L_d {d:+.2} %, L_q {q:+.2} %, zero {zero:+.2} deg, K_t {constant:+.1} %, {} pole pairs",
+            "R {r:+.2} %, L_d {d:+.2} %, L_q {q:+.2} %, zero {zero:+.2} deg, K_t {constant:+.1} % of {uncertain:.0}, {} pole pairs",
             alignment.pole_pairs
         );
         let right = parts.iter().all(|part| part.abs() <= 100.0 * WINDING)
             && zero.abs() <= ZERO
+            && (by_emf.value - joint.motor.torque_constant).abs() <= by_emf.error
             && (alignment.pole_pairs as usize, alignment.reversed) == (windings.pole_pairs, reversed);
         if right { Ok(told) } else { Err(told) }
     }

@@ -340,8 +340,14 @@ fn measure<B: Bench>(
         360.0 * alignment.lag
     ));
     let constant = alignment.torque_constant();
+    let taken = match settings::torque_constant_is_measured(plan, new) {
+        true => {
+            ": taken, because none was given. Beyond 30 % the joint reports 7122h falsely: enter the data sheet's, or check it by --load or --inertia"
+        }
+        false => "",
+    };
     guide.found(&format!(
-        "torque constant by back-EMF {:.5} Nm/A (both ways apart by {:.1} %)",
+        "torque constant by back-EMF {:.5} Nm/A, uncertain by {:.0} %{taken}",
         constant.value,
         100.0 * constant.relative()
     ));

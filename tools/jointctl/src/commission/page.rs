@@ -149,7 +149,12 @@ fn measured(found: &Found) -> Markup {
             "half the difference of there and back; 60° are too much",
         ),
         ("flux linkage", number(alignment.flux, 1e3, 3), "mVs", "back-EMF across the field"),
-        ("torque constant by it", number(alignment.torque_constant(), 1.0, 5), "Nm/A", "3/2 pole pairs × flux linkage"),
+        (
+            "torque constant by it",
+            number(alignment.torque_constant(), 1.0, 5),
+            "Nm/A",
+            "3/2 pole pairs × flux linkage; uncertain by what dead time may hide",
+        ),
     ];
     if let Some(index) = &found.index {
         rows.push((

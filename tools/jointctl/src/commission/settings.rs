@@ -41,7 +41,13 @@ pub(super) fn is_new<B: Bench>(bench: &mut B) -> Result<bool, Stopped> {
 
 /// The torque constant that the joint gets: the user's; a new joint without one, the one by back-EMF; otherwise none, the joint keeps its own.
 pub(super) fn torque_constant(plan: &Plan, found: &Found) -> Option<f64> {
-    plan.torque_constant.or_else(|| found.new.then(|| found.alignment.torque_constant().value.clamp(0.001, 5.0)))
+    let measured = || found.alignment.torque_constant().value.clamp(0.001, 5.0);
+    plan.torque_constant.or_else(|| torque_constant_is_measured(plan, found.new).then(measured))
+}
+
+/// Whether that is the one by back-EMF; `new`: the joint had none.
+pub(super) fn torque_constant_is_measured(plan: &Plan, new: bool) -> bool {
+    new && plan.torque_constant.is_none()
 }
 
 /// Settings of motor and encoder, and on a new joint limits and gains by them.
