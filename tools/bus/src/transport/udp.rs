@@ -15,8 +15,7 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// python-can's `hop_limit`: the local network.
 const HOPS: u32 = 1;
-const ADVICE: &str =
-    "Is there a network that takes multicast? On a machine without one: `sudo ip route add 224.0.0.0/4 dev lo`";
+const ADVICE: &str = "Is there a network that takes multicast? On a machine without one: `sudo ip route add 224.0.0.0/4 dev lo src 127.0.0.1`";
 /// python-can reads no more than this of a datagram.
 const LONGEST: usize = 4096;
 /// Room for frames that come while the program does something else, bytes.

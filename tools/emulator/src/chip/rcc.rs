@@ -179,7 +179,7 @@ impl Rcc {
         let ready = |since: Instant, bit: u32| if at.instant() >= since { bit } else { 0 };
         Ok(match offset {
             // HSICAL is the sum of HSITRIM and the factory's calibration (7.4.2). The oscillator is exact whatever they are.
-            ICSCR => value | ((value >> 24) + CALIBRATION & 0xff) << 16,
+            ICSCR => value | (((value >> 24) + CALIBRATION) & 0xff) << 16,
             CR => value & !(HSIRDY | PLLRDY) | ready(self.hsi, HSIRDY) | ready(self.pll, PLLRDY),
             // The switch is done at once: only ready clocks are accepted.
             CFGR => value & !0xc | (value & 3) << 2,

@@ -5,6 +5,7 @@ use crate::remote::{Entry, Value, drive};
 use bus::client::Command;
 use joint_firmware::joint::fault::Fault;
 use joint_firmware::joint::state_machine::{Controlword, State};
+use joint_firmware::motor::setting::Name;
 use joint_firmware::objects::field::{Actual, ConfigurationField, Field, OpenLoopField, SetPoint};
 use joint_firmware::objects::settings::Setting;
 
@@ -186,11 +187,11 @@ impl<O: Objects> Joint<O> {
     /// The setting that was refused, and what would be possible; where the joint does not say, the words of the refusal.
     fn explained(&mut self, words: String) -> Stopped {
         let mut details = || -> Result<Option<String>, Stopped> {
-            let name = Entry::of(Field::Configuration(ConfigurationField::RefusedSetting));
-            let bytes = self.objects.upload(name.object.index, name.object.sub_index)?;
-            let Some(Value::Text(name)) = name.decode(&bytes).filter(|name| *name != Value::Text(String::new())) else {
+            let code = self.raw(Field::Configuration(ConfigurationField::RefusedSetting))?;
+            let name = Name::from_code(code as u32).text();
+            if name.is_empty() {
                 return Ok(None);
-            };
+            }
             let mut number = |part| self.number(Field::Configuration(part));
             let value = number(ConfigurationField::RefusedValue)?;
             let (low, high) = (number(ConfigurationField::Lowest)?, number(ConfigurationField::Highest)?);

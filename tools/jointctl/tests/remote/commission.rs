@@ -4,7 +4,7 @@ use crate::served::{NODE, Served};
 use joint_firmware::objects::field::Field;
 use joint_firmware::objects::settings::Setting;
 use jointctl::commission::joint::Joint;
-use jointctl::commission::{Failure, Guide, Plan, Stage, Stopped, commission, page};
+use jointctl::commission::{Bench as _, Failure, Guide, Plan, Stage, Stopped, commission, page};
 use jointctl::remote::commission::RemoteObjects;
 use jointctl::remote::configuration::set;
 use jointctl::remote::{Entry, RemoteJoint};
@@ -62,6 +62,8 @@ pub fn a_joint_is_commissioned_with_the_motor_that_it_has_and_stopped_at_once_wh
 
     stage.set(None);
     let mut bench = Joint::new(RemoteObjects::new(joint.clone(), &|| true));
+    let refused = bench.set(&[(Setting::OverCurrent, 0.5)]).unwrap_err().to_string();
+    assert!(refused.contains("refuses its over-current limit of 0.5: "), "{refused}");
     let mut yes = Yes { told: Vec::new(), stage: &stage };
     let mut found = commission(&mut bench, &plan(), &mut yes);
     // A machine with much else to do may be late more often than a commissioning bears.

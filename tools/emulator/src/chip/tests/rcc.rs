@@ -25,7 +25,7 @@ fn the_trim_of_hsi_is_added_to_its_calibration_and_nothing_else_is_kept() {
     assert_eq!(factory >> 24, 64, "7.4.2");
     for trim in [0, 54, 64, 74, 127] {
         bench.set(ICSCR, 0x80ff_ffff & !(0x7f << 24) | trim << 24);
-        assert_eq!(bench.get(ICSCR), trim << 24 | (factory & 0x00ff_0000) + (trim << 16) - (64 << 16), "{trim}");
+        assert_eq!(bench.get(ICSCR), (trim << 24) | ((factory & 0x00ff_0000) + (trim << 16) - (64 << 16)), "{trim}");
     }
     bench.set(ICSCR, 70 << 24);
     assert_eq!(bench.chip.frequency(), 16_000_000);
