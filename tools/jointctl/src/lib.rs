@@ -10,6 +10,7 @@
 
 pub mod augment;
 pub mod certificate_search;
+pub mod choice;
 pub mod classify;
 pub mod clean;
 pub mod commands;

@@ -1,6 +1,7 @@
 //! `jointctl fit`: from a described data set to an image, its TOML twin and a report.
 
 use super::CommandError;
+use crate::choice::{NetworkRule, TermRule};
 use crate::dataset::{Prepared, Warning, prepare};
 use crate::fit::{Fitted, Options, Trainer, fit};
 use crate::image_text;
@@ -70,8 +71,8 @@ pub enum InputChoice {
 /// Choices that `fit` and `demo` share.
 #[derive(Debug, Args)]
 pub struct Choices {
-    /// Physical model: coulomb-viscous, linear, stribeck, nscf, hysteresis, hysteresis-harmonics, full; repeatable, the best
-    /// on validation data is used [default: coulomb-viscous and full]
+    /// Physical model: coulomb-viscous, linear, stribeck, nscf, hysteresis, hysteresis-harmonics, full; repeatable, the
+    /// simplest that no other beats on motions that were left out is used [default: coulomb-viscous and full]
     #[arg(long, value_name = "NAME")]
     preset: Vec<Preset>,
     /// Fit every physical model and rank them
@@ -84,7 +85,7 @@ pub struct Choices {
     #[arg(long, value_name = "N", default_value_t = 8)]
     restarts: usize,
     /// Epochs without a lower validation error after which training stops
-    #[arg(long, value_name = "N", default_value_t = 60)]
+    #[arg(long, value_name = "N", default_value_t = 20)]
     patience: usize,
     /// Penalty on the sum of squared weights, in units of the normalised mean squared error
     #[arg(long, value_name = "X", default_value_t = 1e-4)]
@@ -101,13 +102,20 @@ pub struct Choices {
     /// Train on mirrored samples too: for a joint without preferred direction
     #[arg(long)]
     mirror: bool,
-    /// Inputs of the network [default: position, velocity, load where there is gravity, temperature where it varies by 10 K]
+    /// Inputs of the network [default: velocity, and what pays of position, load where there is gravity, temperature where it
+    /// varies by 10 K]
     #[arg(long, value_enum, value_delimiter = ',')]
     inputs: Vec<InputChoice>,
     /// Regimes with a network each; up to two
     #[arg(long, value_enum, value_delimiter = ',')]
     regimes: Vec<RegimeChoice>,
-    /// Least fall of the validation error for which a network is kept, %
+    /// Who decides about the network: the error on motions that were left out, or you
+    #[arg(long, value_enum, default_value_t)]
+    network: NetworkRule,
+    /// Terms of the full model that are forced (+) or forbidden (-), as in +Stribeck,-Hysteresis
+    #[arg(long = "term", value_name = "±NAME", value_delimiter = ',', allow_hyphen_values = true)]
+    terms: Vec<TermRule>,
+    /// Least fall of the error on left-out motions for which a network is kept, %
     #[arg(long, value_name = "%", default_value_t = 2.0)]
     least_gain: f64,
     /// How far beyond the trained box the network fades out, in half widths of the box
@@ -143,6 +151,8 @@ impl Choices {
             seed: self.seed,
             samples: self.samples,
             equalise: fraction("equalise", self.equalise, 1.0)?,
+            network: self.network,
+            terms: self.terms.clone(),
             least_gain: fraction("least-gain", self.least_gain, 100.0)? / 100.0,
             margin: fraction("margin", self.margin, 100.0)?,
             version: self.image_version,
@@ -231,6 +241,7 @@ pub fn print_summary(prepared: &Prepared, fitted: &Fitted, out: &Path) {
     for table in &report.errors {
         println!("{}", console::error_table(table, &report.units.effort));
     }
+    println!("{}", console::choice(&report.choice));
     if let NetworkOutcome::Rejected { reason } = &report.network {
         println!("Network left out: {reason}.");
     }

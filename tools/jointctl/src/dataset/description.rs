@@ -4,6 +4,7 @@
 //! not silently mean no filter. Every time is in seconds, every frequency in hertz; "unit" is the position's unit,
 //! rad or m. The keys of the signal treatment are in `treatment.rs`; what each value may be is checked in `validate.rs`.
 
+use super::choice_keys::Choice;
 use super::condition_keys::{Condition, Value};
 use super::treatment::{Classify, Clean, Differentiate, Filter};
 use serde::Deserialize;
@@ -49,6 +50,9 @@ pub struct Description {
     /// What is kept for training, validation and judging.
     #[serde(default)]
     pub split: Split,
+    /// How the model is chosen.
+    #[serde(default)]
+    pub choice: Choice,
 }
 
 /// Where the tables are.

@@ -1,5 +1,6 @@
 //! What can be wrong with a data set, said so that the file, line or column can be corrected without a debugger; host.
 
+use crate::choice::grouping::NoGroups;
 use crate::filter::FilterError;
 use std::path::PathBuf;
 use thiserror::Error;
@@ -267,4 +268,7 @@ pub enum DatasetError {
         /// What to look at.
         hint: String,
     },
+    /// A column that tells motions apart is missing or has one value.
+    #[error(transparent)]
+    Groups(#[from] NoGroups),
 }

@@ -3,6 +3,7 @@
 //! `prepare` is the whole way. The keys of the description are documented in `docs/dataset.md`.
 
 pub mod checks;
+pub mod choice_keys;
 mod condition;
 pub mod condition_keys;
 pub mod description;

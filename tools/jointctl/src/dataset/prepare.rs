@@ -12,6 +12,8 @@ use super::treat::{Motion, minimum_samples, treat};
 use super::treatment::VelocityFrom;
 use super::validate;
 use super::warning::Warning;
+use crate::choice::Folds;
+use crate::choice::grouping::{self, Labels};
 use crate::classify::{Thresholds, classify};
 use crate::clean::{Repairs, stretches};
 use crate::fit::rigid_model;
@@ -36,6 +38,8 @@ pub struct Prepared {
     pub recordings: Vec<Recording>,
     /// The test sets, in the order described. Every index is of a sample with `Part::Test`.
     pub test_sets: Vec<TestSet>,
+    /// Motions to be left out in turn when a model is chosen.
+    pub folds: Folds,
     /// Boundaries of the motion states.
     pub thresholds: Thresholds,
     /// What each stage did.
@@ -148,6 +152,9 @@ fn prepare_changed(
     let label = |run: u32| recordings.runs[run as usize].label.clone();
     warnings.extend(checks::model::check(&samples, &rigid, &description, &parent, &label)?);
     in_range(&samples, &continuous, &description)?;
+    let labels = labels(&recordings, &row);
+    let folds = grouping::find(&samples, &continuous, &labels, &description.choice.group_by)?;
+    drop(labels);
     let thresholds = Thresholds::of(&samples, &description.classify);
     classify(&mut samples, thresholds);
     let notes = notes(&recordings, &extracted.findings, repairs, slow, &samples, continuous.len());
@@ -165,6 +172,7 @@ fn prepare_changed(
         lag,
         warnings,
         recordings: continuous,
+        folds,
         test_sets: assignment.test_sets,
         thresholds,
         notes,
@@ -359,6 +367,17 @@ fn static_match(rule: &Rule, recordings: &Recordings, description: &Description)
         }
     }
     mask
+}
+
+/// The texts that may tell motions apart, sample by sample.
+fn labels(recordings: &Recordings, row: &[usize]) -> Vec<Labels> {
+    let columns = recordings.conditions.iter().filter_map(|name| Some((name, recordings.table.texts.get(name)?)));
+    let labels = columns.map(|(name, column)| Labels {
+        column: name.clone(),
+        words: column.words.clone(),
+        codes: row.iter().map(|&row| column.codes[row]).collect(),
+    });
+    labels.collect()
 }
 
 fn in_range(samples: &Samples, runs: &[Recording], description: &Description) -> Result<(), DatasetError> {

@@ -26,6 +26,8 @@ pub struct Recordings {
     pub table: Table,
     /// The runs, in order of first appearance.
     pub runs: Vec<Run>,
+    /// Text columns that may tell motions apart: all of the table of runs but the run's label, and those that `choice.group_by` names.
+    pub conditions: Vec<String>,
     /// Paths of the files, in the order listed.
     pub files: Vec<PathBuf>,
     /// SHA-256 over the bytes of the description, of every file in the order listed and of the table of runs, one after
@@ -49,6 +51,7 @@ impl Recordings {
         let contents = files.iter().map(|file| load::read(file, &mut digest)).collect::<Result<Vec<_>, _>>()?;
 
         let mut wanted = wanted(description);
+        let mut conditions: Vec<String> = Vec::new();
         let mut per_run = None;
         if let Some(name) = &source.runs {
             let file = root.join(name);
@@ -64,6 +67,8 @@ impl Recordings {
             wanted.numbers.retain(not_label);
             wanted.texts.retain(not_label);
             found.numbers.remove(&label);
+            conditions.extend(header.iter().filter(|name| **name != label).cloned());
+            found.texts.extend(header.iter().cloned());
             found.texts.insert(label.clone());
             let mut table = Table::default();
             load::append(&mut table, &text, &file, source, &[], &found, &[])?;
@@ -81,7 +86,9 @@ impl Recordings {
         if let Some((file, label, _, per_run)) = per_run {
             join(&mut table, &runs, &per_run, &label, &file)?;
         }
-        Ok(Recordings { table, runs, files, sha256: digest.finalize().into() })
+        conditions.extend(description.choice.group_by.iter().filter(|name| table.texts.contains_key(*name)).cloned());
+        conditions.dedup();
+        Ok(Recordings { table, runs, conditions, files, sha256: digest.finalize().into() })
     }
 
     /// The file of a row and the line in it.
@@ -107,9 +114,8 @@ fn wanted(description: &Description) -> Wanted {
     d.clean.steady.iter().for_each(|c| number(&c.column));
     d.clean.frozen.iter().for_each(|c| number(&c.column));
     d.clean.saturation.iter().for_each(|c| number(&c.column));
-    if let Some(run) = &columns.run {
-        wanted.texts.insert(run.clone());
-    }
+    wanted.texts.extend(columns.run.clone());
+    wanted.texts.extend(d.choice.group_by.iter().filter(|name| !matches!(name.as_str(), "run" | "file")).cloned());
     let rules = d
         .split
         .test

@@ -1,10 +1,10 @@
 //! The image: quantised parameters, limits, certificate and golden vectors.
 
-use super::{FitError, Learned, Options};
+use super::{FitError, Learned, Options, coverage};
 use crate::dataset::description::EffortUnit;
 use crate::identify::Identified;
 use crate::quantize::{self, full_scale::to_unsigned_q16, golden_vectors};
-use crate::samples::{Part, Samples};
+use crate::samples::Samples;
 use joint_firmware::friction::regime::MAX_SETS;
 use joint_firmware::friction::state::SIGNALS;
 use joint_firmware::friction::{FrictionParameters, ParameterSet};
@@ -49,7 +49,13 @@ pub fn build_image(
 ) -> Result<Built, FitError> {
     let limit = to_unsigned_q16("limit of the output", OUTPUT_LIMIT * largest_effort(samples))?;
     let mut learned = learned.clone();
-    let mut parameters = quantized(samples, physical, &learned, context.options)?;
+    let mut parameters = match quantized(samples, physical, &learned, context.options) {
+        Err(FitError::Quantize(error)) if learned.has_network() => {
+            learned = learned.rejected(format!("an image cannot hold it: {error}"));
+            quantized(samples, physical, &learned, context.options)?
+        }
+        other => other?,
+    };
     let mut proved = prove(&parameters);
     let refusal = match &proved {
         Err(refusal) => Some(refusal.to_string()),
@@ -105,7 +111,7 @@ fn image(parameters: FrictionParameters, limits: Limits, context: &Context) -> R
 }
 
 fn largest_effort(samples: &Samples) -> f64 {
-    samples.indices(Part::Train).into_iter().fold(0.0, |most, i| most.max(samples.effort[i].abs()))
+    coverage::used(samples).fold(0.0, |most, i| most.max(samples.effort[i].abs()))
 }
 
 fn quantized(
@@ -115,11 +121,7 @@ fn quantized(
     options: &Options,
 ) -> Result<FrictionParameters, FitError> {
     let depends = quantize::physical::depends_on(&physical.friction);
-    let train = samples.indices(Part::Train);
-    let range = |column: &[f64]| {
-        let values = train.iter().map(|&i| column[i]);
-        values.fold((f64::MAX, f64::MIN), |(low, high), value| (low.min(value), high.max(value)))
-    };
+    let range = |column: &[f64]| coverage::ends(coverage::used(samples).map(|i| column[i]).collect());
     let columns: [&[f64]; SIGNALS] = [
         &samples.position,
         &samples.velocity,

@@ -1,18 +1,20 @@
-//! Training a network on what the physical model leaves, and deciding on validation samples whether it stays.
+//! Training a network on what the physical model leaves, if it pays on motions that were left out.
 
-use super::extrapolation;
+use super::FitError;
 use super::problem::{MINIMUM_SAMPLES, Problem};
 use super::trainer::{Trainer, curves};
-use super::{FitError, part_rmse};
+use super::uncovered::with_uncovered;
+use super::unseen::{self, Verdict};
 use crate::augment::augment;
+use crate::choice::NetworkRule;
 use crate::classify::Thresholds;
 use crate::equalise::{Equalise, draw};
-use crate::identify::Identified;
+use crate::identify::{Identified, overall};
 use crate::joint_model::{FloatFriction, regimes};
 use crate::network::{InputBox, Network};
 use crate::report::{NetworkOutcome, TrainingCurve};
 use crate::samples::{Part, Samples};
-use crate::train::{TrainError, TrainingSet};
+use crate::train::TrainError;
 use joint_firmware::friction::regime::{Criterion, MAX_CRITERIA, Measure, Selector};
 
 /// A temperature that varies less than this in training is no input, K: over a few kelvins it stands for time.
@@ -31,8 +33,10 @@ pub struct Learned {
     pub input_box: Option<InputBox>,
     /// What became of the network.
     pub outcome: NetworkOutcome,
-    /// Validation error with network, whether kept or not.
-    pub validation_rmse: Option<f64>,
+    /// Error on left-out motions with network, whether kept or not; None where no network was tried.
+    pub unseen_rmse: Option<f64>,
+    /// How the network and its inputs were chosen.
+    pub notes: Vec<String>,
     /// Parameters of the networks.
     pub parameters: usize,
     /// Training curves of every seed.
@@ -49,7 +53,8 @@ impl Learned {
             selector: Selector::default(),
             input_box: None,
             outcome,
-            validation_rmse: None,
+            unseen_rmse: None,
+            notes: vec![],
             parameters: 0,
             curves: vec![],
             reference: None,
@@ -81,14 +86,17 @@ pub fn inputs(samples: &Samples, static_load: bool) -> [bool; 5] {
     [true, true, static_load, false, high - low >= TEMPERATURE_RANGE]
 }
 
-/// Trains as the options say and keeps the network where it lowers the validation error enough.
+/// Decides on left-out motions whether a network is taken and with which inputs, and trains it.
 pub(super) fn learn(problem: &Problem) -> Result<Learned, FitError> {
     let Problem { samples, physical, options, progress, .. } = *problem;
-    let Some(trainer) = options.trainer else { return Ok(Learned::physical(physical, NetworkOutcome::NotTrained)) };
+    let alone = |outcome| Ok(Learned::physical(physical, outcome));
+    let Some(trainer) = options.trainer.filter(|_| options.network != NetworkRule::Never) else {
+        return alone(NetworkOutcome::NotTrained);
+    };
     progress.stage("train");
     let pick = Equalise { limit: options.samples, blend: options.equalise, seed: options.seed, ..Equalise::default() };
     let train = draw(samples, Part::Train, &pick);
-    // Early stopping needs the validation error's shape, not every sample of it; the decision below sees them all.
+    // Early stopping needs the validation error's shape, not every sample of it.
     let validation = draw(samples, Part::Validation, &Equalise { blend: 0.0, ..pick });
     if train.len().min(validation.len()) < MINIMUM_SAMPLES {
         let reason = format!(
@@ -96,30 +104,39 @@ pub(super) fn learn(problem: &Problem) -> Result<Learned, FitError> {
             train.len(),
             validation.len()
         );
-        return Ok(Learned::physical(physical, NetworkOutcome::Rejected { reason }));
+        return alone(NetworkOutcome::Rejected { reason });
     }
-
-    let mut learned = train_sets(problem, trainer, &train, &validation)?;
-    decide(&mut learned, problem);
-    if learned.has_network() && problem.inputs[LOAD] {
-        progress.detail("does the network extrapolate over load?");
-        let ratio = extrapolation::error_ratio(problem, trainer, &train, &validation)?;
-        if ratio >= 1.0 {
-            let percent = 100.0 * (ratio - 1.0);
-            let reason = format!(
-                "trained without the tenth of the samples with the highest load, it raises the error there by {percent:.1} %"
-            );
-            learned = learned.rejected(reason);
+    let verdict = unseen::judge(problem, trainer, &train, &validation, problem.reference)?;
+    let Some(Verdict { inputs, errors, refusal, mut notes }) = verdict else {
+        let reason = "the recording is too short for two folds that leave samples out".to_owned();
+        return alone(NetworkOutcome::Rejected { reason });
+    };
+    let unseen_rmse = overall(&errors);
+    let kept = options.network == NetworkRule::Keep;
+    match &refusal {
+        Some(reason) if !kept => {
+            let outcome = NetworkOutcome::Rejected { reason: reason.clone() };
+            return Ok(Learned { unseen_rmse, notes, ..Learned::physical(physical, outcome) });
         }
+        Some(reason) => notes.push(format!("the network is kept by request; the rule refuses it: {reason}")),
+        None => {}
     }
-    Ok(learned)
+    progress.detail(&format!("network of {}", unseen::names(inputs)));
+    let learned = train_sets(problem, trainer, &train, &validation, inputs)?;
+    Ok(Learned { unseen_rmse, notes, outcome: NetworkOutcome::Kept, ..learned })
 }
 
 /// A network for every parameter set that has enough samples of its own.
-fn train_sets(problem: &Problem, trainer: Trainer, train: &[usize], validation: &[usize]) -> Result<Learned, FitError> {
+fn train_sets(
+    problem: &Problem,
+    trainer: Trainer,
+    train: &[usize],
+    validation: &[usize],
+    inputs: [bool; 5],
+) -> Result<Learned, FitError> {
     let Problem { samples, physical, options, progress, .. } = *problem;
-    let (inputs, _) = problem.targets(&samples.indices(Part::Train));
-    let input_box = InputBox::around(&inputs, problem.inputs).map_err(TrainError::from)?;
+    let (low, high) = super::coverage::trained(samples);
+    let input_box = InputBox::new(low, high, inputs).map_err(TrainError::from)?;
     let selector = selector(&options.regimes, problem.thresholds);
     let sets = regimes(&selector, problem.states, samples);
     let of_set = |indices: &[usize], set: usize| {
@@ -138,9 +155,10 @@ fn train_sets(problem: &Problem, trainer: Trainer, train: &[usize], validation: 
             learned.float.sets.push((physical.friction.clone(), None));
             continue;
         }
-        let (train, validation) = (TrainingSet::unweighted(inputs, targets), TrainingSet::unweighted(checks, checked));
+        let train = with_uncovered(inputs, targets, &input_box, options.seed);
+        let validation = with_uncovered(checks, checked, &input_box, options.seed.wrapping_add(1));
         let task = problem.task(train, validation, input_box, options.restarts);
-        let trained = task.run(trainer)?;
+        let trained = task.run(trainer, false)?;
         learned.parameters += trained.network.parameters().len();
         learned.curves.extend(curves(&trained));
         if options.reference && learned.reference.is_none() {
@@ -150,33 +168,6 @@ fn train_sets(problem: &Problem, trainer: Trainer, train: &[usize], validation: 
         learned.float.sets.push((physical.friction.clone(), Some(trained.network)));
     }
     Ok(learned)
-}
-
-/// Index of the theoretical torque among the inputs.
-const LOAD: usize = 2;
-
-/// Keeps the networks only where they pay on validation samples.
-fn decide(learned: &mut Learned, problem: &Problem) {
-    let Problem { samples, physical, options, .. } = *problem;
-    let sets = regimes(&learned.selector, problem.states, samples);
-    let rigid = |i: usize| physical.rigid_effort(samples, i);
-    let without = part_rmse(samples, Part::Validation, |i| rigid(i) + physical.friction(samples, i));
-    let with = part_rmse(samples, Part::Validation, |i| {
-        let (friction, network) = learned.float.parts(sets[i], samples, i);
-        rigid(i) + friction + network
-    });
-    learned.validation_rmse = Some(with);
-    let gain = 1.0 - with / without;
-    if gain >= options.least_gain {
-        learned.outcome = NetworkOutcome::Kept;
-        return;
-    }
-    let change =
-        format!("{} the validation error by {:.1} %", if gain < 0.0 { "raises" } else { "lowers" }, 100.0 * gain.abs());
-    let reason = format!("it {change}; at least {:.1} % less is needed", 100.0 * options.least_gain);
-    let physical_only = Learned::physical(physical, NetworkOutcome::NotTrained);
-    let whole = std::mem::replace(learned, physical_only);
-    *learned = whole.rejected(reason);
 }
 
 fn selector(measures: &[Measure], thresholds: &Thresholds) -> Selector {

@@ -1,14 +1,16 @@
 //! From a prepared data set to an image and a report: the whole pipeline, stage by stage; host.
 //!
-//! Identification and training see training samples, choices are made on validation samples, test samples are looked at once,
-//! at the end, through the image in the firmware's own arithmetic.
+//! Identification sees the samples for training and validation, training stops by those for validation, choices are made on motions that were
+//! left out (`choice`). Test samples are looked at once, at the end, through the image in the firmware's own arithmetic.
 
 mod assemble;
-mod extrapolation;
+mod coverage;
 mod learn;
 mod problem;
 mod summary;
 mod trainer;
+mod uncovered;
+mod unseen;
 
 use assemble::build_image;
 pub use learn::Learned;
@@ -17,10 +19,12 @@ pub use trainer::Trainer;
 
 use crate::augment::Augment;
 use crate::certificate_search::search;
+use crate::choice::{NetworkRule, TermRule, rank};
 use crate::dataset::Prepared;
 use crate::dataset::checks::slope;
+use crate::dataset::choice_keys::Choice;
 use crate::dataset::description::{Gravity as DescribedGravity, PositionUnit, RigidDescription};
-use crate::evaluate::{Prediction, error_tables, fixed_point_difference, rmse};
+use crate::evaluate::{Prediction, error_tables, fixed_point_difference};
 use crate::friction_parameter::Units;
 use crate::identify::{self, Identified, identify};
 use crate::joint_model::{firmware_states, fixed_point, regimes, rigid_efforts};
@@ -28,7 +32,7 @@ use crate::presets::Preset;
 use crate::progress::Progress;
 use crate::report::{self, NetworkOutcome, Report, Role};
 use crate::rigid::{Gravity, RigidModel, RigidParameters};
-use crate::samples::{Part, Samples};
+use crate::samples::Samples;
 use joint_firmware::friction::FrictionParameters;
 use joint_firmware::friction::regime::Measure;
 use joint_firmware::parameters::certificate::Certificate;
@@ -38,7 +42,7 @@ use serde::Serialize;
 /// Choices of a fit.
 #[derive(Clone, Debug, Serialize)]
 pub struct Options {
-    /// Physical models that compete; the best on validation samples is used.
+    /// Physical models that compete: the simplest that no other beats on motions that were left out is used.
     pub presets: Vec<Preset>,
     /// How the network is trained; None trains none.
     pub trainer: Option<Trainer>,
@@ -57,10 +61,14 @@ pub struct Options {
     /// Copies of training samples.
     #[serde(skip)]
     pub augment: Augment,
-    /// Inputs that the network uses: position, velocity, theoretical torque, measured torque, temperature; None: position and
-    /// velocity; the theoretical torque where there is gravity; the temperature where it varies by 10 K.
+    /// Inputs that the network uses: position, velocity, theoretical torque, measured torque, temperature; None: velocity, and
+    /// those that pay of position, the theoretical torque where there is gravity, and the temperature where it varies by 10 K.
     pub inputs: Option<[bool; 5]>,
-    /// Least fall of the validation error, as a fraction, for which a network is kept.
+    /// Who decides about the network; `Choose`: as the description of the data set says.
+    pub network: NetworkRule,
+    /// Terms of the full model that are forced or forbidden, beside those of the description.
+    pub terms: Vec<TermRule>,
+    /// Least fall of the error on motions that were left out, as a fraction, for which a network is kept.
     pub least_gain: f64,
     /// Criteria of regimes with a network each; none: one network for all.
     #[serde(skip)]
@@ -81,13 +89,15 @@ impl Default for Options {
             presets: vec![Preset::CoulombViscous, Preset::Full],
             trainer: Some(Trainer::LevenbergMarquardt),
             restarts: 8,
-            patience: 60,
+            patience: 20,
             decay: 1e-4,
             seed: 1,
             samples: 12_000,
             equalise: 0.5,
             augment: Augment::default(),
             inputs: None,
+            network: NetworkRule::default(),
+            terms: vec![],
             least_gain: 0.02,
             regimes: vec![],
             reference: true,
@@ -153,9 +163,16 @@ pub struct Fitted {
 pub fn fit(prepared: &mut Prepared, options: &Options, progress: &dyn Progress) -> Result<Fitted, FitError> {
     let rigid_model = rigid_model(&prepared.description.rigid);
     let units = units(prepared);
+    let options = &overruled(options, &prepared.description.choice);
     let samples = &mut prepared.samples;
 
-    let identified = identify_all(samples, &rigid_model, &units, options, progress)?;
+    let choices = identify::Options {
+        units: units.clone(),
+        folds: Some(prepared.folds.clone()),
+        terms: options.terms.clone(),
+        ..identify::Options::default()
+    };
+    let identified = identify_all(samples, &rigid_model, &choices, options, progress)?;
     let effort = prepared.description.columns.effort.unit;
     let context = assemble::Context { effort, sha256: &prepared.sha256, options };
     let (chosen, refused) = choose_physical(samples, &identified, &context)?;
@@ -165,7 +182,18 @@ pub fn fit(prepared: &mut Prepared, options: &Options, progress: &dyn Progress) 
     let static_load = rigid_model.gravity != Gravity::None;
     let inputs = options.inputs.unwrap_or_else(|| learn::inputs(samples, static_load));
     let thresholds = &prepared.thresholds;
-    let learned = learn::learn(&Problem { samples, states: &states, physical, thresholds, inputs, options, progress })?;
+    let reference = simplest(&identified).fold_errors();
+    let learned = learn::learn(&Problem {
+        samples,
+        states: &states,
+        physical,
+        thresholds,
+        inputs,
+        folds: &prepared.folds,
+        reference: &reference,
+        options,
+        progress,
+    })?;
 
     progress.stage("quantise and certify");
     let built = build_image(samples, physical, &learned, &context)?;
@@ -210,6 +238,7 @@ pub fn fit(prepared: &mut Prepared, options: &Options, progress: &dyn Progress) 
         stages: summary::stages(prepared),
         parameters: physical.parameters.iter().map(summary::parameter).collect(),
         candidates: summary::candidates(&identified, chosen, &refused, &learned),
+        choice: summary::choice(&prepared.folds, &identified, chosen, &refused, &learned, options),
         network: learned.outcome.clone(),
         errors,
         fixed_point: Some(difference),
@@ -240,30 +269,45 @@ pub(crate) fn image_on_other_motion(
 fn identify_all(
     samples: &mut Samples,
     rigid: &RigidModel,
-    units: &Units,
+    choices: &identify::Options,
     options: &Options,
     progress: &dyn Progress,
 ) -> Result<Vec<Identified>, FitError> {
     progress.stage("identify");
-    let choices = identify::Options { units: units.clone(), ..identify::Options::default() };
     let mut identified = Vec::new();
     for &preset in &options.presets {
         progress.detail(preset.name());
-        let one = identify(samples, rigid, preset, &choices).map_err(|source| FitError::Identify { preset, source })?;
+        let one = identify(samples, rigid, preset, choices).map_err(|source| FitError::Identify { preset, source })?;
         identified.push(one);
     }
     if identified.is_empty() { Err(FitError::NoPreset) } else { Ok(identified) }
 }
 
-/// The model with the lowest validation error that the certificate accepts, and why it refused better ones.
+/// The options with what the description of the data set overrules; those of the caller go first.
+fn overruled(options: &Options, choice: &Choice) -> Options {
+    let mut all = options.clone();
+    if all.network == NetworkRule::Choose {
+        all.network = choice.network;
+    }
+    let own = |rule: &&TermRule| !options.terms.iter().any(|own| own.term == rule.term);
+    all.terms.extend(choice.terms.iter().filter(own));
+    all
+}
+
+/// The model with the fewest parameters.
+fn simplest(identified: &[Identified]) -> &Identified {
+    identified.iter().min_by_key(|one| one.parameters.len()).unwrap_or(&identified[0])
+}
+
+/// The simplest model that no other beats on motions that were left out, of those that the certificate accepts, and why it refused others.
 fn choose_physical(
     samples: &Samples,
     identified: &[Identified],
     context: &assemble::Context,
 ) -> Result<(usize, Vec<(usize, String)>), FitError> {
-    let error = |i: usize| identified[i].validation_rmse.unwrap_or(identified[i].train_rmse);
-    let mut order: Vec<usize> = (0..identified.len()).collect();
-    order.sort_by(|&a, &b| error(a).total_cmp(&error(b)));
+    let errors: Vec<Vec<f64>> = identified.iter().map(Identified::fold_errors).collect();
+    let parameters: Vec<usize> = identified.iter().map(|one| one.parameters.len()).collect();
+    let order = rank(&errors, &parameters);
     let mut refused = Vec::new();
     let mut last = FitError::NoPreset;
     for i in order {
@@ -300,9 +344,4 @@ pub fn units(prepared: &Prepared) -> Units {
         PositionUnit::Metre => "m",
     };
     Units { position: position.to_owned(), effort: prepared.description.columns.effort.unit.symbol().to_owned() }
-}
-
-/// Root mean square of what a friction leaves of the effort over one part.
-pub(crate) fn part_rmse(samples: &Samples, part: Part, predicted: impl Fn(usize) -> f64) -> f64 {
-    rmse(samples.indices(part).into_iter().map(|i| samples.effort[i] - predicted(i)))
 }

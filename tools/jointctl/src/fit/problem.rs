@@ -2,6 +2,7 @@
 
 use super::Options;
 use super::trainer::Task;
+use crate::choice::Folds;
 use crate::classify::Thresholds;
 use crate::identify::Identified;
 use crate::joint_model::network_inputs;
@@ -21,8 +22,12 @@ pub(super) struct Problem<'a> {
     pub states: &'a [JointState],
     pub physical: &'a Identified,
     pub thresholds: &'a Thresholds,
-    /// Which of the network's inputs are used.
+    /// Which inputs of the network the recording supports.
     pub inputs: [bool; 5],
+    /// Motions that are left out in turn.
+    pub folds: &'a Folds,
+    /// Errors of the simplest physical model on the folds.
+    pub reference: &'a [f64],
     pub options: &'a Options,
     pub progress: &'a dyn Progress,
 }

@@ -2,6 +2,7 @@
 
 use super::{Learned, Options};
 use crate::certificate_search::Found;
+use crate::choice::{Folds, NetworkRule, compare};
 use crate::dataset::Prepared;
 use crate::evaluate::Prediction;
 use crate::friction_parameter::Units;
@@ -68,27 +69,67 @@ pub(super) fn candidates(
         .map(|(i, one)| Candidate {
             model: one.preset.name().to_owned(),
             parameters: one.parameters.len(),
-            validation_rmse: one.validation_rmse.unwrap_or(one.train_rmse),
+            unseen_rmse: one.unseen_rmse(),
             kept: i == chosen,
             reason: match refused.iter().find(|(refused, _)| *refused == i) {
                 Some((_, reason)) => reason.clone(),
-                None if i == chosen => "lowest validation error of the physical models".to_owned(),
-                None => "higher validation error".to_owned(),
+                None if i == chosen => "the simplest that no other beats beyond the spread of the folds".to_owned(),
+                None => against(one, &identified[chosen]),
             },
         })
         .collect();
-    if let Some(validation_rmse) = learned.validation_rmse {
+    if let Some(unseen_rmse) = learned.unseen_rmse {
         let (kept, reason) = match &learned.outcome {
-            NetworkOutcome::Kept => (true, "lowers the validation error".to_owned()),
+            NetworkOutcome::Kept => (true, "lowers the error on left-out motions, or is kept by request".to_owned()),
             NetworkOutcome::Rejected { reason } => (false, reason.clone()),
             NetworkOutcome::NotTrained => (false, "not trained".to_owned()),
         };
         let model = format!("{} + network", identified[chosen].preset);
         let parameters = identified[chosen].parameters.len() + learned.parameters;
-        all.push(Candidate { model, parameters, validation_rmse, kept, reason });
+        all.push(Candidate { model, parameters, unseen_rmse, kept, reason });
     }
-    all.sort_by(|a, b| a.validation_rmse.total_cmp(&b.validation_rmse));
+    all.sort_by(|a, b| a.unseen_rmse.total_cmp(&b.unseen_rmse));
     all
+}
+
+/// How the error on left-out motions changes from the chosen model to another.
+fn against(other: &Identified, chosen: &Identified) -> String {
+    let change = compare(&chosen.fold_errors(), &other.fold_errors());
+    format!("{:+.1} ± {:.1} % on left-out motions", change.percent(), 100.0 * change.standard_error)
+}
+
+/// How the model was chosen, for the report.
+pub(super) fn choice(
+    folds: &Folds,
+    identified: &[Identified],
+    chosen: usize,
+    refused: &[(usize, String)],
+    learned: &Learned,
+    options: &Options,
+) -> report::Choice {
+    let mut overruled: Vec<String> = options.terms.iter().map(|rule| format!("term {rule}")).collect();
+    match options.network {
+        NetworkRule::Choose => {}
+        NetworkRule::Keep => overruled.push("network: keep".into()),
+        NetworkRule::Never => overruled.push("network: never".into()),
+    }
+    let mut notes: Vec<String> = identified[chosen].notes.clone();
+    notes.extend(learned.notes.iter().cloned());
+    notes.extend(refused.iter().map(|(i, reason)| format!("{} is refused: {reason}", identified[*i].preset)));
+    report::Choice {
+        grouping: folds.grouping.clone(),
+        motions: folds.motions,
+        folds: (0..folds.len())
+            .map(|fold| report::FoldRow {
+                left_out: folds.names[fold].clone(),
+                errors: identified.iter().map(|one| one.folds.get(fold).map_or(f64::NAN, |fit| fit.rmse)).collect(),
+            })
+            .collect(),
+        models: identified.iter().map(|one| one.preset.name().to_owned()).collect(),
+        terms: identified[chosen].friction.terms.iter().map(|term| format!("{term:?}")).collect(),
+        notes,
+        overruled,
+    }
 }
 
 pub(super) fn certificate_items(

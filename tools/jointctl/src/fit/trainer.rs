@@ -17,6 +17,10 @@ pub enum Trainer {
     StochasticGradient,
 }
 
+/// Limit of epochs of Levenberg-Marquardt, for the networks that are judged on left-out motions and for the one that is used alike: longer
+/// training follows the runs that it has seen further than what was judged.
+const EPOCHS: usize = 150;
+
 /// One network to be trained.
 pub(super) struct Task<'a> {
     pub train: TrainingSet,
@@ -32,14 +36,19 @@ impl Task<'_> {
         (0..self.restarts.max(1) as u64).map(|n| self.options.seed.wrapping_add(n)).collect()
     }
 
-    /// Trains with every seed; the network of the best one.
-    pub fn run(&self, trainer: Trainer) -> Result<Trained, FitError> {
+    /// Trains with every seed; the network of the best one. With `quiet` it tells no progress.
+    pub fn run(&self, trainer: Trainer, quiet: bool) -> Result<Trained, FitError> {
         let Self { train, validation, input_box, .. } = self;
-        let tell = |p: train::Progress| self.tell("network", p);
+        let tell = |p: train::Progress| {
+            if !quiet {
+                self.tell("network", p);
+            }
+        };
         Ok(match trainer {
             Trainer::LevenbergMarquardt => {
                 let options = levenberg_marquardt::Options {
                     seeds: self.seeds(),
+                    max_epochs: EPOCHS,
                     max_fail: self.options.patience.max(1),
                     decay: self.options.decay,
                     ..Default::default()

@@ -333,10 +333,9 @@ mod tests {
     use super::super::synthetic::{RIGID, friction, motion, rigid};
     use super::*;
     use crate::friction_model::Terms;
-    use crate::samples::Part;
 
     fn layout(structure: &Structure) -> Layout {
-        let limits = Limits::of(&super::super::observations::rows(&motion(2_000), Part::Train), 30.0);
+        let limits = Limits::of(&super::super::observations::rows(&motion(2_000)), 30.0);
         Layout::new(structure, &RIGID.regressors(), &limits)
     }
 

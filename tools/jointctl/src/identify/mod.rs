@@ -4,9 +4,14 @@
 //!    every sample (`Samples::load`), frozen from then on: friction terms that depend on load never see the measured torque.
 //! 2. The terms of the chosen preset are identified, jointly with the rigid part once more.
 //!
+//! Training and validation samples are both used; what is chosen is chosen by folds over motions (`choice`).
+//!
 //! `observations` checks and thins the samples, `layout` maps parameters to the searched vector, `linear` and `nonlinear` fit,
-//! `grid` finds where to start, `selection` chooses the terms of `Preset::Full`, `estimates` adds standard errors.
+//! `grid` finds where to start, `selection` chooses the terms of `Preset::Full`, `crossed` fits without each
+//! fold, `determined` says which terms the data determine, `estimates` adds standard errors.
 
+mod crossed;
+mod determined;
 mod estimates;
 mod grid;
 mod layout;
@@ -15,14 +20,16 @@ mod nonlinear;
 mod observations;
 mod selection;
 
+pub use crossed::{FoldFit, overall};
 pub use estimates::Estimated;
 pub use selection::TEMPERATURE_RANGE;
 
-use crate::friction_model::FrictionModel;
+use crate::choice::{Folds, TermRule, grouping};
+use crate::friction_model::{FrictionModel, Term};
 use crate::friction_parameter::{FrictionParameter, Units};
 use crate::presets::Preset;
 use crate::rigid::{RigidModel, RigidParameters};
-use crate::samples::{Part, Samples};
+use crate::samples::Samples;
 use nonlinear::{Fit, Problem};
 use observations::{Limits, Row, joint_state, rigid_state};
 
@@ -38,8 +45,12 @@ pub struct Options {
     pub reference_temperature: Option<f64>,
     /// k_a; None: sign(a) counts fully from a fifth of the acceleration's root mean square.
     pub hysteresis_acceleration_slope: Option<f64>,
-    /// Evenly decimated train samples that searches use; the last descent uses all.
+    /// Evenly decimated samples that searches use; the last descent uses all.
     pub search_samples: usize,
+    /// Motions that are left out in turn; None: blocks of time.
+    pub folds: Option<Folds>,
+    /// Terms of `Preset::Full` that are forced or forbidden.
+    pub terms: Vec<TermRule>,
 }
 
 impl Default for Options {
@@ -49,6 +60,8 @@ impl Default for Options {
             reference_temperature: None,
             hysteresis_acceleration_slope: None,
             search_samples: 8_000,
+            folds: None,
+            terms: vec![],
         }
     }
 }
@@ -90,9 +103,14 @@ pub enum IdentifyError {
         /// Least number.
         needed: usize,
     },
-    /// The full model is reduced on validation samples, and there are none.
-    #[error("the full model needs validation samples to choose its terms; there are none")]
-    NoValidation,
+    /// The terms of the full model are chosen on samples that are left out, and there are too few for two folds.
+    #[error("the full model needs two folds of samples to choose its terms; the {found} samples make {folds}")]
+    TooFewFolds {
+        /// Number of samples for training and validation.
+        found: usize,
+        /// Folds that they make.
+        folds: usize,
+    },
 }
 
 /// An identified joint.
@@ -108,15 +126,25 @@ pub struct Identified {
     pub friction: FrictionModel,
     /// All identified parameters, rigid ones first.
     pub parameters: Vec<Estimated>,
-    /// Root mean square of effort - rigid - friction over the train samples.
+    /// Root mean square of effort - rigid - friction over the samples for training and validation.
     pub train_rmse: f64,
-    /// The same over the validation samples; None where there are none.
-    pub validation_rmse: Option<f64>,
+    /// The same model fitted without each fold, with its error there.
+    pub folds: Vec<FoldFit>,
     /// What was left out or could not be determined, and why.
     pub notes: Vec<String>,
 }
 
 impl Identified {
+    /// Error on each fold when it is left out.
+    pub fn fold_errors(&self) -> Vec<f64> {
+        self.folds.iter().map(|fold| fold.rmse).collect()
+    }
+
+    /// Root mean square of the errors on all folds, each left out; the training error where there is no fold.
+    pub fn unseen_rmse(&self) -> f64 {
+        overall(&self.fold_errors()).unwrap_or(self.train_rmse)
+    }
+
     /// Rigid part of the effort of one sample.
     pub fn rigid_effort(&self, samples: &Samples, index: usize) -> f64 {
         self.rigid.effort(&rigid_state(samples, index))
@@ -130,7 +158,7 @@ impl Identified {
 
 /// Identifies a joint from its train samples and fills in the theoretical torque (`load`) of all samples.
 ///
-/// Validation samples are used to choose the terms of `Preset::Full` and for nothing else; test samples not at all.
+/// Samples for training and validation are used alike, test samples not at all.
 pub fn identify(
     samples: &mut Samples,
     rigid: &RigidModel,
@@ -138,12 +166,25 @@ pub fn identify(
     options: &Options,
 ) -> Result<Identified, IdentifyError> {
     let problem = theoretical_torque(samples, rigid, options)?;
-    let (fit, mut notes) = match preset.structure(rigid) {
-        Some(structure) => (grid::search(&problem, &structure).polished(&problem), vec![]),
-        None if problem.validation.is_empty() => return Err(IdentifyError::NoValidation),
-        None => selection::select(&problem, rigid),
+    let (fit, folds, mut notes) = match preset.structure(rigid) {
+        Some(structure) => {
+            let structure = problem.determined(structure);
+            let found = grid::search(&problem, &structure);
+            let folds = crossed::crossed(&problem, &found);
+            (found.polished(&problem), folds, vec![])
+        }
+        None if problem.folds.len() < 2 => {
+            return Err(IdentifyError::TooFewFolds { found: problem.train.len(), folds: problem.folds.len() });
+        }
+        None => selection::select(&problem, rigid, &options.terms),
     };
     let (parameters, undetermined) = estimates::estimates(&fit, problem.train.len(), &options.units);
+    if problem.own_part_of_offset < determined::OWN_PART && !fit.friction.terms.contains(Term::Constant) {
+        notes.push(format!(
+            "no offset: over these positions the rigid part explains all but {:.2} % of it",
+            100.0 * problem.own_part_of_offset
+        ));
+    }
     notes.extend(fit.candidate.notes.iter().cloned());
     notes.extend(undetermined);
     if fit.candidate.structure.holds_rigid() {
@@ -154,7 +195,7 @@ pub fn identify(
         rigid: fit.rigid,
         theoretical: problem.theoretical,
         train_rmse: fit.at.cost.sqrt(),
-        validation_rmse: fit.rmse(&problem.validation),
+        folds,
         friction: fit.friction,
         parameters,
         notes,
@@ -164,7 +205,7 @@ pub fn identify(
 /// Step 1: the rigid part with viscous and Coulomb friction; fills in the load of all samples.
 fn theoretical_torque(samples: &mut Samples, rigid: &RigidModel, options: &Options) -> Result<Problem, IdentifyError> {
     observations::check(samples, rigid)?;
-    let train = observations::rows(samples, Part::Train);
+    let train = observations::rows(samples);
     if train.len() < MINIMUM_SAMPLES {
         return Err(IdentifyError::TooFewSamples { found: train.len(), needed: MINIMUM_SAMPLES });
     }
@@ -178,25 +219,30 @@ fn theoretical_torque(samples: &mut Samples, rigid: &RigidModel, options: &Optio
             .unwrap_or(5.0 / limits.acceleration_rms.max(f64::MIN_POSITIVE)),
         ..FrictionModel::default()
     };
+    let regressors = rigid.regressors();
     let mut problem = Problem {
+        own_part_of_offset: determined::own_part_of_offset(&train, &regressors),
         search: observations::decimated(&train, options.search_samples),
         train,
-        validation: observations::rows(samples, Part::Validation),
+        folds: vec![],
         limits,
-        regressors: rigid.regressors(),
+        regressors,
         theoretical: RigidParameters::default(),
         template,
     };
     if let Some(structure) = Preset::CoulombViscous.structure(rigid) {
-        let first: Fit = grid::search(&problem, &structure).polished(&problem);
+        let first: Fit = grid::search(&problem, &problem.determined(structure)).polished(&problem);
         problem.theoretical = first.rigid;
         problem.template.coulomb_slope = first.friction.parameter(FrictionParameter::CoulombSlope);
     }
     samples.load = (0..samples.len()).map(|i| problem.theoretical.effort(&rigid_state(samples, i))).collect();
-    for rows in [&mut problem.train, &mut problem.validation, &mut problem.search] {
+    for rows in [&mut problem.train, &mut problem.search] {
         rows.iter_mut().for_each(|row| row.joint.load = nonlinear::rigid_effort(&problem.theoretical, row));
     }
     problem.limits = Limits::of(&problem.train, reference_temperature);
+    let folds = options.folds.clone().unwrap_or_else(|| grouping::of_time(samples));
+    let left_out: Vec<u8> = observations::used(samples).into_iter().map(|i| folds.left_out[i]).collect();
+    problem.folds = crossed::fold_rows(&problem.train, &left_out, &folds);
     Ok(problem)
 }
 

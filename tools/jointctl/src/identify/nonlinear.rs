@@ -1,9 +1,11 @@
 //! Fitting one structure of terms by Levenberg-Marquardt over all its parameters, with an exact Jacobian; host.
 
+use super::crossed::FoldRows;
+use super::determined::OWN_PART;
 use super::layout::{Layout, PARAMETERS, Parameter, Role};
 use super::linear::{add_to_normal_sums, dependences, normal_equations, normal_sums, sum_over_rows};
 use super::observations::{Limits, Row};
-use crate::friction_model::FrictionModel;
+use crate::friction_model::{FrictionModel, Term};
 use crate::levenberg_marquardt::{Damping, LeastSquares, NormalEquations, Options, minimise};
 use crate::presets::Structure;
 use crate::rigid::{RigidParameters, RigidRegressor};
@@ -13,11 +15,11 @@ use std::ops::ControlFlow;
 /// What all fits of one identification share.
 #[derive(Clone, Debug)]
 pub struct Problem {
-    /// All train rows.
+    /// All rows for training and validation.
     pub train: Vec<Row>,
-    /// All validation rows.
-    pub validation: Vec<Row>,
-    /// Evenly decimated train rows, for searching.
+    /// Rows of every fold; empty until the theoretical torque is known.
+    pub folds: Vec<FoldRows>,
+    /// The same rows, evenly decimated, for searching.
     pub search: Vec<Row>,
     /// Limits of the train rows.
     pub limits: Limits,
@@ -25,8 +27,20 @@ pub struct Problem {
     pub regressors: Vec<RigidRegressor>,
     /// Rigid part that the theoretical torque in the rows was computed with.
     pub theoretical: RigidParameters,
+    /// The part of a constant over the train rows that the rigid part does not explain.
+    pub own_part_of_offset: f64,
     /// Fixed parameters, and the Coulomb slope where a structure does not identify it.
     pub template: FrictionModel,
+}
+
+impl Problem {
+    /// The structure without an offset where nothing tells it from the rigid part.
+    pub fn determined(&self, structure: Structure) -> Structure {
+        match self.own_part_of_offset >= OWN_PART {
+            true => structure,
+            false => Structure { terms: structure.terms.without(Term::Constant), ..structure },
+        }
+    }
 }
 
 /// A structure of terms, laid out for the data at hand.

@@ -95,14 +95,19 @@ pub fn check(samples: &Samples, rigid: &RigidModel) -> Result<(), IdentifyError>
     Ok(())
 }
 
-/// The rows of one part, in order, without a load.
-pub fn rows(samples: &Samples, part: Part) -> Vec<Row> {
+/// Indices of the samples that identification uses: all for training and validation.
+pub fn used(samples: &Samples) -> Vec<usize> {
+    (0..samples.len()).filter(|&i| matches!(samples.part[i], Part::Train | Part::Validation)).collect()
+}
+
+/// The rows of the samples that identification uses, in order, without a load.
+pub fn rows(samples: &Samples) -> Vec<Row> {
     let row = |i| Row {
         joint: JointState { load: 0.0, ..joint_state(samples, i) },
         regressors: RigidParameters::regressor_values(&rigid_state(samples, i)),
         effort: samples.effort[i],
     };
-    samples.indices(part).into_iter().map(row).collect()
+    used(samples).into_iter().map(row).collect()
 }
 
 /// Every n-th row, with the smallest n that leaves at most `limit`.

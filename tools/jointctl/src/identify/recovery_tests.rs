@@ -30,7 +30,7 @@ fn true_value(symbol: &str, truth: &FrictionModel) -> f64 {
 fn asymmetric(terms: &[Term]) -> Structure {
     let terms = Terms::of(terms);
     let asymmetric_breakaway = terms.contains(Term::Stribeck);
-    Structure { terms, asymmetric_coulomb: true, asymmetric_breakaway, coupled_slopes: false }
+    Structure { terms, asymmetric_coulomb: true, asymmetric_breakaway, ..Structure::default() }
 }
 
 fn assert_within_three_standard_errors(found: &[(Estimated, f64)]) {

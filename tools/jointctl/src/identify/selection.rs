@@ -1,15 +1,16 @@
-//! The `full` model: the terms that the data can support, chosen on validation samples; host.
+//! The `full` model: the terms that pay on motions that were left out; host.
 //!
-//! Stepwise: from the full set, the term whose loss leaves the lowest validation error is dropped as long as that error stays
-//! within a tolerance of the lowest one seen; then the missing term that lowers it most is taken back; and so on until
-//! neither helps. Taking terms back matters: a term whose coefficient has reached 0 has lost the gradient of its shapes, and
-//! only a new grid finds them. The result is then measured against every other preset that comes close, on all validation
-//! samples, and the best one wins. Test samples are not seen.
+//! 1. From Coulomb and viscous friction with an offset, the term that lowers the error of the left-out motions most is taken, then those are
+//!    dropped without which it does not rise, and so on until neither helps. A preset that is better starts the same once more.
+//! 2. Of all models on that path the simplest one is chosen that the best does not beat beyond one standard error.
+//!
+//! A term that the others nearly explain is not considered (`determined`). Test samples are not seen.
 
+use super::crossed::{FoldFit, crossed, errors, overall};
+use super::determined::stands_for_itself;
 use super::grid::{search, search_from};
-use super::linear::{add_to_normal_sums, normal_equations, normal_sums, sum_over_rows};
 use super::nonlinear::{Fit, Problem};
-use super::observations::{Row, decimated};
+use crate::choice::{Comparison, TermRule, compare, rank};
 use crate::friction_model::{Term, Terms};
 use crate::presets::{Preset, Structure};
 use crate::rigid::RigidModel;
@@ -18,26 +19,21 @@ use std::fmt;
 
 /// Temperature terms are considered when the train samples cover at least this many kelvin.
 pub const TEMPERATURE_RANGE: f64 = 5.0;
-/// The position slope stands for itself when the rigid part leaves at least this fraction of the position's variance unexplained; with
-/// less its standard error is more than ten times that of a slope alone. Over some 75 degrees either way gravity's sine is a straight line but
-/// for a hundredth: noise then decides how much of gravity counts as friction, which whoever commands the joint has added already.
-const OWN_POSITION: f64 = 0.01;
-/// A position slope that does not stand for itself must be worth this fraction of the validation error.
-const CONFOUNDED_WORTH: f64 = 0.05;
-/// A term stays when it is worth at least this fraction of the validation error.
-const WORTH: f64 = 1e-3;
-/// Limit on steps: each fits about a dozen models.
-const STEPS: usize = 40;
-/// Validation rows that decide on a step.
-const VALIDATION_ROWS: usize = 10_000;
-/// A preset is fitted over all rows when its error over the search rows comes this close to that of the chosen terms.
-const CONTENDER: f64 = 1.02;
+/// A term is taken as long as it lowers the mean error by this fraction.
+const STEP: f64 = 5e-4;
+/// Limit on terms that are taken: each step fits about a dozen models.
+const STEPS: usize = 12;
+/// Terms of every model, unless they are forbidden: the simplest model.
+const ALWAYS: [Term; 3] = [Term::Constant, Term::Viscous, Term::Coulomb];
 
 /// What a structure can lose or gain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Freedom {
+pub enum Freedom {
+    /// A term.
     Term(Term),
+    /// A Coulomb friction for each direction.
     AsymmetricCoulomb,
+    /// A height of the Stribeck peak for each direction.
     AsymmetricBreakaway,
 }
 
@@ -49,13 +45,6 @@ impl fmt::Display for Freedom {
             Self::AsymmetricBreakaway => f.write_str("asymmetry of the breakaway friction"),
         }
     }
-}
-
-/// A structure on the way, its fit over the search rows and its validation error.
-struct Step {
-    changed: Freedom,
-    error: f64,
-    fit: Fit,
 }
 
 /// The terms that the data can support, and why others are left out.
@@ -79,31 +68,80 @@ fn supported(problem: &Problem, rigid: &RigidModel) -> (Structure, Vec<String>) 
             problem.limits.temperature_range
         ));
     }
-    let structure = Structure { terms, asymmetric_coulomb: true, asymmetric_breakaway: true, coupled_slopes: false };
+    let structure = Structure { terms, asymmetric_coulomb: true, asymmetric_breakaway: true, ..Structure::default() };
     (structure, notes)
 }
 
-/// The fraction of the position's variance over the train rows that the rigid part's regressors leave unexplained.
-fn position_beside_rigid(problem: &Problem) -> f64 {
-    let regressors = &problem.regressors;
-    let n = regressors.len() + 1;
-    let sums = sum_over_rows(&problem.train, normal_sums(n), |sums, row| {
-        let mut columns: Vec<f64> = regressors.iter().map(|&regressor| row.regressors[regressor as usize]).collect();
-        columns.push(1.0);
-        add_to_normal_sums(sums, &columns, row.joint.position);
-    });
-    let equations = normal_equations(&sums, n, problem.train.len());
-    let mean = equations.gradient[n - 1];
-    let variance = equations.cost - mean * mean;
-    let explained =
-        equations.hessian.cholesky().map(|factor| factor.solve(&equations.gradient).dot(&equations.gradient));
-    // Regressors that depend on each other explain less together than they are taken for; then nothing is known.
-    explained.map_or(1.0, |explained| (equations.cost - explained) / variance.max(f64::MIN_POSITIVE))
+/// A structure with its fit over the search rows and its fits without each fold.
+#[derive(Clone)]
+struct Crossed {
+    fit: Fit,
+    folds: Vec<FoldFit>,
+    errors: Vec<f64>,
 }
 
-/// What the structure can lose; viscous and Coulomb friction stay.
-fn freedoms(structure: &Structure) -> Vec<Freedom> {
-    let terms = structure.terms.iter().filter(|term| !matches!(term, Term::Viscous | Term::Coulomb));
+impl Crossed {
+    fn new(problem: &Problem, fit: Fit) -> Self {
+        let folds = crossed(problem, &fit);
+        let errors = errors(&folds);
+        Self { fit, folds, errors }
+    }
+
+    fn structure(&self) -> Structure {
+        self.fit.candidate.structure
+    }
+
+    fn overall(&self) -> f64 {
+        overall(&self.errors).unwrap_or(f64::INFINITY)
+    }
+
+    /// How the error changes from `self` to `other`.
+    fn to(&self, other: &Self) -> Comparison {
+        compare(&self.errors, &other.errors)
+    }
+
+    /// True where `other` lowers the mean error by `worth`, and neither the error of all folds together rises nor that of one grouping: a gain on
+    /// slow motions is not paid for with the fast ones, nor one in time with one in speed.
+    fn improves(&self, other: &Self, worth: f64) -> bool {
+        let grouping: Vec<usize> = self.folds.iter().map(|fold| fold.grouping).collect();
+        improves(&self.errors, &other.errors, &grouping, worth)
+    }
+}
+
+/// See [`Crossed::improves`]; errors before and after, and the grouping of each fold.
+fn improves(before: &[f64], after: &[f64], grouping: &[usize], worth: f64) -> bool {
+    let mean = |number: usize| {
+        let of = |errors: &[f64]| -> Vec<f64> {
+            errors.iter().zip(grouping).filter(|(_, grouping)| **grouping == number).map(|(error, _)| *error).collect()
+        };
+        compare(&of(before), &of(after)).mean
+    };
+    let groupings = grouping.iter().max().map_or(0, |last| last + 1);
+    compare(before, after).mean <= (1.0 - worth).ln()
+        && overall(after) <= overall(before)
+        && (0..groupings).all(|number| mean(number) <= 0.0)
+}
+
+/// Terms that a person decides about.
+struct Rules<'a>(&'a [TermRule]);
+
+impl Rules<'_> {
+    fn forced(&self, term: Term) -> bool {
+        self.0.iter().any(|rule| rule.term == term && rule.force)
+    }
+
+    fn forbids(&self, structure: &Structure) -> bool {
+        self.0.iter().any(|rule| !rule.force && structure.terms.contains(rule.term))
+    }
+
+    fn lacks(&self, structure: &Structure) -> bool {
+        self.0.iter().any(|rule| rule.force && !structure.terms.contains(rule.term))
+    }
+}
+
+/// What the structure can lose; the terms of every model stay, and what is forced.
+fn freedoms(structure: &Structure, rules: &Rules) -> Vec<Freedom> {
+    let terms = structure.terms.iter().filter(|&term| !ALWAYS.contains(&term) && !rules.forced(term));
     let sides = [
         (Freedom::AsymmetricCoulomb, structure.asymmetric_coulomb),
         (Freedom::AsymmetricBreakaway, structure.asymmetric_breakaway),
@@ -111,8 +149,8 @@ fn freedoms(structure: &Structure) -> Vec<Freedom> {
     terms.map(Freedom::Term).chain(sides.into_iter().filter(|side| side.1).map(|side| side.0)).collect()
 }
 
-/// The structure with one freedom more or less.
-fn changed(structure: &Structure, freedom: Freedom, on: bool) -> Structure {
+/// The structure with one freedom more or less; nothing where it needs a term that is not there.
+fn changed(structure: &Structure, freedom: Freedom, on: bool) -> Option<Structure> {
     let mut changed = *structure;
     match freedom {
         Freedom::Term(term) if on => changed.terms = changed.terms.with(term),
@@ -120,113 +158,180 @@ fn changed(structure: &Structure, freedom: Freedom, on: bool) -> Structure {
         Freedom::AsymmetricCoulomb => changed.asymmetric_coulomb = on,
         Freedom::AsymmetricBreakaway => changed.asymmetric_breakaway = on,
     }
-    changed.asymmetric_breakaway &= changed.terms.contains(Term::Stribeck);
-    changed
-}
-
-/// The fit over all train rows of the structure with the lowest validation error, and how it was chosen.
-pub fn select(problem: &Problem, rigid: &RigidModel) -> (Fit, Vec<String>) {
-    let (structure, mut notes) = supported(problem, rigid);
-    let rows = decimated(&problem.validation, VALIDATION_ROWS);
-    let own = position_beside_rigid(problem);
-    let chosen = if own >= OWN_POSITION {
-        step_by_step(problem, search(problem, &structure), &structure, &rows, &mut notes)
-    } else {
-        position_last(problem, &structure, own, &rows, &mut notes)
+    let has = |term| changed.terms.contains(term);
+    let possible = match freedom {
+        Freedom::AsymmetricBreakaway => has(Term::Stribeck),
+        Freedom::AsymmetricCoulomb | Freedom::Term(Term::CoulombLoad | Term::CoulombTemperature | Term::Stribeck) => {
+            has(Term::Coulomb)
+        }
+        _ => true,
     };
-    let limit = CONTENDER * error(&chosen, &rows);
-    let chosen = chosen.polished(problem);
-    let mut best = (error(&chosen, &problem.validation), chosen);
-    let may_have_position = best.1.candidate.structure.terms.contains(Term::Position) || own >= OWN_POSITION;
-    let considered = |preset: &Structure| may_have_position || !preset.terms.contains(Term::Position);
-    for preset in Preset::ALL {
-        let Some(structure) = preset.structure(rigid).filter(considered) else { continue };
-        let fit = search(problem, &structure);
-        if error(&fit, &rows) > limit {
-            continue;
-        }
-        let fit = fit.polished(problem);
-        let error = error(&fit, &problem.validation);
-        if error < best.0 {
-            notes.push(format!("{preset} replaces the chosen terms: validation error {:.4e} -> {error:.4e}", best.0));
-            best = (error, fit);
+    changed.asymmetric_breakaway &= has(Term::Stribeck);
+    changed.coupled_slopes &= has(Term::Stribeck);
+    (possible || !on).then_some(changed)
+}
+
+/// The chosen structure fitted to all rows, its fits without each fold, and how it was chosen.
+pub fn select(problem: &Problem, rigid: &RigidModel, rules: &[TermRule]) -> (Fit, Vec<FoldFit>, Vec<String>) {
+    let rules = Rules(rules);
+    let (mut full, notes) = supported(problem, rigid);
+    let forbidden = rules.0.iter().filter(|rule| !rule.force);
+    full.terms = forbidden.fold(full.terms, |terms, rule| terms.without(rule.term));
+    let mut simplest = simplest(&full, &rules);
+    if !rules.forced(Term::Constant) {
+        (full, simplest) = (problem.determined(full), problem.determined(simplest));
+    }
+    let mut search_path = Path { problem, full, rules, path: vec![], notes };
+    search_path.walk(Crossed::new(problem, search(problem, &simplest)));
+    if let Some((preset, better)) = search_path.best_preset(rigid) {
+        let before = search_path.last().clone();
+        search_path.note(&format!("all terms of {preset} taken"), &before, &better);
+        search_path.walk(better);
+    }
+    let Path { mut path, mut notes, .. } = search_path;
+    let errors: Vec<Vec<f64>> = path.iter().map(|model| model.errors.clone()).collect();
+    let sizes: Vec<usize> = path.iter().map(|model| model.fit.x.len()).collect();
+    let order = rank(&errors, &sizes);
+    if let [chosen, best, ..] = order[..] {
+        let change = path[chosen].to(&path[best]);
+        if change.mean < 0.0 {
+            notes.push(format!(
+                "{} numbers instead of {} are chosen: with the latter the error changes by {:+.1} ± {:.1} %",
+                sizes[chosen],
+                sizes[best],
+                change.percent(),
+                100.0 * change.standard_error
+            ));
         }
     }
-    (best.1, notes)
+    let Crossed { fit, folds, .. } = path.swap_remove(order[0]);
+    (fit.polished(problem), folds, notes)
 }
 
-fn error(fit: &Fit, rows: &[Row]) -> f64 {
-    fit.rmse(rows).unwrap_or(f64::INFINITY)
+/// Viscous and Coulomb friction with an offset, and what is forced.
+fn simplest(full: &Structure, rules: &Rules) -> Structure {
+    let base = ALWAYS.into_iter().chain(full.terms.contains(Term::RotorInertia).then_some(Term::RotorInertia));
+    let wanted = Term::ALL.into_iter().filter(|&term| rules.forced(term));
+    let terms: Vec<Term> =
+        base.chain(wanted).filter(|&term| !rules.0.iter().any(|r| !r.force && r.term == term)).collect();
+    Structure { terms: Terms::of(&terms), ..Structure::default() }
 }
 
-/// Chooses among the other terms first, and takes a position slope that the rigid part explains only for what it adds to them.
-fn position_last(problem: &Problem, full: &Structure, own: f64, rows: &[Row], notes: &mut Vec<String>) -> Fit {
-    let slope = Freedom::Term(Term::Position);
-    let others = changed(full, slope, false);
-    let without = step_by_step(problem, search(problem, &others), &others, rows, notes);
-    let with =
-        search_from(problem, &changed(&without.candidate.structure, slope, true), &without, Some(Term::Position));
-    let (before, after) = (error(&without, rows), error(&with, rows));
-    let explained = 100.0 * (1.0 - own);
-    if after <= (1.0 - CONFOUNDED_WORTH) * before {
-        notes.push(format!(
-            "{slope} added, although the rigid part explains {explained:.1} % of the position over these motions: validation error \
-             {before:.4e} -> {after:.4e}"
-        ));
-        return step_by_step(problem, with, full, rows, notes);
+/// The models that were come across, the simplest first, and what they may have.
+struct Path<'a> {
+    problem: &'a Problem,
+    full: Structure,
+    rules: Rules<'a>,
+    path: Vec<Crossed>,
+    notes: Vec<String>,
+}
+
+impl Path<'_> {
+    fn last(&self) -> &Crossed {
+        &self.path[self.path.len() - 1]
     }
-    notes.push(format!(
-        "{slope} left out: the rigid part explains {explained:.1} % of the position over these motions, and it is not worth \
-         {:.0} % of the validation error ({before:.4e} -> {after:.4e})",
-        100.0 * CONFOUNDED_WORTH
-    ));
-    without
-}
 
-/// Drops terms and takes terms of `full` back until neither is worth it.
-fn step_by_step(problem: &Problem, start: Fit, full: &Structure, rows: &[Row], notes: &mut Vec<String>) -> Fit {
-    let all = freedoms(full);
-    let (mut current, mut fit) = (error(&start, rows), start);
-    let mut lowest = current;
-    let (mut adding, mut exhausted) = (false, 0);
-    for _ in 0..STEPS {
-        let structure = fit.candidate.structure;
-        let present = freedoms(&structure);
-        let freedoms = all.iter().copied().filter(|freedom| present.contains(freedom) != adding).collect();
-        let limit = if adding { current * (1.0 - WORTH) } else { lowest * (1.0 + WORTH) };
-        match best_step(problem, &fit, freedoms, adding, rows) {
-            Some(step) if step.error <= limit => {
-                let verb = if adding { "taken back" } else { "dropped" };
-                notes.push(format!("{} {verb}: validation error {current:.4e} -> {:.4e}", step.changed, step.error));
-                (current, fit) = (step.error, step.fit);
-                lowest = lowest.min(current);
-                exhausted = 0;
+    fn note(&mut self, what: &str, before: &Crossed, after: &Crossed) {
+        let (before, after) = (before.overall(), after.overall());
+        self.notes.push(format!("{what}: error on left-out motions {before:.4e} -> {after:.4e}"));
+    }
+
+    /// Takes and drops terms, one at a time, as long as one of both helps.
+    fn walk(&mut self, from: Crossed) {
+        self.path.push(from);
+        for _ in 0..STEPS {
+            let before = self.last().clone();
+            let Some((taken, mut current)) = self.best_addition(&before) else { break };
+            self.note(&format!("{taken} taken"), &before, &current);
+            while let Some((dropped, fewer)) = self.best_removal(&current, taken) {
+                self.note(&format!("{dropped} dropped"), &current, &fewer);
+                current = fewer;
             }
-            _ => {
-                exhausted += 1;
-                adding = !adding;
-            }
-        }
-        if exhausted == 2 {
-            break;
+            self.path.push(current);
         }
     }
-    fit
-}
 
-/// The change of one freedom that leaves the lowest error.
-fn best_step(problem: &Problem, from: &Fit, freedoms: Vec<Freedom>, adding: bool, rows: &[Row]) -> Option<Step> {
-    let steps: Vec<Step> = freedoms
-        .into_par_iter()
-        .map(|freedom| {
-            let structure = changed(&from.candidate.structure, freedom, adding);
+    /// The freedom that lowers the error of the left-out motions most, if any does.
+    fn best_addition(&self, from: &Crossed) -> Option<(Freedom, Crossed)> {
+        let has = freedoms(&from.structure(), &self.rules);
+        let missing: Vec<Freedom> =
+            freedoms(&self.full, &self.rules).into_iter().filter(|freedom| !has.contains(freedom)).collect();
+        let steps = missing.into_par_iter().filter_map(|freedom| {
+            let structure = changed(&from.structure(), freedom, true)?;
             let new = match freedom {
-                Freedom::Term(term) if adding => Some(term),
+                Freedom::Term(term) => Some(term),
                 _ => None,
             };
-            let fit = search_from(problem, &structure, from, new);
-            Step { changed: freedom, error: error(&fit, rows), fit }
-        })
-        .collect();
-    steps.into_iter().reduce(|best, step| if step.error < best.error { step } else { best })
+            let fit = search_from(self.problem, &structure, &from.fit, new);
+            if !stands_for_itself(&fit, freedom) {
+                return None;
+            }
+            let next = Crossed::new(self.problem, fit);
+            from.improves(&next, STEP).then_some((freedom, next))
+        });
+        lowest(steps.collect())
+    }
+
+    /// The freedom, but for the one just taken, without which the error of the left-out motions is lowest, if it does not rise.
+    fn best_removal(&self, from: &Crossed, taken: Freedom) -> Option<(Freedom, Crossed)> {
+        let others: Vec<Freedom> =
+            freedoms(&from.structure(), &self.rules).into_iter().filter(|&freedom| freedom != taken).collect();
+        let steps = others.into_par_iter().filter_map(|freedom| {
+            let structure = changed(&from.structure(), freedom, false)?;
+            let fewer = Crossed::new(self.problem, search_from(self.problem, &structure, &from.fit, None));
+            from.improves(&fewer, 0.0).then_some((freedom, fewer))
+        });
+        lowest(steps.collect())
+    }
+
+    /// The best preset, where it is better than the last model. It has no term that the data do not support.
+    fn best_preset(&self, rigid: &RigidModel) -> Option<(Preset, Crossed)> {
+        let presets = Preset::ALL.into_par_iter().filter_map(|preset| {
+            let mut structure = preset.structure(rigid)?;
+            for term in ALWAYS.into_iter().filter(|&term| self.full.terms.contains(term)) {
+                structure.terms = structure.terms.with(term);
+            }
+            if !self.full.terms.contains(Term::Constant) {
+                structure.terms = structure.terms.without(Term::Constant);
+            }
+            let supported = structure.terms.iter().all(|term| term == Term::Load || self.full.terms.contains(term));
+            if !supported || self.rules.forbids(&structure) || self.rules.lacks(&structure) {
+                return None;
+            }
+            let fit = search(self.problem, &structure);
+            let own = freedoms(&structure, &self.rules).into_iter().all(|freedom| stands_for_itself(&fit, freedom));
+            let model = Crossed::new(self.problem, fit);
+            (own && self.last().improves(&model, STEP)).then_some((preset, model))
+        });
+        lowest(presets.collect())
+    }
+}
+
+/// The model with the lowest error on left-out motions; of equal ones the first.
+fn lowest<T>(models: Vec<(T, Crossed)>) -> Option<(T, Crossed)> {
+    models.into_iter().reduce(|best, model| if best.1.to(&model.1).mean < 0.0 { model } else { best })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_step_lowers_the_mean_error_by_its_worth() {
+        assert!(improves(&[1.0, 1.0], &[0.998, 1.0], &[0, 0], 9e-4));
+        assert!(!improves(&[1.0, 1.0], &[0.998, 1.0], &[0, 0], 1.1e-3));
+    }
+
+    #[test]
+    fn a_step_pays_for_no_gain_with_the_error_of_all_folds_together() {
+        // Half of a small error gained, a tenth of a large one lost.
+        assert!(!improves(&[0.1, 1.0], &[0.05, 1.1], &[0, 0], 0.0));
+        assert!(improves(&[0.1, 1.0], &[0.05, 1.001], &[0, 0], 0.0));
+    }
+
+    #[test]
+    fn a_step_pays_for_no_gain_in_one_grouping_with_the_other() {
+        assert!(!improves(&[1.0, 1.0, 1.0], &[0.5, 0.5, 1.01], &[0, 0, 1], 0.0));
+        assert!(improves(&[1.0, 1.0, 1.0], &[0.5, 0.5, 1.0], &[0, 0, 1], 0.0));
+    }
 }

@@ -85,17 +85,14 @@ pub fn drive(samples: &mut Samples, rigid: &RigidParameters, friction: &Friction
 
 /// The problem of identifying such a joint when its theoretical torque is known exactly.
 pub fn problem(samples: &Samples, model: &RigidModel, theoretical: RigidParameters, truth: &FrictionModel) -> Problem {
-    let load = |part| {
-        let mut rows = rows(samples, part);
-        rows.iter_mut().for_each(|row| row.joint.load = rigid_effort(&theoretical, row));
-        rows
-    };
-    let train = load(Part::Train);
+    let mut train = rows(samples);
+    train.iter_mut().for_each(|row| row.joint.load = rigid_effort(&theoretical, row));
     Problem {
         search: decimated(&train, 8_000),
         limits: Limits::of(&train, truth.reference_temperature),
         train,
-        validation: load(Part::Validation),
+        folds: vec![],
+        own_part_of_offset: 1.0,
         regressors: model.regressors(),
         theoretical,
         template: FrictionModel {

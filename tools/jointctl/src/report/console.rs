@@ -3,6 +3,14 @@
 use super::ErrorTable;
 use super::number::{NONE, optional, percent};
 
+/// How the model was chosen, in lines for a terminal.
+pub fn choice(choice: &super::Choice) -> String {
+    let mut lines = vec![format!("Chosen by {}.", choice.grouping)];
+    lines.push(format!("Terms: {}.", choice.terms.join(", ")));
+    lines.extend(choice.overruled.iter().map(|rule| format!("Overruled: {rule}.")));
+    lines.join("\n")
+}
+
 /// The table with a heading, ending in a line feed. Efforts in `unit`.
 pub fn error_table(table: &ErrorTable, unit: &str) -> String {
     let heading = [

@@ -2,6 +2,7 @@
 //!
 //! All text goes through maud, which escapes it.
 
+use super::choice;
 use super::number::{count, percent, significant};
 use super::summary::{headline, verdict};
 use super::{Figure, NetworkOutcome, Report, style_sheet, tables};
@@ -78,7 +79,7 @@ fn sections(report: &Report, figures: &[Figure]) -> Vec<Option<Section>> {
             !report.candidates.is_empty(),
             "selection",
             "Model selection",
-            html! { (tables::candidates(report)) (gallery(&pick(&["candidates"]))) },
+            html! { (choice::choice(report)) (tables::candidates(report)) (gallery(&pick(&["candidates"]))) },
         ),
         section(
             !report.training.is_empty(),

@@ -4,6 +4,7 @@
 //! numbers as JSON. Nothing here computes a model: errors come from [`crate::metrics`], predictions from the stages.
 //! The outcome is a pure function of the report, so that equal reports give equal bytes.
 
+mod choice;
 pub mod console;
 mod figures;
 mod html;
@@ -38,8 +39,10 @@ pub struct Report {
     pub stages: Vec<StageNote>,
     /// Identified physical parameters.
     pub parameters: Vec<Parameter>,
-    /// The models that were compared on validation data, best first.
+    /// The models that were compared on motions that were left out, best first.
     pub candidates: Vec<Candidate>,
+    /// How the model was chosen.
+    pub choice: Choice,
     /// What became of the network.
     pub network: NetworkOutcome,
     /// Errors on test data, one table for each test set. The verdict looks at all of them.
@@ -113,15 +116,43 @@ pub struct Parameter {
     pub truth: Option<f64>,
 }
 
-/// One model that was compared on validation data.
+/// How the model was chosen.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Choice {
+    /// The groupings of the folds, in words.
+    pub grouping: String,
+    /// False: blocks of time, which say nothing about other motions.
+    pub motions: bool,
+    /// Names of the physical models whose errors the folds have.
+    pub models: Vec<String>,
+    /// The folds.
+    pub folds: Vec<FoldRow>,
+    /// Terms of the chosen model.
+    pub terms: Vec<String>,
+    /// Steps of the choice.
+    pub notes: Vec<String>,
+    /// Decisions that a person made instead.
+    pub overruled: Vec<String>,
+}
+
+/// One fold.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct FoldRow {
+    /// Motions that it leaves out.
+    pub left_out: String,
+    /// RMSE there of each physical model, fitted without it, unit of effort.
+    pub errors: Vec<f64>,
+}
+
+/// One model that was compared on motions that were left out.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Candidate {
     /// Name of the preset, or what was added to it.
     pub model: String,
     /// Number of free parameters.
     pub parameters: usize,
-    /// RMSE on validation data, unit of effort.
-    pub validation_rmse: f64,
+    /// RMSE over the folds, each left out, unit of effort.
+    pub unseen_rmse: f64,
     /// This is the model that is used.
     pub kept: bool,
     /// Why it is, or why it is not.

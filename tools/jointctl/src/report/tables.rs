@@ -166,13 +166,13 @@ pub fn candidates(report: &Report) -> Markup {
                 text(kept),
                 text(&c.reason),
                 text(c.parameters.to_string()),
-                text(significant(c.validation_rmse, 4)),
+                text(significant(c.unseen_rmse, 4)),
             ];
             (c.kept.then_some("kept"), cells)
         })
         .collect();
-    let heading = ["model", "", "why", "parameters", &format!("validation RMSE [{}]", report.units.effort)];
-    let caption = "Models by their error on validation data, which neither identification nor training has seen.";
+    let heading = ["model", "", "why", "parameters", &format!("RMSE on left-out motions [{}]", report.units.effort)];
+    let caption = "Models by their error on motions that each of them was not fitted to.";
     table(&heading, 3, &rows, caption)
 }
 

@@ -153,7 +153,7 @@ fn reports_that_lack_something_are_still_reports() {
 fn numbers_that_are_none_are_shown_as_a_dash() {
     let mut report = example::report(100);
     report.parameters[0].standard_error = Some(f64::INFINITY);
-    report.candidates[2].validation_rmse = f64::NAN;
+    report.candidates[2].unseen_rmse = f64::NAN;
     report.training[0].validation[5] = f64::NAN;
     report.training[1].train[5] = 0.0;
     report.certificate[0].value = f64::INFINITY;

@@ -78,6 +78,7 @@ fn the_reference_names_every_key() {
         ("[classify]\n", "classify."),
         ("[rigid]\n", "rigid."),
         ("[split]\n", "split."),
+        ("[choice]\n", "choice."),
         ("[split.validation]\n", ""),
         ("[split.validation.blocks]\n", "blocks."),
         ("[split.validation.fraction]\n", "fraction."),

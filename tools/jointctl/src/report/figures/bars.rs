@@ -51,13 +51,13 @@ pub fn motion_states(report: &Report) -> Result<Option<Figure>, FigureError> {
     }))
 }
 
-/// Validation RMSE of every candidate, in the order of the report.
+/// RMSE on left-out motions of every candidate, in the order of the report.
 pub fn candidates(report: &Report) -> Result<Option<Figure>, FigureError> {
-    let shown: Vec<_> = report.candidates.iter().filter(|c| c.validation_rmse.is_finite()).collect();
+    let shown: Vec<_> = report.candidates.iter().filter(|c| c.unseen_rmse.is_finite()).collect();
     if shown.is_empty() {
         return Ok(None);
     }
-    let highest = shown.iter().map(|c| c.validation_rmse).fold(0.0, f64::max);
+    let highest = shown.iter().map(|c| c.unseen_rmse).fold(0.0, f64::max);
     let names: Vec<String> = shown.iter().map(|c| shorten(&c.model, 40)).collect();
     let svg = paper(1080, 110 + 34 * shown.len().max(2) as u32, |area| {
         let area = legend(
@@ -65,17 +65,17 @@ pub fn candidates(report: &Report) -> Result<Option<Figure>, FigureError> {
             30,
             &[(Ink::Network, Swatch::Area(1.0), "kept"), (Ink::Measured, Swatch::Area(1.0), "not kept")],
         )?;
-        let x = Axis::linear(0.0..highest * 1.1, 8, format!("validation RMSE [{}]", report.units.effort));
+        let x = Axis::linear(0.0..highest * 1.1, 8, format!("RMSE on left-out motions [{}]", report.units.effort));
         let panel = Panel::new(&area, x, Axis::names(names.iter().map(String::as_str), "").reversed(), 0)?;
         for (place, candidate) in shown.iter().enumerate() {
-            let (place, value) = (place as f64, candidate.validation_rmse);
+            let (place, value) = (place as f64, candidate.unseen_rmse);
             let ink = if candidate.kept { Ink::Network } else { Ink::Measured };
             panel.bar([(0.0, place - 0.34), (value, place + 0.34)], ink, 1.0)?;
             panel.text(&significant(value, 4), (value, place), (6, 0), HPos::Left, VPos::Center)?;
         }
         Ok(())
     })?;
-    let caption = "Validation RMSE of every model that was tried, best first; a more complex model has to earn its place by a \
+    let caption = "RMSE on left-out motions of every model that was tried, best first; a more complex model has to earn its place by a \
                    shorter bar.";
     Ok(Some(Figure { name: "candidates", title: "Candidate models", caption: caption.into(), wide: true, svg }))
 }
