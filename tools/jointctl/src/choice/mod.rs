@@ -2,7 +2,7 @@
 //!
 //! - [`grouping`] finds the motions of a recording and which folds leave them out;
 //! - [`folds`] is the result: up to eight folds, each of which leaves out whole motions;
-//! - [`compare`] is the rule: the simpler model unless a richer one wins beyond the spread of the folds;
+//! - [`mod@compare`] is the rule: the simpler model unless a richer one wins beyond the spread of the folds;
 //! - [`overrule`] holds decisions that a person makes instead.
 //!
 //! The physical terms (`identify::selection`), the physical models and the network with its inputs (`fit`) are chosen by the
