@@ -54,7 +54,7 @@ pub struct Alignment {
     pub zero: Estimate,
     /// How far the rotor lagged behind the field, electrical turns.
     pub lag: f64,
-    /// Flux linkage of the magnet, peak, Vs. Its error is no standard error: it is what may be hidden by what the legs lose, see [`hidden`].
+    /// Flux linkage of the magnet, peak, Vs. Its error is no standard error: it is what may be hidden by what the legs lose, see `hidden`.
     pub flux: Estimate,
     /// By how much the zero differs with less current, electrical turns.
     pub difference: f64,
