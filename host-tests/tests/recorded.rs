@@ -1,4 +1,4 @@
-//! Recorded joints: the fixed-point image predicts unseen samples as README says, beside the best floating-point baseline.
+//! Recorded joints: the fixed-point image predicts unseen samples as README says.
 //!
 //! The recordings are others' and are not part of this repository: they are looked for in `$JOINT_DATA`, else in
 //! `../shared/data` beside it. Where they are absent every test here is reported as ignored, by name.

@@ -79,7 +79,7 @@ impl<W: Wired> Objects for OnBoard<'_, W> {
 #[derive(Debug)]
 pub struct Telling {
     stage: Rc<Cell<Stage>>,
-    /// What it was told.
+    /// All that it was told, line by line.
     pub told: Vec<String>,
 }
 

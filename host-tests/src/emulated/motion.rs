@@ -32,8 +32,8 @@ const ENABLING: [u16; 3] = [0x06, 0x07, 0x0F];
 /// Up to here the joint is enabled, s.
 const ENABLED: f64 = 0.3;
 
-/// An image whose physical model and network act in all that [`Moving`] does: every term, a network in each of four sets,
-/// and a trained box that is not left.
+/// An image whose physical model and network act in all that [`Moving`] does: every term, a network in each of
+/// four sets, and a trained box that is not left.
 pub fn acting_image() -> Vec<u8> {
     image_bytes()
 }

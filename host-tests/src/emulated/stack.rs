@@ -37,8 +37,8 @@ impl PaintedStack {
         Ok(Self(stack))
     }
 
-    /// Bytes that were ever written to since the last start, and bytes that there are. A start after the first leaves zeros
-    /// instead of paint.
+    /// Bytes that were ever written to since the last start, and bytes that there are. A start after the first leaves
+    /// zeros instead of paint.
     ///
     /// # Errors
     /// The stack cannot be read.

@@ -53,8 +53,8 @@ impl Taken {
     }
 }
 
-/// Moves a joint on for so many seconds, with wait states as chosen. Where the network is in the program is told by line
-/// tables, which its file has.
+/// Moves a joint on for so many seconds, with wait states as chosen. Where the network is in the program is told by
+/// line tables, which its file has.
 ///
 /// # Errors
 /// The run ended, a fault was reported, or the bridge is off at its end.

@@ -12,7 +12,7 @@ const CONTROL: u16 = 16 + 18;
 /// Time after power-up by which the second line of the log has come, s.
 const SETTLED: f64 = 1.1;
 
-/// What is shown here.
+/// The tests of this file, by name.
 pub fn trials() -> Vec<Trial> {
     vec![
         Trial::test("b_g431b_esc1_starts_and_controls", esc1_starts),

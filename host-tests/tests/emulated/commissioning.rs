@@ -31,7 +31,7 @@ const COUNTS: [u32; 5] = [2_000, 4_000, 4_096, 8_192, 10_000];
 const MOTEUS: &str = "moteus-r4";
 const ESC1: &str = "b-g431b-esc1-bus";
 
-/// What is shown here.
+/// The tests of this file, by name.
 pub fn trials() -> Vec<Trial> {
     let mut trials = vec![
         Trial::test("moteus_r4_stops_a_commissioning_in_the_same_control_step", || stops(MOTEUS, MoteusR4::new)),

@@ -49,7 +49,7 @@ const PROGRAMS: [&str; 2] = ["moteus-r4", "b-g431b-esc1-bus"];
 const SET_POINT: f64 = 0.005;
 const NODE: u8 = 5;
 
-/// What is shown here.
+/// The tests of this file, by name.
 pub fn trials() -> Vec<Trial> {
     vec![
         Trial::test("every_control_step_of_the_flashed_programs_is_the_hosts", same_steps),

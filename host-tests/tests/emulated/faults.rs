@@ -31,7 +31,7 @@ const SURGE: f64 = 2.2;
 const SAG: f64 = 0.3;
 const LOST: f64 = 0.1;
 
-/// What is shown here.
+/// The tests of this file, by name.
 pub fn trials() -> Vec<Trial> {
     vec![
         Trial::test("moteus_r4_switches_off_in_time_and_says_why", moteus),

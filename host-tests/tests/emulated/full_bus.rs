@@ -37,7 +37,7 @@ const INTERMISSION: u64 = 3;
 /// Bytes of stack that nothing has touched: an exception's frame, twice.
 const MARGIN: u32 = 2 * 104;
 
-/// What is shown here.
+/// The tests of this file, by name.
 pub fn trials() -> Vec<Trial> {
     vec![
         Trial::test("a_full_bus_moves_no_control_step_of_moteus_r4", || on_time(MoteusR4::NAME, MoteusR4::new)),

@@ -35,7 +35,7 @@ const RESET: u16 = 0x80;
 const SHORT: f64 = 10.0 * SET_POINT;
 const LONG: f64 = 30.0 * SET_POINT;
 
-/// What is shown here.
+/// The tests of this file, by name.
 pub fn trials() -> Vec<Trial> {
     vec![
         Trial::test("moteus_r4_names_a_fault_of_its_gate_driver_and_clears_it", faults_in_motion),

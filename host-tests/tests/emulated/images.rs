@@ -34,7 +34,7 @@ const VERIFY: u8 = 1;
 const COMMIT: u8 = 3;
 const ACTIVE: u32 = 7;
 
-/// What is shown here.
+/// The tests of this file, by name.
 pub fn trials() -> Vec<Trial> {
     vec![
         Trial::test("b_g431b_esc1_takes_an_image_and_starts_with_it", || takes_an_image(ESC1, BG431BEsc1::new)),

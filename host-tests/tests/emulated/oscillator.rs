@@ -1,4 +1,5 @@
-//! The trim of the boards' oscillator: a setting that acts as soon as it is taken, and outlasts a loss of power once it is stored.
+//! The trim of the boards' oscillator: a setting that acts as soon as it is taken, and outlasts a loss of power
+//! once it is stored.
 
 use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired};
 use emulator::bus::{Bus, Width};
@@ -13,7 +14,7 @@ const ICSCR: u32 = 0x4002_1004;
 const TRIM: (u16, u8) = (0x2105, 1);
 const FACTORY: u32 = 64;
 
-/// What is shown here.
+/// The tests of this file, by name.
 pub fn trials() -> Vec<Trial> {
     vec![
         Trial::test("moteus_r4_trims_its_oscillator", || trims("moteus-r4", MoteusR4::new)),
@@ -21,7 +22,7 @@ pub fn trials() -> Vec<Trial> {
     ]
 }
 
-/// What the oscillator is trimmed to.
+/// The trim in the oscillator's register.
 fn trimmed<W: Wired>(bench: &mut Bench<W>) -> Result<u32, Failed> {
     let now = bench.emulation.cpu.now();
     let read = Bus::read(&mut bench.emulation.cpu.bus, now, ICSCR, Width::Word);

@@ -30,7 +30,7 @@ const MARKS: u64 = 5;
 /// Longest time from a request to its last operation, s.
 const LONGEST: f64 = 0.4;
 
-/// What is shown here.
+/// The tests of this file, by name.
 pub fn trials() -> Vec<Trial> {
     vec![
         Trial::test("an_image_is_the_old_one_or_the_new_one", || survives(&Content::IMAGE)),

@@ -15,7 +15,7 @@ const STEP: u64 = 170_000;
 /// How many of them: control has begun, and the bus has answered.
 const STEPS: u64 = 300;
 
-/// What is shown here.
+/// The tests of this file, by name.
 pub fn trials() -> Vec<Trial> {
     vec![
         Trial::test("b_g431b_esc1_does_the_same_every_time", || same_every_time(BG431BEsc1::new)),

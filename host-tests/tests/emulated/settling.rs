@@ -8,7 +8,7 @@ use host_tests::emulated::observed::Observed;
 use libtest_mimic::{Failed, Trial};
 use plant::actuator::Fault;
 
-/// What is shown here.
+/// The tests of this file, by name.
 pub fn trials() -> Vec<Trial> {
     vec![
         Trial::test("moteus_r4_samples_settled_currents_at_its_greatest_duty", || {

@@ -13,7 +13,7 @@ const NODE: u8 = 5;
 /// The command deadline's object.
 const DEADLINE: (u16, u8) = (0x2103, 11);
 
-/// What is shown here.
+/// The tests of this file, by name.
 pub fn trials() -> Vec<Trial> {
     vec![
         Trial::test("each_command_does_its_thing_on_the_moteus_r4", on_the_moteus),

@@ -1,4 +1,4 @@
-//! How a model is chosen: by its error on motions that it was not fitted to; host. `docs/model-choice.md` explains it with figures.
+//! Choice of a model by its error on motions that it was not fitted to; host. `docs/model-choice.md` has figures.
 //!
 //! - [`grouping`] finds the motions of a recording and which folds leave them out;
 //! - [`folds`] is the result: up to eight folds, each of which leaves out whole motions;

@@ -45,7 +45,7 @@ pub(super) fn torque_constant(plan: &Plan, found: &Found) -> Option<f64> {
     plan.torque_constant.or_else(|| torque_constant_is_measured(plan, found.new).then(measured))
 }
 
-/// Whether that is the one by back-EMF; `new`: the joint had none.
+/// True for the one by back-EMF; `new`: the joint had none.
 pub(super) fn torque_constant_is_measured(plan: &Plan, new: bool) -> bool {
     new && plan.torque_constant.is_none()
 }

@@ -50,7 +50,7 @@ pub struct Description {
     /// What is kept for training, validation and judging.
     #[serde(default)]
     pub split: Split,
-    /// How the model is chosen.
+    /// Choice of the model.
     #[serde(default)]
     pub choice: Choice,
 }
