@@ -11,6 +11,7 @@ use super::selection::Freedom;
 use crate::friction_model::Term;
 use crate::friction_parameter::FrictionParameter as P;
 use crate::rigid::RigidRegressor;
+use nalgebra::DMatrix;
 
 /// Least own part of a term that the data determine: its standard error is then ten times that of a term that stands alone.
 pub const OWN_PART: f64 = 0.01;
@@ -21,16 +22,16 @@ pub fn stands_for_itself(fit: &Fit, freedom: Freedom) -> bool {
     let Some(column) = size(freedom).and_then(|parameter| layout.column_of(parameter)) else { return true };
     let linear = |i: &usize| matches!(layout.columns[*i].role, Role::Coefficient | Role::Factor);
     let others: Vec<usize> = (0..layout.len()).filter(|i| linear(i) && *i != column).collect();
-    let hessian = &fit.at.hessian;
-    let dependent = dependences(hessian, &others);
-    let mut free: Vec<usize> = others.into_iter().filter(|i| dependent.iter().all(|d| d.column != *i)).collect();
+    own_part(&fit.at.hessian, column, &others) >= OWN_PART
+}
+
+/// The part of a column's square that the others do not explain, from J^T J; 0 where they explain it to the last digit.
+fn own_part(hessian: &DMatrix<f64>, column: usize, others: &[usize]) -> f64 {
+    let dependent = dependences(hessian, others);
+    let mut free: Vec<usize> = others.iter().copied().filter(|i| dependent.iter().all(|d| d.column != *i)).collect();
     free.push(column);
-    // Nothing is left of a column that the others explain to the last digit.
-    let own = inverse(hessian, &free).map_or(0.0, |inverse| {
-        let place = free.len() - 1;
-        1.0 / (inverse[(place, place)] * hessian[(column, column)])
-    });
-    own >= OWN_PART
+    let last = free.len() - 1;
+    inverse(hessian, &free).map_or(0.0, |inverse| 1.0 / (inverse[(last, last)] * hessian[(column, column)]))
 }
 
 /// The part of a constant over the rows that the rigid part does not explain: over a small range of positions gravity is nearly constant.
@@ -42,12 +43,7 @@ pub fn own_part_of_offset(rows: &[Row], regressors: &[RigidRegressor]) -> f64 {
         add_to_normal_sums(sums, &columns, 0.0);
     });
     let hessian = normal_equations(&sums, n, rows.len()).hessian;
-    let offset = n - 1;
-    let dependent = dependences(&hessian, &(0..offset).collect::<Vec<_>>());
-    let mut free: Vec<usize> = (0..offset).filter(|i| dependent.iter().all(|d| d.column != *i)).collect();
-    free.push(offset);
-    let last = free.len() - 1;
-    inverse(&hessian, &free).map_or(0.0, |inverse| 1.0 / (inverse[(last, last)] * hessian[(offset, offset)]))
+    own_part(&hessian, n - 1, &(0..n - 1).collect::<Vec<_>>())
 }
 
 /// The parameter whose column a freedom adds; nothing for several at once.
