@@ -1,6 +1,7 @@
 //! The image life cycle over SDO: every step, every refusal with its code, its abort and its EMCY.
 
 use super::*;
+use crate::friction::common::CommonTerms;
 use crate::friction::domain::{Domain, Range};
 use crate::friction::physical::{Coefficients, PhysicalParameters, Terms};
 use crate::friction::regime::Selector;
@@ -26,6 +27,7 @@ fn image(version: u32) -> Vec<u8> {
     let friction = FrictionParameters {
         domain: Domain { ranges: [range; SIGNALS], margin: 0, reference_temperature: 0 },
         selector: Selector::default(),
+        common: CommonTerms::NONE,
         sets: [set, ParameterSet::default(), ParameterSet::default(), ParameterSet::default()],
     };
     let expected = FrictionModel::new(&friction, 20_000).evaluate(0, &JointState::from_signals([7; SIGNALS]));

@@ -5,6 +5,7 @@ use super::super::certificate::{self, Limits};
 use super::super::image::{Effort, GoldenMismatch, GoldenVector, Image, ImageError, MAX_LENGTH, Target};
 use super::super::slots::{Slot, WriteError};
 use super::*;
+use crate::friction::common::CommonTerms;
 use crate::friction::domain::{Domain, Range};
 use crate::friction::physical::{Coefficients, PhysicalParameters, Terms};
 use crate::friction::regime::Selector;
@@ -24,6 +25,7 @@ fn image(version: u32) -> Image {
     let friction = FrictionParameters {
         domain: Domain { ranges: [range; SIGNALS], margin: 0, reference_temperature: 0 },
         selector: Selector::default(),
+        common: CommonTerms::NONE,
         sets: [set, ParameterSet::default(), ParameterSet::default(), ParameterSet::default()],
     };
     let signals = [100, 200, 300, 400, 500, 600];

@@ -81,7 +81,8 @@ fn certified(image: &Pieces, limits: &Limits) -> Result<Certificate, certificate
     let mut set = ParameterSet::default();
     for index in 0..image.sets() {
         image.set(index, &mut set);
-        certificate::prove_set(&image.header.domain, &set, index, image.sets(), &mut proved)?;
+        let header = &image.header;
+        certificate::prove_set(&header.domain, &header.common, &set, index, image.sets(), &mut proved)?;
     }
     let proved = proved.unwrap_or_default();
     proved.hold(limits)?;
