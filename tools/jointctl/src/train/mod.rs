@@ -4,7 +4,7 @@
 //! - [`stochastic`] gradient descent with batch normalisation (mobile-robot paper, sections 2.2.3 and 3.1);
 //! - [`reference`](mod@reference) the legged-robot paper's own network, one hidden layer of 16, to compare with;
 //! - [`batch`] the samples in blocks, [`normal_equations`] the hot loop, [`batch_norm`] layers that fold away,
-//!   [`weights`] first values and bounds of the weights.
+//!   [`weights`] first values and bounds of the weights, `wide_vectors` the hot loops for the processor at hand.
 //!
 //! Every trainer returns the network of the epoch with the lowest validation error, of the best seed. The same seeds and
 //! samples give the same network whatever the number of threads: work is cut into fixed pieces and summed in order.
@@ -22,6 +22,7 @@ pub mod reference;
 pub mod stochastic;
 mod tanh;
 pub mod weights;
+mod wide_vectors;
 
 #[cfg(test)]
 mod tests;

@@ -3,9 +3,11 @@
 //! The Jacobian exists for one block of samples at a time, in panels of four parameters, so that a 4 x 4 tile of J^T J is
 //! accumulated in registers while two panels stream past. The errors are one more column of the Jacobian: the last row
 //! of the product is then J^T r and its last entry the cost. Only tiles on and below the diagonal are formed. On one core
-//! of the x86-64 baseline 20,000 samples and 96 parameters take about 20 ms (`cargo bench -p jointctl --bench train`).
+//! of the x86-64 baseline 20,000 samples and 96 parameters take about 20 ms (`cargo bench -p jointctl --bench train`), with AVX2
+//! less.
 
-use super::batch::{BLOCK, Batch, Column, PIECE, Pass};
+use super::batch::{BLOCK, Batch, Block, Column, PIECE, Pass};
+use super::wide_vectors::{Loop, on_wide_vectors};
 use crate::levenberg_marquardt::{LeastSquares, NormalEquations};
 use crate::network::Shape;
 use nalgebra::{DMatrix, DVector};
@@ -44,24 +46,12 @@ impl LeastSquares for NetworkFit<'_> {
     }
 
     fn normal_equations(&self, x: &DVector<f64>) -> NormalEquations {
-        let count = self.shape.parameter_count();
-        let panels = (count + 1).div_ceil(PANEL);
+        let panels = panels(self.shape.parameter_count());
         let pieces: Vec<Vec<Tile>> = self
             .samples
             .blocks
             .par_chunks(PIECE)
-            .map(|piece| {
-                let mut pass = Pass::new(self.shape);
-                let mut jacobian = vec![[[0.0; PANEL]; BLOCK]; panels];
-                let mut tiles = vec![Tile::default(); panels * (panels + 1) / 2];
-                for block in piece {
-                    pass.forward(x.as_slice(), block);
-                    store_column(&mut jacobian, count, &pass.weighted_errors(block), None);
-                    pass.backward(x.as_slice(), block, |p, slope, value| store_column(&mut jacobian, p, slope, value));
-                    accumulate(&mut tiles, &jacobian);
-                }
-                tiles
-            })
+            .map(|piece| on_wide_vectors(Products { shape: self.shape, parameters: x.as_slice(), piece }))
             .collect();
         let mut total = vec![Tile::default(); panels * (panels + 1) / 2];
         for piece in &pieces {
@@ -71,6 +61,39 @@ impl LeastSquares for NetworkFit<'_> {
         }
         self.unpack(&total, x)
     }
+}
+
+/// The products of all columns of the Jacobian and the errors over a piece of work.
+struct Products<'a> {
+    shape: &'a Shape,
+    parameters: &'a [f64],
+    piece: &'a [Block],
+}
+
+impl Loop for Products<'_> {
+    type Output = Vec<Tile>;
+
+    #[inline(always)]
+    fn run(self) -> Vec<Tile> {
+        let Self { shape, parameters, piece } = self;
+        let count = shape.parameter_count();
+        let panels = panels(count);
+        let mut pass = Pass::new(shape);
+        let mut jacobian = vec![[[0.0; PANEL]; BLOCK]; panels];
+        let mut tiles = vec![Tile::default(); panels * (panels + 1) / 2];
+        for block in piece {
+            pass.forward(parameters, block);
+            store_column(&mut jacobian, count, &pass.weighted_errors(block), None);
+            pass.backward(parameters, block, |p, slope, value| store_column(&mut jacobian, p, slope, value));
+            accumulate(&mut tiles, &jacobian);
+        }
+        tiles
+    }
+}
+
+/// Panels of the columns of `parameters` parameters and of the errors.
+fn panels(parameters: usize) -> usize {
+    (parameters + 1).div_ceil(PANEL)
 }
 
 impl NetworkFit<'_> {
@@ -90,6 +113,7 @@ impl NetworkFit<'_> {
     }
 }
 
+#[inline(always)]
 fn store_column(jacobian: &mut [[[f64; PANEL]; BLOCK]], parameter: usize, slope: &Column, value: Option<&Column>) {
     let panel = &mut jacobian[parameter / PANEL];
     let lane = parameter % PANEL;
@@ -108,6 +132,7 @@ fn store_column(jacobian: &mut [[[f64; PANEL]; BLOCK]], parameter: usize, slope:
 }
 
 /// Adds the products of all pairs of panels of a block.
+#[inline(always)]
 fn accumulate(tiles: &mut [Tile], jacobian: &[[[f64; PANEL]; BLOCK]]) {
     let mut tiles = tiles.iter_mut();
     for (i, rows) in jacobian.iter().enumerate() {
