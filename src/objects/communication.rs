@@ -17,7 +17,7 @@ pub fn default_communication(node_id: u8) -> CommunicationParameters {
     let cob_id = |base: u16| base.saturating_add(node_id.into());
     parameters.receive = [
         PdoParameters::new(cob_id(0x200), &[CONTROLWORD, map(0x6071, 0, 16), map(0x607A, 0, 32)]),
-        PdoParameters::new(cob_id(0x300), &[CONTROLWORD, map(0x6060, 0, 8), map(0x2010, 1, 8), map(0x60FF, 0, 32)]),
+        PdoParameters::new(cob_id(0x300), &[CONTROLWORD, map(0x6060, 0, 8), map(0x60FF, 0, 32)]),
         PdoParameters::new(cob_id(0x400), &[map(0x2011, 1, 64)]),
         // The rest of the neighbour's PDO is skipped: a dummy of 32 bits.
         PdoParameters {

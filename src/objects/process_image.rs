@@ -1,8 +1,8 @@
 //! Process data of the joint: RPDOs to one [`Demand`], actual values to TPDOs; the receive interrupt.
 //!
-//! An RPDO counts as a whole, once all of its objects are there. Its set-points renew the command deadline
-//! ([`Demand::sequence`]) unless it carries object 2010h:1 with the number that the one before had: a master that repeats itself
-//! without thinking is not alive.
+//! An RPDO counts as a whole, once all of its objects are there. That it arrives renews the command deadline ([`Demand::sequence`]), whatever its
+//! mapping. Where a master maps object 2010h:1 beside its set-points, one that repeats itself without thinking is not alive: the PDO with the
+//! number of the one before renews nothing.
 //!
 //! Outside OPERATIONAL, and in it until a controlword comes, the joint is asked for a quick stop and no torque. It is the node's own
 //! demand, and its sequence changes with the transition only: a joint that still brakes when the command deadline is over has a fault.

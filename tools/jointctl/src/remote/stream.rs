@@ -27,7 +27,7 @@ use std::time::{Duration, Instant};
 pub const RATES: [f64; 2] = [1.0, 1_000.0];
 /// How long each step to "operation enabled" may take.
 const STEP: Duration = Duration::from_secs(1);
-/// RPDOs of the joint: drive and torque and position; velocity with a counter; impedance frame.
+/// RPDOs of the joint: drive and torque and position; velocity; impedance frame.
 const DRIVE: u8 = 0;
 const VELOCITY: u8 = 1;
 const IMPEDANCE: u8 = 2;

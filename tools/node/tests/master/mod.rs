@@ -19,7 +19,6 @@ pub struct Master {
     pub node: VirtualNode,
     /// What the node sent beside SDO answers.
     pub heard: Vec<Frame>,
-    counter: u8,
 }
 
 impl Master {
@@ -45,7 +44,7 @@ impl Master {
         let setup = Setup::of(&parameters);
         let options = Options { node_id: ID, serial: 12, seed: 1 };
         let node = VirtualNode::with_storage(parameters, &setup, &options, storage).unwrap();
-        let mut master = Self { node, heard: vec![], counter: 0 };
+        let mut master = Self { node, heard: vec![] };
         // The joint measures its current sensors' offsets.
         master.wait(200);
         master
@@ -126,9 +125,8 @@ impl Master {
 
     /// RPDO 2 once.
     pub fn velocity(&mut self, controlword: u16, velocity: i32) {
-        self.counter = self.counter.wrapping_add(1);
         let mut data = controlword.to_le_bytes().to_vec();
-        data.extend([9, self.counter]);
+        data.push(9);
         data.extend(velocity.to_le_bytes());
         self.send(0x300 + u16::from(ID), &data);
     }
