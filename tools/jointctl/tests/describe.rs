@@ -22,7 +22,13 @@ fn main() {
     let ignored = !must_run && python.is_none();
     let name = "python_canopen_loads_the_eds_and_cantools_the_dbc_and_both_agree_with_a_joint";
     let trial = Trial::test(name, move || compare(python.as_deref()));
-    libtest_mimic::run(&arguments, vec![trial.with_ignored_flag(ignored)]).exit();
+    let lely = if arguments.list { None } else { DCF_TOOLS.python(env!("CARGO_TARGET_TMPDIR")) };
+    let without = !must_run && lely.is_none();
+    let strict = Trial::test(
+        "lelys_dcfchk_finds_nothing_in_the_eds_and_dcfgen_makes_a_masters_configuration_of_it",
+        move || configure(lely.as_deref()),
+    );
+    libtest_mimic::run(&arguments, vec![trial.with_ignored_flag(ignored), strict.with_ignored_flag(without)]).exit();
 }
 
 /// python-canopen with its bus, and cantools.
@@ -31,6 +37,62 @@ const PACKAGES: Packages = Packages {
     install: &["canopen==2.4.1", "python-can==4.6.1", "msgpack==1.2.4", "cantools==41.0.0"],
     import: "canopen, can, msgpack, cantools",
 };
+
+/// What ros2_canopen and others of Lely's stack make their configuration with.
+const DCF_TOOLS: Packages = Packages { folder: "python-dcf", install: &["dcf-tools==2.4.2"], import: "dcf, dcfgen" };
+
+/// A master with a joint, as ros2_canopen has it.
+const BUS: &str = "\
+master:
+  node_id: 1
+  sync_period: 10000
+  heartbeat_producer: 100
+joint_7:
+  dcf: joint.eds
+  node_id: 7
+  heartbeat_producer: 100
+  boot: true
+  sdo:
+    - {index: 0x6060, sub_index: 0, value: 8}
+  tpdo:
+    1:
+      enabled: true
+      transmission: 1
+      mapping: [{index: 0x6041, sub_index: 0}, {index: 0x6061, sub_index: 0}, {index: 0x6064, sub_index: 0}]
+    2:
+      enabled: true
+      transmission: 1
+      mapping: [{index: 0x606C, sub_index: 0}, {index: 0x6077, sub_index: 0}]
+  rpdo:
+    1:
+      enabled: true
+      mapping: [{index: 0x6040, sub_index: 0}, {index: 0x6060, sub_index: 0}, {index: 0x607A, sub_index: 0}]
+";
+
+fn configure(python: Option<&Path>) -> Result<(), Failed> {
+    let python = DCF_TOOLS.required(python)?;
+    let folder = tempfile::tempdir()?;
+    let written =
+        Command::new(env!("CARGO_BIN_EXE_jointctl")).current_dir(&folder).args(["eds", "joint.eds"]).output()?;
+    if !written.status.success() {
+        return Err(String::from_utf8_lossy(&written.stderr).into_owned().into());
+    }
+    std::fs::write(folder.path().join("bus.yml"), BUS)?;
+    for (program, arguments) in [("dcfchk", &["-n", "7", "joint.eds"][..]), ("dcfgen", &["-rS", "bus.yml"])] {
+        // Beside its Python; a warning is on the error output, and too much.
+        let output = Command::new(python.with_file_name(program)).current_dir(&folder).args(arguments).output()?;
+        let said = String::from_utf8_lossy(&output.stderr);
+        if !output.status.success() || !said.is_empty() {
+            return Err(format!("{program}: {}\n{said}", output.status).into());
+        }
+    }
+    for file in ["master.dcf", "joint_7.bin"] {
+        if std::fs::metadata(folder.path().join(file))?.len() == 0 {
+            return Err(format!("dcfgen left {file} empty").into());
+        }
+    }
+    Ok(())
+}
 
 fn compare(python: Option<&Path>) -> Result<(), Failed> {
     let python = PACKAGES.required(python)?;
@@ -50,6 +112,15 @@ fn compare(python: Option<&Path>) -> Result<(), Failed> {
     let stop = AtomicBool::new(false);
     let output = std::thread::scope(|scope| {
         scope.spawn(|| serve(&mut joint, &*bus, &stop));
+        let own = Command::new(env!("CARGO_BIN_EXE_jointctl"))
+            .current_dir(&folder)
+            .args(["eds", "own.eds", "--bus", &format!("udp:{GROUP}:{port}"), "--node", &NODE.to_string()])
+            .status();
+        let eds = own.and_then(|_| std::fs::read_to_string(folder.path().join("own.eds"))).unwrap_or_default();
+        if !eds.contains("ProductNumber=0x564A6E74\nRevisionNumber=0x1\n") {
+            stop.store(true, Ordering::Relaxed);
+            return Err(std::io::Error::other(format!("the file for this joint alone has not its identity:\n{eds}")));
+        }
         let output = Command::new(python)
             .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/describe.py"))
             .args([folder.path().join("joint.eds"), folder.path().join("joint.dbc")])

@@ -3,6 +3,7 @@
 use super::CommandError;
 use crate::describe::{dbc, eds};
 use crate::output::write_file;
+use crate::remote::RemoteJoint;
 use bus::client::ClientError;
 use clap::Args;
 use std::path::PathBuf;
@@ -14,6 +15,12 @@ pub struct Eds {
     /// File to write
     #[arg(default_value = "joint.eds")]
     file: PathBuf,
+    /// The bus of a joint whose identity (1018h) the file is to have: a master then takes no other [default: any joint]
+    #[arg(long, value_name = "BUS", requires = "node")]
+    bus: Option<String>,
+    /// Node id of that joint, 1 to 127
+    #[arg(long, value_name = "N", requires = "bus")]
+    node: Option<u8>,
 }
 
 impl Eds {
@@ -22,10 +29,20 @@ impl Eds {
         let name = self.file.file_name().unwrap_or_default().to_string_lossy();
         // A clock before 1970 dates the file 1970.
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-        write_file(&self.file, eds::text(&name, now).as_bytes())?;
+        let identity = match (&self.bus, self.node) {
+            (Some(bus), Some(node)) => identity(&RemoteJoint::open(bus, node)?)?,
+            _ => eds::Identity::default(),
+        };
+        write_file(&self.file, eds::text(&name, now, identity).as_bytes())?;
         println!("written: {}", self.file.display());
         Ok(())
     }
+}
+
+fn identity(joint: &RemoteJoint) -> Result<eds::Identity, CommandError> {
+    let number = |sub_index| joint.node().number(0x1018, sub_index).map(u32::from_le_bytes);
+    let read = || Ok(eds::Identity { vendor: number(1)?, product: number(2)?, revision: number(3)? });
+    read().map_err(|error: ClientError| crate::remote::RemoteError::from(error).into())
 }
 
 /// Arguments of `dbc`.

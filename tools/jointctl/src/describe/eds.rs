@@ -1,7 +1,8 @@
 //! The electronic data sheet of a joint, CiA 306-1; host.
 //!
-//! `Unit`, `Factor` and `Description` are no keys of CiA 306: python-canopen reads them, others pass them over. Limits are raw values, as
-//! the object has them on the bus.
+//! Unit, factor and description are no keys of CiA 306, and strict readers (Lely's dcfchk) refuse what they do not know: they are comments. Limits are
+//! raw values, as the object has them on the bus. Those of REAL32 are comments, too: Lely's tools want the bit pattern there, which python-canopen takes
+//! for a number.
 
 use super::plain;
 use crate::remote::Entry;
@@ -17,15 +18,27 @@ const DOMAIN: u8 = 2;
 const VARIABLE: u8 = 7;
 const RECORD: u8 = 9;
 
-/// The file's content. `name` is that of the file, `now` the time since 1970-01-01 UTC for the file's dates.
-pub fn text(name: &str, now: Duration) -> String {
+/// Who a joint is, as its object 1018h says; of a joint that is not known everything is 0, which masters take for any.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Identity {
+    /// 1018h:1.
+    pub vendor: u32,
+    /// 1018h:2.
+    pub product: u32,
+    /// 1018h:3.
+    pub revision: u32,
+}
+
+/// The file's content. `name` is that of the file, `now` the time since 1970-01-01 UTC for the file's dates; `identity` is of the joint that the file
+/// is for.
+pub fn text(name: &str, now: Duration, identity: Identity) -> String {
     let mut text = String::new();
     // Writing to a string does not fail.
-    let _ = write(&mut text, name, now);
+    let _ = write(&mut text, name, now, identity);
     text
 }
 
-fn write(text: &mut String, name: &str, now: Duration) -> std::fmt::Result {
+fn write(text: &mut String, name: &str, now: Duration, identity: Identity) -> std::fmt::Result {
     let (date, time) = (date(now), time(now));
     writeln!(text, "[FileInfo]\nFileName={}\nFileVersion=1\nFileRevision=0\nEDSVersion=4.0", plain(name))?;
     writeln!(text, "Description=Robot joint with learned friction compensation, CiA 402 subset")?;
@@ -35,10 +48,9 @@ fn write(text: &mut String, name: &str, now: Duration) -> std::fmt::Result {
     let program = concat!("jointctl ", env!("CARGO_PKG_VERSION"));
     writeln!(text, "CreatedBy={program}\nModifiedBy={program}\n")?;
 
-    writeln!(
-        text,
-        "[DeviceInfo]\nVendorName=\nVendorNumber=0\nProductName=joint\nProductNumber=0\nRevisionNumber=1\nOrderCode="
-    )?;
+    let Identity { vendor, product, revision } = identity;
+    writeln!(text, "[DeviceInfo]\nVendorName=\nVendorNumber=0x{vendor:X}\nProductName=joint")?;
+    writeln!(text, "ProductNumber=0x{product:X}\nRevisionNumber=0x{revision:X}\nOrderCode=")?;
     for rate in [10, 20, 50, 125, 250, 500, 800, 1000] {
         writeln!(text, "BaudRate_{rate}={}", u8::from(rate == 1000))?;
     }
@@ -66,7 +78,7 @@ fn write(text: &mut String, name: &str, now: Duration) -> std::fmt::Result {
         let of_index = entries.iter().filter(|entry| entry.object.index == index).collect::<Vec<_>>();
         match of_index[..] {
             [] => {}
-            [entry] => object(text, &format!("{index:04X}"), entry.text.object, entry, &defaults)?,
+            [entry] => object(text, &format!("{index:04X}"), entry.text.object, entry, &defaults, identity)?,
             [first, ..] => {
                 writeln!(text, "[{index:04X}]\nParameterName={}", plain(first.text.object))?;
                 writeln!(text, "ObjectType=0x{RECORD:X}\nSubNumber=0x{:X}\n", of_index.len())?;
@@ -77,6 +89,7 @@ fn write(text: &mut String, name: &str, now: Duration) -> std::fmt::Result {
                         entry.text.name,
                         entry,
                         &defaults,
+                        identity,
                     )?;
                 }
             }
@@ -100,6 +113,7 @@ fn object(
     name: &str,
     entry: &Entry,
     defaults: &CommunicationParameters,
+    identity: Identity,
 ) -> std::fmt::Result {
     let object = entry.object;
     let object_type = if object.data_type == DataType::Domain { DOMAIN } else { VARIABLE };
@@ -115,8 +129,12 @@ fn object(
     };
     let mapped = u8::from(object.mappable.receive || object.mappable.transmit);
     writeln!(text, "[{section}]\nParameterName={}\nObjectType=0x{object_type:X}", plain(name))?;
-    writeln!(text, "DataType=0x{:04X}\nAccessType={access}\nPDOMapping={mapped}", object.data_type as u8)?;
-    if let Some(default) = default(entry, defaults) {
+    writeln!(text, "DataType=0x{:04X}\nAccessType={access}", object.data_type as u8)?;
+    // CiA 306 knows the key for variables alone, and node-canopen refuses it elsewhere.
+    if object_type == VARIABLE {
+        writeln!(text, "PDOMapping={mapped}")?;
+    }
+    if let Some(default) = default(entry, defaults, identity) {
         writeln!(text, "DefaultValue={default}")?;
     }
     if let Some((low, high)) = entry.text.limits {
@@ -124,22 +142,23 @@ fn object(
             DataType::F32 => value.to_string(),
             _ => format!("{:.0}", value / entry.text.scale),
         };
-        writeln!(text, "LowLimit={}\nHighLimit={}", raw(low), raw(high))?;
+        let comment = if object.data_type == DataType::F32 { ";" } else { "" };
+        writeln!(text, "{comment}LowLimit={}\n{comment}HighLimit={}", raw(low), raw(high))?;
     }
     if !entry.text.unit.is_empty() {
-        writeln!(text, "Unit={}", plain(entry.text.unit))?;
+        writeln!(text, ";Unit={}", plain(entry.text.unit))?;
     }
     if entry.text.scale != 1.0 {
-        writeln!(text, "Factor={:e}", entry.text.scale)?;
+        writeln!(text, ";Factor={:e}", entry.text.scale)?;
     }
     if !entry.text.description.is_empty() {
-        writeln!(text, "Description={}", plain(entry.text.description))?;
+        writeln!(text, ";Description={}", plain(entry.text.description))?;
     }
     writeln!(text)
 }
 
 /// What a joint has that nobody has set up; none where that is a matter of the joint.
-fn default(entry: &Entry, defaults: &CommunicationParameters) -> Option<String> {
+fn default(entry: &Entry, defaults: &CommunicationParameters, identity: Identity) -> Option<String> {
     let object = entry.object;
     // Parameters were made for node id 0: what depends on it is said as CiA 306 does.
     let by_node = |cob_id: u32| Some(format!("$NODEID+0x{cob_id:X}"));
@@ -153,6 +172,10 @@ fn default(entry: &Entry, defaults: &CommunicationParameters) -> Option<String> 
         (Field::Server, 0x1015, 0) => number(defaults.emergency_inhibit.into()),
         (Field::Server, 0x1016, 1..) => number(0),
         (Field::Server, 0x1017, 0) => number(defaults.heartbeat.into()),
+        (Field::Server, 0x1018, 1..=3) if identity == Identity::default() => None,
+        (Field::Server, 0x1018, 1) => number(identity.vendor),
+        (Field::Server, 0x1018, 2) => number(identity.product),
+        (Field::Server, 0x1018, 3) => number(identity.revision),
         (Field::Server, 0x1029, 1) => number(defaults.error_behaviour.into()),
         (Field::Server, 0x1200, 1) => by_node(0x600),
         (Field::Server, 0x1200, 2) => by_node(0x580),
@@ -220,8 +243,10 @@ mod tests {
 
     #[test]
     fn the_file_is_ascii_and_has_a_section_for_every_entry() {
-        let text = text("joint.eds", Duration::ZERO);
+        let identity = Identity { vendor: 0, product: 0x564A_6E74, revision: 1 };
+        let text = text("joint.eds", Duration::ZERO, identity);
         assert!(text.is_ascii());
+        assert!(text.contains("\nVendorNumber=0x0\nProductName=joint\nProductNumber=0x564A6E74\nRevisionNumber=0x1\n"));
         for entry in Entry::all() {
             let (index, sub_index) = (entry.object.index, entry.object.sub_index);
             let section = format!("\n[{index:04X}sub{sub_index:X}]\n");
@@ -233,7 +258,10 @@ mod tests {
         };
         assert!(of("1A00sub3").contains("DefaultValue=0x60640020"), "{}", of("1A00sub3"));
         assert!(of("1403sub1").contains("DefaultValue=$NODEID+0x80000500"), "{}", of("1403sub1"));
-        assert!(of("2212sub7").contains("LowLimit=1\nHighLimit=3600000\nUnit=s\nFactor=1e-3"), "{}", of("2212sub7"));
+        assert!(of("2212sub7").contains("LowLimit=1\nHighLimit=3600000\n;Unit=s\n;Factor=1e-3"), "{}", of("2212sub7"));
+        assert!(of("2103subB").contains("\n;LowLimit=0.001\n;HighLimit=10\n"), "{}", of("2103subB"));
+        assert!(!of("2210").contains("PDOMapping"), "{}", of("2210"));
+        assert!(of("1018sub2").contains("DefaultValue=0x564A6E74"), "{}", of("1018sub2"));
         assert!(of("6060").contains("AccessType=rww\nPDOMapping=1\nLowLimit=-2\nHighLimit=10"), "{}", of("6060"));
     }
 }
