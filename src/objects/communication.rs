@@ -27,7 +27,12 @@ pub fn default_communication(node_id: u8) -> CommunicationParameters {
     ];
     let synchronous =
         |id, mapping: &[MappedObject]| PdoParameters { transmission: 1, ..PdoParameters::new(id, mapping) };
-    let slow = |id, mapping: &[MappedObject]| PdoParameters { event_timer: SLOW, ..PdoParameters::new(id, mapping) };
+    let slow = |id, mapping: &[MappedObject]| PdoParameters {
+        event_timer: SLOW,
+        // Voltages and temperatures change all the time. 0.1 ms.
+        inhibit: 10 * SLOW,
+        ..PdoParameters::new(id, mapping)
+    };
     parameters.transmit = [
         synchronous(cob_id(0x180), &[STATUSWORD, map(0x6077, 0, 16), map(0x6064, 0, 32)]),
         synchronous(cob_id(0x280), &[map(0x606C, 0, 32), map(0x2020, 1, 16), map(0x2020, 2, 16)]),

@@ -496,6 +496,10 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
         })
     }
 
+    fn may_change_node_id(&self) -> bool {
+        !self.needs_control()
+    }
+
     #[inline(never)]
     fn store_node_id(&mut self, node_id: u8) -> Result<(), Abort> {
         let update = Update { node_id: Some(node_id), application: Part::Kept, communication: Part::Kept };
