@@ -374,7 +374,7 @@ fn a_commissioning_that_nobody_can_agree_to_is_refused_before_the_bus_is_opened(
         jointctl(folder.path(), &[&asked, more].concat())
     };
     let refused = run(&[]);
-    assert_eq!(refused.status.code(), Some(1));
+    assert_eq!(refused.status.code(), Some(2));
     assert!(stderr(&refused).contains("no terminal") && stderr(&refused).contains("--yes"), "{}", stderr(&refused));
     let refused = stderr(&run(&["--yes", "--counts", "15"]));
     assert!(refused.contains("--counts is 15") && refused.contains("16 to 65535"), "{refused}");

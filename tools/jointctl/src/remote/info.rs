@@ -16,12 +16,15 @@ use std::fmt::Write;
 const SIGNALS: [&str; 6] =
     ["position", "velocity", "theoretical torque", "measured torque", "temperature", "acceleration"];
 
+/// Columns of a line's title.
+const TITLE: usize = 16;
+
 /// The page; reads some fifty objects.
 pub fn page(joint: &RemoteJoint) -> Result<String, RemoteError> {
     let mut page = String::new();
     let mut line = |title: &str, text: String| {
         // Writing to a string does not fail.
-        let _ = writeln!(page, "{title:<16}{text}");
+        let _ = writeln!(page, "{title:<TITLE$}{text}");
     };
     let text = |index| joint.node().upload(index, 0).map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
     let word = |sub_index| joint.node().number(0x1018, sub_index).map(u32::from_le_bytes);
@@ -120,6 +123,23 @@ pub fn page(joint: &RemoteJoint) -> Result<String, RemoteError> {
         ),
     );
     Ok(page)
+}
+
+/// The page as JSON: its lines by their titles, those of several lines as an array.
+pub fn json(page: &str) -> serde_json::Value {
+    let mut lines: Vec<(String, Vec<String>)> = Vec::new();
+    for line in page.lines() {
+        let (title, text) = line.split_at_checked(TITLE).unwrap_or((line, ""));
+        match (title.trim_end(), lines.last_mut()) {
+            ("", Some((_, texts))) => texts.push(text.to_owned()),
+            (title, _) => lines.push((title.to_owned(), vec![text.to_owned()])),
+        }
+    }
+    let value = |texts: Vec<String>| match <[String; 1]>::try_from(texts) {
+        Ok([text]) => serde_json::Value::String(text),
+        Err(texts) => texts.into(),
+    };
+    lines.into_iter().map(|(title, texts)| (title, value(texts))).collect()
 }
 
 /// A value with its unit.

@@ -89,8 +89,10 @@ impl Attempt<'_> {
     /// The error for a number that the joint told.
     pub fn refused(&self, joint: &RemoteJoint, code: u16) -> RemoteError {
         let text = match self.reproduce(joint, code) {
-            Ok(Some(Refusal::State { command: None, state })) => {
-                format!("{}; `jointctl discard` ends that", Refusal::State { command: None, state })
+            Ok(Some(refusal @ Refusal::State { command, state }))
+                if command.is_none() || matches!(state, State::Shadow | State::Trial) =>
+            {
+                format!("{refusal}; `jointctl discard` ends that")
             }
             Ok(Some(refusal)) if refusal.code() == code => refusal.to_string(),
             // Whether its details can be read makes no difference to the refusal.

@@ -80,12 +80,14 @@ pub enum RetrainError {
         problem: String,
     },
     /// Somebody's image is on its way.
-    #[error("node {node}: {}; `jointctl discard` ends it", super::info::life(*state, 0.0))]
+    #[error("node {node}: {}; `jointctl discard` ends it", super::info::life(*state, *left))]
     Busy {
         /// Node id.
         node: u8,
         /// Where it stands.
         state: State,
+        /// What is left of a trial or shadow, s.
+        left: f64,
     },
     /// Ended by the user.
     #[error("ended early; node {node} is disabled and keeps the image that it had")]
@@ -281,7 +283,7 @@ impl Round {
         joint.require_off("learning anew")?;
         let status = joint.image_status()?;
         if matches!(status.state, State::Shadow | State::Trial | State::Storing) {
-            return Err(RetrainError::Busy { node, state: status.state });
+            return Err(RetrainError::Busy { node, state: status.state, left: status.left });
         }
         let refuse = |problem| Err(RetrainError::Key { node, problem });
         let number = joint.raw(Field::Image(ImageField::KeyNumber))?;
