@@ -298,10 +298,8 @@ pub enum ImageField {
     KeyNumber,
     /// Lowest version that is taken.
     Floor,
-    /// Wrong tags in a row.
+    /// Wrong tags so far.
     Failures,
-    /// What is left of a lock-out.
-    Lockout,
     /// The key itself, once.
     Key,
 }

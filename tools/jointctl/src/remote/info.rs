@@ -225,10 +225,14 @@ fn authentication(joint: &RemoteJoint) -> Result<String, RemoteError> {
     if raw(ImageField::KeyPresent)? == 0 {
         return Ok(format!("no key: images need no tag; version {floor} or newer"));
     }
-    let mut text = format!("key {:08x}: images need its tag; version {floor} or newer", raw(ImageField::KeyNumber)?);
-    let (failures, left) = (raw(ImageField::Failures)?, joint.number(Field::Image(ImageField::Lockout))?);
+    let number = raw(ImageField::KeyNumber)?;
+    if number == 0 {
+        return Ok("the stored key is damaged: no image is taken".into());
+    }
+    let mut text = format!("key {number:08x}: images need its tag; version {floor} or newer");
+    let failures = raw(ImageField::Failures)?;
     if failures > 0 {
-        let _ = write!(text, "; {failures} wrong tags in a row, locked for {left:.1} s");
+        let _ = write!(text, "; {failures} wrong tags so far");
     }
     Ok(text)
 }

@@ -288,6 +288,7 @@ impl Round {
         let refuse = |problem| Err(RetrainError::Key { node, problem });
         let number = joint.raw(Field::Image(ImageField::KeyNumber))?;
         match (joint.raw(Field::Image(ImageField::KeyPresent))? != 0, &self.key) {
+            (true, _) if number == 0 => return refuse("its key is damaged: it takes no image".into()),
             (true, None) => return refuse(format!("it takes images with a tag of key {number:08x} only: --key FILE")),
             (true, Some(key)) if u64::from(key.id()) != number => {
                 return refuse(format!("it has key {number:08x}, the file key {:08x}", key.id()));
