@@ -65,8 +65,6 @@ pub enum Constant {
     AbortConnectionOption,
     /// A quick stop brakes and then disables.
     QuickStopOption,
-    /// Halt brakes and then holds.
-    HaltOption,
     /// Modes of operation, a bit each.
     SupportedModes,
 }
@@ -77,7 +75,6 @@ impl Constant {
         match self {
             Self::AbortConnectionOption => 3,
             Self::QuickStopOption => 2,
-            Self::HaltOption => 1,
             Self::SupportedModes => 0x0003_0380,
         }
     }
@@ -298,8 +295,10 @@ pub enum ImageField {
     KeyNumber,
     /// Lowest version that is taken.
     Floor,
-    /// Wrong tags so far.
+    /// Wrong tags in a row.
     Failures,
+    /// What is left of a lock-out.
+    Lockout,
     /// The key itself, once.
     Key,
 }

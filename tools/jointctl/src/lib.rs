@@ -34,7 +34,6 @@ pub mod levenberg_marquardt;
 pub mod metrics;
 pub mod network;
 pub mod output;
-pub mod pre_sliding;
 pub mod presets;
 pub mod progress;
 pub mod quantize;

@@ -1,5 +1,4 @@
-//! The `jointctl` program: reads its arguments, runs one command, reports an error in one line. It ends with 0 where that is done, with 1 where it failed, with 2 where
-//! the arguments are wrong, and with 3 where it is done and nothing better came of it.
+//! The `jointctl` program: reads its arguments, runs one command, reports an error in one line.
 
 use clap::Parser;
 use jointctl::commands::{Arguments, run};
@@ -10,7 +9,7 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");
-            ExitCode::from(error.exit_code())
+            ExitCode::FAILURE
         }
     }
 }

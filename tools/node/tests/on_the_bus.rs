@@ -1,13 +1,141 @@
 //! The virtual joint driven over the bus alone, in simulated time: SDO, PDO, NMT, and images from upload to flash and back.
 
-mod master;
-
+use bus::Frame;
 use bus::client::sdo::{Failure, Method, Settings, Transfer};
-use bus::client::{Abort, Command, NmtState, Object};
+use bus::client::{Abort, Command, Emergency, NmtState, Object, Target};
 use joint_firmware::joint::state_machine::State;
 use joint_firmware::parameters::authentication::Key;
-use master::{ID, Master};
-use node::{SampleImage, SlotImages, Storage};
+use node::{Options, SampleImage, SlotImages, Storage, VirtualNode};
+use plant::ActuatorParameters;
+use plant::virtual_joint::Setup;
+use std::time::Duration;
+
+const ID: u8 = 5;
+/// Control steps in a millisecond.
+const MILLISECOND: u64 = 20;
+
+/// A master with one node on its bus.
+struct Master {
+    node: VirtualNode,
+    /// What the node sent beside SDO answers.
+    heard: Vec<Frame>,
+    counter: u8,
+}
+
+impl Master {
+    fn new() -> Self {
+        Self::with(SlotImages::empty().unwrap())
+    }
+
+    fn with(images: SlotImages) -> Self {
+        Self::powered(Storage::with(images).unwrap())
+    }
+
+    /// After a loss of power that left this.
+    fn powered(storage: Storage) -> Self {
+        let parameters = ActuatorParameters::reference().aligned().without_payload();
+        let setup = Setup::of(&parameters);
+        let options = Options { node_id: ID, serial: 12, seed: 1 };
+        let node = VirtualNode::with_storage(parameters, &setup, &options, storage).unwrap();
+        let mut master = Self { node, heard: vec![], counter: 0 };
+        // The joint measures its current sensors' offsets.
+        master.wait(200);
+        master
+    }
+
+    fn listen(&mut self) {
+        while let Some(frame) = self.node.take_frame() {
+            self.heard.push(frame);
+        }
+    }
+
+    fn wait(&mut self, milliseconds: u64) {
+        self.node.advance(milliseconds * MILLISECOND);
+        self.listen();
+    }
+
+    fn send(&mut self, id: u16, data: &[u8]) {
+        self.node.receive(&Frame::new(id, data).unwrap());
+        self.node.work();
+        self.listen();
+    }
+
+    fn command(&mut self, command: Command) {
+        self.node.receive(&command.frame(Target::Node(ID)));
+        self.node.work();
+        self.listen();
+    }
+
+    fn transfer(&mut self, mut transfer: Transfer) -> Result<Vec<u8>, Failure> {
+        loop {
+            let now = Duration::from_secs_f64(self.node.steps() as f64 / f64::from(self.node.rate()));
+            while let Some(message) = transfer.poll(now) {
+                self.node.receive(&Frame::new(0x600 + u16::from(ID), &message).unwrap());
+            }
+            self.node.work();
+            self.listen();
+            let (answers, rest) = self.heard.drain(..).partition(|frame| frame.id() == 0x580 + u16::from(ID));
+            self.heard = rest;
+            let answers: Vec<Frame> = answers;
+            answers.iter().for_each(|frame| transfer.receive(frame.data(), now));
+            if let Some(outcome) = transfer.outcome() {
+                return outcome.clone();
+            }
+            if answers.is_empty() {
+                self.wait(1);
+            }
+        }
+    }
+
+    fn upload(&mut self, index: u16, sub_index: u8) -> Vec<u8> {
+        let object = Object { node: ID, index, sub_index };
+        self.transfer(Transfer::upload(object, Method::Automatic, Settings::default())).unwrap()
+    }
+
+    fn number(&mut self, index: u16, sub_index: u8) -> i64 {
+        let bytes = self.upload(index, sub_index);
+        let mut eight = [0; 8];
+        eight[..bytes.len()].copy_from_slice(&bytes);
+        i64::from_le_bytes(eight)
+    }
+
+    fn download(&mut self, index: u16, sub_index: u8, data: &[u8]) -> Result<(), Failure> {
+        let object = Object { node: ID, index, sub_index };
+        self.transfer(Transfer::download(object, data, Method::Automatic, Settings::default())).map(|_| ())
+    }
+
+    fn image(&mut self, command: u8) -> Result<(), Failure> {
+        self.download(0x2212, 1, &[command])
+    }
+
+    /// RPDO 2 every 10 ms: controlword, velocity mode, velocity in mrad/s.
+    fn drive(&mut self, controlword: u16, velocity: i32, milliseconds: u64) {
+        for _ in 0..milliseconds / 10 {
+            self.counter = self.counter.wrapping_add(1);
+            let mut data = controlword.to_le_bytes().to_vec();
+            data.extend([9, self.counter]);
+            data.extend(velocity.to_le_bytes());
+            self.send(0x300 + u16::from(ID), &data);
+            self.wait(10);
+        }
+    }
+
+    fn enabled(&mut self) {
+        self.command(Command::Start);
+        for controlword in [6, 7, 15] {
+            self.drive(controlword, 0, 10);
+        }
+        assert_eq!(self.state(), State::OperationEnabled);
+    }
+
+    fn state(&self) -> State {
+        self.node.joint().joint().telemetry().state
+    }
+
+    fn emergencies(&self) -> Vec<u16> {
+        self.heard.iter().filter_map(Emergency::decode).map(|emergency| emergency.code).collect()
+    }
+}
 
 #[test]
 fn a_node_boots_says_who_it_is_and_takes_no_set_point_before_it_is_started() {
