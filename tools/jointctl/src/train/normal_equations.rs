@@ -227,6 +227,15 @@ mod tests {
     }
 
     #[test]
+    fn the_kind_of_vectors_changes_no_bit() {
+        let (set, limits, shape, x) = problem();
+        let batch = Batch::new(&set, &limits, 1.0);
+        let products = || Products { shape: &shape, parameters: x.as_slice(), piece: &batch.blocks };
+        let bits = |tiles: Vec<Tile>| -> Vec<u64> { tiles.into_iter().flatten().flatten().map(f64::to_bits).collect() };
+        assert_eq!(bits(on_wide_vectors(products())), bits(products().run()));
+    }
+
+    #[test]
     fn samples_of_weight_zero_change_no_bit() {
         let (mut set, limits, shape, x) = problem();
         let without = NetworkFit::new(&shape, &Batch::new(&set, &limits, 1.0), DECAY).normal_equations(&x);

@@ -27,32 +27,3 @@ pub(super) fn on_wide_vectors<L: Loop>(work: L) -> L::Output {
     }
     work.run()
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The sum of a third of each number, which rounds at every step.
-    struct Thirds<'a>(&'a [f64]);
-
-    impl Loop for Thirds<'_> {
-        type Output = [f64; 4];
-
-        #[inline(always)]
-        fn run(self) -> [f64; 4] {
-            let mut sums = [0.0; 4];
-            for (i, value) in self.0.iter().enumerate() {
-                for (j, sum) in sums.iter_mut().enumerate() {
-                    *sum += value * (i + j + 1) as f64 / 3.0;
-                }
-            }
-            sums
-        }
-    }
-
-    #[test]
-    fn the_kind_of_vectors_changes_no_bit() {
-        let values: Vec<f64> = (0..10_000).map(|i| f64::from(i).sin()).collect();
-        assert_eq!(on_wide_vectors(Thirds(&values)).map(f64::to_bits), Thirds(&values).run().map(f64::to_bits));
-    }
-}
