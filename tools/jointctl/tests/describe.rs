@@ -38,7 +38,7 @@ const PACKAGES: Packages = Packages {
     import: "canopen, can, msgpack, cantools",
 };
 
-/// What ros2_canopen and others of Lely's stack make their configuration with.
+/// Lely's tools, with which ros2_canopen makes its configuration.
 const DCF_TOOLS: Packages = Packages { folder: "python-dcf", install: &["dcf-tools==2.4.2"], import: "dcf, dcfgen" };
 
 /// A master with a joint, as ros2_canopen has it.

@@ -1,8 +1,8 @@
 //! The electronic data sheet of a joint, CiA 306-1; host.
 //!
-//! Unit, factor and description are no keys of CiA 306, and strict readers (Lely's dcfchk) refuse what they do not know: they are comments. Limits are
-//! raw values, as the object has them on the bus. Those of REAL32 are comments, too: Lely's tools want the bit pattern there, which python-canopen takes
-//! for a number.
+//! Unit, factor and description are no keys of CiA 306, and strict readers (Lely's dcfchk) refuse what they do not know:
+//! they are comments. Limits are raw values, as the object has them on the bus. Those of REAL32 are comments, too: Lely's
+//! tools want the bit pattern there, which python-canopen takes for a number.
 
 use super::plain;
 use crate::remote::Entry;
@@ -29,8 +29,8 @@ pub struct Identity {
     pub revision: u32,
 }
 
-/// The file's content. `name` is that of the file, `now` the time since 1970-01-01 UTC for the file's dates; `identity` is of the joint that the file
-/// is for.
+/// The file's content. `name` is that of the file, `now` the time since 1970-01-01 UTC for the file's dates; `identity` is
+/// of the joint that the file is for.
 pub fn text(name: &str, now: Duration, identity: Identity) -> String {
     let mut text = String::new();
     // Writing to a string does not fail.

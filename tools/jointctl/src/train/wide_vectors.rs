@@ -1,7 +1,7 @@
 //! The hot loops of training on vectors of four doubles where the processor has them; host.
 //!
-//! The x86-64 baseline has vectors of two. The loops are compiled once more for AVX2, which halves their time, and change no bit: every
-//! sum keeps its order, and no multiplication is fused with an addition (AVX2 alone has no such instruction, and Rust never fuses).
+//! The x86-64 baseline has vectors of two. The loops are compiled once more for AVX2 and change no bit: every sum keeps its
+//! order, and no multiplication is fused with an addition (AVX2 alone has no such instruction, and Rust never fuses).
 
 /// A loop that is compiled for several kinds of vectors.
 pub(super) trait Loop {
