@@ -136,6 +136,32 @@ pub fn movt<const HIGH: u16>(word: u32) -> u32 {
     word & 0xffff | u32::from(HIGH) << 16
 }
 
+/// Five values, all of them computed before anything that is written behind: no instruction, a barrier for the compiler.
+///
+/// Optimised for nothing but size, the compiler has no scheduler that would keep few values waiting: it would finish one sum after another, with every
+/// factor of all of them on the stack until then.
+#[cfg(target_arch = "arm")]
+#[inline(always)]
+pub fn in_turn([a, b, c, d, e]: [i32; 5]) -> [i32; 5] {
+    let (mut a, mut b, mut c, mut d, mut e) = (a, b, c, d, e);
+    // SAFETY: no instruction at all.
+    unsafe {
+        core::arch::asm!(
+            "/* {a} {b} {c} {d} {e} */",
+            a = inout(reg) a, b = inout(reg) b, c = inout(reg) c, d = inout(reg) d, e = inout(reg) e,
+            options(pure, nomem, nostack, preserves_flags)
+        );
+    }
+    [a, b, c, d, e]
+}
+
+/// Five values, all of them computed before anything that is written behind: no instruction, a barrier for the compiler.
+#[cfg(not(target_arch = "arm"))]
+#[inline(always)]
+pub fn in_turn(values: [i32; 5]) -> [i32; 5] {
+    values
+}
+
 /// The word of a table at `step` from its middle, held at the table's ends.
 ///
 /// Addressed from the middle: the compiler would add half the table's length to every step.

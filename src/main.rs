@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | 0 | control interrupt, every PWM period | measure, one control step, set the bridge |
 //! | 0 | PWM timer's update, twice a period | write the duties of the step |
-//! | 4 | CAN receive interrupt, where there is a bus | NMT, SYNC, RPDOs to commands |
+//! | 4 | CAN receive interrupt | NMT, SYNC, RPDOs to commands |
 //! | 6 | interrupts of drivers and of time | wake tasks |
 //! | 8 | interrupt executor | every millisecond: temperatures, button, watchdog, model in shadow; at 100 Hz: thermal model |
 //! | thread | thread executor | CANopen server, images, flash; LED, log |
@@ -28,6 +28,6 @@ mod tasks;
 #[cfg(not(target_os = "none"))]
 fn main() {
     eprintln!("This is the program of the joint's board. It is flashed with");
-    eprintln!("cargo run --release --target thumbv7em-none-eabihf --features b-g431b-esc1");
+    eprintln!("cargo --config .cargo/b-g431b-esc1.toml run --release --target thumbv7em-none-eabihf");
     std::process::exit(2);
 }

@@ -118,7 +118,7 @@ fn main() -> Outcome<()> {
     println!(
         "\n## The flashed programs in motion\n\nCycles of the control interrupt, entry and return included, while the joint moves for {MOTION} s on the emulated board, over the \
          bus: a velocity of {AMPLITUDE} rad/s, a sine\nof 1 Hz, with the model of above. Rounds: those of the motion loop in which physical model and network acted. In the \
-         B-G431B-ESC1's program with the bus both lie in flash.\nWait states of the flash: none, as if all of it lay in SRAM; prefetched, those of branches and data, as everywhere \
+         B-G431B-ESC1's program both lie in flash.\nWait states of the flash: none, as if all of it lay in SRAM; prefetched, those of branches and data, as everywhere \
          in this file; always, those of each line\nof code and of data as if prefetch and caches were of no use, which nothing can exceed. Targets: {WHOLE} cycles the whole \
          interrupt, {NETWORK} the network.\n"
     );
@@ -126,7 +126,7 @@ fn main() -> Outcome<()> {
         "| program | rounds | wait states | a period | least | mean | most | |\n|---|---|---|---|---|---|---|---|"
     );
     let mut network = Vec::new();
-    in_motion("b-g431b-esc1-bus", BG431BEsc1::new, &mut network, &mut missed)?;
+    in_motion("b-g431b-esc1", BG431BEsc1::new, &mut network, &mut missed)?;
     in_motion("moteus-r4", MoteusR4::new, &mut network, &mut missed)?;
     println!("\nOf this the network, from its inputs in Q31 as above, as it is linked:\n");
     println!("| program | wait states | network | its inputs | |\n|---|---|---|---|---|");
@@ -148,7 +148,7 @@ fn verdict(program: &str, name: &str, most: u64, target: u64, unit: &str, missed
     most <= target
 }
 
-/// The control interrupt of a program with the bus while its joint moves; rows on the network.
+/// The control interrupt of a program while its joint moves; rows on the network.
 fn in_motion<W: Observed + Clone>(
     name: &str,
     board: fn(Drivetrain) -> W,

@@ -99,18 +99,16 @@ fn built(mut command: Command, program: &str, temporary: &str, place: PathBuf) -
     Ok(place)
 }
 
-/// Builds a program as it is flashed, below a test's temporary folder; its path. It is called as its board, with `-bus` behind it where that is a
-/// choice.
+/// Builds a board's program as it is flashed, below a test's temporary folder; its path.
 ///
 /// # Errors
 /// What the compiler says.
-pub fn build(program: &str, temporary: &str) -> Result<PathBuf, String> {
+pub fn build(board: &str, temporary: &str) -> Result<PathBuf, String> {
     let folder = Path::new(temporary).join("flashed");
     std::fs::create_dir_all(&folder).map_err(|error| error.to_string())?;
-    let features = program.strip_suffix("-bus").map_or(program.to_owned(), |board| format!("{board},bus"));
-    let mut command = cargo(program);
+    let mut command = cargo(board);
     command.args(["build", "--release", "-p", "joint-firmware", "--target", TARGET]);
-    command.args(["--no-default-features", "--features", &features]);
+    command.args(["--no-default-features", "--features", board]);
     command.current_dir(root());
-    built(command, "joint-firmware", temporary, folder.join(program))
+    built(command, "joint-firmware", temporary, folder.join(board))
 }

@@ -44,7 +44,6 @@ use embassy_stm32::timer::low_level::CountingMode;
 use embassy_stm32::timer::qei;
 use embassy_stm32::timer::simple_pwm::PwmPin;
 use joint_firmware::default_configuration::{self, BoardConfiguration};
-#[cfg(feature = "bus")]
 use joint_firmware::hardware::Hardware;
 use joint_firmware::joint::{Bridge, BridgeState, Measurements};
 use joint_firmware::sensors::incremental::Incremental;
@@ -53,10 +52,8 @@ use joint_firmware::sensors::thermistor::Thermistor;
 /// Name of the board.
 pub const NAME: &str = "b-g431b-esc1";
 /// Product number, object 1018h:2: "ESC1".
-#[cfg(feature = "bus")]
 pub const PRODUCT: u32 = 0x4553_4331;
 /// Code and parameters lie in one bank of flash.
-#[cfg(feature = "bus")]
 pub const SINGLE_BANK: bool = true;
 /// The board's part of a configuration, and the joint that it is until it is commissioned.
 pub const CONFIGURATION: BoardConfiguration = default_configuration::B_G431B_ESC1;
@@ -178,9 +175,7 @@ pub fn start(p: Peripherals) -> Result<Parts, StartError> {
         sensors: Some(Sensors { encoder: ENCODER, counts_kept: true }),
         led: Led { pin: Some(Output::new(p.PC6, Level::Low, Speed::Low)), lit_when_low: false },
         button: Some(Input::new(p.PC10, Pull::Up)),
-        #[cfg(feature = "bus")]
         can: super::can::configure(p.FDCAN1, p.PA11, p.PB9),
-        #[cfg(feature = "bus")]
         flash: p.FLASH,
         watchdog: p.IWDG,
     })
@@ -387,7 +382,6 @@ pub const fn is_started() -> bool {
 pub const fn ask_reset(_waits: bool) {}
 
 /// What the board tells of its hardware.
-#[cfg(feature = "bus")]
 pub fn hardware() -> Hardware {
     Hardware { options: super::options::found(), ..Hardware::default() }
 }

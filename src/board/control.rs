@@ -12,11 +12,9 @@ use cortex_m::peripheral::{DWT, NVIC};
 use critical_section::Mutex;
 use embassy_stm32::pac::Interrupt;
 use joint_firmware::joint::fault::Faults;
-#[cfg(feature = "bus")]
 use joint_firmware::joint::history::History;
 use joint_firmware::joint::state_machine::Controlword;
 use joint_firmware::joint::{Active, Bridge, BridgeState, Command, Coupled, Demand, Joint, Slow, Telemetry};
-#[cfg(feature = "bus")]
 use joint_firmware::motor::open_loop::Window;
 use joint_firmware::motor::phases::Phases;
 
@@ -28,7 +26,6 @@ struct Control {
     /// The step before had not ended when this one should have begun.
     overrun: bool,
     /// What the joint is commanded with while it is held off.
-    #[cfg(feature = "bus")]
     off: Demand,
 }
 
@@ -39,7 +36,6 @@ pub struct Commands {
     /// Configuration and friction model, prepared: swapped between two control steps.
     pub active: Offering<Active>,
     /// The open loop's last window.
-    #[cfg(feature = "bus")]
     pub window: Subscriber<Window>,
 }
 
@@ -48,7 +44,6 @@ pub struct Ends {
     active: InUse<Active>,
     demand: Subscriber<Demand>,
     report: Publisher<Report>,
-    #[cfg(feature = "bus")]
     window: Publisher<Window>,
 }
 
@@ -75,7 +70,6 @@ struct Words {
     /// The mean square current is taken anew in the next control step.
     mean_square_wanted: AtomicBool,
     /// The joint stays off, whatever it is commanded.
-    #[cfg(feature = "bus")]
     held_off: AtomicBool,
 }
 
@@ -111,7 +105,6 @@ static WORDS: Words = Words {
     gear_temperature: Real::new(25.0),
     mean_square_current: Real::new(0.0),
     mean_square_wanted: AtomicBool::new(false),
-    #[cfg(feature = "bus")]
     held_off: AtomicBool::new(false),
 };
 
@@ -125,7 +118,6 @@ const NOBODY: Demand = Demand {
     coupled: Coupled { velocity: 0.0, sequence: 0 },
 };
 static REPORT: Newest<Report> = Newest::new(Report::NOTHING);
-#[cfg(feature = "bus")]
 static WINDOW: Newest<Window> = Newest::new(Window::NOTHING);
 /// Tasks of both executors read it, one at a time.
 static READER: Mutex<RefCell<Option<Subscriber<Report>>>> = Mutex::new(RefCell::new(None));
@@ -190,7 +182,6 @@ pub fn stop() {
 /// nothing may be written. For the task that writes, and before the control interrupt starts.
 ///
 /// What the control interrupt runs only while operation is enabled may lie in flash on such a board: with this it never waits for a write.
-#[cfg(feature = "bus")]
 pub fn hold_off() -> bool {
     if !super::SINGLE_BANK || WORDS.held_off.load(Ordering::Relaxed) {
         return true;
@@ -208,7 +199,6 @@ pub fn hold_off() -> bool {
 }
 
 /// Nothing is written any more: the joint does again what it is commanded.
-#[cfg(feature = "bus")]
 pub fn release() {
     WORDS.held_off.store(false, Ordering::Release);
 }
@@ -242,7 +232,6 @@ pub fn report() -> Option<Report> {
 }
 
 /// Reads the steps before a fault; none while no fault is latched. A control step that is due meanwhile waits: the bridge is off then.
-#[cfg(feature = "bus")]
 pub fn history<R>(read: impl FnOnce(&History) -> R) -> Option<R> {
     report().filter(|report| !report.latched.is_empty())?;
     cortex_m::interrupt::free(|_| {
@@ -258,21 +247,9 @@ pub fn exchange() -> Option<(Commands, Ends)> {
     let (publisher, demand) = DEMAND.split()?;
     let (report, reader) = REPORT.split()?;
     critical_section::with(|section| READER.replace(section, Some(reader)));
-    #[cfg(feature = "bus")]
     let (window, windows) = WINDOW.split()?;
-    let commands = Commands {
-        demand: publisher,
-        active: offering,
-        #[cfg(feature = "bus")]
-        window: windows,
-    };
-    let ends = Ends {
-        active,
-        demand,
-        report,
-        #[cfg(feature = "bus")]
-        window,
-    };
+    let commands = Commands { demand: publisher, active: offering, window: windows };
+    let ends = Ends { active, demand, report, window };
     Some((commands, ends))
 }
 
@@ -280,14 +257,7 @@ pub fn exchange() -> Option<(Commands, Ends)> {
 /// [`Commands::active`] there is no control step, and the bridge stays off.
 #[inline(never)]
 pub fn start(sensors: Sensors, ends: Ends) {
-    let control = Control {
-        sensors,
-        joint: Joint::new(),
-        ends,
-        overrun: false,
-        #[cfg(feature = "bus")]
-        off: NOBODY,
-    };
+    let control = Control { sensors, joint: Joint::new(), ends, overrun: false, off: NOBODY };
     // SAFETY: the interrupt is not enabled yet, and this runs once: there is one pair of ends.
     unsafe { (*CONTROL.0.get()).write(control) };
     // SAFETY: thread mode at start; nothing else uses these registers of the core.
@@ -325,12 +295,8 @@ extern "C" fn ADC1_2() {
     };
 
     let demand = control.ends.demand.newest();
-    #[cfg(feature = "bus")]
     let held_off = super::SINGLE_BANK && WORDS.held_off.load(Ordering::Acquire);
-    #[cfg(feature = "bus")]
     let demand = if held_off { &control.off } else { demand };
-    #[cfg(not(feature = "bus"))]
-    let held_off = false;
     let wanted = match control.ends.active.current() {
         Some(active) if super::is_started() => control.joint.control_step(active, demand, &slow, &measurements),
         _ => Bridge::OFF,
@@ -348,7 +314,6 @@ extern "C" fn ADC1_2() {
         WORDS.mean_square_wanted.store(false, Ordering::Relaxed);
         WORDS.mean_square_current.store(control.joint.take_mean_square_current(), Ordering::Release);
     }
-    #[cfg(feature = "bus")]
     if control.joint.has_new_window() {
         publish_window(&control.joint, &mut control.ends);
     }
@@ -368,7 +333,6 @@ extern "C" fn ADC1_2() {
 }
 
 /// While the bridge switches: it may lie in flash, as the open loop itself does.
-#[cfg(feature = "bus")]
 #[inline(never)]
 #[unsafe(link_section = ".text.open_loop")]
 fn publish_window(joint: &Joint, ends: &mut Ends) {

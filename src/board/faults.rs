@@ -10,7 +10,6 @@ use core::sync::atomic::{AtomicU8, AtomicU32, Ordering};
 use cortex_m::peripheral::SCB;
 use embassy_stm32::pac;
 use joint_firmware::parameters::ecc::{self, Decision, Storage};
-#[cfg(feature = "bus")]
 use joint_firmware::reset_record::LastReset;
 use joint_firmware::reset_record::{Cause, Record, WORDS};
 
@@ -98,14 +97,12 @@ pub fn report() {
 }
 
 /// What [`report`] has logged.
-#[cfg(feature = "bus")]
 #[inline(never)]
 pub fn last_reset() -> LastReset {
     LastReset { causes: CAUSES.load(Ordering::Relaxed), stop: Record::decode(&words()) }
 }
 
 /// Starts the program anew, as a master asked for: bridge off first. Nothing is kept, as nothing went wrong.
-#[cfg(feature = "bus")]
 pub fn restart() -> ! {
     super::bridge_off();
     store([0; WORDS]);

@@ -11,23 +11,19 @@
 //! - to switch off in a fault handler, which owns no driver.
 
 pub mod adc;
-#[cfg(feature = "bus")]
 pub mod can;
 pub mod control;
 mod copy;
 mod critical_section;
-#[cfg(all(feature = "b-g431b-esc1", feature = "bus"))]
+#[cfg(feature = "b-g431b-esc1")]
 mod division;
 pub mod entry;
 pub mod faults;
-#[cfg(feature = "bus")]
 pub mod flash;
 pub mod memory;
 pub mod options;
-#[cfg(feature = "bus")]
 pub mod oscillator;
 pub mod pwm;
-#[cfg(feature = "bus")]
 pub mod shadow;
 mod shared;
 pub mod watchdog;
@@ -50,9 +46,7 @@ pub use embassy_stm32::Peripherals;
 use embassy_stm32::gpio::{Input, Output};
 use embassy_stm32::peripherals::IWDG;
 pub use joint_firmware::default_configuration::BoardConfiguration;
-pub use shared::Publisher;
-#[cfg(feature = "bus")]
-pub use shared::{Offering, Prepared, Subscriber};
+pub use shared::{Offering, Prepared, Publisher, Subscriber};
 
 /// What a started board hands to the program.
 pub struct Parts {
@@ -66,10 +60,8 @@ pub struct Parts {
     /// The button, on boards that have one.
     pub button: Option<Input<'static>>,
     /// The CAN controller with its pins, stopped.
-    #[cfg(feature = "bus")]
     pub can: embassy_stm32::can::CanConfigurator<'static>,
     /// The flash.
-    #[cfg(feature = "bus")]
     pub flash: embassy_stm32::Peri<'static, embassy_stm32::peripherals::FLASH>,
     /// The independent watchdog, not started.
     pub watchdog: embassy_stm32::Peri<'static, IWDG>,

@@ -48,10 +48,8 @@ use joint_firmware::sensors::thermistor::Thermistor;
 /// Name of the board.
 pub const NAME: &str = "moteus-r4";
 /// Product number, object 1018h:2: "Mot4".
-#[cfg(feature = "bus")]
 pub const PRODUCT: u32 = 0x4D6F_7434;
 /// Code and parameters lie in one bank of flash.
-#[cfg(feature = "bus")]
 pub const SINGLE_BANK: bool = false;
 /// The board's part of a configuration, and the joint that it is until it is commissioned.
 pub const CONFIGURATION: BoardConfiguration = default_configuration::MOTEUS_R4;

@@ -117,7 +117,6 @@ pub struct Prepared<'a, T: 'static> {
 
 impl<T> Offering<T> {
     /// The place for the next value, which is of no use to anybody until one is prepared; none while the one before has not been taken.
-    #[cfg(feature = "bus")]
     pub fn spare(&mut self) -> Option<&mut MaybeUninit<T>> {
         let place = self.preparer.place()?;
         // SAFETY: the place is the preparer's until it is offered, and it is one of the two.

@@ -9,7 +9,7 @@
 
 use super::domain::{Domain, Range};
 use super::smooth::tanh;
-use crate::dsp::{asr, movt, pkhtb, smlad, smmla, smmul, smmulr, smuad};
+use crate::dsp::{asr, in_turn, movt, pkhtb, smlad, smmla, smmul, smmulr, smuad};
 use crate::quantity::Torque;
 
 /// Inputs of the network: the first five [`Signal`](super::state::Signal)s.
@@ -159,7 +159,7 @@ fn activate(sums: [i32; NEURONS]) -> [u32; 3] {
 /// Layer 0's sums with one more input. No closure, here and below: optimised for nothing but size, the compiler calls those.
 #[inline(always)]
 fn add([a, b, c, d, e]: [i32; NEURONS], [wa, wb, wc, wd, we]: &[i32; NEURONS], x: i32) -> [i32; NEURONS] {
-    [smmla(*wa, x, a), smmla(*wb, x, b), smmla(*wc, x, c), smmla(*wd, x, d), smmla(*we, x, e)]
+    in_turn([smmla(*wa, x, a), smmla(*wb, x, b), smmla(*wc, x, c), smmla(*wd, x, d), smmla(*we, x, e)])
 }
 
 /// The activations of a layer of packed neurons.

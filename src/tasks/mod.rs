@@ -1,13 +1,6 @@
 //! Start of the board's program and its tasks; thread mode and the interrupt executor.
 
-#[cfg(feature = "bus")]
-mod networked;
-#[cfg(feature = "bus")]
-use networked as connection;
-#[cfg(not(feature = "bus"))]
-mod standalone;
-#[cfg(not(feature = "bus"))]
-use standalone as connection;
+mod connection;
 
 use crate::board::watchdog::{self, Watchdog};
 use crate::board::{self, Led, Peripherals, StartError, control, faults, options};
@@ -95,10 +88,7 @@ fn begin(slow: Spawner, medium: impl FnOnce() -> SendSpawner, peripherals: Perip
     let parts = board::start(peripherals)?;
     // Started once, so the exchange is new and empty.
     let (commands, ends) = defmt::unwrap!(control::exchange());
-    #[cfg(feature = "bus")]
     let of_the_bus = connection::Parts { can: parts.can, flash: parts.flash };
-    #[cfg(not(feature = "bus"))]
-    let of_the_bus = connection::Parts;
     let (connection, Started { thermal, encoder_counts }) = connection::start(commands, of_the_bus)?;
     let winding = winding(&thermal)?;
     if let Some(mut sensors) = parts.sensors {

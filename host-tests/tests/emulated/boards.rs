@@ -19,7 +19,6 @@ pub fn trials() -> Vec<Trial> {
         Trial::test("b_g431b_esc1_is_ready_once_its_encoder_has_met_the_index", esc1_index),
         Trial::test("b_g431b_esc1_keeps_the_bridge_off_after_the_button", esc1_button),
         Trial::test("moteus_r4_starts_and_controls", moteus_starts),
-        Trial::test("b_g431b_esc1_with_the_bus_starts_and_controls", esc1_bus_starts),
         Trial::test("a_supply_out_of_range_is_a_fault_on_both", supply),
     ]
 }
@@ -30,10 +29,10 @@ fn bench<W: Wired>(board: impl FnOnce(Drivetrain) -> W) -> Result<Bench<W>, Fail
 }
 
 /// The B-G431B-ESC1 with its rotor half a turn from the encoder's index: on it, noise alone would reach the index.
-fn esc1(name: &str) -> Result<Bench<BG431BEsc1>, Failed> {
+fn esc1() -> Result<Bench<BG431BEsc1>, Failed> {
     let mut actuator = actuator();
     actuator.sensors.encoder.zero = 0.5;
-    Bench::with(BG431BEsc1::new, &actuator, &program(name, env!("CARGO_TARGET_TMPDIR"))?)
+    Bench::with(BG431BEsc1::new, &actuator, &program(BG431BEsc1::NAME, env!("CARGO_TARGET_TMPDIR"))?)
 }
 
 /// It starts once, controls once a period and within it, and reports neither faults nor overruns.
@@ -64,11 +63,7 @@ fn starts<W: Wired>(bench: &mut Bench<W>, rate: u32, idle: &str) -> Result<(), F
 }
 
 fn esc1_starts() -> Result<(), Failed> {
-    starts(&mut esc1(BG431BEsc1::NAME)?, 20_000, "not ready to switch on")
-}
-
-fn esc1_bus_starts() -> Result<(), Failed> {
-    starts(&mut esc1("b-g431b-esc1-bus")?, 20_000, "not ready to switch on")
+    starts(&mut esc1()?, 20_000, "not ready to switch on")
 }
 
 fn moteus_starts() -> Result<(), Failed> {
@@ -77,7 +72,7 @@ fn moteus_starts() -> Result<(), Failed> {
 
 /// Somebody turns the link by hand, slowly: the rotor passes the index.
 fn esc1_index() -> Result<(), Failed> {
-    let mut bench = esc1(BG431BEsc1::NAME)?;
+    let mut bench = esc1()?;
     bench.run(0.2)?;
     bench.turn_by_hand(|_| Ok(()))?;
     // A line of the log a second.
@@ -89,7 +84,7 @@ fn esc1_index() -> Result<(), Failed> {
 }
 
 fn esc1_button() -> Result<(), Failed> {
-    let mut bench = esc1(BG431BEsc1::NAME)?;
+    let mut bench = esc1()?;
     bench.run(0.2)?;
     bench.board().inputs().button = true;
     bench.run(0.1)?;
@@ -107,6 +102,6 @@ fn supply() -> Result<(), Failed> {
         bench.expect("fault: supply voltage too high")?;
         if bench.state() == "fault" { Ok(()) } else { Err(bench.log().into()) }
     }
-    over(esc1(BG431BEsc1::NAME)?)?;
+    over(esc1()?)?;
     over(bench(MoteusR4::new)?)
 }

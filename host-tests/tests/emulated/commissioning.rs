@@ -29,7 +29,7 @@ const ZERO: f64 = 3.0;
 /// Counts a turn of incremental encoders.
 const COUNTS: [u32; 5] = [2_000, 4_000, 4_096, 8_192, 10_000];
 const MOTEUS: &str = "moteus-r4";
-const ESC1: &str = "b-g431b-esc1-bus";
+const ESC1: &str = "b-g431b-esc1";
 
 /// The tests of this file, by name.
 pub fn trials() -> Vec<Trial> {

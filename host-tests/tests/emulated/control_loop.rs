@@ -43,8 +43,8 @@ const WIDEST: u64 = 2544;
 const NETWORK: u64 = 330;
 /// Joints that they are spread over, half of them on either board.
 const JOINTS: u64 = 12;
-/// Programs of the boards with the bus.
-const PROGRAMS: [&str; 2] = ["moteus-r4", "b-g431b-esc1-bus"];
+/// The boards' programs.
+const PROGRAMS: [&str; 2] = ["moteus-r4", "b-g431b-esc1"];
 /// Between two set-points, s.
 const SET_POINT: f64 = 0.005;
 const NODE: u8 = 5;

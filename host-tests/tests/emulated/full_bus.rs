@@ -41,9 +41,7 @@ const MARGIN: u32 = 2 * 104;
 pub fn trials() -> Vec<Trial> {
     vec![
         Trial::test("a_full_bus_moves_no_control_step_of_moteus_r4", || on_time(MoteusR4::NAME, MoteusR4::new)),
-        Trial::test("a_full_bus_moves_no_control_step_of_b_g431b_esc1", || {
-            on_time("b-g431b-esc1-bus", BG431BEsc1::new)
-        }),
+        Trial::test("a_full_bus_moves_no_control_step_of_b_g431b_esc1", || on_time("b-g431b-esc1", BG431BEsc1::new)),
     ]
 }
 

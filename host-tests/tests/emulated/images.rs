@@ -18,8 +18,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 
 const NODE: u8 = 5;
-/// The B-G431B-ESC1's program with the bus.
-const ESC1: &str = "b-g431b-esc1-bus";
+/// The B-G431B-ESC1's program.
+const ESC1: &str = "b-g431b-esc1";
 /// Version of the image.
 const VERSION: u32 = 7;
 /// Number of parameter sets in it, all of them with networks: what takes the most stack, time and room.

@@ -18,7 +18,7 @@ const FACTORY: u32 = 64;
 pub fn trials() -> Vec<Trial> {
     vec![
         Trial::test("moteus_r4_trims_its_oscillator", || trims("moteus-r4", MoteusR4::new)),
-        Trial::test("b_g431b_esc1_with_the_bus_trims_its_oscillator", || trims("b-g431b-esc1-bus", BG431BEsc1::new)),
+        Trial::test("b_g431b_esc1_trims_its_oscillator", || trims("b-g431b-esc1", BG431BEsc1::new)),
     ]
 }
 

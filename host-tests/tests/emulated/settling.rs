@@ -15,7 +15,7 @@ pub fn trials() -> Vec<Trial> {
             settled(MoteusR4::NAME, MoteusR4::new)
         }),
         Trial::test("b_g431b_esc1_samples_settled_currents_at_its_greatest_duty", || {
-            settled("b-g431b-esc1-bus", BG431BEsc1::new)
+            settled("b-g431b-esc1", BG431BEsc1::new)
         }),
     ]
 }

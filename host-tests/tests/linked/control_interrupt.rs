@@ -5,7 +5,7 @@
 //! refused. So
 //! is a constant that is an address in the program's flash, from a literal pool or put together by instructions: data there would make the
 //! interrupt wait while the flash erases. An address that is computed otherwise is not found out. The open loop may lie in flash: nothing
-//! is written there while the bridge switches. So may, in the program of the B-G431B-ESC1 with the bus, what runs only while
+//! is written there while the bridge switches. So may, in the program of the B-G431B-ESC1, what runs only while
 //! operation is enabled, or in braking, or at the start: there flash is written only while the joint is held off.
 
 use crate::thumb;
@@ -16,9 +16,8 @@ use std::path::{Path, PathBuf};
 /// A program, its handlers of the highest priority, and which functions of the control step may lie in flash.
 type Checked = (&'static str, [&'static str; 2], fn(&str) -> bool);
 
-const PROGRAMS: [Checked; 3] = [
-    ("b-g431b-esc1", ["ADC1_2", "TIM1_UP_TIM16"], is_open_loop),
-    ("b-g431b-esc1-bus", ["ADC1_2", "TIM1_UP_TIM16"], |name| is_open_loop(name) || seldom_or_operating(name)),
+const PROGRAMS: [Checked; 2] = [
+    ("b-g431b-esc1", ["ADC1_2", "TIM1_UP_TIM16"], |name| is_open_loop(name) || seldom_or_operating(name)),
     ("moteus-r4", ["ADC1_2", "TIM2"], is_open_loop),
 ];
 /// Flash of the larger chip; the smaller one's begins at the same address.

@@ -1,4 +1,4 @@
-//! The stack of the program of the B-G431B-ESC1 with the bus suffices: the deepest path of calls in thread mode and every interrupt's on top of it, all at their deepest at
+//! The stack of the B-G431B-ESC1's program suffices: the deepest path of calls in thread mode and every interrupt's on top of it, all at their deepest at
 //! once, are within the region that the linker leaves for it.
 //!
 //! By the frames of the linked functions ([`crate::thumb::stack`]). Of the priorities, each has one interrupt at a time on the stack; the entries are those of
@@ -14,7 +14,7 @@ use libtest_mimic::{Failed, Trial};
 const EXCEPTION: u32 = 108;
 
 /// The program whose chip has no byte more.
-const BOARD: &str = "b-g431b-esc1-bus";
+const BOARD: &str = "b-g431b-esc1";
 /// Its interrupts by priority, from the highest on: of each one is on the stack. The interrupt executor is below all of these.
 const INTERRUPTS: [&[&str]; 4] =
     [&["NonMaskableInt"], &["ADC1_2", "TIM1_UP_TIM16"], &["FDCAN1_IT0"], &["TIM1_BRK_TIM15"]];
@@ -40,7 +40,7 @@ const CALLS: [(&str, &[&str]); 9] = [
 pub fn trials() -> Vec<Trial> {
     vec![
         Trial::test("a_call_that_nobody_knows_of_is_found_out", finds_unknown_calls),
-        Trial::test("the_stack_of_b_g431b_esc1_with_the_bus_suffices", suffices),
+        Trial::test("the_stack_of_b_g431b_esc1_suffices", suffices),
     ]
 }
 
