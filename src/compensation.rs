@@ -4,6 +4,7 @@
 //! asked for falls back by itself (network, then physical, then nothing) and every step says what it did and why. Switched off,
 //! or without a model, the torque is exactly zero: the loop computes the same bits as one without compensation.
 
+use crate::friction::common::CommonTorques;
 use crate::friction::regime::Memory;
 use crate::friction::state::{JointState, SIGNALS, Signal};
 use crate::friction::{Estimate, FrictionModel};
@@ -180,7 +181,7 @@ impl Default for Output {
 /// Compensation of one joint, from one evaluation to the next.
 ///
 /// An evaluation has four stages, none of them longer than the physical model, so that a control loop can do one in a step:
-/// [`begin`](Self::begin) with a state (its regime), [`network`](Self::network), [`physical_model`](Self::physical_model),
+/// [`begin`](Self::begin) with a state (its regime, pre-sliding, ripple), [`network`](Self::network), [`physical_model`](Self::physical_model),
 /// [`finish`](Self::finish) (the torque).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Compensation {
@@ -193,6 +194,7 @@ pub struct Compensation {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Begun {
     signals: [i32; SIGNALS],
+    common: CommonTorques,
     estimate: Estimate,
 }
 
@@ -220,14 +222,14 @@ impl Compensation {
         self.finish(model, settings)
     }
 
-    /// First stage: the regime of a state.
+    /// First stage: the regime of a state, and what all of an image's parameter sets have in common.
     #[inline]
     pub fn begin(&mut self, model: Option<&FrictionModel>, settings: &Settings, state: &JointState) {
         self.begun = match (settings.request, model) {
             (Request::Off, _) | (_, None) => None,
             (_, Some(model)) => {
-                model.enter(state, &mut self.memory);
-                Some(Begun { signals: state.signals(), estimate: Estimate::default() })
+                let common = model.enter(state, &mut self.memory);
+                Some(Begun { signals: state.signals(), common, estimate: Estimate::default() })
             }
         };
     }
@@ -236,7 +238,7 @@ impl Compensation {
     /// clamp and slew limit.
     #[inline]
     pub fn network(&mut self, model: Option<&FrictionModel>) {
-        if let (Some(Begun { signals, estimate }), Some(model)) = (&mut self.begun, model) {
+        if let (Some(Begun { signals, estimate, .. }), Some(model)) = (&mut self.begun, model) {
             estimate.network = model.by_network(signals, &self.memory);
         }
     }
@@ -244,8 +246,8 @@ impl Compensation {
     /// Third stage: what the regime's physical model gives.
     #[inline]
     pub fn physical_model(&mut self, model: Option<&FrictionModel>) {
-        if let (Some(Begun { signals, estimate }), Some(model)) = (&mut self.begun, model) {
-            estimate.physical = model.by_physical_model(signals, &self.memory);
+        if let (Some(Begun { signals, common, estimate }), Some(model)) = (&mut self.begun, model) {
+            estimate.physical = model.by_physical_model(signals, common, &self.memory);
         }
     }
 
@@ -253,7 +255,7 @@ impl Compensation {
     /// exactly, and the past is forgotten.
     #[inline]
     pub fn finish(&mut self, model: Option<&FrictionModel>, settings: &Settings) -> Output {
-        let (Some(Begun { signals, estimate }), Some(model)) = (&self.begun, model) else {
+        let (Some(Begun { signals, estimate, .. }), Some(model)) = (&self.begun, model) else {
             return self.fade_out(settings);
         };
         let weights = model.fade().weights(signals);

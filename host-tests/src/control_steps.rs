@@ -7,9 +7,12 @@ pub mod replay;
 
 use crate::image_bytes::encoded;
 use crate::parameters::{coefficients, image, q16, range, tame_network};
+use joint_firmware::friction::common::CommonTerms;
 use joint_firmware::friction::domain::Domain;
+use joint_firmware::friction::maxwell_slip::MaxwellElement;
 use joint_firmware::friction::physical::{Coefficients, PhysicalParameters, Terms};
 use joint_firmware::friction::regime::{Criterion, Measure, Selector};
+use joint_firmware::friction::ripple::Ripple;
 use joint_firmware::friction::{FrictionModel, FrictionParameters, ParameterSet};
 use joint_firmware::joint::state_machine::State;
 use joint_firmware::joint::{Demand, Joint};
@@ -65,6 +68,17 @@ pub fn friction() -> FrictionParameters {
         selector: Selector {
             criteria: [criterion(Measure::Speed, 0.05), criterion(Measure::Coupled, 0.1)],
             fade_time: q16(0.002) as u32,
+        },
+        common: CommonTerms {
+            elements: [0.002, 0.006, 0.02, 0.06]
+                .map(|distance| MaxwellElement { stiffness: q16(1.0 / distance), level: q16(0.1) }),
+            ripples: [8.0, 50.0].map(|periods| Ripple {
+                periods: q16(periods / std::f64::consts::TAU),
+                level_sine: q16(0.05),
+                level_cosine: q16(-0.03),
+                torque_sine: q16(0.02),
+                torque_cosine: q16(0.01),
+            }),
         },
         sets: [set(2.5), set(2.4), set(2.3), set(2.2)],
     }

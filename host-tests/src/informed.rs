@@ -1,6 +1,7 @@
 //! A friction model that knows the plant's parameters, or nearly: what compensation is with a model that is wrong by a known amount.
 
 use crate::parameters::{coefficients, q16, range};
+use joint_firmware::friction::common::CommonTerms;
 use joint_firmware::friction::domain::Domain;
 use joint_firmware::friction::physical::{Coefficients, PhysicalParameters, Terms};
 use joint_firmware::friction::regime::Selector;
@@ -57,5 +58,5 @@ pub fn informed(actuator: &ActuatorParameters, friction: &Plant) -> FrictionPara
     let physical = PhysicalParameters { terms, coefficients: coefficients(&domain, &si) };
     let mut sets: [ParameterSet; 4] = Default::default();
     sets[0].physical = physical;
-    FrictionParameters { domain, selector: Selector::default(), sets }
+    FrictionParameters { domain, selector: Selector::default(), common: CommonTerms::NONE, sets }
 }

@@ -1,16 +1,19 @@
 //! Friction parameters drawn from a seed: [`tame`] ones look like those of identified joints and trained networks, [`extreme`]
 //! ones use every bit that an image may hold.
 
+use joint_firmware::friction::common::CommonTerms;
 use joint_firmware::friction::domain::{Domain, Range};
+use joint_firmware::friction::maxwell_slip::{ELEMENTS, MAX_STIFFNESS, MaxwellElement};
 use joint_firmware::friction::network::{
     INPUTS, MAX_FRACTION, MAX_SCALE, MIN_FRACTION, NEURONS, NetworkParameters, Neuron,
 };
 use joint_firmware::friction::physical::{Coefficients, Dimension, PhysicalParameters, Terms};
 use joint_firmware::friction::regime::{Criterion, MAX_CRITERIA, Measure, Selector};
-use joint_firmware::friction::state::{SIGNALS, Signal};
+use joint_firmware::friction::ripple::Ripple;
+use joint_firmware::friction::state::{JointState, SIGNALS, Signal};
 use joint_firmware::friction::{Estimate, FrictionModel, FrictionParameters, ParameterSet};
 use joint_firmware::parameters::certificate::Limits;
-use joint_firmware::parameters::image::{GoldenVector, Image, MAX_GOLDEN};
+use joint_firmware::parameters::image::{GoldenSequence, GoldenVector, Image, MAX_GOLDEN};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
@@ -46,6 +49,7 @@ pub fn frictionless() -> FrictionParameters {
     FrictionParameters {
         domain: Domain { ranges: [range(-1.0, 1.0); SIGNALS], margin: 0, reference_temperature: 0 },
         selector: Selector::default(),
+        common: CommonTerms::NONE,
         sets: Default::default(),
     }
 }
@@ -59,14 +63,63 @@ pub fn tame(random: &mut ChaCha8Rng) -> FrictionParameters {
         let measure = [Measure::Acceleration, Measure::Speed, Measure::Coupled][random.random_range(0..3)];
         *criterion = Some(Criterion { measure, enter, leave: enter - enter / 4 });
     }
-    let mut parameters = FrictionParameters { domain, selector, sets: Default::default() };
+    let mut parameters = FrictionParameters { domain, selector, common: CommonTerms::NONE, sets: Default::default() };
     for set in parameters.sets.iter_mut().take(selector.sets()) {
         *set = ParameterSet {
             physical: tame_physical(random, &domain),
             network: random.random_bool(0.67).then(|| tame_network(random)),
         };
     }
+    if random.random() {
+        parameters.common = tame_common(random);
+    } else {
+        to_format_1(&mut parameters);
+    }
     parameters
+}
+
+/// Takes away what an image of format 1 cannot hold.
+pub fn to_format_1(parameters: &mut FrictionParameters) {
+    parameters.common = CommonTerms::NONE;
+    for set in &mut parameters.sets {
+        set.physical.terms = Terms(set.physical.terms.0 & Terms::FORMAT_1.0);
+        set.physical.coefficients.viscous_asymmetry = 0;
+    }
+}
+
+/// Pre-sliding over 0.3 to 100 mrad and two ripples of up to 0.2 Nm, some of them absent.
+pub fn tame_common(random: &mut ChaCha8Rng) -> CommonTerms {
+    let mut common = CommonTerms::NONE;
+    for element in common.elements.iter_mut().take(random.random_range(0..=ELEMENTS)) {
+        let distance = 10f64.powf(random.random_range(-3.5..-1.0));
+        *element = MaxwellElement { stiffness: q16(1.0 / distance), level: q16(random.random_range(0.01..1.0)) };
+    }
+    for ripple in common.ripples.iter_mut().take(random.random_range(0..=2)) {
+        let mut amplitude = || q16(random.random_range(-0.2..0.2));
+        let (level_sine, level_cosine, torque_sine, torque_cosine) =
+            (amplitude(), amplitude(), amplitude(), amplitude());
+        let periods = q16(random.random_range(0.1..30.0));
+        *ripple = Ripple { periods, level_sine, level_cosine, torque_sine, torque_cosine };
+    }
+    common
+}
+
+/// Any common terms.
+fn extreme_common(random: &mut ChaCha8Rng) -> CommonTerms {
+    let calm = random.random_range(0..16);
+    let mut common = CommonTerms::NONE;
+    for element in &mut common.elements {
+        let (stiffness, level) = (bits(random).saturating_abs().min(MAX_STIFFNESS), bits(random).saturating_abs());
+        *element = MaxwellElement { stiffness, level: level >> calm };
+    }
+    for ripple in &mut common.ripples {
+        let periods = bits(random);
+        let mut amplitude = || bits(random) >> calm;
+        let (level_sine, level_cosine, torque_sine, torque_cosine) =
+            (amplitude(), amplitude(), amplitude(), amplitude());
+        *ripple = Ripple { periods, level_sine, level_cosine, torque_sine, torque_cosine };
+    }
+    common
 }
 
 /// The box of a robot joint.
@@ -89,7 +142,7 @@ pub fn tame_domain(random: &mut ChaCha8Rng) -> Domain {
 
 /// A physical model of ordinary size: friction of 0.1 to 5 Nm whose terms each take part in three cases of four.
 pub fn tame_physical(random: &mut ChaCha8Rng, domain: &Domain) -> PhysicalParameters {
-    let terms = (0..14).filter(|_| random.random_bool(0.75)).fold(0, |terms, bit| terms | 1 << bit);
+    let terms = (0..15).filter(|_| random.random_bool(0.75)).fold(0, |terms, bit| terms | 1 << bit);
     let level = random.random_range(0.1..5.0);
     let mut si = [0.0; Coefficients::COUNT];
     for (value, name) in si.iter_mut().zip(Coefficients::NAMES) {
@@ -98,7 +151,7 @@ pub fn tame_physical(random: &mut ChaCha8Rng, domain: &Domain) -> PhysicalParame
             "position" => (-0.05 * level, 0.05 * level),
             "temperature" => (-0.01 * level, 0.01 * level),
             "load" => (-0.03, 0.03),
-            "viscous" => (0.0, 0.5 * level),
+            "viscous" => (0.02 * level, 0.5 * level),
             "viscous_temperature" | "coulomb_temperature" => (-0.01, 0.002),
             "quadratic" => (-0.02 * level, 0.05 * level),
             "coulomb_positive" | "coulomb_negative" => (0.6 * level, level),
@@ -112,7 +165,7 @@ pub fn tame_physical(random: &mut ChaCha8Rng, domain: &Domain) -> PhysicalParame
             "hysteresis_acceleration_slope" => (0.1, 10.0),
             "harmonic_frequency" => (0.5, 20.0),
             "rotor_inertia" => (0.0, 0.01 * level),
-            _ => (-0.1 * level, 0.1 * level), // harmonics
+            _ => (-0.1 * level, 0.1 * level), // harmonics, viscous asymmetry
         };
         *value = random.random_range(low..high);
     }
@@ -159,12 +212,15 @@ pub fn extreme(random: &mut ChaCha8Rng) -> FrictionParameters {
         let measure = [Measure::Acceleration, Measure::Speed, Measure::Coupled][random.random_range(0..3)];
         *criterion = Some(Criterion { measure, enter: a.max(b), leave: a.min(b) });
     }
-    let mut parameters = FrictionParameters { domain, selector, sets: Default::default() };
+    let mut parameters = FrictionParameters { domain, selector, common: CommonTerms::NONE, sets: Default::default() };
     for set in parameters.sets.iter_mut().take(selector.sets()) {
         *set = ParameterSet {
             physical: extreme_physical(random),
             network: random.random_bool(0.6).then(|| extreme_network(random)),
         };
+    }
+    if random.random() {
+        parameters.common = extreme_common(random);
     }
     parameters
 }
@@ -234,11 +290,12 @@ fn extreme_network(random: &mut ChaCha8Rng) -> NetworkParameters {
 pub fn image(random: &mut ChaCha8Rng, friction: FrictionParameters, golden: usize) -> Image {
     let model = FrictionModel::new(&friction, 20_000);
     let mut vectors = heapless::Vec::new();
+    let mut sequence = GoldenSequence::new(&friction.common);
     for _ in 0..golden.clamp(1, MAX_GOLDEN) {
         let set = random.random_range(0..friction.selector.sets());
         let signals = states::signals(random, &friction);
-        let expected: Estimate =
-            model.evaluate(set, &joint_firmware::friction::state::JointState::from_signals(signals));
+        let state = JointState::from_signals(signals);
+        let expected: Estimate = model.evaluate_with(set, &state, &sequence.next(&state));
         // The count was held at the capacity.
         let _ = vectors.push(GoldenVector { set: set as u8, signals, expected });
     }

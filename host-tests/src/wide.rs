@@ -2,17 +2,23 @@
 //! no shift can lose a bit. Where the control step gives the same, nothing in it overflowed.
 
 use joint_firmware::friction::FrictionParameters;
+use joint_firmware::friction::common::CommonTorques;
 use joint_firmware::friction::domain::{Domain, Range};
 use joint_firmware::friction::network::{INPUTS, MIN_FRACTION, NetworkParameters, Neuron};
 use joint_firmware::friction::physical::{PhysicalParameters, Terms};
 use joint_firmware::friction::smooth::{atan, odd_sines, stribeck, tanh};
 use joint_firmware::friction::state::{SIGNALS, Signal};
 
-/// Torques of the physical model and of the network of one set, Q16.16.
-pub fn evaluate(parameters: &FrictionParameters, set: usize, signals: &[i32; SIGNALS]) -> (i128, i128) {
+/// Torques of the physical model and of the network of one set, Q16.16, with what the common terms give.
+pub fn evaluate(
+    parameters: &FrictionParameters,
+    set: usize,
+    signals: &[i32; SIGNALS],
+    common: &CommonTorques,
+) -> (i128, i128) {
     let set = &parameters.sets[set];
     let network = set.network.as_ref().map_or(0, |network| evaluate_network(network, &parameters.domain, signals));
-    (evaluate_physical(&set.physical, &parameters.domain, signals), network)
+    (evaluate_physical(&set.physical, &parameters.domain, signals, common), network)
 }
 
 fn saturate(value: i128) -> i128 {
@@ -29,7 +35,12 @@ fn round(value: i128, bits: u32) -> i128 {
     (value + (1 << (bits - 1))) >> bits
 }
 
-fn evaluate_physical(model: &PhysicalParameters, domain: &Domain, signals: &[i32; SIGNALS]) -> i128 {
+fn evaluate_physical(
+    model: &PhysicalParameters,
+    domain: &Domain,
+    signals: &[i32; SIGNALS],
+    common: &CommonTorques,
+) -> i128 {
     const ONE: i128 = 1 << 16;
     let on = |term: Terms, value: i32| if model.terms.contains(term) { value as i128 } else { 0 };
     let c = &model.coefficients;
@@ -46,7 +57,7 @@ fn evaluate_physical(model: &PhysicalParameters, domain: &Domain, signals: &[i32
     let (q, v, load) = (scaled(Signal::Position), scaled(Signal::Velocity), scaled(Signal::TheoreticalTorque));
     let (th, a) = (scaled(Signal::Temperature), scaled(Signal::Acceleration));
 
-    let mut sum = on(Terms::CONSTANT, c.constant) << 31;
+    let mut sum = (on(Terms::CONSTANT, c.constant) + common.ripple.torque as i128) << 31;
     sum += on(Terms::POSITION, c.position) * q;
     sum += on(Terms::TEMPERATURE, c.temperature) * th;
     sum += on(Terms::LOAD, c.load) * load;
@@ -54,13 +65,16 @@ fn evaluate_physical(model: &PhysicalParameters, domain: &Domain, signals: &[i32
 
     let factor = saturate(ONE + saturate(round(on(Terms::VISCOUS_TEMPERATURE, c.viscous_temperature) * th, 31)));
     sum += saturate(round(on(Terms::VISCOUS, c.viscous) * factor, 16)) * v;
+    sum += on(Terms::VISCOUS_ASYMMETRY, c.viscous_asymmetry) * magnitude(v);
     sum += on(Terms::QUADRATIC, c.quadratic) * saturate((v * magnitude(v)) >> 31);
 
     let direction = tanh(argument((c.coulomb_slope as i128 * v) >> 22)) as i128;
     let coulomb = (on(Terms::COULOMB, c.coulomb_positive), on(Terms::COULOMB, c.coulomb_negative));
     let factor = saturate(ONE + saturate(round(on(Terms::COULOMB_TEMPERATURE, c.coulomb_temperature) * th, 31)));
     let factor = saturate(factor + saturate(round(on(Terms::COULOMB_LOAD, c.coulomb_load) * magnitude(load), 31)));
-    sum += saturate(round(by_direction(coulomb.0, coulomb.1, v) * factor, 16)) * direction;
+    let level = saturate(by_direction(coulomb.0, coulomb.1, v) + common.ripple.level as i128);
+    sum += saturate(round(level * factor, 16)) * direction;
+    sum += saturate(round(common.pre_sliding as i128 * factor, 16)) * i32::MAX as i128;
 
     if model.terms.contains(Terms::STRIBECK) {
         let positive = saturate(c.breakaway_positive as i128 - coulomb.0);

@@ -4,7 +4,9 @@
 use host_tests::parameters::{extreme, frictionless, range, tame};
 use host_tests::states::signals;
 use host_tests::wide;
+use joint_firmware::friction::common::CommonTorques;
 use joint_firmware::friction::domain::Range;
+use joint_firmware::friction::maxwell_slip::Bent;
 use joint_firmware::friction::network::{MAX_SCALE, NetworkParameters, Neuron};
 use joint_firmware::friction::physical::Terms;
 use joint_firmware::friction::state::{JointState, SIGNALS, Signal};
@@ -36,19 +38,28 @@ struct Subject<'a> {
     parameters: &'a FrictionParameters,
     model: FrictionModel,
     certificate: Certificate,
+    /// How far the pre-sliding elements are bent before an evaluation.
+    bent: Bent,
     inputs: usize,
     worst: Tightness,
 }
 
 impl<'a> Subject<'a> {
     fn new(parameters: &'a FrictionParameters, certificate: Certificate) -> Self {
-        let model = FrictionModel::new(parameters, 20_000);
-        Self { parameters, model, certificate, inputs: 0, worst: Tightness::default() }
+        // The slowest rate that the certificate speaks of.
+        let model = FrictionModel::new(parameters, 1_000);
+        Self { parameters, model, certificate, bent: Bent::default(), inputs: 0, worst: Tightness::default() }
     }
 
     fn estimate(&mut self, set: usize, signals: &[i32; SIGNALS]) -> Estimate {
         self.inputs += 1;
-        self.model.evaluate(set, &JointState::from_signals(*signals))
+        let state = JointState::from_signals(*signals);
+        self.model.evaluate_with(set, &state, &self.common(&state))
+    }
+
+    /// What the common terms give, from the same bending every time.
+    fn common(&self, state: &JointState) -> CommonTorques {
+        self.model.common(&mut { self.bent }, state)
     }
 
     /// |friction| and |network| stay within their bounds, and nothing wraps. The magnitudes.
@@ -56,7 +67,7 @@ impl<'a> Subject<'a> {
         let estimate = self.estimate(set, signals);
         let Estimate { physical, network } = estimate;
         let context = || format!("set {set}, {signals:?}: {:?} {:?}", self.certificate, self.parameters);
-        let wide = wide::evaluate(self.parameters, set, signals);
+        let wide = wide::evaluate(self.parameters, set, signals, &self.common(&JointState::from_signals(*signals)));
         assert_eq!((physical.to_bits() as i128, network.to_bits() as i128), wide, "wrapped: {}", context());
         let [total, network] = [estimate.total(), network].map(|torque| torque.to_bits().unsigned_abs());
         assert!(total <= self.certificate.output, "friction {total}: {}", context());
@@ -122,6 +133,7 @@ impl<'a> Subject<'a> {
     /// Searches a set for the state that comes nearest to a bound: from the best of 100 random ones by changes of one signal that
     /// are kept when they take nothing away. Every state on the way is checked.
     fn climb(&mut self, random: &mut ChaCha8Rng, set: usize, quest: Quest) {
+        self.bent = core::array::from_fn(|_| random.random_range(-(1 << 30)..=1 << 30));
         let domain = self.parameters.domain;
         let mut best = (i64::MIN, [0; SIGNALS]);
         for step in 0..400 {

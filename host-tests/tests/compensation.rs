@@ -3,6 +3,7 @@
 use host_tests::parameters::{bits, extreme, frictionless, q16, range, tame, tame_network};
 use host_tests::states::{signals, within};
 use joint_firmware::compensation::{Acting, Compensation, Output, Reason, Request, Settings, SettingsError};
+use joint_firmware::friction::maxwell_slip::Bent;
 use joint_firmware::friction::physical::Terms;
 use joint_firmware::friction::regime::{Criterion, Measure, Selector};
 use joint_firmware::friction::state::{JointState, SIGNALS, Signal};
@@ -192,7 +193,8 @@ fn beyond_the_trained_box_the_network_then_the_physical_model_fade_to_nothing_wi
             let mut signals = inside;
             signals[signal as usize] = (edge as f64 + outwards * distance) as i32;
             let output = Compensation::default().step(Some(&model), &settings, &state(signals));
-            let estimate = model.evaluate(0, &state(signals));
+            let common = model.common(&mut Bent::default(), &state(signals));
+            let estimate = model.evaluate_with(0, &state(signals), &common);
             let (physical, network) = (estimate.physical.to_f64() * 65536.0, estimate.network.to_f64() * 65536.0);
             let has_network = parameters.sets[0].network.is_some();
             let outside = (signals[signal as usize] as f64 - edge as f64) * outwards;

@@ -45,6 +45,7 @@ fn equation(terms: Terms, si: &Si, domain: &Domain, signals: &[i32; SIGNALS]) ->
     torque += on(Terms::LOAD, c("load") * tau);
     let viscous_factor = 1.0 + on(Terms::VISCOUS_TEMPERATURE, c("viscous_temperature") * th);
     torque += on(Terms::VISCOUS, c("viscous") * viscous_factor * v);
+    torque += on(Terms::VISCOUS_ASYMMETRY, c("viscous_asymmetry") * v.abs());
     torque += on(Terms::QUADRATIC, c("quadratic") * v * v.abs());
     let coulomb_factor = 1.0
         + on(Terms::COULOMB_TEMPERATURE, c("coulomb_temperature") * th)
@@ -96,7 +97,7 @@ fn error(random: &mut ChaCha8Rng, domain: &Domain, parameters: &PhysicalParamete
 #[test]
 fn each_term_alone_and_all_together_follow_their_formula() {
     let mut random = ChaCha8Rng::seed_from_u64(1);
-    let single = (0..14).map(|bit| (Terms::NAMES[bit], with_base(Terms(1 << bit))));
+    let single = (0..15).map(|bit| (Terms::NAMES[bit], with_base(Terms(1 << bit))));
     let combinations = [
         ("all", Terms::ALL),
         ("coulomb and stribeck", Terms::COULOMB.union(Terms::STRIBECK)),
@@ -151,6 +152,7 @@ fn own_coefficients(term: Terms) -> &'static [&'static str] {
             "harmonic_negative_4",
             "harmonic_negative_5",
         ],
+        Terms::VISCOUS_ASYMMETRY => &["viscous_asymmetry"],
         _ => &["rotor_inertia"],
     }
 }
@@ -158,7 +160,7 @@ fn own_coefficients(term: Terms) -> &'static [&'static str] {
 #[test]
 fn a_term_that_is_switched_off_contributes_nothing() {
     let mut random = ChaCha8Rng::seed_from_u64(2);
-    for bit in 0..14 {
+    for bit in 0..15 {
         let term = Terms(1 << bit);
         let mut matters = false;
         for _ in 0..20 {

@@ -2,7 +2,7 @@
 //! same bytes.
 
 use host_tests::image_bytes::{encoded, sealed};
-use host_tests::parameters::{extreme, frictionless, image, tame};
+use host_tests::parameters::{extreme, frictionless, image, tame, tame_common, to_format_1};
 use joint_firmware::friction::domain::Range;
 use joint_firmware::friction::network::{MAX_SCALE, NetworkParameters, Neuron};
 use joint_firmware::friction::physical::Terms;
@@ -15,29 +15,44 @@ use joint_firmware::quantity::Torque;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Parameters with 1, 2 or 4 sets, all of them or none with a network.
-fn parameters(random: &mut ChaCha8Rng, sets: usize, networks: bool) -> FrictionParameters {
+/// Parameters of a format with 1, 2 or 4 sets, all of them or none with a network.
+fn parameters(random: &mut ChaCha8Rng, format: u16, sets: usize, networks: bool) -> FrictionParameters {
     loop {
-        let parameters = tame(random);
+        let mut parameters = tame(random);
         let in_use = &parameters.sets[..parameters.selector.sets()];
         if in_use.len() == sets && in_use.iter().all(|set| set.network.is_some() == networks) {
+            match format {
+                1 => to_format_1(&mut parameters),
+                _ => parameters.common = tame_common(random),
+            }
             return parameters;
         }
     }
 }
 
-/// Valid images of every shape.
+/// Valid images of every shape, [`SHAPES`] of each format.
 fn valid_images() -> Vec<Vec<u8>> {
     let mut random = ChaCha8Rng::seed_from_u64(1);
     let mut images = vec![];
-    for sets in [1, 2, 4] {
-        for networks in [false, true] {
-            let parameters = parameters(&mut random, sets, networks);
-            images.push(encoded(&image(&mut random, parameters, sets)));
+    for format in [1, 2] {
+        for sets in [1, 2, 4] {
+            for networks in [false, true] {
+                let image = loop {
+                    let parameters = parameters(&mut random, format, sets, networks);
+                    let image = image(&mut random, parameters, sets);
+                    if image.format() == format {
+                        break image;
+                    }
+                };
+                images.push(encoded(&image));
+            }
         }
     }
     images
 }
+
+/// Images of one format: without and with networks, for no, one and two criteria.
+const SHAPES: usize = 6;
 
 #[test]
 fn every_flipped_bit_is_refused_with_its_reason() {
@@ -90,7 +105,7 @@ fn lengths_and_numbers_appear_in_the_messages() {
     assert_eq!(message(&damaged), format!("too long: {} bytes, at most {length} are allowed here", length + 1));
     damaged = bytes.clone();
     damaged[4] = 9;
-    assert_eq!(message(&damaged), "format version 9 is not known, this program reads version 1");
+    assert_eq!(message(&damaged), "format version 9 is not known, this program reads versions 1 to 2");
     damaged = bytes.clone();
     damaged[28] = 7;
     assert_eq!(message(&sealed(damaged)), "effort unit (offset 28) is 7, must be 0 to 3");
@@ -116,7 +131,7 @@ enum Byte {
 }
 
 /// The layout of an image with `criteria` criteria and `networks` (a bit a set), from the table in `parameters::image`.
-fn layout(criteria: usize, networks: u8, golden: usize) -> Vec<Byte> {
+fn layout(format: u16, criteria: usize, networks: u8, golden: usize) -> Vec<Byte> {
     use Byte::*;
     let sets = 1 << criteria;
     let mut bytes = vec![Free; 28];
@@ -130,9 +145,14 @@ fn layout(criteria: usize, networks: u8, golden: usize) -> Vec<Byte> {
         bytes.extend([if criterion < criteria { Dependent } else { Reserved }; 8]);
     }
     bytes.extend([Free; 12]);
+    if format == 2 {
+        // Numbers that are not negative, and for the stiffness below a limit.
+        bytes.extend([Free, Free, Free, Dependent, Free, Free, Free, Dependent].repeat(4));
+        bytes.extend([Free; 40]);
+    }
     for set in 0..sets {
-        bytes.extend([Free, Dependent, Reserved, Reserved]); // terms: 14 bits
-        bytes.extend([Free; 124]);
+        bytes.extend([Free, Dependent, Reserved, Reserved]); // terms: 14 bits, 15 in format 2
+        bytes.extend(vec![Free; if format == 2 { 128 } else { 124 }]);
         if networks >> set & 1 == 1 {
             bytes.extend([Free; 120]);
             for _ in 0..11 {
@@ -154,8 +174,9 @@ fn with_a_right_checksum_reserved_bytes_and_fields_are_refused_and_the_rest_is_c
     let mut random = ChaCha8Rng::seed_from_u64(2);
     let mut refused = [0; 2];
     for (shape, bytes) in valid_images().into_iter().enumerate() {
-        let (criteria, sets) = (shape / 2, 1 << (shape / 2));
-        let layout = layout(criteria, if shape % 2 == 1 { (1 << sets) - 1 } else { 0 }, sets);
+        let (format, criteria) = (if shape < SHAPES { 1 } else { 2 }, shape % SHAPES / 2);
+        let sets = 1 << criteria;
+        let layout = layout(format, criteria, if shape % 2 == 1 { (1 << sets) - 1 } else { 0 }, sets);
         assert_eq!(layout.len() + 4, bytes.len());
         for (offset, byte) in layout.into_iter().enumerate().skip(8) {
             let bits = (0..8).map(|bit| bytes[offset] ^ 1 << bit);
@@ -316,7 +337,7 @@ fn what_is_encoded_is_what_is_decoded() {
 #[test]
 fn a_golden_vector_that_this_machine_computes_differently_is_named() {
     let mut random = ChaCha8Rng::seed_from_u64(5);
-    let parameters = parameters(&mut random, 2, true);
+    let parameters = parameters(&mut random, 2, 2, true);
     let image = image(&mut random, parameters, MAX_GOLDEN);
     let model = FrictionModel::new(&image.friction, 20_000);
     assert_eq!(image.verify_golden(&model), Ok(()));
@@ -339,14 +360,16 @@ fn a_golden_vector_that_this_machine_computes_differently_is_named() {
 }
 
 #[test]
-fn four_sets_with_networks_leave_room_for_six_golden_vectors_and_not_for_seven() {
+fn four_sets_with_networks_leave_room_for_six_golden_vectors_and_not_for_seven_in_format_2_for_four_and_not_for_five() {
     let mut random = ChaCha8Rng::seed_from_u64(6);
-    let parameters = parameters(&mut random, 4, true);
-    let six = image(&mut random, parameters, 6);
-    assert_eq!(encoded(&six).len(), 144 + 4 * (128 + 280) + 6 * 36 + 4);
-    let seven = image(&mut random, parameters, 7);
-    let too_long = ImageError::TooLong { length: 144 + 4 * (128 + 280) + 7 * 36 + 4, limit: MAX_LENGTH };
-    assert_eq!(seven.encode(&mut [0; MAX_LENGTH]), Err(too_long));
+    for (format, before_golden, most) in [(1, 144 + 4 * (128 + 280), 6), (2, 216 + 4 * (132 + 280), 4)] {
+        let parameters = parameters(&mut random, format, 4, true);
+        let fits = image(&mut random, parameters, most);
+        assert_eq!((fits.format(), encoded(&fits).len()), (format, before_golden + most * 36 + 4));
+        let too_many = image(&mut random, parameters, most + 1);
+        let too_long = ImageError::TooLong { length: before_golden + (most + 1) * 36 + 4, limit: MAX_LENGTH };
+        assert_eq!(too_many.encode(&mut [0; MAX_LENGTH]), Err(too_long));
+    }
     assert_eq!(MAX_LENGTH, 2016);
 }
 
@@ -381,7 +404,7 @@ fn what_could_not_be_read_back_is_not_written() {
         refused(&|image| image.friction.selector.criteria[1] = Some(Criterion { leave: 5, ..criterion })),
         "second criterion without a first"
     );
-    assert_eq!(refused(&|image| image.friction.sets[0].physical.terms = Terms(1 << 14)), "terms");
+    assert_eq!(refused(&|image| image.friction.sets[0].physical.terms = Terms(1 << 15)), "terms");
     assert_eq!(refused(&|image| with_network(image, 9)), "fraction bits");
     assert_eq!(refused(&|image| with_network(image, 21)), "fraction bits");
     for scale in [MAX_SCALE + 1, -MAX_SCALE - 1] {

@@ -3,16 +3,19 @@
 use host_tests::image_bytes::{crc32, encoded, sealed};
 use host_tests::parameters::frictionless;
 use joint_firmware::friction::FrictionParameters;
+use joint_firmware::friction::common::CommonTerms;
 use joint_firmware::friction::domain::Range;
+use joint_firmware::friction::maxwell_slip::MaxwellElement;
 use joint_firmware::friction::network::Neuron;
 use joint_firmware::friction::physical::{Coefficients, Terms};
 use joint_firmware::friction::regime::{Criterion, Measure, Selector};
+use joint_firmware::friction::ripple::Ripple;
 use joint_firmware::parameters::certificate::Limits;
 use joint_firmware::parameters::image::{Effort, GoldenVector, Image, Target};
 use joint_firmware::quantity::Torque;
 
 /// The coefficients in the order of the bytes: it is part of the format.
-const COEFFICIENTS: [&str; 31] = [
+const COEFFICIENTS: [&str; 32] = [
     "constant",
     "position",
     "temperature",
@@ -44,14 +47,21 @@ const COEFFICIENTS: [&str; 31] = [
     "harmonic_negative_4",
     "harmonic_negative_5",
     "rotor_inertia",
+    "viscous_asymmetry",
 ];
 
+/// Coefficients of a set in a format.
+fn coefficients_of(format: u16) -> usize {
+    if format == 1 { 31 } else { 32 }
+}
+
 /// An image with two sets, the second with a network, written by hand from the table in `parameters::image`.
-fn hand_packed() -> Vec<u8> {
+fn hand_packed(format: u16) -> Vec<u8> {
     let mut bytes: Vec<u8> = vec![];
     bytes.extend(b"JFPI");
-    bytes.extend(1u16.to_le_bytes());
-    bytes.extend((144u16 + 128 + 128 + 280 + 2 * 36 + 4).to_le_bytes());
+    bytes.extend(format.to_le_bytes());
+    let (common, set) = if format == 1 { (0, 128) } else { (72, 132) };
+    bytes.extend((144u16 + common + set + set + 280 + 2 * 36 + 4).to_le_bytes());
     bytes.extend(0x0102_0304u32.to_le_bytes()); // version
     bytes.extend(0x1112_1314u32.to_le_bytes()); // product
     bytes.extend(0x2122_2324u32.to_le_bytes()); // serial
@@ -74,10 +84,19 @@ fn hand_packed() -> Vec<u8> {
     bytes.extend(0xf000_0001u32.to_le_bytes());
     bytes.extend(0xf000_0002u32.to_le_bytes());
     bytes.extend(0xf000_0003u32.to_le_bytes());
+    if format == 2 {
+        for element in 0..4i32 {
+            bytes.extend((100_000 * element + 3).to_le_bytes()); // stiffness
+            bytes.extend((7_000 * element + 5).to_le_bytes()); // level
+        }
+        for number in 0..10i32 {
+            bytes.extend((123_456 * (number - 4)).to_le_bytes()); // two ripples
+        }
+    }
     for set in 0..2i32 {
         bytes.extend(if set == 0 { 0x2aaau16 } else { 0x1555 }.to_le_bytes());
         bytes.extend([0, 0]);
-        for coefficient in 0..31i32 {
+        for coefficient in 0..coefficients_of(format) as i32 {
             bytes.extend((10_000 * (set + 1) - coefficient * 700).to_le_bytes());
         }
     }
@@ -104,9 +123,16 @@ fn hand_packed() -> Vec<u8> {
 
 #[test]
 fn bytes_packed_by_hand_from_the_documented_layout_are_the_image_they_describe() {
+    for format in [1, 2] {
+        bytes_packed_by_hand_are_the_image_they_describe(format);
+    }
+}
+
+fn bytes_packed_by_hand_are_the_image_they_describe(format: u16) {
     assert_eq!(Coefficients::NAMES, COEFFICIENTS);
     assert_eq!(crc32(b"123456789"), 0xcbf4_3926, "check value of CRC-32 ISO-HDLC");
-    let coefficients = |set: i32| Coefficients::from_array(core::array::from_fn(|i| 10_000 * set - i as i32 * 700));
+    let coefficient = |set: i32, i: usize| if i < coefficients_of(format) { 10_000 * set - i as i32 * 700 } else { 0 };
+    let coefficients = |set: i32| Coefficients::from_array(core::array::from_fn(|i| coefficient(set, i)));
     let mut friction = FrictionParameters {
         selector: Selector {
             criteria: [Some(Criterion { measure: Measure::Coupled, enter: 77, leave: -78 }), None],
@@ -115,6 +141,19 @@ fn bytes_packed_by_hand_from_the_documented_layout_are_the_image_they_describe()
         ..frictionless()
     };
     friction.domain.ranges = core::array::from_fn(|i| Range { low: -1000 - i as i32, high: 2000 + i as i32 });
+    if format == 2 {
+        let element = |n: i32| MaxwellElement { stiffness: 100_000 * n + 3, level: 7_000 * n + 5 };
+        let number = |n: i32| 123_456 * (n - 4);
+        let ripple = |n: i32| Ripple {
+            periods: number(n),
+            level_sine: number(n + 1),
+            level_cosine: number(n + 2),
+            torque_sine: number(n + 3),
+            torque_cosine: number(n + 4),
+        };
+        friction.common =
+            CommonTerms { elements: core::array::from_fn(|n| element(n as i32)), ripples: [ripple(0), ripple(5)] };
+    }
     (friction.domain.margin, friction.domain.reference_temperature) = (0x8000_0001, -7);
     let [first, second, ..] = &mut friction.sets;
     first.physical.terms = Terms(0x2aaa);
@@ -146,7 +185,7 @@ fn bytes_packed_by_hand_from_the_documented_layout_are_the_image_they_describe()
         limits: Limits { output: 0xf000_0001, torque_gain: 0xf000_0002, velocity_slope: 0xf000_0003 },
         golden: [vector(0), vector(1)].into_iter().collect(),
     };
-    let bytes = hand_packed();
+    let bytes = hand_packed(format);
     assert_eq!(Image::decode(&bytes).as_ref(), Ok(&expected));
     assert_eq!(encoded(&expected), bytes);
 }

@@ -34,12 +34,11 @@ def state():
 
 def commands():
     """RPDO 2 every 5 ms, with a velocity that swings."""
-    counter, start = 0, time.monotonic()
+    start = time.monotonic()
     while not over.is_set():
-        counter = (counter + 1) % 256
         controlword, amplitude = wanted
         velocity = int(1000 * amplitude * math.sin(4 * (time.monotonic() - start)))
-        network.send_message(0x300 + node_id, struct.pack("<HbBi", controlword, VELOCITY_MODE, counter, velocity))
+        network.send_message(0x300 + node_id, struct.pack("<Hbi", controlword, VELOCITY_MODE, velocity))
         time.sleep(0.005)
 
 

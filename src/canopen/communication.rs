@@ -211,7 +211,13 @@ impl<'a> Communication<'_, 'a> {
                 Parameter::EventTimer => registers.set_event_timer(value as u16),
                 Parameter::Count => mapping::set_count(registers, direction, value as u8, dictionary)?,
                 Parameter::Mapped(entry) => {
-                    mapping::set_mapped(registers, direction, entry, MappedObject(value), dictionary)?;
+                    let object = MappedObject(value);
+                    let set = mapping::set_mapped(registers, direction, entry, object, dictionary);
+                    // The application does not know the server's own objects, which no PDO carries.
+                    let own = || self.find(object.index(), object.sub_index());
+                    set.map_err(|abort| {
+                        if abort == Abort::NO_OBJECT && own().is_some() { Abort::NOT_MAPPABLE } else { abort }
+                    })?;
                 }
             },
         }

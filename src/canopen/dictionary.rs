@@ -157,6 +157,11 @@ pub trait ObjectDictionary {
     /// Object 1011h: lets `group` be the defaults after the next reset.
     fn restore(&mut self, group: Group) -> Result<(), Abort>;
 
+    /// LSS: whether the node id may be changed now.
+    fn may_change_node_id(&self) -> bool {
+        true
+    }
+
     /// LSS: keeps the node id, 1 to 127 or 255, over a loss of power.
     fn store_node_id(&mut self, node_id: u8) -> Result<(), Abort>;
 

@@ -7,6 +7,10 @@ use super::dictionary::{Identity, ObjectDictionary};
 use super::parameters::is_node_id;
 use super::shared::NO_NODE_ID;
 
+/// Error of the manufacturer's, with its number behind it.
+const MANUFACTURERS: u8 = 0xFF;
+/// The application cannot do without its node id at this moment.
+const MOVING: u8 = 1;
 /// "Identify slave", which answers fastscan too, and "identify non-configured slave".
 const IDENTIFIED: u8 = 0x4F;
 const NOT_CONFIGURED: u8 = 0x50;
@@ -82,6 +86,9 @@ impl Lss {
             (0x4C, _) if !is_node_id(node_id) && !is_node_id(self.pending) => Outcome::answer(NOT_CONFIGURED, [0; 4]),
             (0x51, Mode::Waiting) if !is_node_id(node_id) && !is_node_id(self.pending) => {
                 self.fastscan(number, e, f, g, identity)
+            }
+            (0x11 | 0x17, Mode::Configuration) if !dictionary.may_change_node_id() => {
+                Outcome::answer(command, [MANUFACTURERS, MOVING, 0, 0])
             }
             (0x11, Mode::Configuration) => {
                 let valid = is_node_id(a) || a == NO_NODE_ID;

@@ -51,8 +51,7 @@ pub(super) enum Command {
 impl Command {
     /// The command of an NMT message for node `node_id`, itself 1 to 127. CiA 301 section 7.2.8.3.1.
     pub(super) const fn parse(data: &[u8], node_id: u8) -> Option<Self> {
-        // Further bytes are not looked at: a stop that is oddly padded is a stop.
-        let &[command, node, ..] = data else { return None };
+        let &[command, node] = data else { return None };
         if node != 0 && node != node_id {
             return None;
         }
@@ -75,7 +74,9 @@ mod tests {
     fn commands_are_for_this_node_or_for_all() {
         assert_eq!(Command::parse(&[2, 5], 5), Some(Command::Enter(NmtState::Stopped)));
         assert_eq!(Command::parse(&[2, 0], 5), Some(Command::Enter(NmtState::Stopped)));
-        assert_eq!(Command::parse(&[2, 0, 0, 0, 0, 0, 0, 0], 5), Some(Command::Enter(NmtState::Stopped)));
+        for length in [0, 1, 3, 8] {
+            assert_eq!(Command::parse(&[2, 5, 0, 0, 0, 0, 0, 0][..length], 5), None, "{length} bytes are no command");
+        }
         assert_eq!(Command::parse(&[2, 6], 5), None);
         assert_eq!(Command::parse(&[2], 5), None);
         assert_eq!(Command::parse(&[3, 5], 5), None);

@@ -71,6 +71,10 @@ impl<'a> Receiver<'a> {
             }
             id if id == self.shared.sync_cob_id() => {
                 if self.is_sync(frame, now) {
+                    // There is no object 1019h: a counter is not expected.
+                    if !frame.data().is_empty() {
+                        self.shared.note_long_sync();
+                    }
                     self.synchronise(now, image, send);
                 }
             }
@@ -121,8 +125,9 @@ impl<'a> Receiver<'a> {
         self.synchronised = Some(now);
         image.sync();
         for ((registers, synchronous), pdo) in self.shared.transmit.iter().zip(&mut self.synchronous).zip(0..) {
-            if registers.id().is_some() && synchronous.is_due(self.shared, registers, pdo) {
-                assemble(registers, |object| Some(image.transmit(object))).into_iter().for_each(&mut send);
+            if registers.id().is_some() {
+                let frame = || assemble(registers, |object| Some(image.transmit(object)));
+                synchronous.next(self.shared, registers, pdo, frame).into_iter().for_each(&mut send);
             }
         }
         for ((registers, waiting), pdo) in self.shared.receive.iter().zip(&mut self.waiting).zip(0..) {

@@ -177,6 +177,7 @@ impl<'a> Server<'a> {
         if !epoch.state().communicates() {
             self.sdo.cancel(dictionary);
         }
+        self.emergencies.end(Lasting::LongSync);
         for (pdo, timers) in (0..).zip(&mut self.timers) {
             timers.stop();
             self.emergencies.end(Lasting::Deadline(pdo));
@@ -249,6 +250,9 @@ impl<'a> Server<'a> {
                 Some(Change::Dismissed { consumer }) => self.emergencies.end(Lasting::Heartbeat(consumer)),
             }
         }
+        if self.shared.take_long_sync() {
+            self.emergencies.begin(Lasting::LongSync, code::SYNC_LENGTH, 0);
+        }
         let (short, long) = self.shared.take_length_errors();
         let operational = self.shared.state() == NmtState::Operational;
         for (pdo, registers) in (0u8..).zip(&self.shared.receive) {
@@ -284,18 +288,16 @@ impl<'a> Server<'a> {
         self.follow(dictionary);
     }
 
-    /// The next TPDO that is sent by event or by its timer.
+    /// The next TPDO that is sent on a change, by event or by its timer.
     fn transmit(&mut self, now: u32, dictionary: &mut impl ObjectDictionary) -> Option<Frame> {
         if self.shared.state() != NmtState::Operational {
             return None;
         }
         let shared = self.shared;
         for ((registers, timers), pdo) in shared.transmit.iter().zip(&mut self.timers).zip(0..) {
-            if timers.is_due(shared, registers, pdo, now) {
-                let frame = assemble(registers, |object| value(object, dictionary));
-                if frame.is_some() {
-                    return frame;
-                }
+            let frame = || assemble(registers, |object| value(object, dictionary));
+            if let Some(frame) = timers.next(shared, registers, pdo, now, frame) {
+                return Some(frame);
             }
         }
         None

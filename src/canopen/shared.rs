@@ -40,6 +40,8 @@ pub struct Shared {
     events: AtomicU8,
     /// RPDOs that came too short (bits 0 to 3) or too long (bits 4 to 7).
     length_errors: AtomicU8,
+    /// A SYNC had data.
+    long_sync: AtomicBool,
 }
 
 /// An NMT state and how many transitions came before.
@@ -70,6 +72,7 @@ impl Shared {
             consumers: [const { ConsumerRegisters::new() }; CONSUMERS],
             events: AtomicU8::new(0),
             length_errors: AtomicU8::new(0),
+            long_sync: AtomicBool::new(false),
         }
     }
 
@@ -178,6 +181,17 @@ impl Shared {
     pub(super) fn note_length_error(&self, pdo: u8, long: bool) {
         let noted = if long { bit(pdo) << 4 } else { bit(pdo) & 0xF };
         self.length_errors.fetch_or(noted, Ordering::Relaxed);
+    }
+
+    pub(super) fn note_long_sync(&self) {
+        self.long_sync.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether a SYNC had data since the last time.
+    pub(super) fn take_long_sync(&self) -> bool {
+        let had = self.long_sync.load(Ordering::Relaxed);
+        self.long_sync.store(false, Ordering::Relaxed);
+        had
     }
 
     /// RPDOs that came too short and too long since the last time, a bit for each.

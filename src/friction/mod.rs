@@ -1,18 +1,23 @@
 //! What friction is: pure functions of the joint's state, in fixed point, the same bits on every machine.
 //!
 //! `state` says what the model looks at, `domain` where it was identified, `physical` and `network` are its two parts, `smooth` holds the functions that both
-//! share, `regime` chooses between parameter sets. Here they are put together: [`FrictionModel`] is prepared once from an
-//! image's parameters, outside the control interrupt, and evaluated there at a fixed rate.
+//! share, `regime` chooses between parameter sets, `common` holds what these have in common: pre-sliding (`maxwell_slip`) and `ripple`. Here they are put
+//! together: [`FrictionModel`] is prepared once from an image's parameters, outside the control interrupt, and evaluated there at a fixed rate.
 
+pub mod common;
 pub mod domain;
+pub mod maxwell_slip;
 pub mod network;
 pub mod physical;
 pub mod regime;
+pub mod ripple;
 pub mod smooth;
 pub mod state;
 
 use crate::quantity::Torque;
+use common::{Common, CommonTerms, CommonTorques};
 use domain::{Domain, Fade};
+use maxwell_slip::Bent;
 use network::{Inputs, Layers, NetworkParameters};
 use physical::{PhysicalParameters, PreparedTerms, Scaling};
 use regime::{MAX_CRITERIA, MAX_SETS, Memory, Selector};
@@ -34,6 +39,8 @@ pub struct FrictionParameters {
     pub domain: Domain,
     /// Which set applies when.
     pub selector: Selector,
+    /// What all sets have in common.
+    pub common: CommonTerms,
     /// Parameter sets; those beyond [`Selector::sets`] are unused and all zero.
     pub sets: [ParameterSet; MAX_SETS],
 }
@@ -59,6 +66,7 @@ impl Estimate {
 pub struct FrictionModel {
     fade: Fade,
     selector: Selector,
+    common: Common,
     scaling: Scaling,
     inputs: Inputs,
     sets: [(PreparedTerms, Option<Layers>); MAX_SETS],
@@ -71,6 +79,7 @@ impl FrictionModel {
     const NONE: Self = Self {
         fade: Fade::NONE,
         selector: Selector { criteria: [None; MAX_CRITERIA], fade_time: 0 },
+        common: Common::NONE,
         scaling: Scaling::NONE,
         inputs: Inputs::NONE,
         sets: [(PreparedTerms::NONE, None); MAX_SETS],
@@ -80,7 +89,7 @@ impl FrictionModel {
     /// Prepares `parameters` for `rate` evaluations a second (at least 1).
     pub fn new(parameters: &FrictionParameters, rate: u32) -> Self {
         let mut model = Self::NONE;
-        model.set_up(&parameters.domain, &parameters.selector, rate);
+        model.set_up(&parameters.domain, &parameters.selector, &parameters.common, rate);
         for (number, set) in parameters.sets.iter().enumerate() {
             model.prepare_set(number, set);
         }
@@ -93,10 +102,11 @@ impl FrictionModel {
         place: &'a mut Option<Self>,
         domain: &Domain,
         selector: &Selector,
+        common: &CommonTerms,
         rate: u32,
     ) -> &'a mut Self {
         let model = place.insert(Self::NONE);
-        model.set_up(domain, selector, rate);
+        model.set_up(domain, selector, common, rate);
         model
     }
 
@@ -104,13 +114,14 @@ impl FrictionModel {
     #[inline(never)]
     pub fn copy_to(&self, place: &mut Option<Self>) {
         let model = place.insert(Self::NONE);
-        let Self { fade, selector, scaling, inputs, sets, fade_decrement } = self;
-        (model.fade, model.selector, model.scaling, model.inputs) = (*fade, *selector, *scaling, *inputs);
+        let Self { fade, selector, common, scaling, inputs, sets, fade_decrement } = self;
+        (model.fade, model.selector, model.common) = (*fade, *selector, *common);
+        (model.scaling, model.inputs) = (*scaling, *inputs);
         model.sets = *sets;
         model.fade_decrement = *fade_decrement;
     }
 
-    fn set_up(&mut self, domain: &Domain, selector: &Selector, rate: u32) {
+    fn set_up(&mut self, domain: &Domain, selector: &Selector, common: &CommonTerms, rate: u32) {
         // 2^31 / (time * rate), with the time in Q16.16.
         let steps = (selector.fade_time as u64 * rate as u64) >> 16;
         self.fade_decrement = match core::num::NonZeroU64::new(steps) {
@@ -119,6 +130,7 @@ impl FrictionModel {
         };
         self.fade = Fade::new(domain);
         self.selector = *selector;
+        self.common = Common::new(common, rate);
         self.scaling = Scaling::new(domain);
         self.inputs = Inputs::new(domain);
     }
@@ -144,16 +156,17 @@ impl FrictionModel {
     #[inline]
     pub fn step(&self, state: &JointState, memory: &mut Memory) -> Estimate {
         let signals = state.signals();
-        self.enter(state, memory);
+        let common = self.enter(state, memory);
         let network = self.by_network(&signals, memory);
-        let physical = self.by_physical_model(&signals, memory);
+        let physical = self.by_physical_model(&signals, &common, memory);
         self.fade_in(Estimate { physical, network }, memory)
     }
 
-    /// Chooses the regime's parameter set.
+    /// Chooses the regime's parameter set, and steps what all sets have in common.
     #[inline]
-    pub fn enter(&self, state: &JointState, memory: &mut Memory) {
+    pub fn enter(&self, state: &JointState, memory: &mut Memory) -> CommonTorques {
         memory.enter(self.selector.select(state, memory.set.unwrap_or(0)));
+        self.common.step(&mut memory.bent, state)
     }
 
     /// What the regime's network gives; zero without one.
@@ -164,8 +177,8 @@ impl FrictionModel {
 
     /// What the regime's physical model gives.
     #[inline]
-    pub fn by_physical_model(&self, signals: &[i32; SIGNALS], memory: &Memory) -> Torque {
-        by_physical_model(&self.scaling, &self.set(memory.set.unwrap_or(0)).0, signals)
+    pub fn by_physical_model(&self, signals: &[i32; SIGNALS], common: &CommonTorques, memory: &Memory) -> Torque {
+        by_physical_model(&self.scaling, &self.set(memory.set.unwrap_or(0)).0, common, signals)
     }
 
     /// The cross-fade from the regime before to this regime's estimate.
@@ -174,10 +187,28 @@ impl FrictionModel {
         memory.fade(estimate, self.fade_decrement)
     }
 
-    /// Friction in this state by parameter set `set` (taken modulo [`MAX_SETS`]).
+    /// True where the model has pre-sliding elements: friction at a velocity of zero.
+    #[inline(always)]
+    pub fn pre_slides(&self) -> bool {
+        self.common.pre_slides()
+    }
+
+    /// What the common terms give in this state, which bends the pre-sliding elements.
+    #[inline]
+    pub fn common(&self, bent: &mut Bent, state: &JointState) -> CommonTorques {
+        self.common.step(bent, state)
+    }
+
+    /// Friction in this state by parameter set `set` (taken modulo [`MAX_SETS`]) alone, without the common terms.
     #[inline]
     pub fn evaluate(&self, set: usize, state: &JointState) -> Estimate {
-        evaluate(&self.scaling, &self.inputs, self.set(set), state)
+        self.evaluate_with(set, state, &CommonTorques::default())
+    }
+
+    /// [`evaluate`](Self::evaluate), with what the [common terms](Self::common) give.
+    #[inline]
+    pub fn evaluate_with(&self, set: usize, state: &JointState, common: &CommonTorques) -> Estimate {
+        evaluate(&self.scaling, &self.inputs, self.set(set), common, state)
     }
 
     #[inline(always)]
@@ -198,19 +229,25 @@ pub(crate) fn evaluate(
     scaling: &Scaling,
     inputs: &Inputs,
     (physical, network): &(PreparedTerms, Option<Layers>),
+    common: &CommonTorques,
     state: &JointState,
 ) -> Estimate {
     let signals = state.signals();
     Estimate {
-        physical: by_physical_model(scaling, physical, &signals),
+        physical: by_physical_model(scaling, physical, common, &signals),
         network: by_network(inputs, network, &signals),
     }
 }
 
 /// A function of its own: the control step, the shadow and the golden vectors share one.
 #[inline(never)]
-fn by_physical_model(scaling: &Scaling, terms: &PreparedTerms, signals: &[i32; SIGNALS]) -> Torque {
-    terms.evaluate(&scaling.apply(signals))
+fn by_physical_model(
+    scaling: &Scaling,
+    terms: &PreparedTerms,
+    common: &CommonTorques,
+    signals: &[i32; SIGNALS],
+) -> Torque {
+    terms.evaluate(&scaling.apply(signals), common)
 }
 
 /// As above; nothing without a network.

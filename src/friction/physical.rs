@@ -4,10 +4,13 @@
 //! |---|---|---|
 //! | constant, position, temperature, load | c0 + c_q q + c_T th + c_tau tau | 001 eq. 5 |
 //! | viscous, quadratic | f_v (1 + k_v th) v + f_2 v abs(v) | |
-//! | Coulomb | F_c(+/-) (1 + k_c th + k_l abs(tau)) tanh(v / v_c) | 002 eq. 6, 001 eq. 6 |
+//! | viscous asymmetry | f_a abs(v): half the difference of both directions | |
+//! | Coulomb | (F_c(+/-) + ripple level) (1 + k_c th + k_l abs(tau)) tanh(v / v_c) | 002 eq. 6, 001 eq. 6 |
+//! | pre-sliding | (1 + k_c th + k_l abs(tau)) sum of level z | [`maxwell_slip`](super::maxwell_slip) |
 //! | Stribeck | sqrt(2e) (F_brk(+/-) - F_c(+/-)) exp(-(v / v_st)^2) v / v_st | 001 eq. 6 |
 //! | hysteresis | b_h atan(s v + z sign a) | 003 eq. 4 |
 //! | position harmonics | sum over j = 1..5 of b_j(+/-) 4 sin((2j-1) h q) / (pi (2j-1)) | 003 eq. 5 |
+//! | ripple | C sin(h q) + D cos(h q) | [`ripple`](super::ripple) |
 //! | rotor inertia | I_a a | 002 |
 //!
 //! q position, v velocity, a acceleration, tau theoretical torque, th temperature minus reference; (+/-): one value for each
@@ -18,6 +21,7 @@
 //! coefficient of a large signal keeps its resolution. Products have 47 fraction bits and are summed in 64 bits; the sum
 //! wraps, an image is used only after its certificate has proved that it fits.
 
+use super::common::CommonTorques;
 use super::domain::{Domain, Range};
 use super::smooth::{atan, odd_sines, stribeck_of_product, tanh_of_product};
 use super::state::{SIGNALS, Signal};
@@ -29,7 +33,7 @@ pub const HARMONICS: usize = 5;
 
 /// Which terms take part.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Terms(pub u16);
+pub struct Terms(pub u32);
 
 impl Terms {
     /// c0.
@@ -60,11 +64,15 @@ impl Terms {
     pub const HARMONICS: Self = Self(1 << 12);
     /// I_a a.
     pub const ROTOR_INERTIA: Self = Self(1 << 13);
+    /// f_a |v|.
+    pub const VISCOUS_ASYMMETRY: Self = Self(1 << 14);
     /// Every term.
-    pub const ALL: Self = Self((1 << 14) - 1);
+    pub const ALL: Self = Self((1 << 15) - 1);
+    /// Every term of an image of format 1.
+    pub const FORMAT_1: Self = Self((1 << 14) - 1);
 
     /// Names of the terms, from bit 0 up.
-    pub const NAMES: [&'static str; 14] = [
+    pub const NAMES: [&'static str; 15] = [
         "constant",
         "position",
         "temperature",
@@ -79,6 +87,7 @@ impl Terms {
         "hysteresis",
         "harmonics",
         "rotor_inertia",
+        "viscous_asymmetry",
     ];
 
     /// True where every term of `other` takes part.
@@ -199,6 +208,13 @@ coefficients! {
     harmonic_negative_5: true;
     /// I_a, Nm at full-scale acceleration.
     rotor_inertia: true per Acceleration ^ 1;
+    /// f_a, Nm at full-scale velocity.
+    viscous_asymmetry: true per Velocity ^ 1;
+}
+
+impl Coefficients {
+    /// Those that an image of format 1 has, the first ones.
+    pub const FORMAT_1: usize = 31;
 }
 
 /// A physical model as it is stored and transferred.
@@ -251,6 +267,7 @@ pub(crate) struct Factors {
     pub(crate) hysteresis_width: i32,
     pub(crate) hysteresis_acceleration_slope: i32,
     pub(crate) rotor_inertia: i32,
+    pub(crate) viscous_asymmetry: i32,
 }
 
 impl Factors {
@@ -270,6 +287,7 @@ impl Factors {
         hysteresis_width: 0,
         hysteresis_acceleration_slope: 0,
         rotor_inertia: 0,
+        viscous_asymmetry: 0,
     };
 }
 
@@ -366,9 +384,10 @@ impl Physical {
         Self { scaling: Scaling::new(domain), terms: PreparedTerms::new(parameters) }
     }
 
-    /// The model's torque. `signals` in Q16.16, in the order of [`Signal`]; each is clamped to the widened box.
+    /// The model's torque without the [common terms](super::common). `signals` in Q16.16, in the order of [`Signal`]; each is clamped to
+    /// the widened box.
     pub fn evaluate(&self, signals: &[i32; SIGNALS]) -> Torque {
-        self.terms.evaluate(&self.scaling.apply(signals))
+        self.terms.evaluate(&self.scaling.apply(signals), &CommonTorques::default())
     }
 }
 
@@ -426,6 +445,7 @@ impl PreparedTerms {
             hysteresis_width: c.hysteresis_width,
             hysteresis_acceleration_slope: c.hysteresis_acceleration_slope,
             rotor_inertia: on(Terms::ROTOR_INERTIA, c.rotor_inertia),
+            viscous_asymmetry: on(Terms::VISCOUS_ASYMMETRY, c.viscous_asymmetry),
         };
         Self {
             terms: parameters.terms,
@@ -444,14 +464,15 @@ impl PreparedTerms {
         }
     }
 
-    /// The torque for signals [scaled](Scaling::apply).
+    /// The torque for signals [scaled](Scaling::apply), with the common terms.
     #[inline]
-    pub fn evaluate(&self, scaled: &[i32; SIGNALS]) -> Torque {
+    pub fn evaluate(&self, scaled: &[i32; SIGNALS], common: &CommonTorques) -> Torque {
         let [q, v, load, _, th, a] = *scaled;
         let c = &self.coefficients;
         let speed = v.saturating_abs();
 
-        let mut sum = Sum((c.constant as i64) << 31);
+        // The ripple's torque is below twice the range of a torque: its certificate has proved that the sum fits.
+        let mut sum = Sum((c.constant as i64).wrapping_add(common.ripple.torque as i64) << 31);
         sum.add(c.position, q);
         sum.add(c.temperature, th);
         sum.add(c.load, load);
@@ -459,6 +480,7 @@ impl PreparedTerms {
 
         let viscous_factor = ONE.saturating_add(narrow_product(c.viscous_temperature, th));
         sum.add(times(c.viscous, viscous_factor), v);
+        sum.add(c.viscous_asymmetry, speed);
         // Only quadratic friction needs v |v|: the high word of their product in Q30, shifted to Q31.
         sum.add(c.quadratic, saturate(smull(v, speed) >> 31));
 
@@ -466,7 +488,9 @@ impl PreparedTerms {
         let coulomb_factor = ONE
             .saturating_add(narrow_product(c.coulomb_temperature, th))
             .saturating_add(narrow_product(c.coulomb_load, load.saturating_abs()));
-        sum.add(times(self.coulomb.at(v), coulomb_factor), direction);
+        let level = self.coulomb.at(v).saturating_add(common.ripple.level);
+        sum.add(times(level, coulomb_factor), direction);
+        sum.add(times(common.pre_sliding, coulomb_factor), i32::MAX);
 
         if self.terms.contains(Terms::STRIBECK) {
             sum.add(self.stribeck.at(v), stribeck_of_product(smull(c.stribeck_slope, v)));

@@ -6,6 +6,7 @@
 //! stays between the two, and no second evaluation is needed.
 
 use super::Estimate;
+use super::maxwell_slip::Bent;
 use super::state::JointState;
 use crate::dsp::smmul;
 use crate::quantity::Torque;
@@ -95,6 +96,8 @@ pub struct Memory {
     last: Estimate,
     /// Weight of `held`, Q31; falls to zero.
     weight: i32,
+    /// Pre-sliding elements: those of all sets.
+    pub(super) bent: Bent,
 }
 
 impl Memory {

@@ -17,6 +17,8 @@ pub enum Mode {
     Impedance,
     /// A voltage along a turning field, for commissioning ([`crate::motor::open_loop`]).
     OpenLoop,
+    /// The position in which the joint comes to a stop. No set-point counts, so none can be late.
+    Hold,
 }
 
 /// One set-point.

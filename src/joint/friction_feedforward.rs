@@ -2,7 +2,8 @@
 //! control step.
 //!
 //! Two things keep compensation from moving a joint by itself. Where the command has a velocity, friction is computed for that
-//! velocity: a pure feedforward, which no error of the model can turn into an instability, and zero while nothing is asked for.
+//! velocity: a pure feedforward, which no error of the model can turn into an instability, and zero while nothing is asked for. A model with
+//! pre-sliding has friction at a velocity of zero, too, where motion turns back: there the feedforward fades over [`RELEASE`] instead of at once.
 //! Where there is none (torque mode), friction is computed for the measured velocity, and that is a positive feedback. It is held by the
 //! fade near standstill and by the guard: while the joint speeds up although its command does not push it that way, the
 //! compensation backs off within milliseconds, and it comes back only while the command pushes.
@@ -11,12 +12,15 @@ use super::active::{Active, JointMotion};
 use super::configuration::VelocitySource;
 use super::motion_law::Wanted;
 use crate::compensation::{Compensation, Output};
+use crate::friction::FrictionModel;
 use crate::friction::state::JointState;
 use crate::motor::number::{greater, or_zero, within};
 use crate::quantity::{Acceleration, Position, Temperature, Torque, Velocity};
 
 /// Time over which the reference's acceleration is taken, s: several commands of a bus at 1 kHz.
 const DERIVATIVE: f32 = 0.004;
+/// Time in which compensation fades at rest where pre-sliding has friction there, s.
+pub const RELEASE: f32 = 1.0;
 /// Growth of the speed against its mean, as a fraction, from which the joint counts as speeding up.
 const GROWTH: f32 = 0.01;
 
@@ -59,6 +63,8 @@ pub struct FrictionFeedforward {
     withheld: f32,
     /// Slow mean of the speed, rad/s.
     speed: f32,
+    /// Part that the fade at standstill let through in the round before, 0 to 1.
+    moving: f32,
     /// Reference velocity, rad/s, as a first-order lag follows it; what it lacks is its acceleration.
     reference: Option<f32>,
 }
@@ -82,7 +88,7 @@ impl FrictionFeedforward {
     #[inline(never)]
     pub fn reset(&mut self) {
         self.compensation.reset();
-        (self.withheld, self.speed, self.reference) = (0.0, 0.0, None);
+        (self.withheld, self.speed, self.moving, self.reference) = (0.0, 0.0, 0.0, None);
     }
 
     /// First stage of a round: the state that friction is computed for, and its regime. `measured_torque` is the torque of the measured current, Nm.
@@ -131,9 +137,15 @@ impl FrictionFeedforward {
         let reference = reference(active, wanted);
         let velocity = reference.unwrap_or(motion.velocity);
         let speed = if velocity < 0.0 { -velocity } else { velocity };
-        let standstill = within(speed * gains.inverse_standstill, 0.0, 1.0);
+        let mut standstill = within(speed * gains.inverse_standstill, 0.0, 1.0);
         let guarded = match reference {
-            Some(_) => 1.0,
+            Some(_) => {
+                if active.friction.as_ref().is_some_and(FrictionModel::pre_slides) {
+                    standstill = greater(standstill, self.moving - gains.period * (1.0 / RELEASE));
+                }
+                self.moving = standstill;
+                1.0
+            }
             None => self.guard(active, motion, wanted.velocity.unwrap_or(wanted.torque)),
         };
         let permitted = or_zero(standstill * guarded);
@@ -184,7 +196,9 @@ impl FrictionFeedforward {
 mod tests {
     use super::*;
     use crate::compensation::Request;
+    use crate::friction::common::CommonTerms;
     use crate::friction::domain::{Domain, Range};
+    use crate::friction::maxwell_slip::MaxwellElement;
     use crate::friction::physical::{Coefficients, PhysicalParameters, Terms};
     use crate::friction::regime::Selector;
     use crate::friction::state::SIGNALS;
@@ -197,6 +211,11 @@ mod tests {
 
     /// A joint with friction of a constant (Nm) and a viscous part (Nm s/rad).
     fn active(source: VelocitySource, constant: f32, viscous: f32) -> Active {
+        active_with(source, constant, viscous, CommonTerms::NONE)
+    }
+
+    /// The same with common terms.
+    fn active_with(source: VelocitySource, constant: f32, viscous: f32, common: CommonTerms) -> Active {
         let mut board = crate::default_configuration::B_G431B_ESC1;
         let joint = &mut board.joint;
         (joint.limits.torque, joint.limits.damping) = (2.0, 2.0);
@@ -216,7 +235,7 @@ mod tests {
         let physical = PhysicalParameters { terms: Terms::CONSTANT.union(Terms::VISCOUS), coefficients };
         let mut sets = [ParameterSet::default(); 4];
         sets[0].physical = physical;
-        let friction = FrictionParameters { domain, selector: Selector::default(), sets };
+        let friction = FrictionParameters { domain, selector: Selector::default(), common, sets };
         let model = FrictionModel::new(&friction, board.bridge.motion_rate());
         joint.prepare(&board.bridge).unwrap().with_friction(Some(model))
     }
@@ -274,6 +293,27 @@ mod tests {
         for velocity in [-5.0, 0.0, 0.5 * STANDSTILL, 5.0] {
             assert_eq!(round(&mut feedforward, &active, velocity, 0.0, Some(0.0)).torque, 0.0, "{velocity} rad/s");
         }
+    }
+
+    #[test]
+    fn pre_sliding_friction_is_compensated_where_motion_turns_back_and_is_gone_after_a_second_of_rest() {
+        let mut common = CommonTerms::NONE;
+        common.elements[0] = MaxwellElement { stiffness: q16(100.0), level: q16(OFFSET) };
+        let active = active_with(VelocitySource::Reference, 0.0, 0.0, common);
+        let period = active.compensation.period;
+        let mut feedforward = FrictionFeedforward::default();
+        let mut turn = |velocity: f32, time: f32| {
+            let rounds = (time / period).round() as usize;
+            (0..rounds).map(|_| round(&mut feedforward, &active, velocity, 0.0, Some(velocity)).torque).last().unwrap()
+        };
+        let near = |torque: f32, want: f32| assert!((torque - want).abs() < 2e-3, "{torque} Nm, {want} Nm");
+        near(turn(STANDSTILL, 0.5), OFFSET);
+        near(turn(0.0, 0.25 * RELEASE), 0.75 * OFFSET);
+        // The element is bent back over twice its 10 mrad.
+        near(turn(-STANDSTILL, 0.1), 0.0);
+        near(turn(-STANDSTILL, 0.1), -OFFSET);
+        near(turn(0.0, 0.99 * RELEASE), -0.01 * OFFSET);
+        assert_eq!(turn(0.0, 0.02 * RELEASE), 0.0);
     }
 
     #[test]

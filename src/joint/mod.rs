@@ -443,13 +443,15 @@ impl Joint {
         faults
     }
 
-    /// Counts the steps without a new set-point from "ready to switch on" on. In "fault" a count that has led there stays until one comes.
+    /// Counts the steps without a new set-point from "ready to switch on" on, but for a joint that holds: nothing that could be late is asked of it.
+    /// In "fault" a count that has led there stays until one comes.
     #[inline(always)]
     fn count_stale_steps(&mut self, demand: &Demand, state: State) {
         self.stale_steps = match state {
             _ if demand.sequence != self.sequence => 0,
             State::NotReadyToSwitchOn | State::SwitchOnDisabled => 0,
             State::Fault => self.stale_steps,
+            _ if demand.command.mode == Mode::Hold => 0,
             _ => self.stale_steps.saturating_add(1),
         };
         self.sequence = demand.sequence;

@@ -41,12 +41,7 @@ impl MotionLaw {
     #[inline(always)]
     pub fn step(&mut self, active: &Active, command: &Command, motion: &JointMotion, derating: f32) -> Wanted {
         if self.mode != Some(command.mode) {
-            *self = Self {
-                mode: Some(command.mode),
-                position: motion.position,
-                velocity: motion.velocity,
-                ..Self::default()
-            };
+            self.enter(command.mode, motion);
         }
         let gains = &active.motion;
         let (torque, velocity) = match command.mode {
@@ -58,8 +53,8 @@ impl MotionLaw {
                 self.integral += gains.velocity_integral * error;
                 (gains.damping * error + self.integral, Some(self.velocity))
             }
-            Mode::Position => {
-                self.follow(command.position, active);
+            Mode::Position | Mode::Hold => {
+                self.follow(command, active);
                 let error = self.position - motion.position;
                 self.integral += gains.position_integral * error;
                 let damped = gains.damping * (self.velocity - motion.velocity);
@@ -108,13 +103,37 @@ impl MotionLaw {
         self.velocity == 0.0
     }
 
+    /// Begins a mode where the joint is. What moves or holds it goes on without a step from one of these modes to another: velocity, position and hold
+    /// share ramp and integral, position and hold the reference too.
+    #[inline(never)]
+    fn enter(&mut self, mode: Mode, motion: &JointMotion) {
+        let ramps = |mode| matches!(mode, Mode::Velocity | Mode::Position | Mode::Hold);
+        let before = self.mode.filter(|before| ramps(*before) && ramps(mode));
+        let begun = Self { mode: Some(mode), position: motion.position, velocity: motion.velocity, ..Self::default() };
+        *self = match before {
+            None => begun,
+            Some(Mode::Velocity) => Self { position: motion.position, ..*self },
+            Some(_) if mode == Mode::Velocity => Self { velocity: motion.velocity, ..*self },
+            Some(_) => *self,
+        };
+        self.mode = Some(mode);
+    }
+
     fn ramp(&mut self, target: f32, step: f32) {
         self.velocity += limited(target - self.velocity, step);
     }
 
-    /// The fastest approach to `target` from which the ramp can still stop there (trapezoidal profile, in closed loop).
+    /// One round of the reference: towards the command's position, or to a stop.
     #[inline(never)]
-    fn follow(&mut self, target: f32, active: &Active) {
+    fn follow(&mut self, command: &Command, active: &Active) {
+        let velocity = if command.mode == Mode::Hold { 0.0 } else { self.approach(command.position, active) };
+        self.ramp(velocity, active.motion.velocity_step);
+        self.position += self.velocity * active.motion.period;
+    }
+
+    /// Velocity of the fastest approach to `target` from which the ramp can still stop there (trapezoidal profile, in closed loop).
+    #[inline(always)]
+    fn approach(&self, target: f32, active: &Active) -> f32 {
         let gains = &active.motion;
         let (low, high) = active.limits.position;
         let target = if target < low {
@@ -130,8 +149,6 @@ impl MotionLaw {
         let speed =
             lesser(active.limit_gains.speed(2.0 * gains.acceleration * distance, active), distance * gains.rate);
         let speed = lesser(speed, active.limits.velocity);
-        let wanted = if way < 0.0 { -speed } else { speed };
-        self.ramp(wanted, gains.velocity_step);
-        self.position += self.velocity * gains.period;
+        if way < 0.0 { -speed } else { speed }
     }
 }

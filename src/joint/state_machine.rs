@@ -54,6 +54,8 @@ impl Controlword {
     pub const QUICK_STOP: Self = Self(0x02);
     /// Fault reset, on its rising edge.
     pub const FAULT_RESET: Self = Self(0x80);
+    /// Halt, beside another command.
+    pub const HALT: Self = Self(1 << 8);
 
     const fn has(self, bits: u16) -> bool {
         self.0 & bits == bits
@@ -62,6 +64,11 @@ impl Controlword {
     /// "Enable operation".
     pub const fn enables_operation(self) -> bool {
         self.has(0x0f) && self.commands()
+    }
+
+    /// Halt: the joint stops and holds where it came to a stop, in whatever mode.
+    pub const fn halts(self) -> bool {
+        self.has(Self::HALT.0)
     }
 
     /// Not a fault reset, with which nothing else counts: every command of the profile has bit 7 clear.

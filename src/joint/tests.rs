@@ -150,3 +150,53 @@ fn a_bridge_without_a_sensor_does_not_derate() {
     assert_eq!(derated(f32::NAN, 1.0, false), (1.0, Faults::NONE));
     assert_eq!(derated(f32::NAN, 0.5, false), (0.5, Faults::NONE));
 }
+
+#[test]
+fn a_joint_that_holds_waits_for_its_master_and_one_that_follows_does_not() {
+    let board = crate::default_configuration::B_G431B_ESC1;
+    let active = board.joint.prepare(&board.bridge).unwrap();
+    let mut joint = started(&active);
+    let measured = at_rest(18.0);
+    let mut demand = enabled(&mut joint, &active, 0.0, &measured);
+    demand.command.mode = Mode::Hold;
+    for _ in 0..2 * active.deadline_steps {
+        joint.control_step(&active, &demand, &Slow::default(), &measured);
+        assert_eq!(joint.telemetry().state, State::OperationEnabled);
+    }
+    demand.command.mode = Mode::Position;
+    for _ in 0..active.deadline_steps {
+        joint.control_step(&active, &demand, &Slow::default(), &measured);
+        assert_eq!(joint.telemetry().state, State::OperationEnabled);
+    }
+    joint.control_step(&active, &demand, &Slow::default(), &measured);
+    assert!(joint.latched_faults().contains(Fault::StaleCommand));
+}
+
+#[test]
+fn a_joint_that_bears_a_load_goes_on_bearing_it_from_mode_to_mode() {
+    let mut board = crate::default_configuration::B_G431B_ESC1;
+    board.joint.gains.integral = 10.0;
+    let active = board.joint.prepare(&board.bridge).unwrap();
+    let mut law = motion_law::MotionLaw::default();
+    let motion = JointMotion { position: 0.25, ..JointMotion::default() };
+    let command = |mode| Command { mode, position: 0.25, ..Command::default() };
+    // Pulled away from its reference for a while, so that the integral bears something.
+    law.step(&active, &command(Mode::Hold), &motion, 1.0);
+    let pulled = JointMotion { position: 0.249, ..motion };
+    let mut last = (0..2_000).map(|_| law.step(&active, &command(Mode::Hold), &pulled, 1.0).torque).last().unwrap();
+    let spring = active.motion.stiffness * (0.25 - 0.249);
+    assert!(last > 1.02 * spring, "{last} Nm, {spring} Nm of them by the spring");
+    for mode in [Mode::Position, Mode::Hold, Mode::Position] {
+        let torque = law.step(&active, &command(mode), &pulled, 1.0).torque;
+        assert!((torque - last).abs() < 0.01 * last, "{mode:?}: {last} Nm, then {torque} Nm");
+        last = torque;
+    }
+    // Velocity mode knows no spring; the integral stays.
+    let integral = law.step(&active, &command(Mode::Velocity), &pulled, 1.0).torque;
+    assert!((integral - (last - spring)).abs() < 0.02 * spring, "{integral} Nm of {last} Nm");
+    let held = law.step(&active, &command(Mode::Hold), &pulled, 1.0).torque;
+    assert!((held - integral).abs() < 0.02 * spring, "{integral} Nm, then {held} Nm");
+    // Torque mode has none: what follows it begins anew.
+    law.step(&active, &command(Mode::Torque), &pulled, 1.0);
+    assert_eq!(law.step(&active, &command(Mode::Hold), &pulled, 1.0).torque, 0.0);
+}

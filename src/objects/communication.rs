@@ -17,7 +17,7 @@ pub fn default_communication(node_id: u8) -> CommunicationParameters {
     let cob_id = |base: u16| base.saturating_add(node_id.into());
     parameters.receive = [
         PdoParameters::new(cob_id(0x200), &[CONTROLWORD, map(0x6071, 0, 16), map(0x607A, 0, 32)]),
-        PdoParameters::new(cob_id(0x300), &[CONTROLWORD, map(0x6060, 0, 8), map(0x2010, 1, 8), map(0x60FF, 0, 32)]),
+        PdoParameters::new(cob_id(0x300), &[CONTROLWORD, map(0x6060, 0, 8), map(0x60FF, 0, 32)]),
         PdoParameters::new(cob_id(0x400), &[map(0x2011, 1, 64)]),
         // The rest of the neighbour's PDO is skipped: a dummy of 32 bits.
         PdoParameters {
@@ -27,7 +27,12 @@ pub fn default_communication(node_id: u8) -> CommunicationParameters {
     ];
     let synchronous =
         |id, mapping: &[MappedObject]| PdoParameters { transmission: 1, ..PdoParameters::new(id, mapping) };
-    let slow = |id, mapping: &[MappedObject]| PdoParameters { event_timer: SLOW, ..PdoParameters::new(id, mapping) };
+    let slow = |id, mapping: &[MappedObject]| PdoParameters {
+        event_timer: SLOW,
+        // Voltages and temperatures change all the time. 0.1 ms.
+        inhibit: 10 * SLOW,
+        ..PdoParameters::new(id, mapping)
+    };
     parameters.transmit = [
         synchronous(cob_id(0x180), &[STATUSWORD, map(0x6077, 0, 16), map(0x6064, 0, 32)]),
         synchronous(cob_id(0x280), &[map(0x606C, 0, 32), map(0x2020, 1, 16), map(0x2020, 2, 16)]),

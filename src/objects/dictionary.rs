@@ -1,6 +1,6 @@
 //! The joint's objects as [`canopen`](crate::canopen) asks for them; the task.
 
-use super::emergency::{Emergency, Reports, of_refusal};
+use super::emergency::{Emergency, LOST, LOST_BIT, Reports, of_refusal};
 use super::field::{
     ConfigurationField, Field, HardwareField, ImageField, OpenLoopField, RANGES, Range, ResetField, SetPoint,
 };
@@ -160,16 +160,9 @@ impl<'a, P: Program> Objects<'a, P> {
 
     /// How an action went, and what the slots hold now. The next action is there to be taken.
     pub fn finished(&mut self, outcome: Result<(), SlotError>, stored: StoredImages) {
-        let floor = self.images.life().floor();
         self.images.set_stored(stored);
         if let Some(emergency) = self.images.finished(outcome, self.observed.latched) {
             self.report(emergency);
-        }
-        if self.images.life().floor() != floor {
-            // The floor is found again in the stored image's version where it cannot be kept.
-            if let Err(error) = self.keep() {
-                self.report(of_refusal(error.into(), self.observed.latched));
-            }
         }
         self.publish();
     }
@@ -183,7 +176,10 @@ impl<'a, P: Program> Objects<'a, P> {
         self.shared.set_image(self.images.version(), self.images.state());
     }
 
-    fn report(&mut self, emergency: Emergency) {
+    fn report(&mut self, mut emergency: Emergency) {
+        if self.program.damaged() != 0 {
+            emergency.register |= LOST_BIT;
+        }
         // What does not fit is in the objects all the same.
         let _ = self.emergencies.push_back(emergency);
     }
@@ -336,7 +332,7 @@ impl<'a, P: Program> Objects<'a, P> {
 
     #[inline(never)]
     fn write_image(&mut self, field: ImageField, number: u32) -> Result<(), Abort> {
-        let failures = self.images.life().failures();
+        let (floor, failures) = (self.images.life().floor(), self.images.life().failures());
         let result = match field {
             ImageField::Command => self.images.command(number as u8, self.circumstances()),
             ImageField::TrialTime => self.images.set_trial_time(number),
@@ -345,8 +341,15 @@ impl<'a, P: Program> Objects<'a, P> {
         if matches!(field, ImageField::Command) {
             self.heartbeat_lost = false;
         }
-        // Before the client is answered: or a loss of power would make every guess the first.
-        let kept = if self.images.life().failures() != failures { self.keep() } else { Ok(()) };
+        let (risen, count) = (self.images.life().floor() != floor, self.images.life().failures());
+        // Whoever sends wrong tags on and on must not wear the flash out.
+        let counted = count != failures && count.is_power_of_two() && !(self.single_bank && self.needs_control());
+        let kept = if risen || counted { self.keep() } else { Ok(()) };
+        if let (true, Err(error)) = (risen, kept) {
+            // The image comes after its floor, or not at all.
+            let _ = self.images.take_action();
+            let _ = self.images.finished(Err(error), self.observed.latched);
+        }
         self.publish();
         result.map_err(|refusal| self.refuse(refusal))?;
         kept.map_err(|error| self.refuse(error.into()))
@@ -496,6 +499,10 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
         })
     }
 
+    fn may_change_node_id(&self) -> bool {
+        !self.needs_control()
+    }
+
     #[inline(never)]
     fn store_node_id(&mut self, node_id: u8) -> Result<(), Abort> {
         let update = Update { node_id: Some(node_id), application: Part::Kept, communication: Part::Kept };
@@ -520,6 +527,10 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
                     self.told_reset = true;
                     if let Some(emergency) = last_reset::emergency(&self.program.last_reset()) {
                         self.report(emergency);
+                    }
+                    let damaged = self.program.damaged();
+                    if damaged != 0 {
+                        self.report(Emergency { code: LOST, register: 0, information: [damaged, 0, 0, 0, 0] });
                     }
                 }
             }

@@ -7,7 +7,7 @@ use crate::parameters::life_cycle::Refusal;
 
 /// The joint left the range that its friction was learned in. Information: [`reason`](super::table), number of departures (u16).
 pub const ENVELOPE: u16 = 0xFF01;
-/// An image with a wrong tag, or none, or too many of them. Information: code of the refusal (u16).
+/// An image with a wrong tag, or none, or for a joint whose key is damaged. Information: code of the refusal (u16).
 pub const AUTHENTICATION: u16 = 0xFF02;
 /// An image was refused for another reason. Information: code of the refusal (u16).
 pub const PARAMETER: u16 = 0x6320;
@@ -17,6 +17,10 @@ pub const FLASH: u16 = 0x5530;
 pub const WATCHDOG: u16 = 0x6010;
 /// The program stopped by itself before this start. Information: object 2301h:1 and 2.
 pub const STOPPED: u16 = 0x6100;
+/// Stored parameters are damaged, and what was stored before, or the defaults, are in use. Information: bits: 0 friction images, 1 configuration, 2 key.
+pub const LOST: u16 = 0x6310;
+/// Bit of the error register for them: the manufacturer's.
+pub(super) const LOST_BIT: u8 = 1 << 7;
 /// No error any more.
 const RESET: u16 = 0;
 /// A joint that wanders along the edge of the range reports it once in this time, ms.
@@ -92,7 +96,7 @@ impl Reports {
 /// What a refused image is reported as.
 pub(super) fn of_refusal(refusal: Refusal, latched: Faults) -> Emergency {
     let code = match refusal {
-        Refusal::TagMissing | Refusal::TagWrong { .. } | Refusal::LockedOut { .. } => AUTHENTICATION,
+        Refusal::TagMissing | Refusal::TagWrong { .. } | Refusal::KeyDamaged => AUTHENTICATION,
         Refusal::Slots(_) => FLASH,
         _ => PARAMETER,
     };

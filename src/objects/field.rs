@@ -65,6 +65,8 @@ pub enum Constant {
     AbortConnectionOption,
     /// A quick stop brakes and then disables.
     QuickStopOption,
+    /// Halt brakes and then holds.
+    HaltOption,
     /// Modes of operation, a bit each.
     SupportedModes,
 }
@@ -75,6 +77,7 @@ impl Constant {
         match self {
             Self::AbortConnectionOption => 3,
             Self::QuickStopOption => 2,
+            Self::HaltOption => 1,
             Self::SupportedModes => 0x0003_0380,
         }
     }
@@ -295,10 +298,8 @@ pub enum ImageField {
     KeyNumber,
     /// Lowest version that is taken.
     Floor,
-    /// Wrong tags in a row.
+    /// Wrong tags so far.
     Failures,
-    /// What is left of a lock-out.
-    Lockout,
     /// The key itself, once.
     Key,
 }

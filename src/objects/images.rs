@@ -42,6 +42,7 @@ pub struct Images<'a> {
     staging: &'a mut [u8; STAGING],
     life: LifeCycle,
     key: Option<Key>,
+    locked: bool,
     stored: StoredImages,
     action: Action,
     upload: Option<Upload>,
@@ -54,7 +55,13 @@ impl<'a> Images<'a> {
     /// From what was found at start.
     pub fn new(staging: &'a mut [u8; STAGING], life: LifeCycle, key: Option<Key>, stored: StoredImages) -> Self {
         let key_bytes = [0; KEY];
-        Self { staging, life, key, stored, action: Action::Nothing, upload: None, key_bytes, reading: None }
+        let (locked, action) = (false, Action::Nothing);
+        Self { staging, life, key, locked, stored, action, upload: None, key_bytes, reading: None }
+    }
+
+    /// The same, where the stored key is damaged: no image and no other key is taken.
+    pub fn lock(&mut self) {
+        self.locked = true;
     }
 
     /// As [`Images::new`], with the key that there is.
@@ -124,11 +131,10 @@ impl<'a> Images<'a> {
                 Some(Ending::Heartbeat) => 2,
             },
             ImageField::Stored(which, part) => self.stored_part(which, part),
-            ImageField::KeyPresent => self.key.is_some().into(),
+            ImageField::KeyPresent => (self.locked || self.key.is_some()).into(),
             ImageField::KeyNumber => self.key.as_ref().map_or(0, Key::id),
-            ImageField::Floor => self.life.floor(),
+            ImageField::Floor => self.life.lowest(self.key.is_some()),
             ImageField::Failures => self.life.failures().into(),
-            ImageField::Lockout => self.life.lockout_left(now),
         }
     }
 
@@ -158,7 +164,7 @@ impl<'a> Images<'a> {
     /// Carries a command out as far as the life cycle does.
     pub(super) fn command(&mut self, number: u8, circumstances: Circumstances) -> Result<(), Refusal> {
         let Circumstances { now, armed, single_bank } = circumstances;
-        let conditions = Conditions { now, armed, single_bank, key: self.key.as_ref() };
+        let conditions = Conditions { now, armed, single_bank, key: self.key.as_ref(), locked: self.locked };
         let action = self.life.command_number(number, self.staging, &conditions)?;
         if action != Action::Nothing {
             self.action = action;
@@ -177,7 +183,7 @@ impl<'a> Images<'a> {
                 self.life.begin(length)?;
                 self.upload = Some(Upload::Image);
             }
-            ImageField::Key if self.key.is_some() => return Err(Failure::Abort(Abort::LOCAL_CONTROL)),
+            ImageField::Key if self.locked || self.key.is_some() => return Err(Failure::Abort(Abort::LOCAL_CONTROL)),
             ImageField::Key => self.upload = Some(Upload::Key { length: 0 }),
             _ => return Err(Failure::Abort(Abort::READ_ONLY)),
         }
@@ -264,7 +270,7 @@ pub(super) const fn abort(refusal: Refusal) -> Abort {
         Refusal::UploadTooLong { .. } => Abort::TOO_LONG,
         Refusal::UnknownCommand { .. } | Refusal::TrialTime { .. } => Abort::VALUE,
         Refusal::State { .. } | Refusal::Busy | Refusal::Armed { .. } => Abort::DEVICE_STATE,
-        Refusal::TagMissing | Refusal::TagWrong { .. } | Refusal::LockedOut { .. } => Abort::LOCAL_CONTROL,
+        Refusal::TagMissing | Refusal::TagWrong { .. } | Refusal::KeyDamaged => Abort::LOCAL_CONTROL,
         Refusal::Slots(_) => Abort::HARDWARE,
         _ => Abort::STORE,
     }

@@ -7,6 +7,7 @@ use super::shared::Shared;
 use crate::compensation::Reason;
 use crate::joint::Telemetry;
 use crate::joint::fault::Faults;
+use crate::joint::state_machine::State;
 
 /// A copy of what the control step and the slow task know.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,7 +58,10 @@ impl Observed {
         let milli = |value: f32| signed(to_i16(1e3 * value).into());
         let tenths = |value: f32| signed(temperature(value).into());
         match actual {
-            Actual::Statusword => t.statusword().into(),
+            Actual::Statusword => {
+                let follows = t.state == State::OperationEnabled && shared.follows();
+                (t.statusword() | u16::from(follows) << 12).into()
+            }
             Actual::Mode => shared.set_point(SetPoint::Mode),
             Actual::Position => signed(to_i32(1e6 * t.motion.position)),
             Actual::Velocity => signed(to_i32(1e3 * t.motion.velocity)),

@@ -1,8 +1,8 @@
 //! Process data of the joint: RPDOs to one [`Demand`], actual values to TPDOs; the receive interrupt.
 //!
-//! An RPDO counts as a whole, once all of its objects are there. Its set-points renew the command deadline
-//! ([`Demand::sequence`]) unless it carries object 2010h:1 with the number that the one before had: a master that repeats itself
-//! without thinking is not alive.
+//! An RPDO counts as a whole, once all of its objects are there. That it arrives renews the command deadline ([`Demand::sequence`]), whatever its
+//! mapping. Where a master maps object 2010h:1 beside its set-points, one that repeats itself without thinking is not alive: the PDO with the
+//! number of the one before renews nothing.
 //!
 //! Outside OPERATIONAL, and in it until a controlword comes, the joint is asked for a quick stop and no torque. It is the node's own
 //! demand, and its sequence changes with the transition only: a joint that still brakes when the command deadline is over has a fault.
@@ -36,6 +36,8 @@ pub struct JointImage<'a> {
 struct Arrived {
     /// Something that is asked of the joint.
     asked: bool,
+    /// A position is part of it.
+    position: bool,
     /// A neighbour's velocity.
     coupled: bool,
     counter: Option<u8>,
@@ -74,6 +76,7 @@ impl<'a> JointImage<'a> {
         if set_point == SetPoint::Mode || self.state == NmtState::Operational {
             self.arriving = self.points;
             self.put(set_point, value);
+            self.arriving.insist(set_point);
             self.come_into_force();
         }
     }
@@ -100,12 +103,13 @@ impl<'a> JointImage<'a> {
             SetPoint::Counter => self.arrived.counter = Some(value as u8),
             // A choice, nothing that is asked of the joint.
             SetPoint::Mode => {}
+            SetPoint::TargetPosition => (self.arrived.asked, self.arrived.position) = (true, true),
             _ => self.arrived.asked = true,
         }
     }
 
     fn come_into_force(&mut self) {
-        let Arrived { asked, coupled, counter } = core::mem::take(&mut self.arrived);
+        let Arrived { asked, position, coupled, counter } = core::mem::take(&mut self.arrived);
         let repeated = counter.is_some() && counter == self.points.counter;
         if asked && !repeated {
             self.sequence = self.sequence.wrapping_add(1);
@@ -113,6 +117,7 @@ impl<'a> JointImage<'a> {
         if coupled {
             self.coupled_sequence = self.coupled_sequence.wrapping_add(1);
         }
+        self.arriving.succeed(&self.points, position);
         self.points = self.arriving;
         self.points.publish(self.shared);
     }
@@ -166,10 +171,12 @@ mod tests {
         shared.set_rated_torque(10.0);
         let mut image = JointImage::new(&shared);
         image.state_changed(NmtState::Operational);
-        for (index, value) in [(0x6040, 0x0F), (0x6071, 500)] {
-            image.receive(MappedObject::new(index, 0, 16), value);
+        for _ in 0..2 {
+            for (index, value) in [(0x6040, 0x0F), (0x6071, 500)] {
+                image.receive(MappedObject::new(index, 0, 16), value);
+            }
+            image.received(0);
         }
-        image.received(0);
         let asked = image.demand();
         assert!(asked.controlword == Controlword(0x0F) && (asked.command.torque - 5.0).abs() < 1e-5);
         for state in [NmtState::Stopped, NmtState::PreOperational, NmtState::Initialising] {

@@ -35,6 +35,11 @@ pub trait Program {
     /// Makes a record outlast a loss of power. At start it goes to [`Stored::decode`](super::Stored::decode).
     fn store(&mut self, record: &[u8]) -> Result<(), SlotError>;
 
+    /// Which of what is stored was found damaged: bits as of EMCY [`LOST`](super::emergency::LOST).
+    fn damaged(&self) -> u8 {
+        0
+    }
+
     /// Keeps the lowest version that is taken and the number of wrong tags. The client is answered after that.
     fn keep(&mut self, floor: u32, failures: u16) -> Result<(), SlotError>;
 

@@ -13,13 +13,23 @@ pub(super) struct SetPoints {
     pub(super) mode: Mode,
     pub(super) counter: Option<u8>,
     torque: i16,
-    /// None since the last transition: a joint in position mode must not run to zero because nobody said where to.
-    position: Option<i32>,
+    position: i32,
     velocity: i32,
-    impedance: Option<u64>,
+    impedance: u64,
+    /// Targets that count: those that came since operation was enabled in this mode.
+    targets: Targets,
     /// mrad/s.
     pub(super) coupled: i32,
     open_loop: Frame,
+}
+
+/// Which targets there are. A joint must not run to zero, or to where it was to go an hour ago, because nobody said where to.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Targets {
+    torque: bool,
+    position: bool,
+    velocity: bool,
+    impedance: bool,
 }
 
 impl SetPoints {
@@ -30,11 +40,27 @@ impl SetPoints {
             mode,
             counter: None,
             torque: 0,
-            position: None,
+            position: 0,
             velocity: 0,
-            impedance: None,
+            impedance: 0,
+            targets: Targets { torque: false, position: false, velocity: false, impedance: false },
             coupled: 0,
             open_loop: Frame { voltage: 0, speed: 0, along: 0, across: 0 },
+        }
+    }
+
+    /// What an RPDO, or a value by SDO, makes of the set-points `before` it. `position` tells whether it carries one.
+    ///
+    /// Where it enables operation or enters another mode no target counts: the joint holds where it is until one comes. A position has to be another
+    /// one then, because a PDO carries all of its objects, also those that the master has left at zero or at an old value. The position that comes
+    /// with the release of halt counts whatever it is.
+    pub(super) fn succeed(&mut self, before: &Self, position: bool) {
+        let (word, last) = (Controlword(self.controlword), Controlword(before.controlword));
+        let goes_on = last.enables_operation() && self.mode == before.mode;
+        if word.enables_operation() && !goes_on {
+            self.targets = Targets::default();
+        } else if position && last.halts() && !word.halts() {
+            self.targets.position = true;
         }
     }
 
@@ -44,13 +70,33 @@ impl SetPoints {
             SetPoint::Controlword => self.controlword = value as u16,
             SetPoint::Mode => self.mode = mode(value as i8).unwrap_or(self.mode),
             SetPoint::Counter => self.counter = Some(value as u8),
-            SetPoint::TargetTorque => self.torque = value as i16,
-            SetPoint::TargetPosition => self.position = Some(value as i32),
-            SetPoint::TargetVelocity => self.velocity = value as i32,
-            SetPoint::ImpedanceFrame => self.impedance = Some(value),
+            SetPoint::TargetTorque => (self.torque, self.targets.torque) = (value as i16, true),
+            SetPoint::TargetPosition => {
+                self.targets.position |= self.position != value as i32;
+                self.position = value as i32;
+            }
+            SetPoint::TargetVelocity => (self.velocity, self.targets.velocity) = (value as i32, true),
+            SetPoint::ImpedanceFrame => (self.impedance, self.targets.impedance) = (value, true),
             SetPoint::CoupledVelocity => self.coupled = value as i32,
             SetPoint::OpenLoop => self.open_loop = Frame::from_bits(value),
         }
+    }
+
+    /// A position by SDO is meant: it counts also where it is the one that was there.
+    pub(super) fn insist(&mut self, set_point: SetPoint) {
+        self.targets.position |= set_point == SetPoint::TargetPosition;
+    }
+
+    /// Whether there is a target for the mode, and nothing halts the joint.
+    fn follows(&self) -> bool {
+        let target = match self.mode {
+            Mode::Torque => self.targets.torque,
+            Mode::Velocity => self.targets.velocity,
+            Mode::Position => self.targets.position,
+            Mode::Impedance => self.targets.impedance,
+            Mode::OpenLoop | Mode::Hold => false,
+        };
+        target && !Controlword(self.controlword).halts()
     }
 
     /// Leaves copies for the task.
@@ -60,27 +106,34 @@ impl SetPoints {
             (SetPoint::Mode, mode_number(self.mode) as u8 as u64),
             (SetPoint::Counter, self.counter.unwrap_or(0).into()),
             (SetPoint::TargetTorque, self.torque as u64),
-            (SetPoint::TargetPosition, self.position.unwrap_or(0) as u64),
+            (SetPoint::TargetPosition, self.position as u64),
             (SetPoint::TargetVelocity, self.velocity as u64),
-            (SetPoint::ImpedanceFrame, self.impedance.unwrap_or(0)),
+            (SetPoint::ImpedanceFrame, self.impedance),
             (SetPoint::CoupledVelocity, self.coupled as u64),
             (SetPoint::OpenLoop, self.open_loop.to_bits()),
         ] {
             shared.copy(set_point, value);
         }
+        shared.set_follows(self.follows());
     }
 
-    /// The command in SI units; none is asked for where the mode's set-point never came.
+    /// The command in SI units: to hold, where the mode's target has not come or halt is set.
     pub(super) fn command(&self, shared: &Shared) -> Command {
-        let torque = f32::from(self.torque) * (1e-3 * shared.rated_torque());
+        let torque = match self.targets.torque {
+            true => f32::from(self.torque) * (1e-3 * shared.rated_torque()),
+            false => 0.0,
+        };
         let plain = Command { mode: self.mode, torque, ..Command::default() };
-        match (self.mode, self.position, self.impedance) {
-            (Mode::Torque, ..) => plain,
-            (Mode::OpenLoop, ..) => Command { mode: self.mode, open_loop: self.open_loop, ..Command::default() },
-            (Mode::Velocity, ..) => Command { velocity: 1e-3 * self.velocity as f32, ..plain },
-            (Mode::Position, Some(position), _) => Command { position: 1e-6 * position as f32, ..plain },
-            (Mode::Impedance, _, Some(frame)) => impedance(frame, |range| shared.range(range)),
-            (Mode::Position | Mode::Impedance, ..) => Command::default(),
+        match self.mode {
+            Mode::OpenLoop if Controlword(self.controlword).halts() => Command { torque: 0.0, ..plain },
+            Mode::OpenLoop => Command { open_loop: self.open_loop, torque: 0.0, ..plain },
+            // What bears a load goes on bearing it.
+            Mode::Velocity | Mode::Position if !self.follows() => Command { mode: Mode::Hold, ..plain },
+            _ if !self.follows() => Command { mode: Mode::Hold, torque: 0.0, ..plain },
+            Mode::Torque | Mode::Hold => plain,
+            Mode::Velocity => Command { velocity: 1e-3 * self.velocity as f32, ..plain },
+            Mode::Position => Command { position: 1e-6 * self.position as f32, ..plain },
+            Mode::Impedance => impedance(self.impedance, |range| shared.range(range)),
         }
     }
 
@@ -98,6 +151,7 @@ pub(super) const fn mode(number: i8) -> Option<Mode> {
         10 => Mode::Torque,
         -1 => Mode::Impedance,
         -2 => Mode::OpenLoop,
+        0 => Mode::Hold,
         _ => return None,
     })
 }
@@ -110,6 +164,7 @@ pub(super) const fn mode_number(mode: Mode) -> i8 {
         Mode::Torque => 10,
         Mode::Impedance => -1,
         Mode::OpenLoop => -2,
+        Mode::Hold => 0,
     }
 }
 

@@ -20,6 +20,7 @@ pub struct Shared {
     copies: [Value; SET_POINTS],
     ranges: [AtomicU32; RANGES],
     rated_torque: AtomicU32,
+    follows: AtomicBool,
     image_version: AtomicU32,
     image_state: AtomicU8,
 }
@@ -64,6 +65,7 @@ impl Shared {
                 AtomicU32::new(torque.to_bits()),
             ],
             rated_torque: AtomicU32::new(0),
+            follows: AtomicBool::new(false),
             image_version: AtomicU32::new(0),
             image_state: AtomicU8::new(0),
         }
@@ -136,6 +138,16 @@ impl Shared {
 
     pub(super) fn set_rated_torque(&self, torque: f32) {
         self.rated_torque.store(torque.to_bits(), Ordering::Relaxed);
+    }
+
+    /// Whether the joint, once enabled, follows its mode's target.
+    pub(super) fn follows(&self) -> bool {
+        self.follows.load(Ordering::Relaxed)
+    }
+
+    /// Interrupt.
+    pub(super) fn set_follows(&self, follows: bool) {
+        self.follows.store(follows, Ordering::Relaxed);
     }
 
     pub(super) fn image_version(&self) -> u32 {

@@ -14,6 +14,9 @@
 //!
 //! The same key verifies and signs: whoever reads it out of a joint can sign for every joint that shares it. Commands in real time,
 //! setpoints among them, are not authenticated.
+//!
+//! Wrong tags are counted and keep nobody out: 256 bits cannot be guessed, and a joint that refused right tags after wrong ones could be shut off from its
+//! owner by anybody on the bus.
 
 use super::image::MAX_LENGTH;
 use hmac::{Hmac, KeyInit, Mac};
@@ -31,13 +34,6 @@ const _: () = assert!(STAGING == 2048);
 const IMAGE: &[u8; 16] = b"joint image tag1";
 /// What the key's number is made from.
 const KEY_ID: &[u8; 16] = b"joint key number";
-
-/// Failures that cost no time: a wrong file, a wrong key, a slip.
-const FREE_FAILURES: u16 = 3;
-/// First lock-out, ms; each further failure doubles it.
-const FIRST_LOCKOUT: u32 = 1_000;
-/// Longest lock-out, ms: an hour.
-const LONGEST_LOCKOUT: u32 = 3_600_000;
 
 /// A joint's key. Its bytes are neither printed nor compared.
 #[derive(Clone)]
@@ -134,29 +130,6 @@ pub fn split(upload: &[u8]) -> (&[u8], Option<&[u8; TAG]>) {
     }
 }
 
-/// How long nothing is verified after `failures` wrong tags in a row, ms.
-///
-/// Three failures are free, then 1 s, doubled by each further one up to an hour. The count has to survive a reset, and time counts
-/// from the last failure or the start, whichever is later: switching off and on does not shorten it.
-pub const fn lockout(failures: u16) -> u32 {
-    let beyond = match failures.checked_sub(FREE_FAILURES) {
-        None | Some(0) => return 0,
-        Some(beyond) => beyond as u32 - 1,
-    };
-    // From 2^12 on it is the longest anyhow; a shift by more than 31 would not be one.
-    if beyond > 12 {
-        return LONGEST_LOCKOUT;
-    }
-    let lockout = FIRST_LOCKOUT << beyond;
-    if lockout > LONGEST_LOCKOUT { LONGEST_LOCKOUT } else { lockout }
-}
-
-/// What is left of the lock-out, ms, `elapsed` ms after the last failure or the start.
-pub const fn lockout_left(failures: u16, elapsed: u64) -> u32 {
-    let whole = lockout(failures);
-    if elapsed >= whole as u64 { 0 } else { whole - elapsed as u32 }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -251,14 +224,5 @@ mod tests {
             assert_eq!(refused(None, [byte; KEY]), KeyRefusal::Trivial);
         }
         assert_eq!(format!("{first:?}"), format!("Key({id:08x})"));
-    }
-
-    #[test]
-    fn lockout_doubles_from_a_second_to_an_hour() {
-        let seconds: Vec<u32> = (0..20).map(|failures| lockout(failures) / 1000).collect();
-        let expected = [0, 0, 0, 0, 1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048, 3600, 3600, 3600, 3600];
-        assert_eq!(seconds, expected);
-        assert_eq!((lockout(u16::MAX), lockout_left(u16::MAX, u64::MAX)), (3_600_000, 0));
-        assert_eq!([0, 1, 999, 1000, 1001].map(|elapsed| lockout_left(4, elapsed)), [1000, 999, 1, 0, 0]);
     }
 }

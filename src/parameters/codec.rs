@@ -1,17 +1,22 @@
 //! Reading and writing the bytes of an image, field by field, in the order of the [layout](super::image).
 
 use super::certificate::Limits;
-use super::image::{CRC_LENGTH, Effort, FORMAT, GoldenVector, Image, ImageError, MAGIC, MAX_GOLDEN, Target};
+use super::image::{CRC_LENGTH, Effort, GoldenVector, Image, ImageError, MAGIC, MAX_GOLDEN, Target};
+use crate::friction::common::CommonTerms;
 use crate::friction::domain::{Domain, Range};
+use crate::friction::maxwell_slip::{ELEMENTS, MAX_STIFFNESS, MaxwellElement};
 use crate::friction::network::{INPUTS, MAX_FRACTION, MAX_SCALE, MIN_FRACTION, NEURONS, NetworkParameters};
 use crate::friction::physical::{Coefficients, PhysicalParameters, Terms};
 use crate::friction::regime::{Criterion, MAX_SETS, Measure, Selector};
+use crate::friction::ripple::{RIPPLES, Ripple};
 use crate::friction::state::{SIGNALS, Signal};
 use crate::friction::{Estimate, FrictionParameters, ParameterSet};
 use crate::quantity::Torque;
 
 /// What stands before the parameter sets.
 pub(super) struct Header {
+    /// 1 or 2.
+    pub(super) format: u16,
     pub(super) version: u32,
     pub(super) target: Target,
     pub(super) created: u64,
@@ -20,6 +25,7 @@ pub(super) struct Header {
     pub(super) domain: Domain,
     pub(super) selector: Selector,
     pub(super) limits: Limits,
+    pub(super) common: CommonTerms,
     /// Parameter sets; a bit for each that has a network; golden vectors.
     pub(super) sets: u8,
     pub(super) networks: u8,
@@ -28,14 +34,14 @@ pub(super) struct Header {
 
 /// Everything between the length and the checksum.
 pub(super) fn decode_content(mut reader: Reader) -> Result<Image, ImageError> {
-    let Header { version, target, created, effort, data_hash, domain, selector, limits, sets, networks, golden: count } =
-        decode_header(&mut reader);
+    let header = decode_header(&mut reader);
     let mut parameters = [ParameterSet::default(); MAX_SETS];
-    for (i, set) in parameters.iter_mut().enumerate().take(sets as usize) {
-        decode_set(&mut reader, networks >> i & 1 == 1, set);
+    for (i, set) in parameters.iter_mut().enumerate().take(header.sets as usize) {
+        decode_set(&mut reader, &header, i, set);
     }
+    let Header { version, target, created, effort, data_hash, domain, selector, limits, common, sets, .. } = header;
     let mut golden = heapless::Vec::new();
-    for _ in 0..count {
+    for _ in 0..header.golden {
         // The count was checked against the capacity.
         let _ = golden.push(decode_golden(&mut reader, sets));
     }
@@ -43,14 +49,17 @@ pub(super) fn decode_content(mut reader: Reader) -> Result<Image, ImageError> {
     if let Some(error) = reader.error {
         return Err(error);
     }
-    let friction = FrictionParameters { domain, selector, sets: parameters };
+    let friction = FrictionParameters { domain, selector, common, sets: parameters };
     Ok(Image { version, target, created, effort, data_hash, friction, limits, golden })
 }
 
 #[inline(never)]
 pub(super) fn decode_header(reader: &mut Reader) -> Header {
-    reader.skip(8);
+    reader.skip(4);
+    let format = reader.u16();
+    reader.skip(2);
     let mut header = Header {
+        format,
         version: reader.u32(),
         target: Target { product: reader.u32(), serial: reader.u32() },
         created: u64::from(reader.u32()) | u64::from(reader.u32()) << 32,
@@ -64,6 +73,7 @@ pub(super) fn decode_header(reader: &mut Reader) -> Header {
         domain: Domain { ranges: [Range::ANY; SIGNALS], margin: 0, reference_temperature: 0 },
         selector: Selector::default(),
         limits: Limits::default(),
+        common: CommonTerms::NONE,
         sets: 0,
         networks: 0,
         golden: 0,
@@ -111,15 +121,36 @@ pub(super) fn decode_header(reader: &mut Reader) -> Header {
         reader.refuse(ImageError::Field { name, offset, value, low: expected, high: expected });
     }
     header.limits = Limits { output: reader.u32(), torque_gain: reader.u32(), velocity_slope: reader.u32() };
+    if format > 1 {
+        decode_common(reader, &mut header.common);
+    }
     header
 }
 
-/// Overwrites the whole set.
 #[inline(never)]
-pub(super) fn decode_set(reader: &mut Reader, has_network: bool, set: &mut ParameterSet) {
-    decode_physical(reader, &mut set.physical);
+fn decode_common(reader: &mut Reader, common: &mut CommonTerms) {
+    for element in &mut common.elements {
+        let stiffness = reader.checked_i32("stiffness of a pre-sliding element", 0, MAX_STIFFNESS);
+        *element =
+            MaxwellElement { stiffness, level: reader.checked_i32("level of a pre-sliding element", 0, i32::MAX) };
+    }
+    for ripple in &mut common.ripples {
+        *ripple = Ripple {
+            periods: reader.i32(),
+            level_sine: reader.i32(),
+            level_cosine: reader.i32(),
+            torque_sine: reader.i32(),
+            torque_cosine: reader.i32(),
+        };
+    }
+}
+
+/// Overwrites the whole set, which is that of number `index`.
+#[inline(never)]
+pub(super) fn decode_set(reader: &mut Reader, header: &Header, index: usize, set: &mut ParameterSet) {
+    decode_physical(reader, header.format, &mut set.physical);
     set.network = None;
-    if has_network {
+    if header.networks >> index & 1 == 1 {
         decode_network(reader, set.network.insert(NetworkParameters::default()));
     }
 }
@@ -144,16 +175,20 @@ pub(super) fn decode_end(reader: &mut Reader) {
     }
 }
 
-fn decode_physical(reader: &mut Reader, physical: &mut PhysicalParameters) {
+fn decode_physical(reader: &mut Reader, format: u16, physical: &mut PhysicalParameters) {
     let offset = reader.offset;
-    let terms = reader.u16();
-    if terms & !Terms::ALL.0 != 0 {
-        let (low, high) = (0, Terms::ALL.0 as i64);
+    let terms = u32::from(reader.u16());
+    let (known, count) = match format {
+        1 => (Terms::FORMAT_1, Coefficients::FORMAT_1),
+        _ => (Terms::ALL, Coefficients::COUNT),
+    };
+    if terms & !known.0 != 0 {
+        let (low, high) = (0, known.0 as i64);
         reader.refuse(ImageError::Field { name: "terms", offset, value: terms as i64, low, high });
     }
     reader.reserved(2);
     let mut coefficients = [0; Coefficients::COUNT];
-    for coefficient in &mut coefficients {
+    for coefficient in coefficients.iter_mut().take(count) {
         *coefficient = reader.i32();
     }
     *physical = PhysicalParameters { terms: Terms(terms), coefficients: Coefficients::from_array(coefficients) };
@@ -177,10 +212,11 @@ fn decode_network(reader: &mut Reader, network: &mut NetworkParameters) {
 /// Everything before the checksum; the length stays open.
 pub(super) fn encode_content(image: &Image, writer: &mut Writer) {
     let Image { friction, limits, golden, .. } = image;
+    let format = image.format();
     let sets = friction.selector.sets();
     let networks = (0..sets).filter(|&i| friction.sets[i].network.is_some()).fold(0u8, |mask, i| mask | 1 << i);
     writer.put(&MAGIC);
-    writer.put(&FORMAT.to_le_bytes());
+    writer.put(&format.to_le_bytes());
     writer.put(&[0; 2]); // the length, known at the end
     writer.put(&image.version.to_le_bytes());
     writer.put(&image.target.product.to_le_bytes());
@@ -204,8 +240,11 @@ pub(super) fn encode_content(image: &Image, writer: &mut Writer) {
     for limit in [limits.output, limits.torque_gain, limits.velocity_slope] {
         writer.put(&limit.to_le_bytes());
     }
+    if format > 1 {
+        encode_common(&friction.common, writer);
+    }
     for set in friction.sets.iter().take(sets) {
-        encode_set(set, writer);
+        encode_set(set, format, writer);
     }
     for vector in golden {
         writer.put(&[vector.set, 0, 0, 0]);
@@ -217,10 +256,24 @@ pub(super) fn encode_content(image: &Image, writer: &mut Writer) {
     }
 }
 
-fn encode_set(set: &ParameterSet, writer: &mut Writer) {
-    writer.put(&set.physical.terms.0.to_le_bytes());
+fn encode_common(common: &CommonTerms, writer: &mut Writer) {
+    for element in &common.elements {
+        writer.i32(element.stiffness);
+        writer.i32(element.level);
+    }
+    for ripple in &common.ripples {
+        let Ripple { periods, level_sine, level_cosine, torque_sine, torque_cosine } = *ripple;
+        for number in [periods, level_sine, level_cosine, torque_sine, torque_cosine] {
+            writer.i32(number);
+        }
+    }
+}
+
+fn encode_set(set: &ParameterSet, format: u16, writer: &mut Writer) {
+    writer.put(&(set.physical.terms.0 as u16).to_le_bytes());
     writer.put(&[0; 2]);
-    for coefficient in set.physical.coefficients.to_array() {
+    let count = if format == 1 { Coefficients::FORMAT_1 } else { Coefficients::COUNT };
+    for coefficient in set.physical.coefficients.to_array().into_iter().take(count) {
         writer.i32(coefficient);
     }
     let Some(network) = &set.network else { return };
@@ -356,4 +409,5 @@ impl Writer<'_> {
 }
 
 /// The sizes that the layout states.
-const _: () = assert!(4 + 4 * Coefficients::COUNT == 128 && 4 * NEURONS * (INPUTS + 1) + 11 * 14 + 6 == 280);
+const _: () = assert!(4 + 4 * Coefficients::FORMAT_1 == 128 && 4 + 4 * Coefficients::COUNT == 132);
+const _: () = assert!(4 * NEURONS * (INPUTS + 1) + 11 * 14 + 6 == 280 && 8 * ELEMENTS + 20 * RIPPLES == 72);

@@ -1,6 +1,9 @@
 //! The parameter image: one binary blob that holds a joint's friction model; task or host, never the control interrupt.
 //!
-//! # Layout, format version 1
+//! # Layout, format versions 1 and 2
+//!
+//! Format 2 has [common terms](crate::friction::common) and one coefficient more. An image is written in the oldest format that can hold it, and one of format 1
+//! means the same bits that it always did.
 //!
 //! All numbers are little-endian two's complement. Q16.16 means a 32-bit integer that counts 1/65536 of the unit. Reserved
 //! bytes are zero. "Full scale" is explained in [`Domain::shifts`](crate::friction::domain::Domain::shifts).
@@ -8,7 +11,7 @@
 //! | offset | bytes | content |
 //! |---|---|---|
 //! | 0 | 4 | magic: the ASCII characters `JFPI` |
-//! | 4 | 2 | format version, 1 |
+//! | 4 | 2 | format version, 1 or 2 |
 //! | 6 | 2 | length of the image in bytes, checksum included; at most [`MAX_LENGTH`] |
 //! | 8 | 4 | image version, rises with every image of a joint |
 //! | 12 | 4 | product that the image is for, 0 = any |
@@ -27,17 +30,19 @@
 //! | 132 | 4 | limit of the absolute friction, Q16.16 of the effort's unit, unsigned |
 //! | 136 | 4 | limit of the absolute slope of the network over the measured torque, Q16.16, unsigned |
 //! | 140 | 4 | limit of the absolute slope of friction over velocity, unsigned, 1/256 Nm s/rad |
-//! | 144 | | parameter sets, one after another |
+//! | 144 | 4 x 8 | only in format 2: pre-sliding elements: stiffness, Q16.16 per rad, 0 to [`MAX_STIFFNESS`](crate::friction::maxwell_slip::MAX_STIFFNESS); level, Q16.16 of the effort's unit, not negative |
+//! | 176 | 2 x 20 | only in format 2: ripple: periods in a rad; sine and cosine of the level, of the torque; Q16.16 |
+//! | 144, 216 | | parameter sets, one after another |
 //! | | | golden vectors, one after another |
 //! | length - 4 | 4 | CRC-32 (ISO-HDLC: polynomial 0x04C11DB7 reflected, start and final XOR 0xFFFFFFFF) of all bytes before |
 //!
-//! A parameter set is 128 bytes, and 280 more where it has a network:
+//! A parameter set is 128 bytes, 132 in format 2, and 280 more where it has a network:
 //!
 //! | bytes | content |
 //! |---|---|
 //! | 2 | terms of the physical model that take part, a bit each ([`Terms`]) |
 //! | 2 | reserved |
-//! | 31 x 4 | coefficients at full scale, Q16.16, in the order of [`Coefficients::NAMES`](crate::friction::physical::Coefficients::NAMES) |
+//! | 31 x 4, 32 x 4 | coefficients at full scale, Q16.16, in the order of [`Coefficients::NAMES`](crate::friction::physical::Coefficients::NAMES) |
 //! | 5 x 6 x 4 | network layer 0: per neuron five weights in Q26 and a bias in Q25 |
 //! | 10 x 14 | layers 1 and 2: per neuron five weights and a bias, 16 bits each, their fraction bits (8 bits, 10 to 20), a reserved byte |
 //! | 14 | layer 3, one neuron of the same form |
@@ -46,12 +51,15 @@
 //!
 //! A golden vector is 36 bytes: the index of the set (1 byte), three reserved, the six signals (Q16.16, in the order of [`Signal`]),
 //! and the exact Q16.16 torques of the physical model and of the network. A device evaluates them before it uses an
-//! image, which proves that its arithmetic is the one that the image was judged with.
+//! image, which proves that its arithmetic is the one that the image was judged with. Golden vectors are a sequence: each is one step of [`GOLDEN_RATE`],
+//! and pre-sliding elements, at rest before the first, go on from one to the next.
 //!
 //! An upload is an image and, behind it, the tag of 32 bytes that [authenticates](super::authentication) it, where there is one.
 
 use super::certificate::Limits;
 use super::codec::{Reader, Writer, decode_content, encode_content};
+use crate::friction::common::{Common, CommonTerms, CommonTorques};
+use crate::friction::maxwell_slip::{Bent, MAX_STIFFNESS};
 use crate::friction::network::{MAX_FRACTION, MAX_SCALE, MIN_FRACTION};
 use crate::friction::physical::Terms;
 use crate::friction::state::{JointState, SIGNALS, Signal};
@@ -59,8 +67,10 @@ use crate::friction::{Estimate, FrictionModel, FrictionParameters, ParameterSet}
 
 /// The magic bytes.
 pub const MAGIC: [u8; 4] = *b"JFPI";
-/// The format version that this code reads and writes.
-pub const FORMAT: u16 = 1;
+/// The newest format version that this code reads and writes; the first is 1.
+pub const FORMAT: u16 = 2;
+/// Steps a second of the sequence of golden vectors.
+pub const GOLDEN_RATE: u32 = 1_000;
 /// Longest image: a flash page less 32 bytes for the slot's header.
 pub const MAX_LENGTH: usize = 2048 - 32;
 /// Most golden vectors that an image can hold.
@@ -204,7 +214,7 @@ impl core::fmt::Display for ImageError {
                 write!(f, "not a parameter image: starts with {found:02x?}, not with \"JFPI\"")
             }
             Self::UnsupportedFormat { found } => {
-                write!(f, "format version {found} is not known, this program reads version {FORMAT}")
+                write!(f, "format version {found} is not known, this program reads versions 1 to {FORMAT}")
             }
             Self::Checksum { stored, computed } => {
                 write!(f, "damaged: checksum {stored:08x} is stored, the content has {computed:08x}")
@@ -262,7 +272,7 @@ impl Image {
         }
         let Some((&format, rest)) = rest.split_first_chunk::<2>() else { return Err(truncated(6)) };
         let format = u16::from_le_bytes(format);
-        if format != FORMAT {
+        if !(1..=FORMAT).contains(&format) {
             return Err(ImageError::UnsupportedFormat { found: format });
         }
         let Some(&stated) = rest.first_chunk::<2>() else { return Err(truncated(8)) };
@@ -301,10 +311,21 @@ impl Image {
         Ok(length)
     }
 
+    /// The oldest format that can hold the image.
+    pub fn format(&self) -> u16 {
+        let FrictionParameters { common, sets, .. } = &self.friction;
+        let older = |set: &ParameterSet| {
+            Terms::FORMAT_1.contains(set.physical.terms) && set.physical.coefficients.viscous_asymmetry == 0
+        };
+        if *common == CommonTerms::NONE && sets.iter().all(older) { 1 } else { 2 }
+    }
+
     /// Evaluates every golden vector with `model`, which must have been prepared from this image.
     pub fn verify_golden(&self, model: &FrictionModel) -> Result<(), GoldenMismatch> {
+        let mut sequence = GoldenSequence::new(&self.friction.common);
         for (index, vector) in self.golden.iter().enumerate() {
-            let computed = model.evaluate(vector.set as usize, &JointState::from_signals(vector.signals));
+            let state = JointState::from_signals(vector.signals);
+            let computed = model.evaluate_with(vector.set as usize, &state, &sequence.next(&state));
             if computed != vector.expected {
                 return Err(GoldenMismatch { index, expected: vector.expected, computed });
             }
@@ -313,10 +334,28 @@ impl Image {
     }
 }
 
+/// What the common terms of an image give along its golden vectors.
+pub struct GoldenSequence {
+    common: Common,
+    bent: Bent,
+}
+
+impl GoldenSequence {
+    /// Before the first vector.
+    pub fn new(terms: &CommonTerms) -> Self {
+        Self { common: Common::new(terms, GOLDEN_RATE), bent: Bent::default() }
+    }
+
+    /// At the next vector's state.
+    pub fn next(&mut self, state: &JointState) -> CommonTorques {
+        self.common.step(&mut self.bent, state)
+    }
+}
+
 impl Image {
     /// Refuses what no image may hold, but its types can.
     fn check(&self) -> Result<(), ImageError> {
-        let Self { friction: FrictionParameters { domain, selector, sets }, golden, .. } = self;
+        let Self { friction: FrictionParameters { domain, selector, common, sets }, golden, .. } = self;
         let field = |name, value: i64, low: i64, high: i64| match (low..=high).contains(&value) {
             true => Ok(()),
             false => Err(ImageError::Field { name, offset: 0, value, low, high }),
@@ -329,6 +368,10 @@ impl Image {
         }
         for criterion in selector.criteria.iter().flatten() {
             field("lower threshold", criterion.leave as i64, i32::MIN as i64, criterion.enter as i64)?;
+        }
+        for element in &common.elements {
+            field("stiffness of a pre-sliding element", element.stiffness as i64, 0, MAX_STIFFNESS as i64)?;
+            field("level of a pre-sliding element", element.level as i64, 0, i32::MAX as i64)?;
         }
         let last = selector.sets() as i64 - 1;
         for (index, set) in sets.iter().enumerate() {

@@ -4,7 +4,7 @@
 //! a friction model in its place, with one parameter set in hand.
 
 use super::codec::{Header, Reader, decode_end, decode_golden, decode_header, decode_set};
-use super::image::{GoldenMismatch, GoldenVector, Image, ImageError};
+use super::image::{GoldenMismatch, GoldenSequence, GoldenVector, Image, ImageError};
 use crate::friction::network::{Inputs, Layers};
 use crate::friction::physical::{PreparedTerms, Scaling};
 use crate::friction::state::JointState;
@@ -46,7 +46,7 @@ impl<'a> Pieces<'a> {
     fn read_sets(&self, last: usize, set: &mut ParameterSet) -> Reader<'a> {
         let mut reader = self.sets.clone();
         for index in 0..self.sets().min(last.saturating_add(1)) {
-            decode_set(&mut reader, self.header.networks >> index & 1 == 1, set);
+            decode_set(&mut reader, &self.header, index, set);
         }
         reader
     }
@@ -76,10 +76,12 @@ impl<'a> Pieces<'a> {
         for number in 0..self.sets() {
             let prepared = self.prepared(number);
             let mut index = 0;
+            let mut sequence = GoldenSequence::new(&self.header.common);
             self.walk(usize::MAX, &mut |vector| {
+                let state = JointState::from_signals(vector.signals);
+                let common = sequence.next(&state);
                 if usize::from(vector.set) == number {
-                    let state = JointState::from_signals(vector.signals);
-                    let computed = friction::evaluate(&scaling, &inputs, &prepared, &state);
+                    let computed = friction::evaluate(&scaling, &inputs, &prepared, &common, &state);
                     if computed != vector.expected && first.is_none_or(|first| index < first.index) {
                         first = Some(GoldenMismatch { index, expected: vector.expected, computed });
                     }
@@ -100,8 +102,8 @@ impl<'a> Pieces<'a> {
     /// The friction model for a control loop of `rate` Hz, in its place.
     #[inline(never)]
     fn prepare(&self, rate: u32, place: &mut Option<FrictionModel>) {
-        let Header { domain, selector, .. } = &self.header;
-        let model = FrictionModel::place(place, domain, selector, rate);
+        let Header { domain, selector, common, .. } = &self.header;
+        let model = FrictionModel::place(place, domain, selector, common, rate);
         let mut set = ParameterSet::default();
         for number in 0..self.sets() {
             self.set(number, &mut set);
@@ -125,7 +127,9 @@ impl Image {
 mod tests {
     use super::*;
     use crate::friction::FrictionParameters;
+    use crate::friction::common::CommonTerms;
     use crate::friction::domain::{Domain, Range};
+    use crate::friction::maxwell_slip::MaxwellElement;
     use crate::friction::network::{MIN_FRACTION, NEURONS, NetworkParameters, Neuron};
     use crate::friction::physical::{Coefficients, PhysicalParameters, Terms};
     use crate::friction::regime::{Criterion, Measure, Selector};
@@ -148,7 +152,7 @@ mod tests {
             scale: seed >> 14,
         };
         ParameterSet {
-            physical: PhysicalParameters { terms: Terms(seed as u16 & Terms::ALL.0), coefficients },
+            physical: PhysicalParameters { terms: Terms(seed as u32 & Terms::ALL.0), coefficients },
             network: network.then_some(learned),
         }
     }
@@ -170,13 +174,21 @@ mod tests {
                 for (place, (seed, network)) in sets.iter_mut().zip(seeds).take(selector.sets()) {
                     *place = set(seed, network);
                 }
+                let element =
+                    |n: i32| MaxwellElement { stiffness: (seeds[0].0 >> n & 0xfff_ffff).abs(), level: 1 << (10 + n) };
+                let common = match seeds[0].1 {
+                    true => CommonTerms { elements: core::array::from_fn(|n| element(n as i32)), ..CommonTerms::NONE },
+                    false => CommonTerms::NONE,
+                };
                 let range = Range { low: -(2 << 16), high: 3 << 16 };
                 let domain = Domain { ranges: [range; SIGNALS], margin: 1 << 14, reference_temperature: 1 << 16 };
-                let friction = FrictionParameters { domain, selector, sets };
+                let friction = FrictionParameters { domain, selector, common, sets };
                 let model = FrictionModel::new(&friction, 20_000);
+                let mut sequence = GoldenSequence::new(&common);
                 let golden = vectors.into_iter().map(|(number, signals)| {
                     let set = number % selector.sets() as u8;
-                    let expected = model.evaluate(set.into(), &JointState::from_signals(signals));
+                    let state = JointState::from_signals(signals);
+                    let expected = model.evaluate_with(set.into(), &state, &sequence.next(&state));
                     GoldenVector { set, signals, expected }
                 });
                 let golden = golden.collect();
@@ -212,7 +224,7 @@ mod tests {
                 pieces.set(index, &mut set);
                 prop_assert_eq!(set, image.friction.sets[index]);
                 let result =
-                    certificate::prove_set(&pieces.header.domain, &set, index, pieces.sets(), &mut proved);
+                    certificate::prove_set(&pieces.header.domain, &pieces.header.common, &set, index, pieces.sets(), &mut proved);
                 refused = refused.or(result.err());
             }
             prop_assert_eq!(refused.map_or(Ok(proved.unwrap_or_default()), Err), certificate::prove(&image.friction));

@@ -131,7 +131,7 @@ impl<W: Observed> Moving<W> {
         let time = f64::from(self.period) * SET_POINT;
         let velocity = self.amplitude * (TAU * time).sin();
         let mut frame = controlword.to_le_bytes().to_vec();
-        frame.extend([VELOCITY, self.period as u8]);
+        frame.push(VELOCITY);
         frame.extend(((1e3 * velocity) as i32).to_le_bytes());
         self.period += 1;
         if !self.silent {

@@ -275,7 +275,7 @@ fn stop<W: Wired>(mut bench: Bench<W>, cause: Cause, rate: f64) -> Result<String
     let seconds = |from: Instant, to: Instant| (to.0 as f64 - from.0 as f64) * 1e-12;
     let drive = |controlword: u16, mode: i8| {
         let mut frame = controlword.to_le_bytes().to_vec();
-        frame.extend([mode as u8, 0, 0, 0, 0, 0]);
+        frame.extend([mode as u8, 0, 0, 0, 0]);
         frame
     };
     // The earliest and the latest instant at which the program can know, from now on, s.

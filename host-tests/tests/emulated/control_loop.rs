@@ -247,7 +247,7 @@ fn drive<W: Observed>(
             _ => {}
         }
         let mut frame = controlword.to_le_bytes().to_vec();
-        frame.extend([9, period as u8]);
+        frame.push(9);
         frame.extend(((1e3 * velocity) as i32).to_le_bytes());
         send(&mut bench.emulation, 0x300 + u16::from(NODE), &frame)?;
         look(&mut bench, SET_POINT)?;

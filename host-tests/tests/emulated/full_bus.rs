@@ -56,10 +56,7 @@ const LOADS: [Load; 3] = [
         frames.extend([(0x77E, vec![5]), (0x77F, vec![5])]);
         frames
     }),
-    ("set-points of its own alone", |number| {
-        let frame = |part| (0x300 + u16::from(NODE), set_point(number.wrapping_mul(9).wrapping_add(part), 0x0F, 0.5));
-        (0..9).map(frame).collect()
-    }),
+    ("set-points of its own alone", |_| vec![(0x300 + u16::from(NODE), set_point(0x0F, 0.5)); 9]),
 ];
 
 /// The frames of a flood, by their number.
@@ -75,10 +72,10 @@ const FLOODS: [Flood; 6] = [
     ("LSS requests that are too short", |_| (0x7E5, Vec::new())),
 ];
 
-/// Controlword, mode, counter and velocity, rad/s.
-fn set_point(counter: u32, controlword: u16, velocity: f64) -> Vec<u8> {
+/// Controlword, mode and velocity, rad/s.
+fn set_point(controlword: u16, velocity: f64) -> Vec<u8> {
     let mut frame = controlword.to_le_bytes().to_vec();
-    frame.extend([9, counter as u8]);
+    frame.push(9);
     frame.extend(((1e3 * velocity) as i32).to_le_bytes());
     frame
 }
@@ -118,8 +115,8 @@ fn on_time<W: Observed>(name: &str, board: fn(Drivetrain) -> W) -> Result<(), Fa
     bench.download(NODE, 0x1017, 0, &10u16.to_le_bytes())?;
     // The joint measures its currents' zeros first.
     for (controlword, times) in [(0x06, 150), (0x07, 20), (0x0F, 100)] {
-        for counter in 0..times {
-            send(&mut bench.emulation, 0x300 + u16::from(NODE), &set_point(counter, controlword, 0.0))?;
+        for _ in 0..times {
+            send(&mut bench.emulation, 0x300 + u16::from(NODE), &set_point(controlword, 0.0))?;
             bench.run(SET_POINT)?;
         }
     }
@@ -175,7 +172,7 @@ fn under<W: Observed>(bench: &mut Bench<W>, frames: fn(u32) -> Vec<Heard>) -> Re
     let from = bench.emulation.now();
     for number in 0..LASTS {
         let velocity = (TAU * REVERSALS * f64::from(number) * SET_POINT).sin();
-        let own = (0x300 + u16::from(NODE), set_point(number, 0x0F, velocity));
+        let own = (0x300 + u16::from(NODE), set_point(0x0F, velocity));
         for (id, data) in frames(number).into_iter().chain([own]) {
             bits += put(bench, id, &data)?;
         }
@@ -186,8 +183,8 @@ fn under<W: Observed>(bench: &mut Bench<W>, frames: fn(u32) -> Vec<Heard>) -> Re
     }
     let microseconds = (bench.emulation.now().0 - from.0) as f64 * 1e-6;
     // What is still waiting goes before the next load.
-    for number in LASTS..LASTS + 50 {
-        send(&mut bench.emulation, 0x300 + u16::from(NODE), &set_point(number, 0x0F, 0.0))?;
+    for _ in LASTS..LASTS + 50 {
+        send(&mut bench.emulation, 0x300 + u16::from(NODE), &set_point(0x0F, 0.0))?;
         bench.run(SET_POINT)?;
     }
     Ok((steps, (bits as f64 / microseconds).min(1.0)))

@@ -288,7 +288,7 @@ fn other_boards() -> Result<(), Failed> {
         // Whatever is asked for.
         send(&mut bench.emulation, 0x000, &[0x01, NODE])?;
         for word in [SHUTDOWN, 0x07, 0x0F] {
-            send(&mut bench.emulation, 0x300 + u16::from(NODE), &[word as u8, 0, 9, 0, 0, 0, 0, 0])?;
+            send(&mut bench.emulation, 0x300 + u16::from(NODE), &[word as u8, 0, 9, 0, 0, 0, 0])?;
             bench.run(0.01)?;
         }
         is(&mut bench, State::NotReadyToSwitchOn)?;

@@ -80,6 +80,7 @@ fn seldom_or_operating(name: &str) -> bool {
         "19FrictionFeedforward5guard",
         "10motion_law9MotionLaw6follow",
         "10motion_law9MotionLaw5brake",
+        "10motion_law9MotionLaw5enter",
         "9limit_law5bound",
         "5joint7offsets",
         "5joint12regeneration",

@@ -160,8 +160,8 @@ struct Seen {
     fading: u32,
     selectors: BTreeSet<[u8; 2]>,
     networks: BTreeSet<bool>,
-    present: u16,
-    absent: u16,
+    present: u32,
+    absent: u32,
 }
 
 impl Seen {

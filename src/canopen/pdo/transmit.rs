@@ -1,4 +1,4 @@
-//! TPDOs: assembling one, in either context, and the timers of those that are sent by event, in the task.
+//! TPDOs: assembling one, in either context, and when it is sent: with SYNC, on a change, by its timer.
 
 use super::MappedObject;
 use crate::canopen::frame::Frame;
@@ -25,42 +25,65 @@ pub(crate) fn assemble(registers: &PdoRegisters, mut value: impl FnMut(MappedObj
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Synchronous {
     syncs: u8,
+    /// Last frame of type 0.
+    sent: Option<Frame>,
 }
 
 impl Synchronous {
-    /// Whether TPDO `pdo` is due with this SYNC.
-    pub(crate) fn is_due(&mut self, shared: &Shared, registers: &PdoRegisters, pdo: u8) -> bool {
+    /// What TPDO `pdo` sends with this SYNC; `frame` assembles it.
+    pub(crate) fn next(
+        &mut self,
+        shared: &Shared,
+        registers: &PdoRegisters,
+        pdo: u8,
+        frame: impl FnOnce() -> Option<Frame>,
+    ) -> Option<Frame> {
         match registers.transmission() {
-            0 => shared.take_event(pdo),
+            0 => {
+                let frame = frame()?;
+                let due = shared.take_event(pdo) || self.sent != Some(frame);
+                self.sent = Some(frame);
+                due.then_some(frame)
+            }
             every @ 1..=240 => {
                 self.syncs = self.syncs.saturating_add(1);
                 let due = self.syncs >= every;
-                if due {
-                    self.syncs = 0;
+                if !due {
+                    return None;
                 }
-                due
+                self.syncs = 0;
+                frame()
             }
-            _ => false,
+            _ => None,
         }
     }
 }
 
-/// Inhibit time and event timer of one TPDO of type 254 or 255; the task.
+/// Inhibit time, event timer and last content of one TPDO of type 254 or 255; the task.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Timers {
     /// Instant of the last transmission, while the inhibit time is not over.
     inhibited: Option<u32>,
     /// Instant from which the event timer counts.
     counting: Option<u32>,
+    sent: Option<Frame>,
     generation: u8,
 }
 
 impl Timers {
-    /// Whether TPDO `pdo` is due; then it counts as sent. Called in every poll in OPERATIONAL.
-    pub(crate) fn is_due(&mut self, shared: &Shared, registers: &PdoRegisters, pdo: u8, now: u32) -> bool {
+    /// What TPDO `pdo` sends now: `frame`, which is assembled where the inhibit time is over, if it is another one than the last, an event has
+    /// happened or the timer has expired. Called in every poll in OPERATIONAL.
+    pub(crate) fn next(
+        &mut self,
+        shared: &Shared,
+        registers: &PdoRegisters,
+        pdo: u8,
+        now: u32,
+        frame: impl FnOnce() -> Option<Frame>,
+    ) -> Option<Frame> {
         if registers.transmission() < 254 || registers.id().is_none() {
             *self = Self::default();
-            return false;
+            return None;
         }
         if self.generation != registers.generation() {
             *self = Self { generation: registers.generation(), ..Self::default() };
@@ -76,14 +99,19 @@ impl Timers {
             // Without a timer the instant would grow older than time reaches back.
             self.counting = None;
         }
-        if self.inhibited.is_some() || !(expired || shared.has_event(pdo)) {
-            return false;
+        if self.inhibited.is_some() {
+            return None;
+        }
+        let frame = frame()?;
+        if !(expired || shared.has_event(pdo) || self.sent != Some(frame)) {
+            return None;
         }
         shared.take_event(pdo);
+        self.sent = Some(frame);
         self.inhibited = (inhibit != 0).then_some(now);
         // The timer runs from the last transmission, whatever caused it.
         self.counting = Some(now);
-        true
+        Some(frame)
     }
 
     /// Outside OPERATIONAL nothing is counted.

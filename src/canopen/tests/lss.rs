@@ -53,6 +53,18 @@ fn a_node_gets_its_id_boots_with_it_and_stores_it() {
 }
 
 #[test]
+fn a_node_that_cannot_do_without_its_id_keeps_it() {
+    let mut node = Node::operational();
+    ask(&mut node, message(0x04, 1));
+    node.dictionary.keeps_node_id = true;
+    assert_eq!(ask(&mut node, message(0x11, 7)), answered(0x11, [0xFF, 1, 0, 0]));
+    assert_eq!(ask(&mut node, message(0x17, 0)), answered(0x17, [0xFF, 1, 0, 0]));
+    assert_eq!(node.dictionary.stored_node_id, None);
+    node.dictionary.keeps_node_id = false;
+    assert_eq!(ask(&mut node, message(0x11, 7)), answered(0x11, [0; 4]));
+}
+
+#[test]
 fn a_node_with_an_id_changes_it_with_the_next_reset() {
     let mut node = Node::operational();
     ask(&mut node, message(0x04, 1));

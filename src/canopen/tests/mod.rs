@@ -44,6 +44,7 @@ pub struct Dictionary {
     pub stored: Option<(Group, CommunicationParameters)>,
     pub restored: Option<Group>,
     pub stored_node_id: Option<u8>,
+    pub keeps_node_id: bool,
     pub parameters: Option<CommunicationParameters>,
     /// The interrupt takes another reset while the task tells of one.
     pub interrupted: Option<&'static Shared>,
@@ -136,6 +137,10 @@ impl ObjectDictionary for Dictionary {
         Ok(())
     }
 
+    fn may_change_node_id(&self) -> bool {
+        !self.keeps_node_id
+    }
+
     fn restore(&mut self, group: Group) -> Result<(), Abort> {
         self.restored = Some(group);
         Ok(())
@@ -177,6 +182,8 @@ pub struct Image {
     pub received: Vec<u8>,
     pub states: Vec<NmtState>,
     pub syncs: u32,
+    /// Added to every actual value.
+    pub actual: u64,
 }
 
 impl ProcessImage for Image {
@@ -190,7 +197,7 @@ impl ProcessImage for Image {
 
     fn transmit(&mut self, object: MappedObject) -> u64 {
         // More bits than any object has.
-        0xA5A5_A5A5_0000_0000 | u64::from(object.0)
+        (0xA5A5_A5A5_0000_0000 | u64::from(object.0)).wrapping_add(self.actual)
     }
 
     fn sync(&mut self) {

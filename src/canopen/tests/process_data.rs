@@ -127,7 +127,7 @@ fn sync_can_be_moved_to_a_free_identifier_only() {
 }
 
 #[test]
-fn a_tpdo_of_type_0_follows_its_event_with_the_next_sync() {
+fn a_tpdo_of_type_0_follows_an_event_or_a_change_with_the_next_sync() {
     let mut node = Node::operational();
     node.write(0x1800, 2, &[0]).unwrap();
     // Once when the node became operational.
@@ -136,6 +136,62 @@ fn a_tpdo_of_type_0_follows_its_event_with_the_next_sync() {
     node.shared.trigger(0);
     assert_eq!(node.task(), []);
     assert_eq!(node.sync().len(), 1);
+    assert_eq!(node.sync().len(), 0);
+    node.image.actual = node.image.actual.wrapping_add(1);
+    assert_eq!(node.task(), []);
+    assert_eq!(node.sync().len(), 1);
+    assert_eq!(node.sync().len(), 0);
+}
+
+#[test]
+fn a_tpdo_of_type_254_and_255_is_sent_on_a_change_and_keeps_its_inhibit_time() {
+    for kind in [254, 255] {
+        let mut node = Node::booted();
+        node.dictionary.values.insert((0x2000, 1), vec![0]);
+        map(&mut node, 0x1801, 0x1A01, 0x285, &[U8]).unwrap();
+        node.write(0x1801, 1, &0x8000_0285u32.to_le_bytes()).unwrap();
+        node.write(0x1801, 2, &[kind]).unwrap();
+        node.write(0x1801, 3, &50u16.to_le_bytes()).unwrap();
+        node.write(0x1801, 1, &0x285u32.to_le_bytes()).unwrap();
+        assert_eq!(node.bus(0, &[1, 0]), [frame(0x285, &[0])]);
+        assert_eq!(node.run(100), [], "nothing changes");
+        node.dictionary.values.insert((0x2000, 1), vec![1]);
+        assert_eq!(node.run(1), [frame(0x285, &[1])]);
+        // Three changes within the inhibit time: the newest counts.
+        for value in 2..5 {
+            node.dictionary.values.insert((0x2000, 1), vec![value]);
+            assert_eq!(node.run(1), []);
+        }
+        assert_eq!(node.run(2), [frame(0x285, &[4])]);
+        assert_eq!(node.run(100), []);
+        // There and back within the inhibit time is no change.
+        node.dictionary.values.insert((0x2000, 1), vec![5]);
+        assert_eq!(node.run(1).len(), 1);
+        node.dictionary.values.insert((0x2000, 1), vec![6]);
+        node.run(1);
+        node.dictionary.values.insert((0x2000, 1), vec![5]);
+        assert_eq!(node.run(100), []);
+    }
+}
+
+#[test]
+fn a_sync_with_data_counts_and_is_reported_once() {
+    let mut node = Node::operational();
+    node.sync();
+    node.task();
+    let told = |frames: &[Frame]| {
+        frames.iter().filter(|frame| frame.id() == 0x85).map(|frame| frame.data()[..3].to_vec()).collect::<Vec<_>>()
+    };
+    let mut sent = Vec::new();
+    for counter in 1..=5u8 {
+        node.now += 1_000;
+        let answered = node.bus(0x80, &[counter]);
+        assert!(answered.iter().any(|frame| frame.id() == 0x185), "{answered:?}");
+        sent.extend(answered);
+    }
+    assert_eq!(told(&sent), [[0x40, 0x82, 0x11]]);
+    // Its end comes with another NMT state.
+    assert_eq!(told(&node.bus(0, &[0x80, 0])), [[0, 0, 0]]);
 }
 
 #[test]
@@ -216,6 +272,9 @@ fn what_cannot_be_mapped_is_refused() {
     assert_eq!(map(0x1403, 0x1603, &[MappedObject::new(0x2010, 0, 64)]), Err(Abort::NOT_MAPPABLE.0));
     assert_eq!(map(0x1803, 0x1A03, &[MappedObject::new(0x2002, 0, 32)]), Err(Abort::NOT_MAPPABLE.0));
     assert_eq!(map(0x1803, 0x1A03, &[MappedObject::new(5, 0, 8)]), Err(Abort::NO_OBJECT.0));
+    for own in [0x1017_0010, 0x1018_0120, 0x1801_0210, 0x1001_0008] {
+        assert_eq!(map(0x1803, 0x1A03, &[MappedObject(own)]), Err(Abort::NOT_MAPPABLE.0), "{own:08x}");
+    }
     assert_eq!(map(0x1403, 0x1603, &[U64, U8]), Err(Abort::PDO_LENGTH.0));
     assert_eq!(map(0x1403, 0x1603, &[U8; 8]), Ok(()));
     assert_eq!(node.write(0x1403, 1, &0x8000_0444u32.to_le_bytes()), Ok(()));

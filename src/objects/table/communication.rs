@@ -71,8 +71,8 @@ macro_rules! pdo {
                 room! {
                     $communication $name {
                         1, "COB-ID", U32, RW, UNMAPPED, S; "", 1.0, ANY; "Identifier; bit 31: the PDO does not exist"
-                        2, "transmission type", U8, RW, UNMAPPED, S; "", 1.0, ANY; "0 to 240 with SYNC, 254 and 255 by event"
-                        $($inhibit, "inhibit time", U16, RW, UNMAPPED, S; "s", 1e-4, ANY; "Least distance of two events")?
+                        2, "transmission type", U8, RW, UNMAPPED, S; "", 1.0, ANY; "With SYNC: 1 to 240 every so many, 0 where something has changed. 254 and 255: on a change, and by the event timer"
+                        $($inhibit, "inhibit time", U16, RW, UNMAPPED, S; "s", 1e-4, ANY; "Least distance of two transmissions of type 254 or 255")?
                         5, "event timer", U16, RW, UNMAPPED, S; "s", 1e-3, ANY;
                             "A TPDO is sent, an RPDO has to arrive so often; 0 never"
                     }

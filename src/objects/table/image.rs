@@ -56,15 +56,13 @@ room! {
     }
     0x2215 "image authentication" {
         1, "key present", Bool, RO, UNMAPPED, I(ImageField::KeyPresent); "", 1.0, ANY;
-            "1 once the joint has a key: images then need a tag"
+            "1 once the joint has a key: images then need a tag. With key number 0 the stored key is damaged, and no image is taken"
         2, "key number", U32, RO, UNMAPPED, I(ImageField::KeyNumber); "", 1.0, ANY;
             "Tells keys apart; 0 where there is none"
         3, "version floor", U32, RO, UNMAPPED, I(ImageField::Floor); "", 1.0, ANY;
-            "Lowest image version that is taken"
+            "Lowest image version that is taken: with a key the highest that its tag was right for, without one the highest that is stored"
         4, "wrong tags", U16, RO, UNMAPPED, I(ImageField::Failures); "", 1.0, ANY;
-            "Wrong tags in a row"
-        5, "lock-out left", U32, RO, UNMAPPED, I(ImageField::Lockout); "s", 1e-3, ANY;
-            "Time for which nothing is verified"
+            "Wrong tags so far; kept over a loss of power at 1, 2, 4, 8 and so on. They keep no right one out"
         6, "key", Domain, WO, UNMAPPED, I(ImageField::Key); "", 1.0, ANY;
             "The key, 32 bytes; once"
     }

@@ -8,7 +8,7 @@ use crate::objects::field::{
 room! {
     0x2010 "set-point counter" {
         1, "counter", U8, RW, RECEIVE, Set(SetPoint::Counter); "", 1.0, ANY;
-            "Where a PDO carries it, a set-point with the counter of the one before does not renew the command deadline"
+            "Optional, in no PDO at first. Where a PDO carries it beside set-points, they do not renew the command deadline with the counter of the one before"
     }
     0x2011 "impedance command" {
         1, "impedance frame", U64, RW, RECEIVE, Set(SetPoint::ImpedanceFrame); "", 1.0, ANY;

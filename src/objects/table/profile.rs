@@ -1,7 +1,7 @@
 //! 6000h to 67FFh: what CiA 402-2 has an object for.
 
 use super::*;
-use crate::objects::field::Constant::{AbortConnectionOption, QuickStopOption, SupportedModes};
+use crate::objects::field::Constant::{AbortConnectionOption, HaltOption, QuickStopOption, SupportedModes};
 use crate::objects::field::{Actual, Field::Actual as A, Field::Constant, Field::SetPoint as Set, SetPoint};
 
 room! {
@@ -15,19 +15,24 @@ room! {
     }
     0x6040 "controlword" {
         0, "controlword", U16, RW, RECEIVE, Set(SetPoint::Controlword); "", 1.0, ANY;
-            "Commands of the state machine"
+            "Commands of the state machine, and halt (bit 8): the joint brakes and holds where it came to a stop, in every mode; the open loop applies no voltage"
     }
     0x6041 "statusword" {
         0, "statusword", U16, RO, TRANSMIT, A(Actual::Statusword); "", 1.0, ANY;
-            "State of the state machine, voltage present (bit 4), remote (bit 9); operation enabled with bit 14 is the open loop"
+            "State of the state machine, voltage present (bit 4), remote (bit 9), the joint follows the target of its mode (bit 12: not before one has come, nor in halt); operation enabled with bit 14 is the open loop"
     }
     0x605A "quick stop option code" {
         0, "quick stop option code", I16, RO, UNMAPPED, Constant(QuickStopOption); "", 1.0, ANY;
             "2: brake along the quick-stop ramp, then switch on disabled"
     }
+    0x605D "halt option code" {
+        0, "halt option code", I16, RO, UNMAPPED, Constant(HaltOption); "", 1.0, ANY;
+            "1: brake along the ramp of 2104h:6, then hold, with operation enabled"
+    }
     0x6060 "modes of operation" {
         0, "modes of operation", I8, RW, RECEIVE, Set(SetPoint::Mode); "", 1.0, within(-2.0, 10.0);
-            "8 position (CSP), 9 velocity (CSV), 10 torque (CST), -1 impedance, -2 open loop (2107h); in a PDO any other number changes nothing"
+            "8 position (CSP), 9 velocity (CSV), 10 torque (CST), 0 none (the joint holds where it is), -1 impedance, -2 open loop (2107h); in a PDO any other number changes nothing. \
+             Enabled, or in another mode, the joint holds where it is until a target of the mode comes in a later PDO or by SDO"
     }
     0x6061 "modes of operation display" {
         0, "modes of operation display", I8, RO, TRANSMIT, A(Actual::Mode); "", 1.0, ANY;
@@ -59,7 +64,7 @@ room! {
     }
     0x607A "target position" {
         0, "target position", I32, RW, RECEIVE, Set(SetPoint::TargetPosition); "rad", 1e-6, ANY;
-            "Position mode; without one since the last NMT transition the joint gives no torque"
+            "Position mode. In a PDO it counts once it is another one than when the mode was entered or operation enabled, or with the release of halt"
     }
     0x60FF "target velocity" {
         0, "target velocity", I32, RW, RECEIVE, Set(SetPoint::TargetVelocity); "rad/s", 1e-3, ANY;

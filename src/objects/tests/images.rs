@@ -1,6 +1,7 @@
 //! The image life cycle over SDO: every step, every refusal with its code, its abort and its EMCY.
 
 use super::*;
+use crate::friction::common::CommonTerms;
 use crate::friction::domain::{Domain, Range};
 use crate::friction::physical::{Coefficients, PhysicalParameters, Terms};
 use crate::friction::regime::Selector;
@@ -26,6 +27,7 @@ fn image(version: u32) -> Vec<u8> {
     let friction = FrictionParameters {
         domain: Domain { ranges: [range; SIGNALS], margin: 0, reference_temperature: 0 },
         selector: Selector::default(),
+        common: CommonTerms::NONE,
         sets: [set, ParameterSet::default(), ParameterSet::default(), ParameterSet::default()],
     };
     let expected = FrictionModel::new(&friction, 20_000).evaluate(0, &JointState::from_signals([7; SIGNALS]));
@@ -139,7 +141,8 @@ fn a_commit_goes_through_flash_to_active_and_back() {
     assert_eq!(node.download(0x2210, 0, &bytes), Err(0x0800_0022));
     assert_eq!(node.objects.take_action(), Action::Store { length: bytes.len() });
     node.objects.finished(Ok(()), stored(&bytes));
-    assert_eq!(node.objects.program().kept, [(4, 0)]);
+    // Without a key there is no floor to be kept.
+    assert_eq!(node.objects.program().kept, []);
     assert_eq!((node.number(0x2212, 2), node.objects.take_action()), (6, Action::Activate));
     node.objects.program().image = bytes.clone();
     node.objects.finished(Ok(()), stored(&bytes));
@@ -203,17 +206,15 @@ fn a_key_is_given_once_and_from_then_on_tags_count() {
     assert_eq!(command(&mut node, VERIFY), Err(0x0800_0021));
     assert_eq!((node.number(0x2212, 3), node.number(0x2215, 4)), (0x0301, 0));
     node.download(0x2210, 0, &tagged(&[0; 32])).unwrap();
-    for failures in 1..=4 {
+    for failures in 1..=9u16 {
         assert_eq!(command(&mut node, VERIFY), Err(0x0800_0021));
-        assert_eq!(node.objects.program().kept.last(), Some(&(0, failures)));
+        assert_eq!(node.number(0x2215, 4), u64::from(failures));
     }
-    assert_eq!((node.number(0x2215, 4), node.number(0x2215, 5)), (4, 1_000));
+    // Few of many reach the flash.
+    assert_eq!(node.objects.program().kept, [1, 2, 4, 8].map(|failures| (0, failures)));
     node.download(0x2210, 0, &tagged(&key.sign(&image))).unwrap();
-    assert_eq!((command(&mut node, VERIFY), node.number(0x2212, 3)), (Err(0x0800_0021), 0x0303));
-    node.now += 1_000_000;
-    node.task();
     command(&mut node, VERIFY).unwrap();
-    assert_eq!((node.number(0x2212, 2), node.number(0x2215, 4)), (2, 0));
+    assert_eq!((node.number(0x2212, 2), node.number(0x2215, 4)), (2, 9));
     assert_eq!(node.number(0x1003, 1) as u16, emergency::AUTHENTICATION);
 }
 
@@ -225,4 +226,52 @@ fn an_upload_that_breaks_off_is_not_verified() {
     node.receive(0x605, &[0x00, 1, 2, 3, 4, 5, 6, 7]);
     node.receive(0x605, &[0x80, 0x10, 0x22, 0, 0, 0, 0, 0]);
     assert_eq!((command(&mut node, VERIFY), node.number(0x2212, 3)), (Err(0x0800_0020), 0x0102));
+}
+
+#[test]
+fn the_floor_is_kept_before_an_image_with_a_tag_is_stored_or_it_is_not_stored() {
+    let mut node = Node::new();
+    let bytes: [u8; 32] = core::array::from_fn(|i| i as u8);
+    node.download(0x2215, 6, &bytes).unwrap();
+    let image = image(7);
+    let tagged = [&image[..], &Key::new(bytes).unwrap().sign(&image)].concat();
+    node.download(0x2210, 0, &tagged).unwrap();
+    command(&mut node, VERIFY).unwrap();
+    node.objects.program().fails = Some(SlotError::Verify { slot: Slot::First });
+    assert_eq!(command(&mut node, COMMIT), Err(0x0606_0000));
+    assert_eq!((node.objects.take_action(), node.number(0x2212, 2)), (Action::Nothing, 2));
+    node.objects.program().fails = None;
+    command(&mut node, COMMIT).unwrap();
+    assert_eq!(node.objects.take_action(), Action::Store { length: image.len() });
+}
+
+#[test]
+fn what_is_stored_and_damaged_is_announced_and_stays_in_the_error_register() {
+    let mut node = Node::new();
+    node.objects.program().damaged = 2;
+    node.objects.restart(
+        LifeCycle::new(
+            Requirements {
+                target: Target { product: 2, serial: 4 },
+                effort: Effort::NewtonMetre,
+                limits: Limits { output: u32::MAX, torque_gain: u32::MAX, velocity_slope: u32::MAX },
+            },
+            0,
+            0,
+            0,
+        ),
+        StoredImages::default(),
+        &Start { configuration: BOARD.joint, ranges: DEFAULT_RANGES, single_bank: false },
+    );
+    node.receive(0, &[0x82, NODE]);
+    let sent = node.task();
+    let told = sent.iter().find(|frame| frame.id() == 0x85).map(|frame| frame.data().to_vec());
+    assert_eq!(told, Some(vec![0x10, 0x63, 0x81, 2, 0, 0, 0, 0]));
+    assert_eq!(node.number(0x1001, 0), 0x81);
+    // The end of a fault ends nothing of it.
+    node.observed.latched.set(crate::joint::fault::Fault::OverVoltage, true);
+    node.task();
+    node.observed.latched = crate::joint::fault::Faults::NONE;
+    node.task();
+    assert_eq!(node.number(0x1001, 0), 0x81);
 }

@@ -49,6 +49,7 @@ pub struct Memory {
     pub history: Option<History>,
     pub window: Window,
     pub fails: Option<SlotError>,
+    pub damaged: u8,
     pub reset: LastReset,
     pub hardware: Hardware,
     /// How often the chip's options were set.
@@ -67,6 +68,7 @@ impl Default for Memory {
             history: None,
             window: Window::NOTHING,
             fails: None,
+            damaged: 0,
             reset: LastReset::POWER_UP,
             hardware: Hardware::default(),
             options_set: 0,
@@ -102,7 +104,12 @@ impl Program for Memory {
         Ok(())
     }
 
+    fn damaged(&self) -> u8 {
+        self.damaged
+    }
+
     fn keep(&mut self, floor: u32, failures: u16) -> Result<(), SlotError> {
+        self.fails.map_or(Ok(()), Err)?;
         self.kept.push((floor, failures));
         Ok(())
     }

@@ -9,8 +9,8 @@ fn rpdo1(controlword: u16, torque: i16, position: i32) -> Vec<u8> {
     [&controlword.to_le_bytes()[..], &torque.to_le_bytes(), &position.to_le_bytes()].concat()
 }
 
-fn rpdo2(controlword: u16, mode: i8, counter: u8, velocity: i32) -> Vec<u8> {
-    [&controlword.to_le_bytes()[..], &mode.to_le_bytes(), &[counter], &velocity.to_le_bytes()].concat()
+fn rpdo2(controlword: u16, mode: i8, velocity: i32) -> Vec<u8> {
+    [&controlword.to_le_bytes()[..], &mode.to_le_bytes(), &velocity.to_le_bytes()].concat()
 }
 
 fn set_mode(node: &mut Node, mode: i8) {
@@ -22,16 +22,19 @@ fn set_mode(node: &mut Node, mode: i8) {
 fn each_mode_takes_its_own_set_point() {
     let mut node = Node::operational();
     let rated = BOARD.joint.limits.torque;
+    node.receive(0x205, &rpdo1(0x0F, 0, 0));
     node.receive(0x205, &rpdo1(0x0F, -250, 1_500_000));
     let Demand { controlword, command, .. } = node.image.demand();
     assert_eq!(controlword, Controlword(0x0F));
     assert_eq!((command.mode, command.position), (Mode::Torque, 0.0));
     assert!((command.torque + 0.25 * rated).abs() < 1e-6 * rated);
     set_mode(&mut node, 8);
+    node.receive(0x205, &rpdo1(0x0F, -250, 1_500_001));
     let command = node.image.demand().command;
     assert_eq!(command.mode, Mode::Position);
     assert!((command.position - 1.5).abs() < 1e-6 && (command.torque + 0.25 * rated).abs() < 1e-6 * rated);
-    node.receive(0x305, &rpdo2(0x0F, 9, 1, -2_500));
+    node.receive(0x305, &rpdo2(0x0F, 9, 0));
+    node.receive(0x305, &rpdo2(0x0F, 9, -2_500));
     let command = node.image.demand().command;
     assert_eq!((command.mode, command.velocity), (Mode::Velocity, -2.5));
 }
@@ -83,12 +86,107 @@ fn the_impedance_frame_is_the_mini_cheetahs() {
 }
 
 #[test]
-fn a_joint_that_was_not_told_where_to_go_is_asked_for_no_torque() {
+fn a_joint_that_was_not_told_where_to_go_holds_where_it_is() {
     let mut node = Node::operational();
-    for mode in [8, -1] {
-        node.receive(0x305, &rpdo2(0x0F, mode, mode as u8, 0));
-        assert_eq!(node.image.demand().command, Command::default());
+    for mode in [8, -1, 9, 10, 0] {
+        node.receive(0x305, &rpdo2(0x0F, mode, 700));
+        assert_eq!(node.image.demand().command, HOLD, "mode {mode}");
+        assert_eq!(node.number(0x6061, 0), u64::from(mode as u8));
     }
+}
+
+/// Nothing is asked of the joint but to stay where it is.
+const HOLD: Command = Command { mode: Mode::Hold, ..Command::NOTHING };
+
+#[test]
+fn a_position_counts_once_it_is_another_one_by_sdo_or_with_the_release_of_halt() {
+    let at = |node: &Node| match node.image.demand().command {
+        Command { mode: Mode::Position, position, .. } => Some((1e6 * position).round() as i32),
+        _ => None,
+    };
+    let entered = |position| {
+        let mut node = Node::operational();
+        set_mode(&mut node, 8);
+        node.receive(0x205, &rpdo1(0x07, 0, 1));
+        for _ in 0..3 {
+            node.receive(0x205, &rpdo1(0x0F, 0, position));
+            assert_eq!(at(&node), None);
+        }
+        node
+    };
+    for position in [0, 1, 500] {
+        let mut node = entered(position);
+        node.receive(0x205, &rpdo1(0x0F, 0, position + 1));
+        assert_eq!(at(&node), Some(position + 1));
+        // And back.
+        node.receive(0x205, &rpdo1(0x0F, 0, position));
+        assert_eq!(at(&node), Some(position));
+        // Nothing of it is left once operation was disabled, or another mode was chosen meanwhile.
+        node.receive(0x205, &rpdo1(0x07, 0, position + 2));
+        node.receive(0x205, &rpdo1(0x0F, 0, position + 3));
+        node.receive(0x205, &rpdo1(0x0F, 0, position + 3));
+        assert_eq!(at(&node), None);
+        node.receive(0x205, &rpdo1(0x0F, 0, position));
+        set_mode(&mut node, 9);
+        set_mode(&mut node, 8);
+        node.receive(0x205, &rpdo1(0x0F, 0, position));
+        assert_eq!(at(&node), None);
+
+        let mut node = entered(position);
+        node.download(0x607A, 0, &position.to_le_bytes()).unwrap();
+        assert_eq!(at(&node), Some(position));
+
+        let mut node = entered(position);
+        node.receive(0x205, &rpdo1(0x10F, 0, position));
+        assert_eq!(at(&node), None);
+        node.receive(0x205, &rpdo1(0x0F, 0, position));
+        assert_eq!(at(&node), Some(position));
+    }
+}
+
+#[test]
+fn halt_holds_in_every_mode_and_keeps_only_the_torque_that_bears_a_load() {
+    let mut node = Node::operational();
+    for mode in [8, 9, 10, -1, 0, -2] {
+        set_mode(&mut node, mode);
+        node.receive(0x205, &rpdo1(0x0F, 0, 0));
+        node.receive(0x205, &rpdo1(0x0F, 100, mode.into()));
+        node.receive(0x405, &[1, 2, 3, 4, 5, 6, 7, 8]);
+        node.download(0x60FF, 0, &1_000i32.to_le_bytes()).unwrap();
+        node.download(0x2107, 1, &7u64.to_le_bytes()).unwrap();
+        let moving = node.image.demand().command;
+        assert_eq!(node.shared.follows(), matches!(mode, 8 | 9 | 10 | -1), "mode {mode}");
+        node.receive(0x205, &rpdo1(0x10F, 100, mode.into()));
+        let Demand { controlword, command, .. } = node.image.demand();
+        assert!(controlword.enables_operation() && controlword.halts() && !node.shared.follows());
+        match mode {
+            -2 => assert_eq!(command, Command { mode: Mode::OpenLoop, ..Command::NOTHING }),
+            8 | 9 => assert_eq!(command, Command { torque: moving.torque, ..HOLD }),
+            _ => assert_eq!(command, HOLD, "mode {mode}"),
+        }
+        assert!(mode == 0 || moving != command, "mode {mode}");
+        node.receive(0x205, &rpdo1(0x0F, 100, mode.into()));
+        assert_eq!(node.image.demand().command, moving, "mode {mode} goes on");
+    }
+}
+
+#[test]
+fn the_statusword_tells_whether_the_target_is_followed() {
+    let mut node = Node::operational();
+    set_mode(&mut node, 9);
+    let follows = |node: &mut Node| node.number(0x6041, 0) >> 12 & 1;
+    node.receive(0x305, &rpdo2(0x0F, 9, 0));
+    node.observed.telemetry.state = State::OperationEnabled;
+    assert_eq!(follows(&mut node), 0);
+    node.receive(0x305, &rpdo2(0x0F, 9, 0));
+    assert_eq!(follows(&mut node), 1);
+    node.receive(0x305, &rpdo2(0x10F, 9, 0));
+    assert_eq!(follows(&mut node), 0);
+    node.receive(0x305, &rpdo2(0x0F, 9, 0));
+    assert_eq!(follows(&mut node), 1);
+    // The drive is elsewhere than the controlword asks for.
+    node.observed.telemetry.state = State::SwitchedOn;
+    assert_eq!(follows(&mut node), 0);
 }
 
 #[test]
@@ -109,8 +207,9 @@ fn every_transition_ends_every_set_point_and_keeps_the_mode() {
         assert_eq!(node.image.demand(), after);
         node.receive(0, &[1, NODE]);
         let Demand { controlword, command, .. } = node.image.demand();
-        assert_eq!((controlword, command), (Controlword::QUICK_STOP, Command::default()));
+        assert_eq!((controlword, command), (Controlword::QUICK_STOP, HOLD));
         node.receive(0x205, &rpdo1(0x0F, 0, 500_000));
+        node.receive(0x205, &rpdo1(0x0F, 0, 500_001));
         assert_eq!(node.image.demand().command.mode, Mode::Position);
     }
 }
@@ -125,6 +224,8 @@ fn set_points_by_sdo_need_operational_and_a_mode_does_not() {
     }
     set_mode(&mut node, 9);
     assert_eq!(node.download(0x6060, 0, &[3]), Err(0x0609_0030));
+    set_mode(&mut node, 0);
+    set_mode(&mut node, 9);
     node.receive(0, &[1, NODE]);
     let before = node.image.demand().sequence;
     node.download(0x6040, 0, &[0x06, 0]).unwrap();
@@ -135,25 +236,46 @@ fn set_points_by_sdo_need_operational_and_a_mode_does_not() {
 }
 
 #[test]
-fn a_repeated_counter_does_not_renew_the_deadline() {
+fn a_pdo_renews_the_deadline_by_its_arrival_whatever_it_carries() {
     let mut node = Node::operational();
-    let mut sequences = [1u8, 1, 2, 2].map(|counter| {
-        node.receive(0x305, &rpdo2(0x0F, 9, counter, 0));
+    let mut last = node.image.demand().sequence;
+    for _ in 0..3 {
+        for (id, data) in [(0x205, rpdo1(0x0F, 0, 0)), (0x305, rpdo2(0x0F, 9, 0)), (0x405, vec![0; 8])] {
+            node.receive(id, &data);
+            last += 1;
+            assert_eq!(node.image.demand().sequence, last, "{id:03x}");
+        }
+    }
+}
+
+#[test]
+fn a_counter_that_is_mapped_and_repeated_does_not_renew_the_deadline() {
+    let mut node = Node::new();
+    node.download(0x1401, 1, &0x8000_0305u32.to_le_bytes()).unwrap();
+    node.download(0x1601, 0, &[0]).unwrap();
+    for (entry, object) in (1..).zip([0x6040_0010u32, 0x2010_0108, 0x60FF_0020]) {
+        node.download(0x1601, entry, &object.to_le_bytes()).unwrap();
+    }
+    node.download(0x1601, 0, &[3]).unwrap();
+    node.download(0x1401, 1, &0x305u32.to_le_bytes()).unwrap();
+    node.receive(0, &[1, NODE]);
+    let mut sequences = [0u8, 0, 1, 1, 2].map(|counter| {
+        node.receive(0x305, &rpdo2(0x0F, counter as i8, 0));
         node.image.demand().sequence
     });
-    assert_eq!((sequences[0], sequences[2]), (sequences[1], sequences[3]));
-    assert_eq!(sequences[2], sequences[0] + 1);
+    let first = sequences[0];
+    assert_eq!(sequences, [first, first, first + 1, first + 1, first + 2]);
     // A PDO without the counter is not measured by it.
-    sequences[3] += 1;
+    sequences[4] += 1;
     node.receive(0x205, &rpdo1(0x0F, 0, 0));
-    assert_eq!(node.image.demand().sequence, sequences[3]);
+    assert_eq!(node.image.demand().sequence, sequences[4]);
 }
 
 #[test]
 fn a_mode_that_does_not_exist_changes_nothing() {
     let mut node = Node::operational();
-    node.receive(0x305, &rpdo2(0x0F, 9, 1, 5));
-    node.receive(0x305, &rpdo2(0x0F, 3, 2, 6));
+    node.receive(0x305, &rpdo2(0x0F, 9, 5));
+    node.receive(0x305, &rpdo2(0x0F, 3, 6));
     assert_eq!(node.image.demand().command, Command { mode: Mode::Velocity, velocity: 0.006, ..Command::default() });
 }
 

@@ -13,6 +13,9 @@
 //!   where a signal is clamped or a torque saturates. The fixed-point model is a fine staircase: between two states that differ
 //!   in that signal alone it moves by at most slope times distance plus twice the [resolution](Certificate::resolution).
 //!
+//! Pre-sliding elements have a state, whatever which: their torque is bounded, and the slope over velocity contains what one evaluation
+//! bends, a thousand times a second or more often. Over the position they are a spring of the sum of level times stiffness.
+//!
 //! Not certified: what the [fade](crate::friction::domain::Fade) beyond the trained box and the cross-fade between sets add to these slopes.
 //! The compensation limits both by its slew rate.
 
@@ -21,6 +24,7 @@ mod network;
 mod physical;
 mod slopes;
 
+use crate::friction::common::CommonTerms;
 use crate::friction::domain::Domain;
 use crate::friction::smooth::tanh;
 use crate::friction::state::Signal;
@@ -169,10 +173,10 @@ impl core::fmt::Display for Decimal {
 
 /// Computes what can be proved of `parameters`, whatever their limits; an error where a sum could wrap.
 pub fn prove(parameters: &FrictionParameters) -> Result<Certificate, Refusal> {
-    let FrictionParameters { domain, selector, sets } = parameters;
+    let FrictionParameters { domain, selector, common, sets } = parameters;
     let mut proved = None;
     for (index, set) in sets.iter().enumerate().take(selector.sets()) {
-        prove_set(domain, set, index, selector.sets(), &mut proved)?;
+        prove_set(domain, common, set, index, selector.sets(), &mut proved)?;
     }
     Ok(proved.unwrap_or_default())
 }
@@ -181,6 +185,7 @@ pub fn prove(parameters: &FrictionParameters) -> Result<Certificate, Refusal> {
 #[inline(never)]
 pub(crate) fn prove_set(
     domain: &Domain,
+    common: &CommonTerms,
     set: &ParameterSet,
     index: usize,
     sets: usize,
@@ -188,7 +193,8 @@ pub(crate) fn prove_set(
 ) -> Result<(), Refusal> {
     let depth = depth(sets);
     let velocity_shift = domain.shifts()[Signal::Velocity as usize];
-    let physical = physical::bounds(&set.physical, domain, depth).ok_or(Refusal::PhysicalOverflow { set: index })?;
+    let physical =
+        physical::bounds(&set.physical, common, domain, depth).ok_or(Refusal::PhysicalOverflow { set: index })?;
     let network = match &set.network {
         Some(network) => network::bounds(network, domain, depth).map_err(|sum| Refusal::NetworkOverflow {
             set: index,
@@ -198,7 +204,7 @@ pub(crate) fn prove_set(
         })?,
         None => network::Bounds::default(),
     };
-    let slope = physical.slope.per_unit(velocity_shift).add(network.velocity_slope);
+    let slope = physical.slope.per_unit(velocity_shift).add(network.velocity_slope).add(physical.bending);
     let this = Certificate {
         output: physical.torque.add(network.torque).magnitude(),
         network: network.torque.magnitude(),

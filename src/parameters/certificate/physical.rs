@@ -3,8 +3,11 @@
 use super::interval::Interval;
 use super::{bisect, tanh_at};
 use crate::dsp::{narrow, saturate};
+use crate::friction::common::CommonTerms;
 use crate::friction::domain::Domain;
+use crate::friction::maxwell_slip::MAX_STIFFNESS;
 use crate::friction::physical::{Directional, PhysicalParameters, PreparedTerms, Scaling, Terms, times};
+use crate::friction::ripple::Ripple;
 use crate::friction::smooth::{TANH, atan, stribeck, stribeck_slope};
 use crate::friction::state::{SIGNALS, Signal};
 
@@ -15,6 +18,8 @@ pub(super) struct Bounds {
     pub(super) torque: Interval,
     /// Slope over velocity, Q16.16 per full scale.
     pub(super) slope: Interval,
+    /// Slope over velocity that bending the pre-sliding elements adds in one evaluation, 1/256 Nm s/rad.
+    pub(super) bending: Interval,
     /// How far the fixed-point model departs from the smooth one whose slope is bounded, Q16.16.
     pub(super) resolution: u32,
 }
@@ -26,21 +31,39 @@ struct CellBounds {
     slope: Interval,
 }
 
+/// What the common terms can give, whatever the velocity.
+struct Common {
+    /// Added to the Coulomb friction, Q16.16.
+    level: Interval,
+    /// Sum of products, 47 fraction bits.
+    sum: Interval,
+    /// See [`Bounds::bending`].
+    bending: Interval,
+    /// Roundings of pre-sliding and ripple, Q16.16.
+    roundings: i64,
+}
+
 /// One, Q16.16.
 const ONE: Interval = Interval::point(1 << 16);
 
 /// Bounds, or nothing where the sum could leave the range of a torque.
 #[inline(never)]
-pub(super) fn bounds(parameters: &PhysicalParameters, domain: &Domain, depth: u32) -> Option<Bounds> {
+pub(super) fn bounds(
+    parameters: &PhysicalParameters,
+    common: &CommonTerms,
+    domain: &Domain,
+    depth: u32,
+) -> Option<Bounds> {
     let (physical, box_) = (&PreparedTerms::new(parameters), scaled_box(&Scaling::new(domain)));
     if !harmonics_fit(physical) {
         return None;
     }
+    let common = common_bounds(common, coulomb_factor(physical, &box_))?;
     let velocity = box_[Signal::Velocity as usize];
     let found = bisect(
         velocity,
         depth,
-        &|cell: &Interval| cell_bounds(physical, &box_, *cell),
+        &|cell: &Interval| cell_bounds(physical, &common, &box_, *cell),
         &|a, b| CellBounds { sum: a.sum.union(b.sum), slope: a.slope.union(b.slope) },
         &|found, new| found.sum.contains(new.sum) && found.slope.contains(new.slope),
         &halves,
@@ -51,7 +74,8 @@ pub(super) fn bounds(parameters: &PhysicalParameters, domain: &Domain, depth: u3
         torque: found.sum.map(|sum| narrow(sum) as i64),
         // Zero belongs to it, for beyond the box the velocity is clamped.
         slope: found.slope.union(Interval::ZERO),
-        resolution: resolution(physical, &box_),
+        bending: common.bending,
+        resolution: resolution(physical, &common, &box_),
     })
 }
 
@@ -114,20 +138,55 @@ fn clip(interval: Interval) -> Interval {
     interval.map(|value| saturate(value) as i64)
 }
 
-/// The Coulomb levels, with their factor, that a velocity interval can select, Q16.16.
-fn coulomb_levels(physical: &PreparedTerms, box_: &[Interval; SIGNALS], velocity: Interval) -> Interval {
+/// The factor of dry friction, Q16.16.
+fn coulomb_factor(physical: &PreparedTerms, box_: &[Interval; SIGNALS]) -> Interval {
     let [_, _, load, _, th, _] = *box_;
     let c = &physical.coefficients;
-    let factor =
-        clip(clip(ONE.add(factor_part(c.coulomb_temperature, th))).add(factor_part(c.coulomb_load, load.abs())));
-    rounded_times(level(physical.coulomb, velocity), factor)
+    clip(clip(ONE.add(factor_part(c.coulomb_temperature, th))).add(factor_part(c.coulomb_load, load.abs())))
 }
 
-fn cell_bounds(physical: &PreparedTerms, box_: &[Interval; SIGNALS], v: Interval) -> CellBounds {
+/// The Coulomb levels, with their factor, that a velocity interval can select, Q16.16.
+fn coulomb_levels(
+    physical: &PreparedTerms,
+    common: &Common,
+    box_: &[Interval; SIGNALS],
+    velocity: Interval,
+) -> Interval {
+    rounded_times(clip(level(physical.coulomb, velocity).add(common.level)), coulomb_factor(physical, box_))
+}
+
+/// Bounds of the common terms, or nothing where their own sums could wrap. `factor`: of dry friction, Q16.16.
+#[inline(never)]
+fn common_bounds(common: &CommonTerms, factor: Interval) -> Option<Common> {
+    let (level, torque) = Ripple::bound(&common.ripples);
+    let (mut pre_sliding, mut stiffness) = (0i64, 0i64);
+    for element in common.elements {
+        let level = element.level as i64;
+        pre_sliding += level;
+        // Fewer than 2^60 each; in Nm/rad they have 32 fraction bits.
+        stiffness += level * element.stiffness.min(MAX_STIFFNESS) as i64;
+    }
+    let fit = [level, torque, pre_sliding].into_iter().all(|bound| bound < 1 << 31);
+    // Per rad in 8 fraction bits, a thousandth of it per rad/s; the factor may exceed one.
+    let per_step = Interval { low: 0, high: stiffness / (1_000 << 24) + 1 };
+    fit.then(|| Common {
+        level: Interval::symmetric(level),
+        roundings: if pre_sliding == 0 && level == 0 && torque == 0 { 0 } else { 4 },
+        sum: Interval::symmetric(torque)
+            .times(Interval::point(1 << 31))
+            .add(rounded_times(Interval::symmetric(pre_sliding), factor).times(Interval::point(i32::MAX as i64))),
+        bending: match pre_sliding {
+            0 => Interval::ZERO,
+            _ => per_step.times(factor).shift_right(16).union(Interval::ZERO),
+        },
+    })
+}
+
+fn cell_bounds(physical: &PreparedTerms, common: &Common, box_: &[Interval; SIGNALS], v: Interval) -> CellBounds {
     let [q, _, load, _, th, a] = *box_;
     let c = &physical.coefficients;
 
-    let mut sum = Interval::point((c.constant as i64) << 31);
+    let mut sum = Interval::point((c.constant as i64) << 31).add(common.sum);
     for (coefficient, signal) in [(c.position, q), (c.temperature, th), (c.load, load), (c.rotor_inertia, a)] {
         sum = sum.add(product(coefficient, signal));
     }
@@ -141,10 +200,17 @@ fn cell_bounds(physical: &PreparedTerms, box_: &[Interval; SIGNALS], v: Interval
     sum =
         sum.add(product(c.quadratic, v.map(|v| saturate((v * v.saturating_abs().min(i32::MAX as i64)) >> 31) as i64)));
     slope = slope.add(product(c.quadratic, speed).shift_right(30));
+    sum = sum.add(product(c.viscous_asymmetry, speed));
+    let side = c.viscous_asymmetry as i64;
+    slope = slope.add(match (v.low < 0, v.high > 0) {
+        (true, true) => Interval::symmetric(side),
+        (true, false) => Interval::point(-side),
+        _ => Interval::point(side),
+    });
 
     let argument = product(c.coulomb_slope, v).map(|p| saturate(p >> 22) as i64);
     let direction = argument.map(tanh_at);
-    let coulomb = coulomb_levels(physical, box_, v);
+    let coulomb = coulomb_levels(physical, common, box_, v);
     sum = sum.add(coulomb.times(direction));
     // Slope of the direction over full-scale velocity, Q16: table slope Q14 times 1 / v_c in Q16.
     let edge = tanh_slopes(argument).times(Interval::point(c.coulomb_slope as i64)).shift_right(14);
@@ -248,8 +314,8 @@ fn atan_slopes(argument: Interval) -> Interval {
 }
 
 /// Worst departure from the smooth model whose slopes are bounded, Q16.16.
-fn resolution(physical: &PreparedTerms, box_: &[Interval; SIGNALS]) -> u32 {
-    let coulomb = coulomb_levels(physical, box_, box_[Signal::Velocity as usize]).abs().high;
+fn resolution(physical: &PreparedTerms, common: &Common, box_: &[Interval; SIGNALS]) -> u32 {
+    let coulomb = coulomb_levels(physical, common, box_, box_[Signal::Velocity as usize]).abs().high;
     let stribeck = level(physical.stribeck, box_[Signal::Velocity as usize]).abs().high;
     let harmonics: i64 = physical.harmonic_difference.iter().map(|a| (*a as i64).abs()).sum();
     // Arguments are cut to 17 fraction bits before tanh (slope 1), to 18 before the Stribeck bump (slope 2.33): hardly more
@@ -257,8 +323,8 @@ fn resolution(physical: &PreparedTerms, box_: &[Interval; SIGNALS]) -> u32 {
     // where two directions have different levels, they meet at this distance from zero. The arc tangent's argument and
     // reciprocal are rounded at 2^-16 (slope 2 / pi).
     let levels = (coulomb >> 16) + (harmonics >> 16) + (stribeck >> 15) + ((physical.hysteresis as i64).abs() >> 15);
-    // Shifts above, v |v|, the harmonics' two roundings and the last one.
-    (levels + 4 + 1 + 2 + 1).min(u32::MAX as i64) as u32
+    // Shifts above, v |v|, the harmonics' two roundings, those of pre-sliding and ripple, and the last one.
+    (levels + 4 + 1 + 2 + common.roundings + 1).min(u32::MAX as i64) as u32
 }
 
 #[cfg(test)]

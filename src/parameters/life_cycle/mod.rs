@@ -10,15 +10,19 @@
 //! ([`LifeCycle::finished`]). Time is passed in, in milliseconds of a clock that does not wrap (u64). The bytes of an upload lie in
 //! a buffer of the caller's that nobody else writes; what was verified is compared by its checksum before it is run or stored.
 //!
-//! Versions: an image older than the floor is refused. Storing an image raises the floor to its version; the same version may come
-//! again. Rolling back goes to the stored previous image alone, whatever its version, and leaves the floor.
+//! Versions: an image older than the floor is refused. Storing an image whose tag was right raises the floor to its version; the same version may come
+//! again. Rolling back goes to the stored previous image alone, whatever its version, and leaves the floor. A joint without a key takes none that is
+//! older than what it stored, which guards against slips; a key that is given later begins without that, or an image of version FFFFFFFFh
+//! from anybody would be the last one for good.
+//!
+//! A key that is damaged locks: no image is taken, tried or rolled back.
 
 mod refusal;
 #[cfg(test)]
 mod tests;
 mod verification;
 
-use super::authentication::{Key, STAGING, lockout_left};
+use super::authentication::{Key, STAGING};
 use super::slots::SlotError;
 pub use refusal::Refusal;
 pub use verification::{Requirements, Verified};
@@ -103,7 +107,7 @@ pub enum Action {
     },
     /// Swap the stored image in again, or none where there is none.
     Revert,
-    /// Store the first `length` bytes of the staging buffer in the slots; then keep [`LifeCycle::floor`].
+    /// Store the first `length` bytes of the staging buffer in the slots, once [`LifeCycle::floor`] is kept.
     Store {
         /// Bytes of the image.
         length: usize,
@@ -134,6 +138,8 @@ pub struct Conditions<'a> {
     pub single_bank: bool,
     /// The key, once there is one.
     pub key: Option<&'a Key>,
+    /// The stored key is damaged.
+    pub locked: bool,
 }
 
 /// What verification leaves behind.
@@ -162,17 +168,17 @@ pub struct LifeCycle {
     trial_time: u32,
     ending: Option<Ending>,
     floor: u32,
+    newest: u32,
     failures: u16,
-    last_failure: u64,
     result: Option<Refusal>,
 }
 
 impl LifeCycle {
-    /// At start, at time `now`, ms: nothing is staged.
+    /// At start: nothing is staged.
     ///
-    /// `floor`: the highest of the kept floor and the versions of both stored images, so that a loss of power between storing an
-    /// image and keeping its floor does not lower it. `failures`: the kept count of wrong tags.
-    pub const fn new(requirements: Requirements, floor: u32, failures: u16, now: u64) -> Self {
+    /// `floor`: as it was kept. `newest`: the highest version of the stored images, whose tags nobody knows. `failures`: the kept count of
+    /// wrong tags.
+    pub const fn new(requirements: Requirements, floor: u32, newest: u32, failures: u16) -> Self {
         Self {
             requirements,
             state: State::Empty,
@@ -184,8 +190,8 @@ impl LifeCycle {
             trial_time: 0,
             ending: None,
             floor,
+            newest,
             failures,
-            last_failure: now,
             result: None,
         }
     }
@@ -210,19 +216,19 @@ impl LifeCycle {
         self.length
     }
 
-    /// Lowest version that is taken. To be kept when it has risen.
+    /// Highest version with a right tag that was to be stored. To be kept when it has risen, before the image is stored.
     pub const fn floor(&self) -> u32 {
         self.floor
     }
 
-    /// Wrong tags in a row. To be kept whenever it has changed, before the client is answered.
-    pub const fn failures(&self) -> u16 {
-        self.failures
+    /// Lowest version that is taken by a joint with a key, or without.
+    pub fn lowest(&self, has_key: bool) -> u32 {
+        if has_key { self.floor } else { self.floor.max(self.newest) }
     }
 
-    /// What is left of a lock-out, ms.
-    pub const fn lockout_left(&self, now: u64) -> u32 {
-        lockout_left(self.failures, now.saturating_sub(self.last_failure))
+    /// Wrong tags so far.
+    pub const fn failures(&self) -> u16 {
+        self.failures
     }
 
     /// What is left of a trial or shadow, ms; 0 outside.
@@ -292,6 +298,7 @@ impl LifeCycle {
     ) -> Result<Action, Refusal> {
         let result = match self.pending {
             Some(_) => Err(Refusal::Busy),
+            None if conditions.locked && command != Command::Discard => Err(Refusal::KeyDamaged),
             None => match command {
                 Command::Verify => self.verify(staging, conditions),
                 Command::Shadow => self.run(Mode::Shadow, staging, conditions),
@@ -339,7 +346,7 @@ impl LifeCycle {
         let next = match (action, outcome) {
             (Action::Store { .. }, Ok(())) => {
                 if let Some(checked) = self.verified {
-                    self.floor = self.floor.max(checked.verified.version);
+                    self.newest = self.newest.max(checked.verified.version);
                 }
                 self.state = State::Committed;
                 Action::Activate
@@ -419,24 +426,12 @@ impl LifeCycle {
         if let Some(announced) = self.announced.filter(|announced| *announced != length) {
             return Err(Refusal::UploadLength { length, announced });
         }
-        let left = self.lockout_left(conditions.now);
-        if conditions.key.is_some() && left > 0 {
-            return Err(Refusal::LockedOut { left, failures: self.failures });
-        }
-        // A wrong tag is counted in flash before the client is answered.
-        if conditions.single_bank && conditions.armed && conditions.key.is_some() {
-            return Err(Refusal::Armed { command: Command::Verify });
-        }
         let upload = staging.get(..length).ok_or(Refusal::UploadTooLong { length })?;
         if !verification::authentic(upload, conditions.key)? {
             self.failures = self.failures.saturating_add(1);
-            self.last_failure = conditions.now;
             return Err(Refusal::TagWrong { failures: self.failures });
         }
-        if conditions.key.is_some() {
-            self.failures = 0;
-        }
-        let verified = verification::verify(upload, &self.requirements, self.floor)?;
+        let verified = verification::verify(upload, &self.requirements, self.lowest(conditions.key.is_some()))?;
         self.verified = Some(Checked { verified, checksum: CRC.checksum(upload), key: conditions.key.map(Key::id) });
         self.state = State::Verified;
         Ok(Action::Nothing)
@@ -482,9 +477,12 @@ impl LifeCycle {
     }
 
     fn commit(&mut self, staging: &[u8; STAGING], conditions: &Conditions) -> Result<Action, Refusal> {
-        let Verified { length, .. } = self.unchanged(Command::Commit, staging, conditions)?;
+        let Verified { length, version, .. } = self.unchanged(Command::Commit, staging, conditions)?;
         if conditions.single_bank && conditions.armed {
             return Err(Refusal::Armed { command: Command::Commit });
+        }
+        if conditions.key.is_some() {
+            self.floor = self.floor.max(version);
         }
         let before = self.state;
         self.state = State::Storing;

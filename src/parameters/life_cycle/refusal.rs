@@ -29,16 +29,11 @@ pub enum Refusal {
     TagMissing,
     /// The tag is not the image's.
     TagWrong {
-        /// Wrong tags in a row.
+        /// Wrong tags so far.
         failures: u16,
     },
-    /// Too many wrong tags: nothing is verified for a while.
-    LockedOut {
-        /// Time left, ms.
-        left: u32,
-        /// Wrong tags in a row.
-        failures: u16,
-    },
+    /// The stored key is damaged: nobody's tag can be checked.
+    KeyDamaged,
     /// An older image than one that was in use.
     Version {
         /// Version of the image.
@@ -119,7 +114,8 @@ impl Refusal {
             Self::Image(ImageError::Field { .. }) => 0x0207,
             Self::TagMissing => 0x0301,
             Self::TagWrong { .. } => 0x0302,
-            Self::LockedOut { .. } => 0x0303,
+            // 0303h was a lock-out.
+            Self::KeyDamaged => 0x0304,
             Self::Version { .. } => 0x0401,
             Self::Product { .. } => 0x0501,
             Self::Serial { .. } => 0x0502,
@@ -156,9 +152,11 @@ impl core::fmt::Display for Refusal {
             }
             Self::Image(error) => write!(f, "image: {error}"),
             Self::TagMissing => f.write_str("the joint has a key, but no tag of 32 bytes follows the image"),
-            Self::TagWrong { failures } => write!(f, "the tag is not that of this image and key ({failures} in a row)"),
-            Self::LockedOut { left, failures } => {
-                write!(f, "{failures} wrong tags in a row: nothing is verified for another {left} ms")
+            Self::TagWrong { failures } => {
+                write!(f, "the tag is not that of this image and key ({failures} wrong ones so far)")
+            }
+            Self::KeyDamaged => {
+                f.write_str("the joint's key is damaged: it takes no image, and keeps the one that it has")
             }
             Self::Version { version, floor } => write!(f, "image version {version}, must be at least {floor}"),
             Self::Product { image, joint } => write!(f, "image for product {image:#x}, this joint is {joint:#x}"),

@@ -5,6 +5,7 @@ use super::super::certificate::{self, Limits};
 use super::super::image::{Effort, GoldenMismatch, GoldenVector, Image, ImageError, MAX_LENGTH, Target};
 use super::super::slots::{Slot, WriteError};
 use super::*;
+use crate::friction::common::CommonTerms;
 use crate::friction::domain::{Domain, Range};
 use crate::friction::physical::{Coefficients, PhysicalParameters, Terms};
 use crate::friction::regime::Selector;
@@ -24,6 +25,7 @@ fn image(version: u32) -> Image {
     let friction = FrictionParameters {
         domain: Domain { ranges: [range; SIGNALS], margin: 0, reference_temperature: 0 },
         selector: Selector::default(),
+        common: CommonTerms::NONE,
         sets: [set, ParameterSet::default(), ParameterSet::default(), ParameterSet::default()],
     };
     let signals = [100, 200, 300, 400, 500, 600];
@@ -58,12 +60,13 @@ struct Joint {
     armed: bool,
     single_bank: bool,
     key: Option<Key>,
+    locked: bool,
 }
 
 impl Joint {
     fn new() -> Self {
         let life = LifeCycle::new(REQUIREMENTS, 0, 0, 0);
-        Self { life, staging: [0; STAGING], now: 0, armed: false, single_bank: true, key: None }
+        Self { life, staging: [0; STAGING], now: 0, armed: false, single_bank: true, key: None, locked: false }
     }
 
     fn upload(&mut self, bytes: &[u8]) {
@@ -75,7 +78,8 @@ impl Joint {
 
     fn command(&mut self, command: Command) -> Result<Action, Refusal> {
         let key = self.key.as_ref();
-        let conditions = Conditions { now: self.now, armed: self.armed, single_bank: self.single_bank, key };
+        let conditions =
+            Conditions { now: self.now, armed: self.armed, single_bank: self.single_bank, key, locked: self.locked };
         let result = self.life.command(command, &self.staging, &conditions);
         assert_eq!(self.life.result(), result.err());
         result
@@ -127,9 +131,9 @@ fn an_image_goes_from_bytes_to_flash() {
         assert_eq!(joint.life.state(), state);
     }
     assert_eq!(joint.command(Command::Commit), Ok(Action::Store { length: bytes.len() }));
-    assert_eq!((joint.life.state(), joint.life.floor()), (State::Storing, 0));
+    assert_eq!((joint.life.state(), joint.life.lowest(false)), (State::Storing, 0));
     assert_eq!(joint.life.finished(Ok(())), Action::Activate);
-    assert_eq!((joint.life.state(), joint.life.floor()), (State::Committed, 3));
+    assert_eq!((joint.life.state(), joint.life.lowest(false)), (State::Committed, 3));
     assert_eq!(joint.life.finished(Ok(())), Action::Nothing);
     assert_eq!((joint.life.state(), joint.life.length()), (State::Active, 0));
     assert_eq!(joint.command(Command::Discard), Ok(Action::Nothing));
@@ -185,7 +189,7 @@ fn a_failed_store_leaves_the_image_where_it_was_and_the_floor_too() {
     joint.command(Command::Commit).expect("stores");
     let error = SlotError::Write(WriteError { word: 3 });
     assert_eq!(joint.life.finished(Err(error)), Action::Nothing);
-    assert_eq!((joint.life.state(), joint.life.floor()), (State::Trial, 0));
+    assert_eq!((joint.life.state(), joint.life.lowest(false)), (State::Trial, 0));
     assert_eq!(joint.life.result(), Some(Refusal::Slots(error)));
     assert_eq!(joint.life.tick(5_000, false), Action::Revert, "and still ends");
 }
@@ -205,27 +209,75 @@ fn one_bank_is_written_with_the_motor_off_two_at_any_time() {
 }
 
 #[test]
-fn one_bank_counts_wrong_tags_with_the_motor_off() {
+fn a_tag_is_checked_under_current_too() {
     let mut joint = Joint::new();
     joint.key = Some(key());
-    joint.upload(&encoded(&image(1)));
     joint.armed = true;
-    assert_eq!(joint.command(Command::Verify), Err(Refusal::Armed { command: Command::Verify }));
-    assert_eq!(joint.life.failures(), 0);
-    joint.single_bank = false;
+    joint.upload(&encoded(&image(1)));
     assert_eq!(joint.command(Command::Verify), Err(Refusal::TagMissing));
-    (joint.single_bank, joint.armed) = (true, false);
-    assert_eq!(joint.command(Command::Verify), Err(Refusal::TagMissing));
+    joint.upload(&signed(&image(1)));
+    assert_eq!(joint.command(Command::Verify), Ok(Action::Nothing));
+    assert_eq!(joint.command(Command::Commit), Err(Refusal::Armed { command: Command::Commit }));
+    assert_eq!(joint.life.floor(), 0, "nothing was to be stored");
+}
+
+#[test]
+fn the_floor_rises_with_right_tags_alone() {
+    let store = |joint: &mut Joint, upload: &[u8]| {
+        joint.upload(upload);
+        assert_eq!(joint.command(Command::Verify), Ok(Action::Nothing));
+        joint.command(Command::Commit).expect("stores");
+        let floor = joint.life.floor();
+        joint.life.finished(Ok(()));
+        joint.life.finished(Ok(()));
+        assert_eq!((joint.life.state(), joint.life.floor()), (State::Active, floor), "kept before it is stored");
+        floor
+    };
+    let mut joint = Joint::new();
+    assert_eq!(store(&mut joint, &encoded(&image(u32::MAX))), 0);
+    // Without a key nothing older is taken by mistake.
+    joint.upload(&encoded(&image(u32::MAX - 1)));
+    assert_eq!(joint.refuses_to_verify(), Refusal::Version { version: u32::MAX - 1, floor: u32::MAX });
+    // The owner of a key begins anew, also after a loss of power.
+    joint.key = Some(key());
+    for life in [joint.life.clone(), LifeCycle::new(REQUIREMENTS, 0, u32::MAX, 0)] {
+        joint.life = life;
+        assert_eq!(store(&mut joint, &signed(&image(5))), 5);
+        joint.upload(&signed(&image(4)));
+        assert_eq!(joint.refuses_to_verify(), Refusal::Version { version: 4, floor: 5 });
+        assert_eq!(store(&mut joint, &signed(&image(5))), 5);
+        assert_eq!(store(&mut joint, &signed(&image(6))), 6);
+    }
+}
+
+#[test]
+fn a_damaged_key_takes_nothing_and_leaves_what_there_is() {
+    let mut joint = Joint::new();
+    joint.locked = true;
+    for upload in [encoded(&image(1)), signed(&image(1))] {
+        joint.upload(&upload);
+        for command in Command::ALL.into_iter().filter(|command| *command != Command::Discard) {
+            assert_eq!(joint.command(command), Err(Refusal::KeyDamaged), "{command:?}");
+        }
+    }
+    assert_eq!(joint.command(Command::Discard), Ok(Action::Nothing));
+    // Damaged while an image is on trial: it ends by itself, and goes no further.
+    let mut joint = Joint::verified(&encoded(&image(1)));
+    joint.command(Command::Trial).expect("runs");
+    joint.life.finished(Ok(()));
+    joint.locked = true;
+    assert_eq!(joint.command(Command::Commit), Err(Refusal::KeyDamaged));
+    assert_eq!(joint.life.tick(5_000, false), Action::Revert);
 }
 
 #[test]
 fn rolling_back_goes_past_the_floor_and_leaves_it() {
     let mut joint = Joint::new();
-    joint.life = LifeCycle::new(REQUIREMENTS, 9, 0, 0);
+    joint.life = LifeCycle::new(REQUIREMENTS, 0, 9, 0);
     assert_eq!(joint.command(Command::RollBack), Ok(Action::RollBack));
     assert_eq!(joint.life.finished(Ok(())), Action::Activate);
     assert_eq!(joint.life.finished(Ok(())), Action::Nothing);
-    assert_eq!((joint.life.state(), joint.life.floor()), (State::Active, 9));
+    assert_eq!((joint.life.state(), joint.life.lowest(false)), (State::Active, 9));
     joint.upload(&encoded(&image(8)));
     assert_eq!(joint.refuses_to_verify(), Refusal::Version { version: 8, floor: 9 });
     joint.command(Command::RollBack).expect("rolls back");
@@ -378,33 +430,23 @@ fn an_image_verified_before_the_key_came_needs_its_tag_after() {
 }
 
 #[test]
-fn wrong_tags_lock_out_for_longer_each_time_even_over_a_reset_and_a_right_one_ends_it() {
+fn wrong_tags_are_counted_and_a_right_one_is_always_taken() {
     let right = signed(&image(1));
     let mut wrong = right.clone();
     *wrong.last_mut().expect("a tag") ^= 1;
     let mut joint = Joint::new();
     joint.key = Some(key());
-    joint.upload(&wrong);
-    for failures in 1..=4 {
+    for failures in 1..=100 {
+        joint.upload(&wrong);
         assert_eq!(joint.refuses_to_verify(), Refusal::TagWrong { failures });
+        joint.upload(&right);
+        assert_eq!(joint.command(Command::Verify), Ok(Action::Nothing));
     }
-    joint.now += 400;
-    assert_eq!(joint.refuses_to_verify(), Refusal::LockedOut { left: 600, failures: 4 });
-    joint.upload(&right);
-    assert_eq!(joint.refuses_to_verify(), Refusal::LockedOut { left: 600, failures: 4 });
-    // Switched off and on: the count was kept, and the time begins anew.
-    joint.life = LifeCycle::new(REQUIREMENTS, 0, joint.life.failures(), 0);
+    joint.life = LifeCycle::new(REQUIREMENTS, 0, 0, u16::MAX);
     joint.upload(&wrong);
-    joint.now = 999;
-    assert_eq!(joint.refuses_to_verify(), Refusal::LockedOut { left: 1, failures: 4 });
-    joint.now = 1_000;
-    assert_eq!(joint.refuses_to_verify(), Refusal::TagWrong { failures: 5 });
+    assert_eq!(joint.refuses_to_verify(), Refusal::TagWrong { failures: u16::MAX });
     joint.upload(&right);
-    joint.now = 2_999;
-    assert_eq!(joint.refuses_to_verify(), Refusal::LockedOut { left: 1, failures: 5 });
-    joint.now = 3_000;
     assert_eq!(joint.command(Command::Verify), Ok(Action::Nothing));
-    assert_eq!(joint.life.failures(), 0);
 }
 
 #[test]
@@ -447,7 +489,7 @@ fn every_refusal_has_a_number_and_a_text_of_its_own() {
         Refusal::Image(ImageError::Field { name: "terms", offset: 1, value: 2, low: 3, high: 4 }),
         Refusal::TagMissing,
         Refusal::TagWrong { failures: 2 },
-        Refusal::LockedOut { left: 7, failures: 5 },
+        Refusal::KeyDamaged,
         Refusal::Version { version: 1, floor: 2 },
         Refusal::Product { image: 1, joint: 2 },
         Refusal::Serial { image: 1, joint: 2 },

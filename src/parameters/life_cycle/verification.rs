@@ -1,6 +1,6 @@
 //! Everything that must hold of an upload before a joint runs it; task or host, some tens of milliseconds on the board.
 //!
-//! In this order: lock-out, length and checksum, tag, the fields, version, target, unit, certificate, golden vectors. With a key, nothing
+//! In this order: length and checksum, tag, the fields, version, target, unit, certificate, golden vectors. With a key, nothing
 //! behind the length is interpreted before the tag is right; a damaged upload is told from a forged one by its checksum and costs no
 //! failure.
 
@@ -81,7 +81,8 @@ fn certified(image: &Pieces, limits: &Limits) -> Result<Certificate, certificate
     let mut set = ParameterSet::default();
     for index in 0..image.sets() {
         image.set(index, &mut set);
-        certificate::prove_set(&image.header.domain, &set, index, image.sets(), &mut proved)?;
+        let header = &image.header;
+        certificate::prove_set(&header.domain, &header.common, &set, index, image.sets(), &mut proved)?;
     }
     let proved = proved.unwrap_or_default();
     proved.hold(limits)?;

@@ -216,6 +216,11 @@ impl Slots {
         }
     }
 
+    /// Whether a slot was whole once and is not any more, as it was found at start or since. What it held may have been newer than what the other one holds.
+    pub const fn is_damaged(&self) -> bool {
+        matches!(self.first, SlotState::Damaged) || matches!(self.second, SlotState::Damaged)
+    }
+
     /// The newest whole slot.
     pub const fn active(&self) -> Option<Slot> {
         match (self.first, self.second) {

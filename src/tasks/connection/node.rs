@@ -60,8 +60,7 @@ fn identity() -> &'static Identity<'static> {
 fn images(program: &BoardProgram, stored: &StoredImages, identity: &Identity, start: &Start) -> Images<'static> {
     static BUFFER: ConstStaticCell<[u8; STAGING]> = ConstStaticCell::new([0; STAGING]);
 
-    let kept = program.guard.floor;
-    let floor = [stored.active, stored.previous].iter().flatten().map(|(image, _)| image.version).fold(kept, u32::max);
+    let newest = [stored.active, stored.previous].iter().flatten().map(|(image, _)| image.version).fold(0, u32::max);
     let requirements = Requirements {
         target: Target { product: identity.product, serial: identity.serial },
         effort: Effort::NewtonMetre,
@@ -72,9 +71,13 @@ fn images(program: &BoardProgram, stored: &StoredImages, identity: &Identity, st
             velocity_slope: u32::MAX,
         },
     };
-    let life = LifeCycle::new(requirements, floor, program.guard.failures, 0);
+    let life = LifeCycle::new(requirements, program.guard.floor, newest, program.guard.failures);
     let key = program.guard.key.clone();
-    Images::new(BUFFER.take(), life, key, *stored)
+    let mut images = Images::new(BUFFER.take(), life, key, *stored);
+    if program.guard.locked {
+        images.lock();
+    }
+    images
 }
 
 /// The task's part of the node.

@@ -136,15 +136,19 @@ impl Program for BoardProgram {
         self.store.store_record(record)
     }
 
+    fn damaged(&self) -> u8 {
+        self.store.damaged() | u8::from(self.guard.locked) << 2
+    }
+
     fn keep(&mut self, floor: u32, failures: u16) -> Result<(), SlotError> {
-        let guard = Guard { floor, failures, key: self.guard.key.clone() };
+        let guard = Guard { floor, failures, ..self.guard.clone() };
         self.store.keep(&guard)?;
         self.guard = guard;
         Ok(())
     }
 
     fn provision(&mut self, key: &Key) -> Result<(), SlotError> {
-        let guard = Guard { key: Some(key.clone()), ..self.guard };
+        let guard = Guard { key: Some(key.clone()), ..self.guard.clone() };
         self.store.keep(&guard)?;
         self.guard = guard;
         Ok(())

@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | 0, 1 | 1 | friction image |
 //! | 2, 3 | 2 | record of object 1010h ([`Stored`](joint_firmware::objects::Stored)) |
-//! | 4, 5 | 3 | guard: floor (4 bytes), wrong tags (2), whether there is a key (1), reserved (1), key (32), all little-endian |
+//! | 4, 5 | 3 | guard: floor (4 bytes), wrong tags (2), key: 0 none, 1 present, 2 lost by damage (1), reserved (1), key (32), all little-endian |
 
 use crate::board::flash::Parameters;
 use joint_firmware::objects::StoredImages;
@@ -18,12 +18,17 @@ use joint_firmware::parameters::slots::{Layout, Slot, SlotError, Slots, WriteErr
 pub struct Guard {
     /// Lowest version that is taken.
     pub floor: u32,
-    /// Wrong tags in a row.
+    /// Wrong tags so far.
     pub failures: u16,
     /// The key, once there is one.
     pub key: Option<Key>,
+    /// What was kept is damaged, and whether there was a key is not known.
+    pub locked: bool,
 }
 
+/// There is a key; what was kept is damaged.
+const PRESENT: u8 = 1;
+const LOCKED: u8 = 2;
 const GUARD: usize = 8 + KEY;
 
 impl Guard {
@@ -31,7 +36,7 @@ impl Guard {
         let mut bytes = [0; GUARD];
         let [a, b, c, d] = self.floor.to_le_bytes();
         let [low, high] = self.failures.to_le_bytes();
-        let head = [a, b, c, d, low, high, self.key.is_some().into(), 0];
+        let head = [a, b, c, d, low, high, if self.locked { LOCKED } else { self.key.is_some().into() }, 0];
         let key = self.key.as_ref().map_or([0; KEY], Key::to_bytes);
         bytes.iter_mut().zip(head.into_iter().chain(key)).for_each(|(place, byte)| *place = byte);
         bytes
@@ -39,8 +44,13 @@ impl Guard {
 
     fn decode(bytes: &[u8; GUARD]) -> Self {
         let (&[a, b, c, d, low, high, present, _], key) = bytes.split_first_chunk().unwrap_or((&[0; 8], &[]));
-        let key = key.first_chunk().filter(|_| present != 0).and_then(|key| Key::new(*key).ok());
-        Self { floor: u32::from_le_bytes([a, b, c, d]), failures: u16::from_le_bytes([low, high]), key }
+        let key = key.first_chunk().filter(|_| present == PRESENT).and_then(|key| Key::new(*key).ok());
+        Self {
+            floor: u32::from_le_bytes([a, b, c, d]),
+            failures: u16::from_le_bytes([low, high]),
+            key,
+            locked: present == LOCKED,
+        }
     }
 }
 
@@ -122,13 +132,24 @@ impl Store {
         self.records.store(&mut self.flash, record)
     }
 
-    /// What guards the images.
+    /// What guards the images. Where it is damaged and no key is left the joint is locked, and that is kept: the slot that is damaged is given up.
     pub fn guard(&mut self) -> Guard {
         let mut bytes = [0; GUARD];
-        match self.guards.load(&mut self.flash, &mut bytes) {
+        let mut guard = match self.guards.load(&mut self.flash, &mut bytes) {
             Ok(Some(GUARD)) => Guard::decode(&bytes),
             _ => Guard::default(),
+        };
+        if self.guards.is_damaged() && guard.key.is_none() && !guard.locked {
+            guard.locked = true;
+            // Where it cannot be written it is found damaged again.
+            let _ = self.keep(&guard);
         }
+        guard
+    }
+
+    /// What is damaged: bits as of EMCY 6310h.
+    pub fn damaged(&self) -> u8 {
+        u8::from(self.images.is_damaged()) | u8::from(self.records.is_damaged()) << 1
     }
 
     /// Keeps what guards the images.

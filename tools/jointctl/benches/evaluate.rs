@@ -3,6 +3,7 @@
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
+use joint_firmware::friction::common::CommonTerms;
 use joint_firmware::friction::domain::{Domain, Range};
 use joint_firmware::friction::network::{NetworkParameters, Neuron};
 use joint_firmware::friction::physical::{Coefficients, PhysicalParameters, Terms};
@@ -29,6 +30,7 @@ fn parameters() -> FrictionParameters {
     FrictionParameters {
         domain: Domain { ranges: [range; SIGNALS], margin: 1 << 15, reference_temperature: 0 },
         selector: Selector::default(),
+        common: CommonTerms::NONE,
         sets: [set, ParameterSet::default(), ParameterSet::default(), ParameterSet::default()],
     }
 }

@@ -4,8 +4,11 @@
 //!
 //! ```text
 //! friction = c0 + c_q q + c_T th + c_tau tau_t                              linear      (001 eq. 5)
-//!          + f_v (1 + k_v th) v + f_2 v |v|                                 viscous
-//!          + F_c(+/-) (1 + k_c th + k_l |tau_t|) tanh(v / v_c)              Coulomb     (002 eq. 6, asymmetric)
+//!          + f_v (1 + k_v th) v + f_2 v |v| + f_a |v|                       viscous
+//!          + (1 + k_c th + k_l |tau_t|) dry
+//!    dry   = (F_c(+/-) + sum_k A_k sin(h_k q) + B_k cos(h_k q)) d           Coulomb     (002 eq. 6, asymmetric), ripple
+//!          + sum_n L_n z_n                                                  pre-sliding (Maxwell-slip elements)
+//!          + sum_k C_k sin(h_k q) + D_k cos(h_k q)                          ripple
 //!          + sqrt(2e) (F_brk(+/-) - F_c(+/-)) exp(-u^2) u,  u = v / v_st    Stribeck    (001 eq. 6)
 //!          + b_h atan(s v + z clamp(k_a a, -1, 1))                          hysteresis  (003 eq. 4)
 //!          + sum_j (b_j+ (1 + d)/2 + b_j- (1 - d)/2) 4 sin((2j-1) h q) / (pi (2j-1))    (003 eq. 5)
@@ -16,11 +19,17 @@
 //! two directions are blended by d; its sign(a) is a ramp of slope k_a, so that noise around a = 0 does not chatter.
 
 use crate::friction_parameter::{FrictionParameter, HARMONICS};
+use joint_firmware::friction::maxwell_slip::ELEMENTS;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
 /// sqrt(2 e): makes the Stribeck peak, at u = 1/sqrt(2), exactly F_brk - F_c.
 pub const STRIBECK_PEAK: f64 = 2.331_643_981_597_124;
+
+/// Number of ripple series.
+pub const RIPPLES: usize = joint_firmware::friction::ripple::RIPPLES;
+/// How far each pre-sliding element is bent: z, -1 to 1.
+pub type Bent = [f64; ELEMENTS];
 
 /// One summand, or one factor, of the friction formula that can be on or off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -54,11 +63,19 @@ pub enum Term {
     Harmonics,
     /// I_a a.
     RotorInertia,
+    /// f_a |v|: half the difference of the viscous friction of both directions.
+    ViscousAsymmetry,
+    /// The Maxwell-slip elements.
+    PreSliding,
+    /// The first ripple over the position.
+    Ripple,
+    /// The second ripple over the position.
+    SecondRipple,
 }
 
 impl Term {
     /// All terms, in the order of the formula.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 18] = [
         Self::Constant,
         Self::Position,
         Self::Temperature,
@@ -73,13 +90,19 @@ impl Term {
         Self::Hysteresis,
         Self::Harmonics,
         Self::RotorInertia,
+        Self::ViscousAsymmetry,
+        Self::PreSliding,
+        Self::Ripple,
+        Self::SecondRipple,
     ];
+    /// The terms that each parameter set of an image has for itself; the others are common to all.
+    pub const OF_A_SET: usize = 15;
 }
 
 /// A set of terms; written to files as the list of their names.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(from = "Vec<Term>", into = "Vec<Term>")]
-pub struct Terms(u16);
+pub struct Terms(u32);
 
 impl Terms {
     /// The set of the given terms.
@@ -89,17 +112,17 @@ impl Terms {
 
     /// True when the term is on.
     pub const fn contains(self, term: Term) -> bool {
-        self.0 & (1 << term as u16) != 0
+        self.0 & (1 << term as u32) != 0
     }
 
     /// The set with the term on.
     pub const fn with(self, term: Term) -> Self {
-        Self(self.0 | 1 << term as u16)
+        Self(self.0 | 1 << term as u32)
     }
 
     /// The set with the term off.
     pub const fn without(self, term: Term) -> Self {
-        Self(self.0 & !(1 << term as u16))
+        Self(self.0 & !(1 << term as u32))
     }
 
     /// The terms that are on, in the order of the formula.
@@ -133,6 +156,8 @@ pub struct JointState {
     pub load: f64,
     /// Temperature T.
     pub temperature: f64,
+    /// How far the pre-sliding elements are bent.
+    pub bent: Bent,
 }
 
 /// One value for each direction of the velocity.
@@ -149,6 +174,21 @@ impl Directional {
     pub fn at(self, velocity: f64) -> f64 {
         if velocity < 0.0 { self.negative } else { self.positive }
     }
+}
+
+/// One series over the position.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Ripple {
+    /// h, rad per unit of position; 0: absent.
+    pub frequency: f64,
+    /// A: sine of what is added to the Coulomb friction of both directions.
+    pub level_sine: f64,
+    /// B: cosine of it.
+    pub level_cosine: f64,
+    /// C: sine of what is added to friction, whatever the direction.
+    pub torque_sine: f64,
+    /// D: cosine of it.
+    pub torque_cosine: f64,
 }
 
 /// The physical friction model: which terms are on, and all their parameters (module documentation: formula).
@@ -202,6 +242,18 @@ pub struct FrictionModel {
     pub rotor_inertia: f64,
     /// T_ref, degrees Celsius.
     pub reference_temperature: f64,
+    /// f_a.
+    #[serde(default)]
+    pub viscous_asymmetry: f64,
+    /// 1/d_n: the reciprocal of the way that bends a pre-sliding element to its end; 0: absent. Not identified, but chosen.
+    #[serde(default)]
+    pub element_stiffness: [f64; ELEMENTS],
+    /// L_n.
+    #[serde(default)]
+    pub element_level: [f64; ELEMENTS],
+    /// Ripples over the position; their frequencies are not identified, but chosen.
+    #[serde(default)]
+    pub ripples: [Ripple; RIPPLES],
 }
 
 impl FrictionModel {
@@ -248,16 +300,40 @@ impl FrictionModel {
             sum += self.quadratic * v * v.abs();
             derivative(P::Quadratic, v * v.abs());
         }
+        if on(Term::ViscousAsymmetry) {
+            sum += self.viscous_asymmetry * v.abs();
+            derivative(P::ViscousAsymmetry, v.abs());
+        }
         if on(Term::RotorInertia) {
             sum += self.rotor_inertia * a;
             derivative(P::RotorInertia, a);
+        }
+        let mut level = 0.0;
+        let mut shapes = [(0.0, 0.0); RIPPLES];
+        for (k, (ripple, shape)) in self.ripples.iter().zip(&mut shapes).enumerate() {
+            if on([Term::Ripple, Term::SecondRipple][k]) {
+                let (sine, cosine) = (ripple.frequency * q).sin_cos();
+                *shape = (sine, cosine);
+                level += ripple.level_sine * sine + ripple.level_cosine * cosine;
+                sum += ripple.torque_sine * sine + ripple.torque_cosine * cosine;
+                derivative(P::RippleTorqueSine(k), sine);
+                derivative(P::RippleTorqueCosine(k), cosine);
+            }
         }
         if on(Term::Coulomb) || on(Term::Harmonics) {
             let direction = (v * self.coulomb_slope).tanh();
             let steepness = v * (1.0 - direction * direction);
             let mut by_slope = 0.0;
             if on(Term::Coulomb) {
-                sum += self.coulomb_and_stribeck(s, warming, direction, steepness, &mut by_slope, &mut derivative);
+                let ripple = (level, shapes);
+                sum += self.coulomb_and_stribeck(
+                    s,
+                    warming,
+                    (direction, steepness),
+                    ripple,
+                    &mut by_slope,
+                    &mut derivative,
+                );
             }
             if on(Term::Harmonics) {
                 sum += self.harmonics(q, direction, steepness, &mut by_slope, &mut derivative);
@@ -281,8 +357,8 @@ impl FrictionModel {
         &self,
         s: &JointState,
         warming: f64,
-        direction: f64,
-        steepness: f64,
+        (direction, steepness): (f64, f64),
+        (ripple, shapes): (f64, [(f64, f64); RIPPLES]),
         by_slope: &mut f64,
         derivative: &mut impl FnMut(FrictionParameter, f64),
     ) -> f64 {
@@ -293,19 +369,33 @@ impl FrictionModel {
         } else {
             (P::CoulombPositive, P::BreakawayPositive)
         };
+        let pre_slides = self.terms.contains(Term::PreSliding);
+        let mut dry = (coulomb + ripple) * direction;
+        if pre_slides {
+            dry += self.element_level.iter().zip(s.bent).map(|(level, bent)| level * bent).sum::<f64>();
+        }
         let mut gain = 1.0;
         if self.terms.contains(Term::CoulombTemperature) {
             gain += self.coulomb_temperature * warming;
-            derivative(P::CoulombTemperature, coulomb * warming * direction);
+            derivative(P::CoulombTemperature, dry * warming);
         }
         if self.terms.contains(Term::CoulombLoad) {
             gain += self.coulomb_load * s.load.abs();
-            derivative(P::CoulombLoad, coulomb * s.load.abs() * direction);
+            derivative(P::CoulombLoad, dry * s.load.abs());
         }
-        *by_slope += coulomb * gain * steepness;
+        if pre_slides {
+            s.bent.into_iter().enumerate().for_each(|(n, bent)| derivative(P::Element(n), gain * bent));
+        }
+        for (k, (sine, cosine)) in shapes.into_iter().enumerate() {
+            if (sine, cosine) != (0.0, 0.0) {
+                derivative(P::RippleLevelSine(k), gain * direction * sine);
+                derivative(P::RippleLevelCosine(k), gain * direction * cosine);
+            }
+        }
+        *by_slope += (coulomb + ripple) * gain * steepness;
         if !self.terms.contains(Term::Stribeck) {
             derivative(of_coulomb, gain * direction);
-            return coulomb * gain * direction;
+            return gain * dry;
         }
         let u = v * self.stribeck_slope;
         let bell = STRIBECK_PEAK * (-u * u).exp();
@@ -313,7 +403,7 @@ impl FrictionModel {
         derivative(of_coulomb, gain * direction - bell * u);
         derivative(of_breakaway, bell * u);
         derivative(P::StribeckSlope, excess * bell * (1.0 - 2.0 * u * u) * v);
-        coulomb * gain * direction + excess * bell * u
+        gain * dry + excess * bell * u
     }
 
     #[inline(always)]
@@ -377,6 +467,12 @@ impl FrictionModel {
             P::HysteresisWidth => &mut self.hysteresis_width,
             P::HarmonicFrequency => &mut self.harmonic_frequency,
             P::RotorInertia => &mut self.rotor_inertia,
+            P::ViscousAsymmetry => &mut self.viscous_asymmetry,
+            P::Element(n) => &mut self.element_level[n],
+            P::RippleLevelSine(k) => &mut self.ripples[k].level_sine,
+            P::RippleLevelCosine(k) => &mut self.ripples[k].level_cosine,
+            P::RippleTorqueSine(k) => &mut self.ripples[k].torque_sine,
+            P::RippleTorqueCosine(k) => &mut self.ripples[k].torque_cosine,
             P::HarmonicPositive(n) => &mut self.harmonic_positive[n],
             P::HarmonicNegative(n) => &mut self.harmonic_negative[n],
         }

@@ -28,6 +28,13 @@ fn everything() -> FrictionModel {
         harmonic_negative: [0.07, 0.05, -0.02, 0.01, 0.03],
         rotor_inertia: 0.17,
         reference_temperature: 25.0,
+        viscous_asymmetry: 0.06,
+        element_stiffness: [100.0, 20.0, 5.0, 1.0],
+        element_level: [0.3, 0.2, 0.15, 0.1],
+        ripples: [
+            Ripple { frequency: 4.0, level_sine: 0.1, level_cosine: 0.05, torque_sine: -0.02, torque_cosine: 0.03 },
+            Ripple { frequency: 50.0, level_sine: -0.04, level_cosine: 0.02, torque_sine: 0.06, torque_cosine: 0.01 },
+        ],
     }
 }
 
@@ -44,6 +51,7 @@ fn states() -> Vec<JointState> {
         acceleration,
         load,
         temperature,
+        bent: [1.0, 0.7, -0.4, 0.0],
     })
     .to_vec()
 }
@@ -63,8 +71,14 @@ fn it_is_the_sum_that_the_design_writes() {
                 b * 4.0 * (odd * 2.2 * q).sin() / (PI * odd)
             })
             .sum();
+        let ripple = |h: f64, a: f64, b: f64| a * (h * q).sin() + b * (h * q).cos();
+        let level = fc + ripple(4.0, 0.1, 0.05) + ripple(50.0, -0.04, 0.02);
+        let pre_sliding = 0.3 * 1.0 + 0.2 * 0.7 - 0.15 * 0.4;
         let by_hand = 0.11 - 0.07 * q + 0.013 * th + 0.05 * tau + 0.9 * (1.0 - 0.011 * th) * v - 0.08 * v * v.abs()
-            + fc * (1.0 - 0.006 * th + 0.04 * tau.abs()) * d
+            + 0.06 * v.abs()
+            + (1.0 - 0.006 * th + 0.04 * tau.abs()) * (level * d + pre_sliding)
+            + ripple(4.0, -0.02, 0.03)
+            + ripple(50.0, 0.06, 0.01)
             + (2.0 * 1f64.exp()).sqrt() * (fb - fc) * (-u * u).exp() * u
             + 0.21 * (3.0 * v + 0.8 * (0.7 * a).clamp(-1.0, 1.0)).atan()
             + harmonics

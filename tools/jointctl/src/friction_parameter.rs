@@ -3,6 +3,8 @@
 //! The model itself (`friction_model`) has fields; identification, reports and bounds need to speak of "the third
 //! harmonic of the positive direction" as a value. The names and symbols are those of the design's friction formula.
 
+use crate::friction_model::RIPPLES;
+use joint_firmware::friction::maxwell_slip::ELEMENTS;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -56,6 +58,18 @@ pub enum FrictionParameter {
     HarmonicPositive(usize),
     /// Amplitude of a position harmonic at negative velocity, numbered alike.
     HarmonicNegative(usize),
+    /// Half the difference of the viscous coefficients of both directions.
+    ViscousAsymmetry,
+    /// Torque of a pre-sliding element while it slips; 0-based.
+    Element(usize),
+    /// Sine of a ripple of the Coulomb friction; 0-based.
+    RippleLevelSine(usize),
+    /// Cosine of it.
+    RippleLevelCosine(usize),
+    /// Sine of a ripple whatever the direction; 0-based.
+    RippleTorqueSine(usize),
+    /// Cosine of it.
+    RippleTorqueCosine(usize),
 }
 
 /// Units of a data set's position and effort, in which those of all parameters are expressed.
@@ -75,7 +89,7 @@ impl Default for Units {
 
 impl FrictionParameter {
     /// Number of different parameters.
-    pub const COUNT: usize = 20 + 2 * HARMONICS;
+    pub const COUNT: usize = 21 + 2 * HARMONICS + ELEMENTS + 4 * RIPPLES;
 
     /// Position in a table of all parameters, 0..COUNT.
     pub const fn index(self) -> usize {
@@ -102,6 +116,12 @@ impl FrictionParameter {
             Self::RotorInertia => 19,
             Self::HarmonicPositive(n) => 20 + n,
             Self::HarmonicNegative(n) => 20 + HARMONICS + n,
+            Self::ViscousAsymmetry => 20 + 2 * HARMONICS,
+            Self::Element(n) => 21 + 2 * HARMONICS + n,
+            Self::RippleLevelSine(k) => 21 + 2 * HARMONICS + ELEMENTS + 4 * k,
+            Self::RippleLevelCosine(k) => Self::RippleLevelSine(k).index() + 1,
+            Self::RippleTorqueSine(k) => Self::RippleLevelSine(k).index() + 2,
+            Self::RippleTorqueCosine(k) => Self::RippleLevelSine(k).index() + 3,
         }
     }
 
@@ -131,7 +151,16 @@ impl FrictionParameter {
             Self::RotorInertia,
         ];
         let harmonics = (0..HARMONICS).map(Self::HarmonicPositive).chain((0..HARMONICS).map(Self::HarmonicNegative));
-        for parameter in single.into_iter().chain(harmonics) {
+        let ripples = (0..RIPPLES).flat_map(|k| {
+            [
+                Self::RippleLevelSine(k),
+                Self::RippleLevelCosine(k),
+                Self::RippleTorqueSine(k),
+                Self::RippleTorqueCosine(k),
+            ]
+        });
+        let others = (0..ELEMENTS).map(Self::Element).chain(ripples).chain([Self::ViscousAsymmetry]);
+        for parameter in single.into_iter().chain(harmonics).chain(others) {
             all[parameter.index()] = parameter;
         }
         all
@@ -162,6 +191,12 @@ impl FrictionParameter {
             Self::RotorInertia => "I_a".into(),
             Self::HarmonicPositive(n) => format!("b_{}+", n + 1),
             Self::HarmonicNegative(n) => format!("b_{}-", n + 1),
+            Self::ViscousAsymmetry => "f_a".into(),
+            Self::Element(n) => format!("L_{}", n + 1),
+            Self::RippleLevelSine(k) => format!("A_{}", k + 1),
+            Self::RippleLevelCosine(k) => format!("B_{}", k + 1),
+            Self::RippleTorqueSine(k) => format!("C_{}", k + 1),
+            Self::RippleTorqueCosine(k) => format!("D_{}", k + 1),
         }
     }
 
@@ -172,7 +207,7 @@ impl FrictionParameter {
             Self::PositionSlope => format!("{effort}/{position}"),
             Self::TemperatureSlope => format!("{effort}/K"),
             Self::LoadSlope | Self::HysteresisWidth => "1".into(),
-            Self::Viscous => format!("{effort} s/{position}"),
+            Self::Viscous | Self::ViscousAsymmetry => format!("{effort} s/{position}"),
             Self::ViscousTemperature | Self::CoulombTemperature => "1/K".into(),
             Self::Quadratic => format!("{effort} s^2/{position}^2"),
             Self::CoulombLoad => format!("1/{effort}"),
@@ -186,7 +221,12 @@ impl FrictionParameter {
             | Self::BreakawayNegative
             | Self::Hysteresis
             | Self::HarmonicPositive(_)
-            | Self::HarmonicNegative(_) => effort.clone(),
+            | Self::HarmonicNegative(_)
+            | Self::Element(_)
+            | Self::RippleLevelSine(_)
+            | Self::RippleLevelCosine(_)
+            | Self::RippleTorqueSine(_)
+            | Self::RippleTorqueCosine(_) => effort.clone(),
         }
     }
 }
@@ -217,6 +257,12 @@ impl fmt::Display for FrictionParameter {
             Self::RotorInertia => f.write_str("rotor inertia"),
             Self::HarmonicPositive(n) => write!(f, "position harmonic {}, positive direction", 2 * n + 1),
             Self::HarmonicNegative(n) => write!(f, "position harmonic {}, negative direction", 2 * n + 1),
+            Self::ViscousAsymmetry => f.write_str("viscous asymmetry"),
+            Self::Element(n) => write!(f, "pre-sliding friction, element {}", n + 1),
+            Self::RippleLevelSine(k) => write!(f, "ripple {} of the Coulomb friction, sine", k + 1),
+            Self::RippleLevelCosine(k) => write!(f, "ripple {} of the Coulomb friction, cosine", k + 1),
+            Self::RippleTorqueSine(k) => write!(f, "ripple {} of both directions, sine", k + 1),
+            Self::RippleTorqueCosine(k) => write!(f, "ripple {} of both directions, cosine", k + 1),
         }
     }
 }

@@ -5,10 +5,13 @@
 
 use crate::quantize::QuantizeError;
 use crate::quantize::full_scale::{from_q16, from_si, to_integer, to_q16, to_si, to_unsigned_q8, to_unsigned_q16};
+use joint_firmware::friction::common::CommonTerms;
 use joint_firmware::friction::domain::{Domain, Range};
+use joint_firmware::friction::maxwell_slip::MaxwellElement;
 use joint_firmware::friction::network::{INPUTS, NEURONS, NetworkParameters, Neuron};
 use joint_firmware::friction::physical::{Coefficients, PhysicalParameters, Terms};
 use joint_firmware::friction::regime::{Criterion, MAX_CRITERIA, MAX_SETS, Measure, Selector};
+use joint_firmware::friction::ripple::Ripple;
 use joint_firmware::friction::state::{SIGNALS, Signal};
 use joint_firmware::friction::{Estimate, FrictionParameters, ParameterSet};
 use joint_firmware::parameters::certificate::Limits;
@@ -24,7 +27,7 @@ pub enum TextError {
     #[error("{0}")]
     Toml(#[from] toml::de::Error),
     /// Written for another format.
-    #[error("format is {found}, this program reads format {FORMAT}")]
+    #[error("format is {found}, this program reads formats 1 to {FORMAT}")]
     Format {
         /// Format of the text.
         found: u16,
@@ -67,8 +70,44 @@ struct ImageText {
     limits: LimitsText,
     domain: BTreeMap<String, toml::Value>,
     selector: SelectorText,
+    #[serde(default, skip_serializing_if = "CommonText::is_none")]
+    common: CommonText,
     set: Vec<SetText>,
     golden: Vec<GoldenText>,
+}
+
+#[derive(Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CommonText {
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    element: Vec<ElementText>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    ripple: Vec<RippleText>,
+}
+
+impl CommonText {
+    fn is_none(&self) -> bool {
+        self.element.is_empty() && self.ripple.is_empty()
+    }
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ElementText {
+    /// 1/rad.
+    stiffness: f64,
+    level: f64,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RippleText {
+    /// In a rad.
+    periods: f64,
+    level_sine: f64,
+    level_cosine: f64,
+    torque_sine: f64,
+    torque_cosine: f64,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -142,7 +181,7 @@ pub fn to_text(image: &Image) -> String {
     let shifts = image.friction.domain.shifts();
     let sets = image.friction.sets.iter().take(image.friction.selector.sets());
     let text = ImageText {
-        format: FORMAT,
+        format: image.format(),
         version: image.version,
         created: image.created,
         effort: image.effort.symbol().to_owned(),
@@ -155,6 +194,7 @@ pub fn to_text(image: &Image) -> String {
         },
         domain: domain_text(&image.friction.domain),
         selector: selector_text(&image.friction.selector),
+        common: common_text(&image.friction.common),
         set: sets.map(|set| set_text(set, &shifts)).collect(),
         golden: image.golden.iter().map(golden_text).collect(),
     };
@@ -171,7 +211,7 @@ pub fn from_text(text: &str) -> Result<Image, TextError> {
         format: u16,
     }
     let Head { format } = toml::from_str(text)?;
-    if format != FORMAT {
+    if !(1..=FORMAT).contains(&format) {
         return Err(TextError::Format { found: format });
     }
     let text: ImageText = toml::from_str(text)?;
@@ -198,7 +238,7 @@ pub fn from_text(text: &str) -> Result<Image, TextError> {
         created: text.created,
         effort: named("effort", &text.effort, Effort::ALL, Effort::symbol)?,
         data_hash: hash_of(&text.data_hash)?,
-        friction: FrictionParameters { domain, selector, sets },
+        friction: FrictionParameters { domain, selector, common: common_of(&text.common)?, sets },
         limits: Limits {
             output: to_unsigned_q16("limits.output", text.limits.output)?,
             torque_gain: to_unsigned_q16("limits.torque_gain", text.limits.torque_gain)?,
@@ -313,6 +353,51 @@ fn selector_of(text: &SelectorText) -> Result<Selector, TextError> {
         });
     }
     Ok(Selector { criteria, fade_time: to_unsigned_q16("selector.fade_time", text.fade_time)? })
+}
+
+/// Elements and ripples up to the last that is there.
+fn common_text(common: &CommonTerms) -> CommonText {
+    let elements = common.elements.iter().rposition(|e| *e != MaxwellElement::default()).map_or(0, |last| last + 1);
+    let ripples = common.ripples.iter().rposition(|r| *r != Ripple::default()).map_or(0, |last| last + 1);
+    let element = |e: &MaxwellElement| ElementText { stiffness: from_q16(e.stiffness), level: from_q16(e.level) };
+    let ripple = |r: &Ripple| RippleText {
+        periods: from_q16(r.periods),
+        level_sine: from_q16(r.level_sine),
+        level_cosine: from_q16(r.level_cosine),
+        torque_sine: from_q16(r.torque_sine),
+        torque_cosine: from_q16(r.torque_cosine),
+    };
+    CommonText {
+        element: common.elements[..elements].iter().map(element).collect(),
+        ripple: common.ripples[..ripples].iter().map(ripple).collect(),
+    }
+}
+
+fn common_of(text: &CommonText) -> Result<CommonTerms, TextError> {
+    let mut common = CommonTerms::NONE;
+    let too_many = |key, found, most: usize| TextError::Count { key, found, expected: format!("at most {most}") };
+    if text.element.len() > common.elements.len() {
+        return Err(too_many("common.element", text.element.len(), common.elements.len()));
+    }
+    if text.ripple.len() > common.ripples.len() {
+        return Err(too_many("common.ripple", text.ripple.len(), common.ripples.len()));
+    }
+    for (place, element) in common.elements.iter_mut().zip(&text.element) {
+        *place = MaxwellElement {
+            stiffness: to_q16("common.element.stiffness", element.stiffness)?,
+            level: to_q16("common.element.level", element.level)?,
+        };
+    }
+    for (place, ripple) in common.ripples.iter_mut().zip(&text.ripple) {
+        *place = Ripple {
+            periods: to_q16("common.ripple.periods", ripple.periods)?,
+            level_sine: to_q16("common.ripple.level_sine", ripple.level_sine)?,
+            level_cosine: to_q16("common.ripple.level_cosine", ripple.level_cosine)?,
+            torque_sine: to_q16("common.ripple.torque_sine", ripple.torque_sine)?,
+            torque_cosine: to_q16("common.ripple.torque_cosine", ripple.torque_cosine)?,
+        };
+    }
+    Ok(common)
 }
 
 fn set_text(set: &ParameterSet, shifts: &[u32; SIGNALS]) -> SetText {

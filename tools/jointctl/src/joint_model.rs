@@ -9,6 +9,8 @@ use crate::quantize::QuantizeError;
 use crate::rigid::{RigidParameters, RigidState};
 use crate::samples::Samples;
 use joint_firmware::compensation::{Compensation, Request, Settings};
+use joint_firmware::friction::common::CommonTorques;
+use joint_firmware::friction::maxwell_slip::Bent as FirmwareBent;
 use joint_firmware::friction::regime::Selector;
 use joint_firmware::friction::state::JointState;
 use joint_firmware::friction::{FrictionModel as FirmwareModel, FrictionParameters};
@@ -38,7 +40,8 @@ impl FloatFriction {
     /// The friction that an image's parameters stand for, without the rounding of the firmware's arithmetic.
     pub fn of_image(parameters: &FrictionParameters) -> Result<Self, QuantizeError> {
         let sets = parameters.sets.iter().take(parameters.selector.sets()).map(|set| {
-            let physical = crate::quantize::physical::dequantize(&set.physical, &parameters.domain);
+            let mut physical = crate::quantize::physical::dequantize(&set.physical, &parameters.domain);
+            crate::quantize::common::dequantize(&parameters.common, &mut physical);
             let network = set.network.as_ref();
             let network = network.map(|n| crate::quantize::network::dequantize(n, &parameters.domain)).transpose()?;
             Ok((physical, network))
@@ -63,6 +66,7 @@ pub fn float_state(samples: &Samples, index: usize) -> FloatState {
         acceleration: samples.acceleration[index],
         load: load(samples, index),
         temperature: samples.temperature[index],
+        bent: samples.bent.get(index).copied().unwrap_or_default(),
     }
 }
 
@@ -122,22 +126,39 @@ pub fn regimes(selector: &Selector, states: &[JointState], samples: &Samples) ->
     sets
 }
 
-/// Physical friction and the network's share of every sample, computed by the firmware.
-pub fn fixed_point(parameters: &FrictionParameters, states: &[JointState], sets: &[usize]) -> Vec<(f64, f64)> {
-    let model = FirmwareModel::new(parameters, 1);
-    let evaluate = |(state, set): (&JointState, &usize)| {
-        let estimate = model.evaluate(*set, state);
+/// Evaluations a second at the rate of the samples, at least 1.
+fn rate(samples: &Samples) -> u32 {
+    (1.0 / crate::pre_sliding::period(samples)).round().max(1.0) as u32
+}
+
+/// Physical friction and the network's share of every sample, computed by the firmware. Every run begins anew.
+pub fn fixed_point(
+    parameters: &FrictionParameters,
+    states: &[JointState],
+    sets: &[usize],
+    samples: &Samples,
+) -> Vec<(f64, f64)> {
+    let model = FirmwareModel::new(parameters, rate(samples));
+    let mut bent = FirmwareBent::default();
+    let common: Vec<CommonTorques> = (0..states.len())
+        .map(|i| {
+            if i > 0 && samples.run[i] != samples.run[i - 1] {
+                bent = FirmwareBent::default();
+            }
+            model.common(&mut bent, &states[i])
+        })
+        .collect();
+    let evaluate = |((state, set), common): ((&JointState, &usize), &CommonTorques)| {
+        let estimate = model.evaluate_with(*set, state, common);
         (estimate.physical.to_f64(), estimate.network.to_f64())
     };
-    states.par_iter().zip(sets).with_min_len(4096).map(evaluate).collect()
+    states.par_iter().zip(sets).zip(&common).with_min_len(4096).map(evaluate).collect()
 }
 
 /// Compensation torque of every sample, computed step by step as in the control loop: regimes with cross-fade, fades outside
 /// the trained box; full gain, no clamp, no slew limit. Every run begins anew.
 pub fn replay(parameters: &FrictionParameters, states: &[JointState], samples: &Samples) -> Vec<f64> {
-    let period = samples.time.windows(2).map(|pair| pair[1] - pair[0]).find(|period| *period > 0.0).unwrap_or(1.0);
-    let rate = (1.0 / period).round().max(1.0) as u32;
-    let model = FirmwareModel::new(parameters, rate);
+    let model = FirmwareModel::new(parameters, rate(samples));
     // The widest settings are always in range.
     let Ok(settings) = Settings::new(Request::PhysicalAndNetwork, 1 << 16, Torque::MAX, Torque::MAX, 1) else {
         return vec![0.0; states.len()];

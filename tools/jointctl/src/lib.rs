@@ -34,6 +34,7 @@ pub mod levenberg_marquardt;
 pub mod metrics;
 pub mod network;
 pub mod output;
+pub mod pre_sliding;
 pub mod presets;
 pub mod progress;
 pub mod quantize;

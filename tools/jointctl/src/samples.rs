@@ -1,5 +1,6 @@
 //! The recorded joint as every stage of the pipeline sees it: columns of equal length in SI units.
 
+use crate::friction_model::Bent;
 use std::collections::BTreeMap;
 
 /// What a sample may be used for. Test samples are never seen by identification, training or selection.
@@ -52,6 +53,8 @@ pub struct Samples {
     pub temperature: Vec<f64>,
     /// Theoretical torque: the rigid-body part of the effort. Empty until the rigid body is identified.
     pub load: Vec<f64>,
+    /// How far each pre-sliding element of the identified model is bent. Empty until there is one.
+    pub bent: Vec<Bent>,
     /// Index of the run (continuous recording) that the sample belongs to.
     pub run: Vec<u32>,
     /// Motion state of each sample.

@@ -26,14 +26,11 @@ def number(kind, index, subindex=0):
 
 
 def command(controlword, velocity, seconds):
-    """RPDO 2 every 10 ms: the joint brakes where its commands stop coming. The counter shows that the master is alive."""
+    """RPDO 2 every 10 ms: the joint brakes where its commands stop coming."""
     for _ in range(int(seconds / 0.01)):
-        command.counter = (command.counter + 1) % 256
-        network.send_message(0x300 + node_id, struct.pack("<HbBi", controlword, VELOCITY_MODE, command.counter, velocity))
+        network.send_message(0x300 + node_id, struct.pack("<Hbi", controlword, VELOCITY_MODE, velocity))
         time.sleep(0.01)
 
-
-command.counter = 0
 
 print("name", node.sdo.upload(0x1008, 0).decode())
 node.nmt.state = "OPERATIONAL"

@@ -30,6 +30,12 @@ impl SlotImages {
         Ok(Self { flash, slots })
     }
 
+    /// Whether a slot was whole once and is not any more.
+    #[must_use]
+    pub fn is_damaged(&self) -> bool {
+        self.slots.is_damaged()
+    }
+
     /// Empty slots.
     ///
     /// # Errors

@@ -79,6 +79,10 @@ impl Program for VirtualProgram {
         self.storage.store_configuration(record)
     }
 
+    fn damaged(&self) -> u8 {
+        self.storage.damaged()
+    }
+
     fn keep(&mut self, floor: u32, failures: u16) -> Result<(), SlotError> {
         self.storage.store_counts(floor, failures)
     }

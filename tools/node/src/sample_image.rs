@@ -1,5 +1,6 @@
 //! Images with constant friction, for tests, benchmarks and hostile buses: what acts can be told from the torque alone.
 
+use joint_firmware::friction::common::CommonTerms;
 use joint_firmware::friction::domain::{Domain, Range};
 use joint_firmware::friction::network::{MIN_FRACTION, NetworkParameters, Neuron};
 use joint_firmware::friction::physical::{Coefficients, PhysicalParameters, Terms};
@@ -50,7 +51,7 @@ impl SampleImage<'_> {
         }
         let range = Range { low: -(100 << 16), high: 100 << 16 };
         let domain = Domain { ranges: [range; SIGNALS], margin: 0, reference_temperature: 0 };
-        let friction = FrictionParameters { domain, selector: self.selector, sets };
+        let friction = FrictionParameters { domain, selector: self.selector, common: CommonTerms::NONE, sets };
         let model = FrictionModel::new(&friction, 20_000);
         let golden = (0..self.golden.min(MAX_GOLDEN)).map(|number| {
             let signals = [7 + number as i32; SIGNALS];

@@ -55,6 +55,10 @@ impl Record {
         Some(buffer)
     }
 
+    fn is_damaged(&self) -> bool {
+        self.slots.is_damaged()
+    }
+
     fn store(&mut self, bytes: &[u8]) -> Result<(), SlotError> {
         self.slots.store(&mut self.flash, bytes)
     }
@@ -138,6 +142,17 @@ impl Storage {
         Key::new(bytes).ok()
     }
 
+    /// Whether there was a key that cannot be read any more: it is written once, so no other slot holds it.
+    pub(crate) fn key_is_damaged(&mut self) -> bool {
+        self.key.is_damaged() && self.key().is_none()
+    }
+
+    /// What of it is damaged: bits as of EMCY 6310h.
+    pub(crate) fn damaged(&self) -> u8 {
+        let parts = [self.images.is_damaged(), self.configuration.is_damaged(), self.key.is_damaged()];
+        parts.into_iter().rev().fold(0, |bits, damaged| bits << 1 | u8::from(damaged))
+    }
+
     pub(crate) fn store_key(&mut self, key: &Key) -> Result<(), SlotError> {
         self.key.store(&key.to_bytes())
     }
@@ -161,6 +176,34 @@ mod tests {
         let mut storage = Storage::open(&path).unwrap();
         assert_eq!((storage.configuration(), storage.counts()), (Some(vec![1, 2, 3]), (70_001, 4)));
         assert_eq!(storage.key().unwrap().to_bytes(), key.to_bytes());
+    }
+
+    #[test]
+    fn a_bit_of_a_stored_key_that_flips_leaves_the_key_or_locks_and_never_opens() {
+        let folder = tempfile::tempdir().unwrap();
+        let key = Key::new(std::array::from_fn(|i| i as u8)).unwrap();
+        Storage::open(folder.path()).unwrap().store_key(&key).unwrap();
+        let path = folder.path().join("key.bin");
+        let whole = std::fs::read(&path).unwrap();
+        let mut locked = 0;
+        // The header, the key, and something of what is blank behind it.
+        for bit in 0..8 * 80 {
+            let mut damaged = whole.clone();
+            damaged[bit / 8] ^= 1 << (bit % 8);
+            std::fs::write(&path, &damaged).unwrap();
+            // It stays so from start to start.
+            for _ in 0..2 {
+                let mut storage = Storage::open(folder.path()).unwrap();
+                match storage.key() {
+                    Some(found) => assert_eq!(found.to_bytes(), key.to_bytes(), "bit {bit}"),
+                    None => assert!(storage.key_is_damaged() && storage.damaged() == 4, "bit {bit}"),
+                }
+                locked += u32::from(storage.key_is_damaged());
+            }
+        }
+        assert!(locked >= 2 * 8 * 32, "{locked}");
+        std::fs::write(&path, &whole).unwrap();
+        assert!(Storage::open(folder.path()).unwrap().key().is_some());
     }
 
     #[test]

@@ -156,9 +156,12 @@ impl VirtualNode {
                 velocity_slope: u32::MAX,
             },
         };
-        let (life, stored_images) = life(requirements, &mut program.storage, 0);
+        let (life, stored_images) = life(requirements, &mut program.storage);
         let key = program.storage.key();
-        let images = Images::new(Box::leak(Box::new([0; STAGING])), life, key, stored_images);
+        let mut images = Images::new(Box::leak(Box::new([0; STAGING])), life, key, stored_images);
+        if program.storage.key_is_damaged() {
+            images.lock();
+        }
         let start = Start { configuration, ranges: stored.ranges(), single_bank: true };
         let node_id = if stored.node_id == NO_NODE_ID { options.node_id } else { stored.node_id };
         Ok(Self {
@@ -335,12 +338,11 @@ impl VirtualNode {
         if !off || !std::mem::take(&mut self.objects.program().reset) {
             return;
         }
-        let now = self.microseconds() / 1_000;
         let defaults = self.setup.configuration;
         let program = self.objects.program();
         program.last_reset = LastReset::REQUESTED;
         let (stored, configuration) = program.power_on(&defaults);
-        let (life, stored_images) = life(self.requirements, &mut program.storage, now);
+        let (life, stored_images) = life(self.requirements, &mut program.storage);
         let model = program.storage.images.model(self.motion_rate);
         // Refused only where even the defaults are, with which the joint began.
         program.next = configuration.prepare(&self.setup.bridge).ok();
@@ -457,10 +459,10 @@ impl VirtualNode {
     }
 }
 
-/// The life cycle of a joint that starts at `now`, ms, and what its slots hold.
-fn life(requirements: Requirements, storage: &mut Storage, now: u64) -> (LifeCycle, StoredImages) {
+/// The life cycle of a joint that starts, and what its slots hold.
+fn life(requirements: Requirements, storage: &mut Storage) -> (LifeCycle, StoredImages) {
     let stored = storage.images.stored();
     let versions = [stored.active, stored.previous].into_iter().flatten().map(|(summary, _)| summary.version);
     let (floor, failures) = storage.counts();
-    (LifeCycle::new(requirements, versions.fold(floor, u32::max), failures, now), stored)
+    (LifeCycle::new(requirements, floor, versions.fold(0, u32::max), failures), stored)
 }

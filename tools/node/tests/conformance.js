@@ -51,7 +51,6 @@ device.eds.addTransmitPdo({
     dataObjects: [
         controlword,
         object(0x6060, 'mode', DataType.INTEGER8),
-        object(0x2010, 'counter', DataType.UNSIGNED8),
         object(0x60ff, 'target velocity', DataType.INTEGER32),
     ],
 });
@@ -129,7 +128,6 @@ async function command(word, torque = 0, position = value('position')) {
 async function turn(velocity) {
     controlword.value = 0x0f;
     objects.mode.value = VELOCITY;
-    objects.counter.value = (value('counter') + 1) % 256;
     objects['target velocity'].value = velocity;
     device.pdo.write(0x300 + node);
     await cycle();

@@ -52,7 +52,6 @@ def dictionary():
         (0x60FF, "target velocity", i32),
     ]:
         od.add_object(variable(index, 0, name, kind))
-    record(0x2010, [(1, "counter", u8)])
     record(0x2011, [(1, "impedance frame", datatypes.UNSIGNED64)])
     record(0x2020, [(1, "compensation torque", i16), (2, "residual torque", i16)])
     for number in range(4):
@@ -133,16 +132,11 @@ def command(controlword, torque=0, position=None):
 def turn(velocity, controlword=0x0F):
     """RPDO 2 and SYNC."""
     pdo = node.rpdo[2]
-    turn.counter = (turn.counter + 1) % 256
     pdo["controlword"].raw = controlword
     pdo["mode"].raw = VELOCITY
-    pdo[2].raw = turn.counter
     pdo["target velocity"].raw = velocity
     pdo.transmit()
     cycle()
-
-
-turn.counter = 0
 
 
 def enable(mode):

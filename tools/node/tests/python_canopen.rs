@@ -18,10 +18,14 @@ fn main() {
     let must_run = std::env::var_os("CI").is_some();
     let python = if arguments.list { None } else { PACKAGES.python(env!("CARGO_TARGET_TMPDIR")) };
     let ignored = !must_run && python.is_none();
-    let (one, two, three) = (python.clone(), python.clone(), python);
+    let (one, two, three, four) = (python.clone(), python.clone(), python.clone(), python);
     let trials = vec![
         Trial::test("python_canopen_enables_turns_and_feeds_an_image_to_the_joint", move || drive(one.as_deref())),
         Trial::test("python_canopen_can_do_everything_with_the_joint", move || conformance(two.as_deref())),
+        Trial::test("python_canopens_profile_402_enables_and_moves_the_joint_with_the_default_pdos", move || {
+            let text = run(four.as_deref(), "tests/profile402.py", &[], &[])?;
+            if text.lines().last() == Some("done") { Ok(()) } else { Err(text.into()) }
+        }),
         Trial::test("python_canopen_transfers_every_length_in_every_way", move || {
             client::every_length(|first, step| run(three.as_deref(), "tests/lengths.py", &[], &[first, step]))
         }),

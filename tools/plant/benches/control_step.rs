@@ -2,6 +2,7 @@
 
 use divan::{Bencher, black_box};
 use joint_firmware::compensation::{Acting, Request};
+use joint_firmware::friction::common::CommonTerms;
 use joint_firmware::friction::domain::{Domain, Range};
 use joint_firmware::friction::network::{NetworkParameters, Neuron};
 use joint_firmware::friction::physical::{Coefficients, PhysicalParameters, Terms};
@@ -38,6 +39,7 @@ fn friction() -> FrictionModel {
     let parameters = FrictionParameters {
         domain: Domain { ranges: [range; SIGNALS], margin: 1 << 15, reference_temperature: 0 },
         selector: Selector::default(),
+        common: CommonTerms::NONE,
         sets: [set, ParameterSet::default(), ParameterSet::default(), ParameterSet::default()],
     };
     FrictionModel::new(&parameters, 20_000)

@@ -9,6 +9,7 @@ use joint_firmware::parameters::image::Image;
 use node::{Options, Storage, VirtualNode, serve};
 use plant::ActuatorParameters;
 use plant::virtual_joint::Setup;
+use serde_json::json;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -174,8 +175,11 @@ fn wait(duration: Option<Duration>, stop: &AtomicBool) {
 #[derive(Debug, Args)]
 pub struct Scan {
     /// The bus, as of `sim --bus`
-    #[arg(long, value_name = "BUS")]
+    #[arg(long, value_name = "BUS", env = "JOINTCTL_BUS")]
     bus: String,
+    /// Print a JSON array, an object for each node
+    #[arg(long)]
+    json: bool,
 }
 
 impl Scan {
@@ -185,12 +189,18 @@ impl Scan {
         let transport = bus::open(&self.bus).map_err(|error| failed(&error))?;
         let network = Network::new(transport);
         let present = present(&network).map_err(|error| failed(&error))?;
+        let mut list = Vec::new();
         for &id in &present {
             match network.node(id).and_then(|node| Described::of(&node)) {
+                Ok(described) if self.json => list.push(described.json(id)),
                 Ok(described) => println!("node {id}: {described}"),
                 Err(error @ ClientError::Bus(_)) => return Err(failed(&error)),
+                Err(error) if self.json => list.push(json!({ "node": id, "error": error.to_string() })),
                 Err(error) => println!("node {id}: {error}"),
             }
+        }
+        if self.json {
+            println!("{:#}", serde_json::Value::Array(list));
         }
         if present.is_empty() {
             return Err(CommandError::Bus(format!("{}: no node answered", self.bus)));
@@ -234,6 +244,18 @@ impl Described {
             name: String::from_utf8_lossy(&node.upload(0x1008, 0)?).into_owned(),
             statusword: node.number::<2>(0x6041, 0).map(u16::from_le_bytes)?,
             version: word(0x2213, 1)?,
+        })
+    }
+
+    fn json(&self, node: u8) -> serde_json::Value {
+        let Self { name, product, serial, statusword, version } = self;
+        json!({
+            "node": node,
+            "name": name,
+            "product": product,
+            "serial": serial,
+            "statusword": statusword,
+            "image_version": version
         })
     }
 }

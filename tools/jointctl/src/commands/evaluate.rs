@@ -8,8 +8,10 @@ use crate::evaluate::{Prediction, error_tables, fixed_point_difference, rigid_be
 use crate::fit::{FitError, image_on_other_motion, rigid_model, units};
 use crate::identify::{self, identify};
 use crate::joint_model::{FloatFriction, firmware_states, fixed_point, regimes, replay, rigid_efforts};
+use crate::pre_sliding;
 use crate::presets::Preset;
 use crate::progress::{Progress, Terminal};
+use crate::quantize::full_scale::from_q16;
 use crate::report::{Role, console};
 use crate::sample_table::write_sample_table;
 use clap::Args;
@@ -65,10 +67,12 @@ impl Evaluate {
             }));
         }
         progress.stage("judge");
+        let stiffness = image.friction.common.elements.map(|element| from_q16(element.stiffness));
+        prepared.samples.bent = pre_sliding::bent(&prepared.samples, &stiffness);
         let samples = &prepared.samples;
         let states = firmware_states(samples).map_err(FitError::from)?;
         let sets = regimes(&image.friction.selector, &states, samples);
-        let fixed = fixed_point(&image.friction, &states, &sets);
+        let fixed = fixed_point(&image.friction, &states, &sets, samples);
         let float = FloatFriction::of_image(&image.friction).map_err(FitError::from)?;
         let friction: Vec<f64> = fixed.iter().map(|(physical, network)| physical + network).collect();
         let beside = rigid_beside(&friction, &rigid_model, samples);

@@ -63,7 +63,7 @@ impl Keep {
 #[derive(Debug, Args)]
 pub struct Address {
     /// The bus, as of `scan`
-    #[arg(long, value_name = "BUS")]
+    #[arg(long, value_name = "BUS", env = "JOINTCTL_BUS")]
     bus: String,
     /// The first node id to give; those that are taken are left out
     #[arg(long, value_name = "N", default_value_t = 1)]

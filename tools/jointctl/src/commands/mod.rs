@@ -182,6 +182,18 @@ pub enum CommandError {
     Arguments(String),
 }
 
+impl CommandError {
+    /// Exit code of the program: 1 failed, 2 wrong arguments (as clap's own), 3 done, and nothing better came of it.
+    #[must_use]
+    pub const fn exit_code(&self) -> u8 {
+        match self {
+            Self::Retrain(crate::remote::retrain::RetrainError::NotBetter { .. }) => 3,
+            Self::Arguments(_) => 2,
+            _ => 1,
+        }
+    }
+}
+
 /// Runs a command.
 pub fn run(arguments: Arguments) -> Result<(), CommandError> {
     match arguments.command {

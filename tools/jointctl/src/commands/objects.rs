@@ -15,12 +15,19 @@ pub struct Info {
     /// Which joint.
     #[command(flatten)]
     on: Where,
+    /// Print a JSON object, a text for each line of the page
+    #[arg(long)]
+    json: bool,
 }
 
 impl Info {
     /// Runs the command.
     pub fn run(&self) -> Result<(), CommandError> {
-        print!("{}", info::page(&self.on.joint()?)?);
+        let page = info::page(&self.on.joint()?)?;
+        match self.json {
+            true => println!("{:#}", info::json(&page)),
+            false => print!("{page}"),
+        }
         Ok(())
     }
 }
@@ -32,23 +39,26 @@ pub struct Get {
     #[arg(value_name = "NAME|INDEX[:SUB]", required_unless_present = "list")]
     objects: Vec<String>,
     /// The bus: socketcan:can0, slcan:/dev/ttyACM0, slcan:tcp://host:port, udp:239.74.163.2:43113
-    #[arg(long, value_name = "BUS", required_unless_present = "list")]
+    #[arg(long, value_name = "BUS", required_unless_present = "list", env = "JOINTCTL_BUS")]
     bus: Option<String>,
     /// Node id of the joint, 1 to 127
-    #[arg(long, value_name = "N", required_unless_present = "list")]
+    #[arg(long, value_name = "N", required_unless_present = "list", env = "JOINTCTL_NODE")]
     node: Option<u8>,
     /// Write the bytes of the one object to a file: an image, a fault history
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Name all objects, with index, type, access, unit and limits; needs no bus
-    #[arg(long, conflicts_with_all = ["objects", "bus", "node", "out"])]
+    #[arg(long, conflicts_with_all = ["objects", "out"])]
     list: bool,
+    /// Print a JSON object: for each object its value and unit
+    #[arg(long, conflicts_with_all = ["list", "out"])]
+    json: bool,
 }
 
 impl Get {
     /// Runs the command.
     pub fn run(&self) -> Result<(), CommandError> {
-        let (Some(bus), Some(node)) = (&self.bus, self.node) else {
+        let (Some(bus), Some(node), false) = (&self.bus, self.node, self.list) else {
             let lines = Entry::all().filter(Entry::is_content).map(|entry| format!("{}\n", entry.listed()));
             // Whoever closes the pipe, as `head` does, has seen enough.
             let _ = std::io::stdout().write_all(lines.collect::<String>().as_bytes());
@@ -64,6 +74,20 @@ impl Get {
             let bytes = bytes.map_err(crate::remote::RemoteError::from)?;
             write_file(path, &bytes)?;
             println!("{}: {} bytes written: {}", entry.described(), bytes.len(), path.display());
+            return Ok(());
+        }
+        if self.json {
+            let entries = named.concat();
+            let record = entries.len() > 1;
+            let mut list = serde_json::Map::new();
+            for entry in entries.into_iter().filter(|entry| !record || entry.is_readable()) {
+                let value = match joint.read(entry) {
+                    Err(error) if record => serde_json::json!({ "error": error.to_string() }),
+                    value => serde_json::json!({ "value": value?.json(), "unit": entry.text.unit }),
+                };
+                list.insert(entry.full_name(), value);
+            }
+            println!("{:#}", serde_json::Value::Object(list));
             return Ok(());
         }
         let mut text = String::new();

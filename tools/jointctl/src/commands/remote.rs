@@ -9,10 +9,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 #[derive(Debug, Args)]
 pub struct Where {
     /// The bus: socketcan:can0, slcan:/dev/ttyACM0, slcan:tcp://host:port, udp:239.74.163.2:43113
-    #[arg(long, value_name = "BUS")]
+    #[arg(long, value_name = "BUS", env = "JOINTCTL_BUS")]
     pub bus: String,
     /// Node id of the joint, 1 to 127
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", env = "JOINTCTL_NODE")]
     pub node: u8,
 }
 

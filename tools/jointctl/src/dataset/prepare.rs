@@ -60,7 +60,7 @@ impl Prepared {
     pub fn on_other_motion(&self) -> Option<(&'static str, Samples)> {
         let Track { position, velocity } = self.other.clone()?;
         let name = if self.description.filter.causal_motion { "zero-phase motion" } else { "joint's observer" };
-        Some((name, Samples { position, velocity, ..self.samples.clone() }))
+        Some((name, Samples { position, velocity, bent: vec![], ..self.samples.clone() }))
     }
 }
 

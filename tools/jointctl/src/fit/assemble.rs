@@ -135,6 +135,7 @@ fn quantized(
         (depends[i] || network).then(|| range(columns[i]))
     });
     let domain = quantize::domain(&limits, options.margin, physical.friction.reference_temperature)?;
+    let common = quantize::common::quantize(&physical.friction)?;
     let mut sets = [ParameterSet::default(); MAX_SETS];
     for (place, (friction, network)) in sets.iter_mut().zip(&learned.float.sets) {
         *place = ParameterSet {
@@ -142,5 +143,5 @@ fn quantized(
             network: network.as_ref().map(quantize::network::quantize).transpose()?,
         };
     }
-    Ok(FrictionParameters { domain, selector: learned.selector, sets })
+    Ok(FrictionParameters { domain, selector: learned.selector, common, sets })
 }

@@ -202,7 +202,7 @@ pub fn fit(prepared: &mut Prepared, options: &Options, progress: &dyn Progress) 
     progress.stage("judge");
     let parameters = &built.image.friction;
     let sets = regimes(&parameters.selector, &states, samples);
-    let fixed = fixed_point(parameters, &states, &sets);
+    let fixed = fixed_point(parameters, &states, &sets, samples);
     let mut predictions = summary::predictions(samples, &identified, chosen, &learned, &sets, &fixed);
     prepared.warnings.extend(slope::check(&physical.friction, &prepared.samples));
     if let Some((name, other)) = prepared.on_other_motion() {
@@ -260,7 +260,7 @@ pub(crate) fn image_on_other_motion(
 ) -> Result<Prediction, FitError> {
     let states = firmware_states(samples)?;
     let sets = regimes(&parameters.selector, &states, samples);
-    let fixed = fixed_point(parameters, &states, &sets);
+    let fixed = fixed_point(parameters, &states, &sets, samples);
     let rigid = rigid_efforts(rigid, samples);
     Ok(Prediction::new(format!("image, {name}"), Role::OtherMotion, &rigid, |i| fixed[i].0 + fixed[i].1))
 }

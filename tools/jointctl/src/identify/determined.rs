@@ -62,7 +62,10 @@ fn size(freedom: Freedom) -> Option<P> {
         Freedom::Term(Term::Stribeck) => P::BreakawayPositive,
         Freedom::Term(Term::Hysteresis) => P::Hysteresis,
         Freedom::Term(Term::RotorInertia) => P::RotorInertia,
-        Freedom::Term(Term::Viscous | Term::Coulomb | Term::Harmonics) => return None,
+        Freedom::Term(Term::ViscousAsymmetry) => P::ViscousAsymmetry,
+        Freedom::Term(
+            Term::Viscous | Term::Coulomb | Term::Harmonics | Term::PreSliding | Term::Ripple | Term::SecondRipple,
+        ) => return None,
     })
 }
 

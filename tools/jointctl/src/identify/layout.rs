@@ -5,7 +5,7 @@
 //! as logarithms: their plausible range covers three decades.
 
 use super::observations::Limits;
-use crate::friction_model::{FrictionModel, Term};
+use crate::friction_model::{FrictionModel, Ripple, Term};
 use crate::friction_parameter::{FrictionParameter as P, HARMONICS};
 use crate::presets::Structure;
 use crate::rigid::{RigidParameters, RigidRegressor};
@@ -128,9 +128,20 @@ impl Layout {
             (Term::Position, P::PositionSlope, FREE),
             (Term::Temperature, P::TemperatureSlope, FREE),
             (Term::Quadratic, P::Quadratic, FREE),
+            (Term::ViscousAsymmetry, P::ViscousAsymmetry, FREE),
         ] {
             if on(term) {
                 layout.own(parameter, Role::Coefficient, bounds);
+            }
+        }
+        if on(Term::PreSliding) {
+            (0..limits.elements).for_each(|n| layout.own(P::Element(n), Role::Coefficient, POSITIVE));
+        }
+        for k in (0..limits.ripples).filter(|&k| on([Term::Ripple, Term::SecondRipple][k])) {
+            for parameter in
+                [P::RippleLevelSine(k), P::RippleLevelCosine(k), P::RippleTorqueSine(k), P::RippleTorqueCosine(k)]
+            {
+                layout.own(parameter, Role::Coefficient, FREE);
             }
         }
         if on(Term::Stribeck) {
@@ -283,6 +294,8 @@ impl Layout {
             coulomb_slope: template.coulomb_slope,
             hysteresis_acceleration_slope: template.hysteresis_acceleration_slope,
             reference_temperature: template.reference_temperature,
+            element_stiffness: template.element_stiffness,
+            ripples: template.ripples.map(|ripple| Ripple { frequency: ripple.frequency, ..Ripple::default() }),
             ..FrictionModel::default()
         };
         if self.column_of(P::CoulombSlope).is_some() {
@@ -336,6 +349,7 @@ mod tests {
 
     fn layout(structure: &Structure) -> Layout {
         let limits = Limits::of(&super::super::observations::rows(&motion(2_000)), 30.0);
+        let limits = Limits { elements: 4, ripples: 2, ..limits };
         Layout::new(structure, &RIGID.regressors(), &limits)
     }
 

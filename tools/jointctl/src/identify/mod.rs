@@ -8,7 +8,7 @@
 //!
 //! `observations` checks and thins the samples, `layout` maps parameters to the searched vector, `linear` and `nonlinear` fit,
 //! `grid` finds where to start, `selection` chooses the terms of `Preset::Full`, `crossed` fits without each
-//! fold, `determined` says which terms the data determine, `estimates` adds standard errors.
+//! fold, `shapes` chooses distances and frequencies, `determined` says which terms the data determine, `estimates` adds standard errors.
 
 mod crossed;
 mod determined;
@@ -19,6 +19,7 @@ mod linear;
 mod nonlinear;
 mod observations;
 mod selection;
+mod shapes;
 
 pub use crossed::{FoldFit, overall};
 pub use estimates::Estimated;
@@ -165,7 +166,11 @@ pub fn identify(
     preset: Preset,
     options: &Options,
 ) -> Result<Identified, IdentifyError> {
-    let problem = theoretical_torque(samples, rigid, options)?;
+    let mut problem = theoretical_torque(samples, rigid, options)?;
+    if preset == Preset::Full {
+        shapes::choose(&mut problem, samples);
+    }
+    problem.leave_out(samples, options);
     let (fit, folds, mut notes) = match preset.structure(rigid) {
         Some(structure) => {
             let structure = problem.determined(structure);
@@ -240,10 +245,16 @@ fn theoretical_torque(samples: &mut Samples, rigid: &RigidModel, options: &Optio
         rows.iter_mut().for_each(|row| row.joint.load = nonlinear::rigid_effort(&problem.theoretical, row));
     }
     problem.limits = Limits::of(&problem.train, reference_temperature);
-    let folds = options.folds.clone().unwrap_or_else(|| grouping::of_time(samples));
-    let left_out: Vec<u8> = observations::used(samples).into_iter().map(|i| folds.left_out[i]).collect();
-    problem.folds = crossed::fold_rows(&problem.train, &left_out, &folds);
     Ok(problem)
+}
+
+impl Problem {
+    /// Fills in the rows of every fold.
+    fn leave_out(&mut self, samples: &Samples, options: &Options) {
+        let folds = options.folds.clone().unwrap_or_else(|| grouping::of_time(samples));
+        let left_out: Vec<u8> = observations::used(samples).into_iter().map(|i| folds.left_out[i]).collect();
+        self.folds = crossed::fold_rows(&self.train, &left_out, &folds);
+    }
 }
 
 #[cfg(test)]

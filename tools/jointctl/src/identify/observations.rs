@@ -42,6 +42,10 @@ pub struct Limits {
     pub position_range: f64,
     /// Each direction of motion visits most of the position range.
     pub position_covered: bool,
+    /// Pre-sliding elements whose distances were chosen.
+    pub elements: usize,
+    /// Ripples whose frequencies were chosen.
+    pub ripples: usize,
 }
 
 /// Reads what the rigid part depends on from the samples; mass and length are 0 where there are no such columns.
@@ -63,6 +67,7 @@ pub fn joint_state(samples: &Samples, index: usize) -> JointState {
         acceleration: samples.acceleration[index],
         load: samples.load.get(index).copied().unwrap_or(0.0),
         temperature: samples.temperature[index],
+        bent: samples.bent.get(index).copied().unwrap_or_default(),
     }
 }
 
@@ -138,6 +143,8 @@ impl Limits {
             position: lowest.abs().max(highest.abs()),
             position_range: highest - lowest,
             position_covered: covers_positions(rows, lowest, highest),
+            elements: 0,
+            ripples: 0,
         }
     }
 }

@@ -51,6 +51,13 @@ impl fmt::Display for Freedom {
 fn supported(problem: &Problem, rigid: &RigidModel) -> (Structure, Vec<String>) {
     use Term::*;
     let mut terms = Terms::of(&[Constant, Position, Viscous, Quadratic, Coulomb, CoulombLoad, Stribeck, Hysteresis]);
+    terms = terms.with(ViscousAsymmetry);
+    let limits = &problem.limits;
+    for (term, found) in
+        [(PreSliding, limits.elements > 0), (Ripple, limits.ripples > 0), (SecondRipple, limits.ripples > 1)]
+    {
+        terms = if found { terms.with(term) } else { terms };
+    }
     let mut notes = Vec::new();
     if !rigid.inertia {
         terms = terms.with(RotorInertia);
@@ -161,9 +168,15 @@ fn changed(structure: &Structure, freedom: Freedom, on: bool) -> Option<Structur
     let has = |term| changed.terms.contains(term);
     let possible = match freedom {
         Freedom::AsymmetricBreakaway => has(Term::Stribeck),
-        Freedom::AsymmetricCoulomb | Freedom::Term(Term::CoulombLoad | Term::CoulombTemperature | Term::Stribeck) => {
-            has(Term::Coulomb)
-        }
+        Freedom::AsymmetricCoulomb
+        | Freedom::Term(
+            Term::CoulombLoad
+            | Term::CoulombTemperature
+            | Term::Stribeck
+            | Term::PreSliding
+            | Term::Ripple
+            | Term::SecondRipple,
+        ) => has(Term::Coulomb),
         _ => true,
     };
     changed.asymmetric_breakaway &= has(Term::Stribeck);

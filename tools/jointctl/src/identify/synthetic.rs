@@ -2,7 +2,8 @@
 
 use super::nonlinear::{Problem, rigid_effort};
 use super::observations::{Limits, decimated, joint_state, rigid_state, rows};
-use crate::friction_model::{Directional, FrictionModel, Terms};
+use crate::friction_model::{Directional, FrictionModel, Ripple, Terms};
+use crate::pre_sliding;
 use crate::rigid::{Gravity, RigidModel, RigidParameters};
 use crate::samples::{MotionState, Part, Samples};
 use rand_chacha::ChaCha8Rng;
@@ -43,6 +44,13 @@ pub fn friction(terms: Terms) -> FrictionModel {
         harmonic_negative: [0.14, 0.11, -0.09, 0.12, 0.10],
         rotor_inertia: 0.3,
         reference_temperature: 30.0,
+        viscous_asymmetry: 0.1,
+        element_stiffness: [4.0, 20.0, 0.0, 0.0],
+        element_level: [0.4, 0.3, 0.0, 0.0],
+        ripples: [
+            Ripple { frequency: 7.1, level_sine: 0.1, level_cosine: -0.2, torque_sine: 0.05, torque_cosine: 0.1 },
+            Ripple { frequency: 17.0, level_sine: 0.2, level_cosine: 0.1, torque_sine: -0.1, torque_cosine: 0.1 },
+        ],
     }
 }
 
@@ -76,6 +84,7 @@ pub fn drive(samples: &mut Samples, rigid: &RigidParameters, friction: &Friction
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let normal = Normal::new(0.0, noise).unwrap();
     samples.load = (0..samples.len()).map(|i| rigid.effort(&rigid_state(samples, i))).collect();
+    samples.bent = pre_sliding::bent(samples, &friction.element_stiffness);
     for i in 0..samples.len() {
         let lost = friction.friction(&joint_state(samples, i));
         samples.effort[i] = samples.load[i] + lost + normal.sample(&mut random);
@@ -87,9 +96,10 @@ pub fn drive(samples: &mut Samples, rigid: &RigidParameters, friction: &Friction
 pub fn problem(samples: &Samples, model: &RigidModel, theoretical: RigidParameters, truth: &FrictionModel) -> Problem {
     let mut train = rows(samples);
     train.iter_mut().for_each(|row| row.joint.load = rigid_effort(&theoretical, row));
+    let limits = Limits { elements: 2, ripples: 2, ..Limits::of(&train, truth.reference_temperature) };
     Problem {
         search: decimated(&train, 8_000),
-        limits: Limits::of(&train, truth.reference_temperature),
+        limits,
         train,
         folds: vec![],
         own_part_of_offset: 1.0,
@@ -98,6 +108,8 @@ pub fn problem(samples: &Samples, model: &RigidModel, theoretical: RigidParamete
         template: FrictionModel {
             coulomb_slope: truth.coulomb_slope,
             hysteresis_acceleration_slope: truth.hysteresis_acceleration_slope,
+            element_stiffness: truth.element_stiffness,
+            ripples: truth.ripples.map(|ripple| Ripple { frequency: ripple.frequency, ..Ripple::default() }),
             reference_temperature: truth.reference_temperature,
             ..FrictionModel::default()
         },

@@ -145,12 +145,13 @@ fn a_position_slope_that_gravity_explains_is_not_friction_and_one_that_it_does_n
     assert!((wide.friction.position_slope - sloped.position_slope).abs() < 0.03, "{:?}", wide.friction);
 }
 
+/// But for their velocities, which bend the pre-sliding elements that the motion behind them begins with.
 #[test]
 fn the_test_samples_are_never_looked_at() {
     let mut clean = joint(3_000);
     let mut corrupt = clean.clone();
     for i in corrupt.indices(Part::Test) {
-        (corrupt.effort[i], corrupt.velocity[i], corrupt.temperature[i]) = (f64::NAN, 1e6, -300.0);
+        (corrupt.effort[i], corrupt.acceleration[i], corrupt.temperature[i]) = (f64::NAN, 1e6, -300.0);
     }
     let found =
         [&mut clean, &mut corrupt].map(|samples| identify(samples, &RIGID, Preset::Full, &Options::default()).unwrap());

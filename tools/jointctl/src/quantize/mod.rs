@@ -3,6 +3,7 @@
 //! `full_scale` converts single numbers between SI and the image's form, `physical` and `network` whole models. Every
 //! number is rounded to nearest; what does not fit is refused by name, value and limit, never clipped.
 
+pub mod common;
 pub mod full_scale;
 pub mod network;
 pub mod physical;
@@ -11,7 +12,7 @@ use full_scale::to_q16;
 use joint_firmware::friction::domain::{Domain, Range};
 use joint_firmware::friction::state::{JointState, SIGNALS, Signal};
 use joint_firmware::friction::{FrictionModel, FrictionParameters};
-use joint_firmware::parameters::image::GoldenVector;
+use joint_firmware::parameters::image::{GoldenSequence, GoldenVector};
 
 /// A model that an image cannot hold.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -77,6 +78,7 @@ pub fn domain(
 pub fn golden_vectors(parameters: &FrictionParameters, count: usize) -> Vec<GoldenVector> {
     let model = FrictionModel::new(parameters, 1);
     let sets = parameters.selector.sets();
+    let mut sequence = GoldenSequence::new(&parameters.common);
     let vector = |n: usize| {
         let set = n % sets;
         let mut signals = [0; SIGNALS];
@@ -87,7 +89,8 @@ pub fn golden_vectors(parameters: &FrictionParameters, count: usize) -> Vec<Gold
             let width = range.high as f64 - range.low as f64;
             *signal = if range == Range::ANY { 0 } else { (range.low as f64 + place * width).round() as i32 };
         }
-        let expected = model.evaluate(set, &JointState::from_signals(signals));
+        let state = JointState::from_signals(signals);
+        let expected = model.evaluate_with(set, &state, &sequence.next(&state));
         GoldenVector { set: set as u8, signals, expected }
     };
     (0..count.max(sets)).map(vector).collect()

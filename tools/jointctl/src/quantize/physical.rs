@@ -22,13 +22,19 @@ pub fn quantize(model: &FrictionModel, domain: &Domain) -> Result<PhysicalParame
             other => other?,
         };
     }
-    let terms = model.terms.iter().fold(Terms::default(), |set, term| set.union(firmware_term(term)));
+    let terms = of_a_set().filter(|&term| model.terms.contains(term));
+    let terms = terms.fold(Terms::default(), |set, term| set.union(firmware_term(term)));
     Ok(PhysicalParameters { terms, coefficients: Coefficients::from_array(bits) })
 }
 
-/// The firmware's bit for a term: both list them in the order of the formula.
+/// The terms that a parameter set has for itself.
+fn of_a_set() -> impl Iterator<Item = Term> {
+    Term::ALL.into_iter().take(Term::OF_A_SET)
+}
+
+/// The firmware's bit for a term of a set: both list them in the same order.
 fn firmware_term(term: Term) -> Terms {
-    Terms(1 << term as u16)
+    Terms(1 << term as u32)
 }
 
 /// The coefficients in SI, in the firmware's order; zero where their term is off.
@@ -61,6 +67,7 @@ fn natural(model: &FrictionModel) -> [f64; Coefficients::COUNT] {
     values.extend(model.harmonic_positive.map(harmonic));
     values.extend(model.harmonic_negative.map(harmonic));
     values.push(on(Term::RotorInertia, model.rotor_inertia));
+    values.push(on(Term::ViscousAsymmetry, model.viscous_asymmetry));
     std::array::from_fn(|i| values[i])
 }
 
@@ -70,8 +77,7 @@ pub fn dequantize(parameters: &PhysicalParameters, domain: &Domain) -> FrictionM
     let bits = parameters.coefficients.to_array();
     let values: [f64; Coefficients::COUNT] =
         std::array::from_fn(|i| to_si(bits[i], Coefficients::DIMENSIONS[i], &shifts));
-    let terms: Vec<Term> =
-        Term::ALL.into_iter().filter(|term| parameters.terms.contains(firmware_term(*term))).collect();
+    let terms: Vec<Term> = of_a_set().filter(|term| parameters.terms.contains(firmware_term(*term))).collect();
     FrictionModel {
         terms: FloatTerms::of(&terms),
         offset: values[0],
@@ -95,7 +101,9 @@ pub fn dequantize(parameters: &PhysicalParameters, domain: &Domain) -> FrictionM
         harmonic_positive: std::array::from_fn(|j| values[20 + j]),
         harmonic_negative: std::array::from_fn(|j| values[25 + j]),
         rotor_inertia: values[30],
+        viscous_asymmetry: values[31],
         reference_temperature: from_q16(domain.reference_temperature),
+        ..FrictionModel::default()
     }
 }
 
@@ -105,7 +113,7 @@ pub fn depends_on(model: &FrictionModel) -> [bool; SIGNALS] {
     use Term::*;
     [
         any(&[Position, Harmonics]),
-        any(&[Viscous, Quadratic, Coulomb, Stribeck, Hysteresis, Harmonics]),
+        any(&[Viscous, ViscousAsymmetry, Quadratic, Coulomb, Stribeck, Hysteresis, Harmonics]),
         any(&[Load, CoulombLoad]),
         false,
         any(&[Temperature, ViscousTemperature, CoulombTemperature]),
@@ -119,12 +127,13 @@ mod tests {
 
     #[test]
     fn both_sides_list_terms_and_coefficients_in_the_same_order() {
-        for (term, name) in Term::ALL.into_iter().zip(Terms::NAMES) {
+        assert_eq!(Term::OF_A_SET, Terms::NAMES.len());
+        for (term, name) in of_a_set().zip(Terms::NAMES) {
             let text = serde_json::to_string(&term).unwrap().replace('-', "_");
             assert_eq!(text.trim_matches('"'), name);
         }
         let mut model = FrictionModel { rotor_inertia: 7.0, offset: 1.0, ..FrictionModel::default() };
-        model.terms = Term::ALL.into_iter().fold(model.terms, |set, term| set.with(term));
+        model.terms = of_a_set().fold(model.terms, |set, term| set.with(term));
         (model.stribeck_slope, model.harmonic_negative[4]) = (14.0, 29.0);
         let values = natural(&model);
         let at = |name: &str| values[Coefficients::NAMES.iter().position(|n| *n == name).unwrap()];

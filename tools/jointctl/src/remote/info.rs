@@ -16,12 +16,15 @@ use std::fmt::Write;
 const SIGNALS: [&str; 6] =
     ["position", "velocity", "theoretical torque", "measured torque", "temperature", "acceleration"];
 
+/// Columns of a line's title.
+const TITLE: usize = 16;
+
 /// The page; reads some fifty objects.
 pub fn page(joint: &RemoteJoint) -> Result<String, RemoteError> {
     let mut page = String::new();
     let mut line = |title: &str, text: String| {
         // Writing to a string does not fail.
-        let _ = writeln!(page, "{title:<16}{text}");
+        let _ = writeln!(page, "{title:<TITLE$}{text}");
     };
     let text = |index| joint.node().upload(index, 0).map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
     let word = |sub_index| joint.node().number(0x1018, sub_index).map(u32::from_le_bytes);
@@ -122,6 +125,23 @@ pub fn page(joint: &RemoteJoint) -> Result<String, RemoteError> {
     Ok(page)
 }
 
+/// The page as JSON: its lines by their titles, those of several lines as an array.
+pub fn json(page: &str) -> serde_json::Value {
+    let mut lines: Vec<(String, Vec<String>)> = Vec::new();
+    for line in page.lines() {
+        let (title, text) = line.split_at_checked(TITLE).unwrap_or((line, ""));
+        match (title.trim_end(), lines.last_mut()) {
+            ("", Some((_, texts))) => texts.push(text.to_owned()),
+            (title, _) => lines.push((title.to_owned(), vec![text.to_owned()])),
+        }
+    }
+    let value = |texts: Vec<String>| match <[String; 1]>::try_from(texts) {
+        Ok([text]) => serde_json::Value::String(text),
+        Err(texts) => texts.into(),
+    };
+    lines.into_iter().map(|(title, texts)| (title, value(texts))).collect()
+}
+
 /// A value with its unit.
 pub fn show(joint: &RemoteJoint, field: Field) -> Result<String, RemoteError> {
     let entry = Entry::of(field);
@@ -205,10 +225,14 @@ fn authentication(joint: &RemoteJoint) -> Result<String, RemoteError> {
     if raw(ImageField::KeyPresent)? == 0 {
         return Ok(format!("no key: images need no tag; version {floor} or newer"));
     }
-    let mut text = format!("key {:08x}: images need its tag; version {floor} or newer", raw(ImageField::KeyNumber)?);
-    let (failures, left) = (raw(ImageField::Failures)?, joint.number(Field::Image(ImageField::Lockout))?);
+    let number = raw(ImageField::KeyNumber)?;
+    if number == 0 {
+        return Ok("the stored key is damaged: no image is taken".into());
+    }
+    let mut text = format!("key {number:08x}: images need its tag; version {floor} or newer");
+    let failures = raw(ImageField::Failures)?;
     if failures > 0 {
-        let _ = write!(text, "; {failures} wrong tags in a row, locked for {left:.1} s");
+        let _ = write!(text, "; {failures} wrong tags so far");
     }
     Ok(text)
 }

@@ -26,7 +26,7 @@ const WORDS: [(u16, &str); 32] = [
     (0x0207, "a field of the image has a value that it cannot have"),
     (0x0301, "the joint has a key, but no tag of 32 bytes follows the image; `jointctl sign` puts one there"),
     (0x0302, "the tag is not that of this image and the joint's key"),
-    (0x0303, "too many wrong tags: nothing is verified for a while"),
+    (0x0304, "the joint's key is damaged: it takes no image, and keeps the one that it has"),
     (0x0401, "the image is older than one that the joint has had"),
     (0x0501, "the image is for another product"),
     (0x0502, "the image is for another joint"),
@@ -89,8 +89,10 @@ impl Attempt<'_> {
     /// The error for a number that the joint told.
     pub fn refused(&self, joint: &RemoteJoint, code: u16) -> RemoteError {
         let text = match self.reproduce(joint, code) {
-            Ok(Some(Refusal::State { command: None, state })) => {
-                format!("{}; `jointctl discard` ends that", Refusal::State { command: None, state })
+            Ok(Some(refusal @ Refusal::State { command, state }))
+                if command.is_none() || matches!(state, State::Shadow | State::Trial) =>
+            {
+                format!("{refusal}; `jointctl discard` ends that")
             }
             Ok(Some(refusal)) if refusal.code() == code => refusal.to_string(),
             // Whether its details can be read makes no difference to the refusal.
@@ -118,10 +120,6 @@ impl Attempt<'_> {
             }
             (0x0201..=0x0207, Err(error)) => Refusal::Image(error),
             (0x0302, _) => Refusal::TagWrong { failures: raw(ImageField::Failures)? as u16 },
-            (0x0303, _) => Refusal::LockedOut {
-                left: raw(ImageField::Lockout)? as u32,
-                failures: raw(ImageField::Failures)? as u16,
-            },
             (0x0401, Ok(image)) => Refusal::Version { version: image.version, floor: raw(ImageField::Floor)? as u32 },
             (0x0501, Ok(image)) => Refusal::Product { image: image.target.product, joint: identity(2)? },
             (0x0502, Ok(image)) => Refusal::Serial { image: image.target.serial, joint: identity(4)? },

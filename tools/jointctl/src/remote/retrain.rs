@@ -80,12 +80,14 @@ pub enum RetrainError {
         problem: String,
     },
     /// Somebody's image is on its way.
-    #[error("node {node}: {}; `jointctl discard` ends it", super::info::life(*state, 0.0))]
+    #[error("node {node}: {}; `jointctl discard` ends it", super::info::life(*state, *left))]
     Busy {
         /// Node id.
         node: u8,
         /// Where it stands.
         state: State,
+        /// What is left of a trial or shadow, s.
+        left: f64,
     },
     /// Ended by the user.
     #[error("ended early; node {node} is disabled and keeps the image that it had")]
@@ -281,11 +283,12 @@ impl Round {
         joint.require_off("learning anew")?;
         let status = joint.image_status()?;
         if matches!(status.state, State::Shadow | State::Trial | State::Storing) {
-            return Err(RetrainError::Busy { node, state: status.state });
+            return Err(RetrainError::Busy { node, state: status.state, left: status.left });
         }
         let refuse = |problem| Err(RetrainError::Key { node, problem });
         let number = joint.raw(Field::Image(ImageField::KeyNumber))?;
         match (joint.raw(Field::Image(ImageField::KeyPresent))? != 0, &self.key) {
+            (true, _) if number == 0 => return refuse("its key is damaged: it takes no image".into()),
             (true, None) => return refuse(format!("it takes images with a tag of key {number:08x} only: --key FILE")),
             (true, Some(key)) if u64::from(key.id()) != number => {
                 return refuse(format!("it has key {number:08x}, the file key {:08x}", key.id()));

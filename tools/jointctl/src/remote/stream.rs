@@ -27,7 +27,7 @@ use std::time::{Duration, Instant};
 pub const RATES: [f64; 2] = [1.0, 1_000.0];
 /// How long each step to "operation enabled" may take.
 const STEP: Duration = Duration::from_secs(1);
-/// RPDOs of the joint: drive and torque and position; velocity with a counter; impedance frame.
+/// RPDOs of the joint: drive and torque and position; velocity; impedance frame.
 const DRIVE: u8 = 0;
 const VELOCITY: u8 = 1;
 const IMPEDANCE: u8 = 2;
@@ -40,10 +40,11 @@ fn mode_number(mode: Mode) -> i8 {
         Mode::Torque => 10,
         Mode::Impedance => -1,
         Mode::OpenLoop => -2,
+        Mode::Hold => 0,
     }
 }
 
-/// The open loop is a bench's, not a master's.
+/// The open loop is a bench's, not a master's; a joint that holds is asked for nothing.
 pub(super) fn no_set_points() -> RemoteError {
     let object = Entry::of(Field::SetPoint(SetPoint::Mode)).described();
     RemoteError::Value { object, problem: "the open loop has no set-points; `jointctl commission` uses it".into() }
@@ -157,7 +158,7 @@ impl Stream {
             Mode::Torque | Mode::Position => &[DRIVE],
             Mode::Velocity => &[VELOCITY],
             Mode::Impedance => &[DRIVE, IMPEDANCE],
-            Mode::OpenLoop => return Err(no_set_points()),
+            Mode::OpenLoop | Mode::Hold => return Err(no_set_points()),
         };
         for pdo in Pdo::all(Direction::Receive).into_iter().filter(|pdo| needed.contains(&pdo.number)) {
             if let Some(wanted) = defaults.get(usize::from(pdo.number)) {

@@ -20,6 +20,21 @@ pub enum Value {
 }
 
 impl Value {
+    /// As JSON: bytes as an array of numbers; what JSON has no number for as null.
+    #[must_use]
+    pub fn json(&self) -> serde_json::Value {
+        match self {
+            Self::Bool(value) => (*value).into(),
+            Self::Integer(value) => {
+                i64::try_from(*value).map_or_else(|_| u64::try_from(*value).unwrap_or(u64::MAX).into(), Into::into)
+            }
+            // A REAL32 is told by as many digits as it has.
+            Self::Real(value) => format!("{}", *value as f32).parse::<f64>().unwrap_or(*value).into(),
+            Self::Text(text) => text.as_str().into(),
+            Self::Bytes(bytes) => bytes.as_slice().into(),
+        }
+    }
+
     /// As a number, where it is one.
     pub fn number(&self) -> Option<f64> {
         match self {

@@ -6,6 +6,7 @@ use super::*;
 use crate::friction_model::{Directional, FrictionModel as FloatModel, Term, Terms};
 use crate::quantize::physical::quantize;
 use joint_firmware::compensation::Request;
+use joint_firmware::friction::common::CommonTerms;
 use joint_firmware::friction::domain::{Domain, Range};
 use joint_firmware::friction::physical::PhysicalParameters;
 use joint_firmware::friction::regime::Selector;
@@ -43,7 +44,7 @@ fn its_friction(plant: &ActuatorParameters) -> FrictionModel {
     let mut sets = [nothing; 4];
     sets[0].physical = physical;
     let selector = Selector { criteria: [None, None], fade_time: 0 };
-    FrictionModel::new(&FrictionParameters { domain, selector, sets }, 20_000)
+    FrictionModel::new(&FrictionParameters { domain, selector, common: CommonTerms::NONE, sets }, 20_000)
 }
 
 /// Two seconds of a sweep that reverses a few times.

@@ -1,5 +1,6 @@
 //! Virtual joints on a bus within this process.
 
+use joint_firmware::friction::common::CommonTerms;
 use joint_firmware::friction::domain::{Domain, Range};
 use joint_firmware::friction::physical::{Coefficients, PhysicalParameters, Terms};
 use joint_firmware::friction::regime::Selector;
@@ -85,6 +86,7 @@ pub fn image(version: u32, level: f64, serial: u32) -> Vec<u8> {
     let friction = FrictionParameters {
         domain: Domain { ranges: [range; SIGNALS], margin: 0, reference_temperature: 0 },
         selector: Selector::default(),
+        common: CommonTerms::NONE,
         sets: [set, ParameterSet::default(), ParameterSet::default(), ParameterSet::default()],
     };
     let signals = [7; SIGNALS];

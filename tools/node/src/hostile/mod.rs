@@ -363,7 +363,7 @@ impl<'a> HostileNode<'a> {
 /// The state that a frame may lead to: CiA 301 section 7.3.2.
 fn allowed(frame: &Frame, before: NmtState, id: u8) -> NmtState {
     match (frame.id(), frame.data()) {
-        (0, &[command, node, ..]) if id != NO_NODE_ID && (node == 0 || node == id) => match (command, before) {
+        (0, &[command, node]) if id != NO_NODE_ID && (node == 0 || node == id) => match (command, before) {
             (0x81 | 0x82, _) => NmtState::Initialising,
             (_, NmtState::Initialising) => before,
             (0x01, _) => NmtState::Operational,

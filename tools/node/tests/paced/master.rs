@@ -25,7 +25,6 @@ pub struct Line {
     pub heard: Vec<Delivery>,
     /// The master's set-points: controlword and velocity, mrad/s, of each joint.
     pub driven: Vec<Option<(u16, i32)>>,
-    counter: u8,
     tick: Duration,
 }
 
@@ -44,7 +43,7 @@ impl Line {
             nodes.add(node, number * 50 * US / u32::from(joints));
         }
         let driven = vec![None; joints.into()];
-        let mut line = Self { nodes, master, heard: vec![], driven, counter: 0, tick: Duration::ZERO };
+        let mut line = Self { nodes, master, heard: vec![], driven, tick: Duration::ZERO };
         line.wait(200 * MILLISECOND);
         line
     }
@@ -80,11 +79,10 @@ impl Line {
     }
 
     fn drive(&mut self) {
-        self.counter = self.counter.wrapping_add(1);
         for (id, driven) in (0x300 + u16::from(FIRST)..).zip(self.driven.clone()) {
             let Some((controlword, velocity)) = driven else { continue };
             let mut data = controlword.to_le_bytes().to_vec();
-            data.extend([9, self.counter]);
+            data.push(9);
             data.extend(velocity.to_le_bytes());
             self.send(id, &data);
         }
