@@ -6,6 +6,7 @@
 //! `src/board/`.
 
 use crate::compensation::Request;
+use crate::friction::regime::MOST_SETS;
 use crate::joint::BoardLimits;
 use crate::joint::configuration::{
     BridgeConfiguration, CompensationConfiguration, Configuration, FACTORY_TRIM, Gains, GearConfiguration, Limits,
@@ -23,6 +24,8 @@ pub struct BoardConfiguration {
     pub analog: Analog,
     /// The joint, not commissioned.
     pub joint: Configuration,
+    /// Parameter sets of an image that its program has room for: 1, no regimes, or 4.
+    pub parameter_sets: usize,
 }
 
 const B_G431B_ESC1_ANALOG: Analog = Analog {
@@ -82,6 +85,7 @@ pub const B_G431B_ESC1: BoardConfiguration = BoardConfiguration {
     ),
     analog: B_G431B_ESC1_ANALOG,
     joint: uncommissioned((8.0, 25.0), 1.0, 0.0),
+    parameter_sets: 1,
 };
 
 /// mjbots moteus r4.11. Supply: a bench supply of 12 to 24 V. The encoder's answer is two control periods old. The motor's
@@ -111,6 +115,7 @@ pub const MOTEUS_R4: BoardConfiguration = BoardConfiguration {
     ),
     analog: MOTEUS_R4_ANALOG,
     joint: uncommissioned((10.0, 30.0), 4.0, 2.0 / MOTEUS_R4_RATE),
+    parameter_sets: MOST_SETS,
 };
 
 /// Control steps a second, Hz.

@@ -73,17 +73,16 @@ fn main() -> Outcome<()> {
          wait states,\nas they are where the control interrupt runs from (`tools/emulator/src/cpu/timing.rs`). Each board's code is compiled as its \
          program is.\nA part that takes more instructions than `.ci/instructions` permits fails the tests (`control_step.rs`, which says how to change that)."
     );
-    let image = image_bytes();
-    let steps = input(&image, &record()?);
     let boards = [run::<BG431BEsc1>(&BOARDS[0], BG431BEsc1::new)?, run::<MoteusR4>(&BOARDS[1], MoteusR4::new)?];
     let mut missed = Vec::new();
     println!(
         "\n## The control step\n\nFive runs of 200 steps, recorded in closed loop with the virtual joint and replayed: off; the physical model; all of the \
-         model; torque mode with energy\nguard; position mode. The model is a certified image with every term, a network in each of four sets and two criteria. \
+         model; torque mode with energy\nguard; position mode. The model is a certified image with every term, a network in each of its sets, and where the board has room for them four sets and two criteria. \
          Least, median and most of the\nsteps that a part runs in. What the compiler has inlined counts for where it was written. A round of the motion loop takes {MOTION_STEPS} steps:\na step has one stage of it, four of them friction. The board's part (converters, timer, report) is that of its program, as it\nis flashed, on the emulated board: {INTERRUPTS} control interrupts while the joint is off."
     );
     for (board, program) in BOARDS.iter().zip(&boards) {
-        let (_, runs) = counted(&board.probe("step", Some(("PROBE_RUNS", &steps)), &[], TEMPORARY)?)?;
+        let steps = input(&image_bytes(board.parameter_sets), &record(board.parameter_sets)?);
+        let (_, runs) = counted(&board.probe("step", Some(("PROBE_RUNS", &steps)), board.room(), TEMPORARY)?)?;
         let steps: Vec<Step> = runs.concat();
         println!("\n### {}\n", board.name);
         println!("| | instructions | cycles | target | |\n|---|---|---|---|---|");
@@ -131,7 +130,7 @@ fn main() -> Outcome<()> {
     println!("\nOf this the network, from its inputs in Q31 as above, as it is linked:\n");
     println!("| program | wait states | network | its inputs | |\n|---|---|---|---|---|");
     network.iter().for_each(|line| println!("{line}"));
-    networks(&image, &mut missed)?;
+    networks(&mut missed)?;
     memories(&boards);
     println!("\n## What is missed\n");
     missed.iter().for_each(|line| println!("- {line}"));
@@ -159,7 +158,7 @@ fn in_motion<W: Observed + Clone>(
     let program = Program::parse(std::fs::read(&path)?)?;
     let variables = Variables::of(&program)?;
     let failed = |failed: Failed| failed.message().unwrap_or("failed").to_owned();
-    let moving = Moving::start(board, &actuator(), &program, &acting_image()).map_err(failed)?;
+    let moving = Moving::start(board, &actuator(), &program, &acting_image::<W>()).map_err(failed)?;
     let period = (170e6 / W::CONFIGURATION.bridge.rate).round();
     for (waiting, wait_states) in
         [(Waiting::Never, "none"), (Waiting::Prefetched, "prefetched"), (Waiting::Always, "always")]
@@ -209,8 +208,8 @@ fn row(
     println!("| {name} | {} {} {} | {} {} {} | {} | {said} |", i[0], i[1], i[2], c[0], c[1], c[2], targets.join(", "));
 }
 
-fn networks(image: &[u8], missed: &mut Vec<String>) -> Outcome<()> {
-    let friction = friction();
+fn networks(missed: &mut Vec<String>) -> Outcome<()> {
+    let (image, friction) = (image_bytes(1), friction(1));
     let (domain, parameters) = (friction.domain, friction.sets[0].network.ok_or("no network")?);
     let exact = Exact::new(&parameters);
     let mut random = ChaCha8Rng::seed_from_u64(8);
@@ -229,7 +228,7 @@ fn networks(image: &[u8], missed: &mut Vec<String>) -> Outcome<()> {
     for board in &BOARDS {
         let mut core = Core::start(&board.probe("networks", None, &["peers"], TEMPORARY)?)?;
         core.run_to((1, 0))?;
-        core.write("IMAGE", image)?;
+        core.write("IMAGE", &image)?;
         core.write_words("LENGTH", [image.len() as i32])?;
         core.write_words("SIGNAL_ROWS", signals.iter().flatten().copied())?;
         let floats = inputs.iter().flatten().map(|x| (*x as f32).to_bits() as i32);

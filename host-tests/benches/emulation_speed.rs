@@ -42,7 +42,7 @@ fn measure<W: Observed + Clone>(name: &str, board: fn(Drivetrain) -> W) -> Resul
         repeated(&off, |bench| bench.run(SECONDS), |bench| bench.emulation.cpu.instructions()).map_err(failed)?;
     report(name, rate, "off", runs);
 
-    let mut moving = Moving::start(board, &actuator(), &program, &acting_image()).map_err(failed)?;
+    let mut moving = Moving::start(board, &actuator(), &program, &acting_image::<W>()).map_err(failed)?;
     moving.run(WARM).map_err(failed)?;
     let runs = repeated(&moving, |moving| moving.run(SECONDS), |moving| moving.bench.emulation.cpu.instructions())
         .map_err(failed)?;

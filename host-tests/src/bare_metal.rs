@@ -1,5 +1,6 @@
 //! The boards' programs, built as they are flashed, those of the probe, built in the same way, and whether that is possible on this machine.
 
+use joint_firmware::default_configuration::{B_G431B_ESC1, MOTEUS_R4};
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -20,12 +21,22 @@ pub fn target_installed() -> bool {
 pub struct Board {
     /// Its feature.
     pub name: &'static str,
+    /// Parameter sets that its program has room for.
+    pub parameter_sets: usize,
 }
 
 /// The boards.
-pub const BOARDS: [Board; 2] = [Board { name: "b-g431b-esc1" }, Board { name: "moteus-r4" }];
+pub const BOARDS: [Board; 2] = [
+    Board { name: "b-g431b-esc1", parameter_sets: B_G431B_ESC1.parameter_sets },
+    Board { name: "moteus-r4", parameter_sets: MOTEUS_R4.parameter_sets },
+];
 
 impl Board {
+    /// Features of the probe with which it has the room that the board's program has.
+    pub fn room(&self) -> &'static [&'static str] {
+        if self.parameter_sets == 1 { &["one-parameter-set"] } else { &[] }
+    }
+
     /// Builds a program of `probe/src/bin` as this board's is, below a test's temporary folder; its path. `input` is a variable of the program's
     /// build, and the file that it names; `features` are the
     /// probe's.

@@ -24,8 +24,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use replay::{SCENARIOS, SEED, START, STEPS, Scenario, WORDS};
 
-/// Every term, a network in every set, and two criteria that the runs cross; friction like the reference joint's.
-pub fn friction() -> FrictionParameters {
+/// Every term, a network in every set, and two criteria that the runs cross where there is room for `most_sets` > 1; friction like the reference joint's.
+pub fn friction(most_sets: usize) -> FrictionParameters {
     let domain = Domain {
         ranges: [
             range(-2.5, 2.5),
@@ -63,12 +63,16 @@ pub fn friction() -> FrictionParameters {
         ParameterSet { physical, network: Some(network) }
     };
     let criterion = |measure, enter: f64| Some(Criterion { measure, enter: q16(enter), leave: q16(0.8 * enter) });
+    let selector = Selector {
+        criteria: [criterion(Measure::Speed, 0.05), criterion(Measure::Coupled, 0.1)],
+        fade_time: q16(0.002) as u32,
+    };
+    let sets = [set(2.5), set(2.4), set(2.3), set(2.2)];
+    let one = [sets[0], ParameterSet::default(), ParameterSet::default(), ParameterSet::default()];
+    let (selector, sets) = if most_sets == 1 { (Selector::default(), one) } else { (selector, sets) };
     FrictionParameters {
         domain,
-        selector: Selector {
-            criteria: [criterion(Measure::Speed, 0.05), criterion(Measure::Coupled, 0.1)],
-            fade_time: q16(0.002) as u32,
-        },
+        selector,
         common: CommonTerms {
             elements: [0.002, 0.006, 0.02, 0.06]
                 .map(|distance| MaxwellElement { stiffness: q16(1.0 / distance), level: q16(0.1) }),
@@ -80,7 +84,7 @@ pub fn friction() -> FrictionParameters {
                 torque_cosine: q16(0.01),
             }),
         },
-        sets: [set(2.5), set(2.4), set(2.3), set(2.2)],
+        sets,
     }
 }
 
@@ -88,8 +92,8 @@ pub fn friction() -> FrictionParameters {
 ///
 /// # Panics
 /// Where the certificate refuses it.
-pub fn image_bytes() -> Vec<u8> {
-    let friction = friction();
+pub fn image_bytes(most_sets: usize) -> Vec<u8> {
+    let friction = friction(most_sets);
     prove(&friction).unwrap_or_else(|error| panic!("{error:?}"));
     encoded(&image(&mut ChaCha8Rng::seed_from_u64(6), friction, 1))
 }
@@ -106,7 +110,7 @@ pub fn input(image: &[u8], steps: &[[u32; WORDS]]) -> Vec<u8> {
 ///
 /// # Errors
 /// The virtual joint cannot be made, or has not stayed enabled.
-pub fn record() -> Result<Vec<[u32; WORDS]>, Box<dyn std::error::Error>> {
+pub fn record(most_sets: usize) -> Result<Vec<[u32; WORDS]>, Box<dyn std::error::Error>> {
     let parameters = ActuatorParameters::reference().aligned();
     let (configuration, bridge) = replay::configuration(&SCENARIOS[0]);
     let mut started = VirtualJoint::new(parameters, &Setup { configuration, bridge }, 25.0, 3)?;
@@ -124,7 +128,7 @@ pub fn record() -> Result<Vec<[u32; WORDS]>, Box<dyn std::error::Error>> {
         let mut joint = started.clone();
         let (configuration, bridge) = replay::configuration(scenario);
         joint.set_active(configuration.prepare(&bridge)?);
-        joint.set_friction(Some(FrictionModel::new(&friction(), bridge.motion_rate())));
+        joint.set_friction(Some(FrictionModel::new(&friction(most_sets), bridge.motion_rate())));
         for n in 0..STEPS {
             let state = step(&mut joint, &replay::demand(scenario, n));
             if state != State::OperationEnabled {

@@ -8,7 +8,7 @@ use joint_firmware::friction::network::{
     INPUTS, MAX_FRACTION, MAX_SCALE, MIN_FRACTION, NEURONS, NetworkParameters, Neuron,
 };
 use joint_firmware::friction::physical::{Coefficients, Dimension, PhysicalParameters, Terms};
-use joint_firmware::friction::regime::{Criterion, MAX_CRITERIA, Measure, Selector};
+use joint_firmware::friction::regime::{Criterion, MAX_CRITERIA, MOST_SETS, Measure, Selector};
 use joint_firmware::friction::ripple::Ripple;
 use joint_firmware::friction::state::{JointState, SIGNALS, Signal};
 use joint_firmware::friction::{Estimate, FrictionModel, FrictionParameters, ParameterSet};
@@ -56,9 +56,14 @@ pub fn frictionless() -> FrictionParameters {
 
 /// Parameters like those of an identified joint: 1, 2 or 4 sets, each with a network in two cases of three.
 pub fn tame(random: &mut ChaCha8Rng) -> FrictionParameters {
+    tame_within(random, MOST_SETS)
+}
+
+/// The same with so many sets at the most: 1, 2 or 4.
+pub fn tame_within(random: &mut ChaCha8Rng, most_sets: usize) -> FrictionParameters {
     let domain = tame_domain(random);
     let mut selector = Selector { fade_time: q16(random.random_range(0.01..0.3)) as u32, ..Selector::default() };
-    for criterion in selector.criteria.iter_mut().take(random.random_range(0..=MAX_CRITERIA)) {
+    for criterion in selector.criteria.iter_mut().take(random.random_range(0..=most_sets.ilog2() as usize)) {
         let enter = q16(random.random_range(0.1..2.0));
         let measure = [Measure::Acceleration, Measure::Speed, Measure::Coupled][random.random_range(0..3)];
         *criterion = Some(Criterion { measure, enter, leave: enter - enter / 4 });

@@ -14,7 +14,10 @@ use crate::quantity::Torque;
 /// Most criteria that an image can hold.
 pub const MAX_CRITERIA: usize = 2;
 /// Most parameter sets that an image can hold: every combination of the criteria.
-pub const MAX_SETS: usize = 1 << MAX_CRITERIA;
+pub const MOST_SETS: usize = 1 << MAX_CRITERIA;
+/// Most parameter sets that this program has room for. With the feature `one-parameter-set` a chip's program has no regimes; on the host nothing changes.
+pub const MAX_SETS: usize =
+    if cfg!(all(feature = "one-parameter-set", target_os = "none")) { 1 } else { MOST_SETS };
 
 /// What a criterion looks at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -74,6 +77,9 @@ impl Selector {
     /// Index of the set for this state; between the thresholds of a criterion, as in `previous`.
     #[inline]
     pub fn select(&self, state: &JointState, previous: usize) -> usize {
+        if MAX_SETS == 1 {
+            return 0;
+        }
         let upper = |criterion: &Criterion, before: bool| {
             let measure = criterion.measure.of(state);
             measure >= criterion.enter || measure > criterion.leave && before
@@ -104,7 +110,7 @@ impl Memory {
     /// Takes note of the set for this step; a change starts a cross-fade from the last output.
     #[inline]
     pub(super) fn enter(&mut self, set: usize) {
-        if self.set.is_some_and(|before| before != set) {
+        if MAX_SETS > 1 && self.set.is_some_and(|before| before != set) {
             self.held = self.last;
             self.weight = i32::MAX;
         }
@@ -114,6 +120,9 @@ impl Memory {
     /// Blends the set's estimate with the fading one; `decrement` is the fade per step, Q31.
     #[inline]
     pub(super) fn fade(&mut self, new: Estimate, decrement: i32) -> Estimate {
+        if MAX_SETS == 1 {
+            return new;
+        }
         self.last = Estimate {
             physical: blend(self.held.physical, new.physical, self.weight),
             network: blend(self.held.network, new.network, self.weight),

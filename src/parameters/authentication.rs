@@ -18,7 +18,7 @@
 //! Wrong tags are counted and keep nobody out: 256 bits cannot be guessed, and a joint that refused right tags after wrong ones could be shut off from its
 //! owner by anybody on the bus.
 
-use super::image::MAX_LENGTH;
+use super::image::{MAX_LENGTH, ROOM};
 use hmac::{Hmac, KeyInit, Mac};
 use sha2::Sha256;
 
@@ -26,9 +26,9 @@ use sha2::Sha256;
 pub const TAG: usize = 32;
 /// Bytes of a key.
 pub const KEY: usize = 32;
-/// Longest upload: the longest image and a tag.
-pub const STAGING: usize = MAX_LENGTH + TAG;
-const _: () = assert!(STAGING == 2048);
+/// Longest upload: the longest image that the program has room for, and a tag.
+pub const STAGING: usize = ROOM + TAG;
+const _: () = assert!(MAX_LENGTH + TAG == 2048);
 
 /// What is signed with a tag; another use of the key has another text.
 const IMAGE: &[u8; 16] = b"joint image tag1";

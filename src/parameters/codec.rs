@@ -7,7 +7,7 @@ use crate::friction::domain::{Domain, Range};
 use crate::friction::maxwell_slip::{ELEMENTS, MAX_STIFFNESS, MaxwellElement};
 use crate::friction::network::{INPUTS, MAX_FRACTION, MAX_SCALE, MIN_FRACTION, NEURONS, NetworkParameters};
 use crate::friction::physical::{Coefficients, PhysicalParameters, Terms};
-use crate::friction::regime::{Criterion, MAX_SETS, Measure, Selector};
+use crate::friction::regime::{Criterion, MAX_SETS, MOST_SETS, Measure, Selector};
 use crate::friction::ripple::{RIPPLES, Ripple};
 use crate::friction::state::{SIGNALS, Signal};
 use crate::friction::{Estimate, FrictionParameters, ParameterSet};
@@ -79,7 +79,7 @@ pub(super) fn decode_header(reader: &mut Reader) -> Header {
         golden: 0,
     };
     let sets_offset = reader.offset;
-    header.sets = reader.checked_u8("number of sets", 1, MAX_SETS as u8);
+    header.sets = reader.checked_u8("number of sets", 1, MOST_SETS as u8);
     header.networks = reader.checked_u8("networks", 0, ((1u16 << header.sets) - 1) as u8);
     header.golden = reader.checked_u8("number of golden vectors", 1, MAX_GOLDEN as u8);
     reader.fill(&mut header.data_hash);
@@ -119,6 +119,10 @@ pub(super) fn decode_header(reader: &mut Reader) -> Header {
         let (expected, value) = (expected as i64, header.sets as i64);
         let (name, offset) = ("number of sets", sets_offset);
         reader.refuse(ImageError::Field { name, offset, value, low: expected, high: expected });
+    }
+    if expected > MAX_SETS {
+        reader.refuse(ImageError::TooManySets { sets: header.sets });
+        header.sets = MAX_SETS as u8;
     }
     header.limits = Limits { output: reader.u32(), torque_gain: reader.u32(), velocity_slope: reader.u32() };
     if format > 1 {

@@ -62,6 +62,7 @@ use crate::friction::common::{Common, CommonTerms, CommonTorques};
 use crate::friction::maxwell_slip::{Bent, MAX_STIFFNESS};
 use crate::friction::network::{MAX_FRACTION, MAX_SCALE, MIN_FRACTION};
 use crate::friction::physical::Terms;
+use crate::friction::regime::MAX_SETS;
 use crate::friction::state::{JointState, SIGNALS, Signal};
 use crate::friction::{Estimate, FrictionModel, FrictionParameters, ParameterSet};
 
@@ -75,6 +76,11 @@ pub const GOLDEN_RATE: u32 = 1_000;
 pub const MAX_LENGTH: usize = 2048 - 32;
 /// Most golden vectors that an image can hold.
 pub const MAX_GOLDEN: usize = 8;
+/// Longest image that this program has room for: [`MAX_LENGTH`], or less where it has room for fewer parameter sets.
+pub const ROOM: usize = {
+    let longest = 216 + MAX_SETS * (132 + 280) + MAX_GOLDEN * 36 + CRC_LENGTH;
+    if longest < MAX_LENGTH { longest } else { MAX_LENGTH }
+};
 
 const HEADER_LENGTH: usize = 144;
 pub(super) const CRC_LENGTH: usize = 4;
@@ -185,6 +191,11 @@ pub enum ImageError {
         /// CRC-32 of the content.
         computed: u32,
     },
+    /// Regimes, where the program has room for one parameter set ([`MAX_SETS`]).
+    TooManySets {
+        /// Parameter sets of the image.
+        sets: u8,
+    },
     /// Bytes that must be zero are not: written by a newer program, perhaps.
     Reserved {
         /// Offset of the first reserved byte.
@@ -218,6 +229,9 @@ impl core::fmt::Display for ImageError {
             }
             Self::Checksum { stored, computed } => {
                 write!(f, "damaged: checksum {stored:08x} is stored, the content has {computed:08x}")
+            }
+            Self::TooManySets { sets } => {
+                write!(f, "{sets} parameter sets: the joint's program has room for one and no regimes (`jointctl fit` without --regimes)")
             }
             Self::Reserved { offset } => write!(f, "reserved byte at offset {offset} is not zero"),
             Self::Field { name, offset, value, low, high } => {

@@ -33,9 +33,9 @@ const ENABLING: [u16; 3] = [0x06, 0x07, 0x0F];
 const ENABLED: f64 = 0.3;
 
 /// An image whose physical model and network act in all that [`Moving`] does: every term, a network in each of
-/// four sets, and a trained box that is not left.
-pub fn acting_image() -> Vec<u8> {
-    image_bytes()
+/// the sets that the board has room for, and a trained box that is not left.
+pub fn acting_image<W: Observed>() -> Vec<u8> {
+    image_bytes(W::CONFIGURATION.parameter_sets)
 }
 
 /// A joint that somebody moves. A clone is a snapshot.

@@ -56,7 +56,7 @@ pub fn trials() -> Vec<Trial> {
         Trial::test("moteus_r4_in_motion_takes_the_cycles_that_are_published", || {
             published(PROGRAMS[0], MoteusR4::new)
         }),
-        Trial::test("b_g431b_esc1_with_the_bus_in_motion_takes_the_cycles_that_are_published", || {
+        Trial::test("b_g431b_esc1_in_motion_takes_the_cycles_that_are_published", || {
             published(PROGRAMS[1], BG431BEsc1::new)
         }),
     ]
@@ -66,7 +66,7 @@ pub fn trials() -> Vec<Trial> {
 fn published<W: Observed + Clone>(name: &str, board: fn(Drivetrain) -> W) -> Result<(), Failed> {
     let path = build(name, env!("CARGO_TARGET_TMPDIR"))?;
     let program = Program::parse(std::fs::read(&path)?)?;
-    let moving = Moving::start(board, &actuator(), &program, &acting_image())?;
+    let moving = Moving::start(board, &actuator(), &program, &acting_image::<W>())?;
     let variables = Variables::of(&program)?;
     for (waiting, wait_states) in
         [(Waiting::Never, "none"), (Waiting::Prefetched, "prefetched"), (Waiting::Always, "always")]
@@ -204,7 +204,7 @@ fn drive<W: Observed>(
         _ => Request::PhysicalAndNetwork,
     };
     let configuration = configuration::<W>(&actuator, NODE, request);
-    let mut friction = parameters::tame(&mut random);
+    let mut friction = parameters::tame_within(&mut random, W::CONFIGURATION.parameter_sets);
     // The bench is at room temperature, and so is the box of every second joint.
     if joint.is_multiple_of(2) {
         friction.domain.ranges[Signal::Temperature as usize] = parameters::range(10.0, 40.0);

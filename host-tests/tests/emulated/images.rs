@@ -8,8 +8,9 @@ use host_tests::emulated::Bench;
 use host_tests::emulated::bench::program;
 use host_tests::emulated::stack::PaintedStack;
 use host_tests::image_bytes::encoded;
-use host_tests::parameters::{image, tame};
+use host_tests::parameters::{image, tame_within};
 use joint_firmware::friction::physical::PhysicalParameters;
+use joint_firmware::friction::regime::MOST_SETS;
 use joint_firmware::parameters::certificate::{Certificate, prove};
 use joint_firmware::parameters::image::Image;
 use joint_firmware::quantity::Torque;
@@ -22,8 +23,6 @@ const NODE: u8 = 5;
 const ESC1: &str = "b-g431b-esc1";
 /// Version of the image.
 const VERSION: u32 = 7;
-/// Number of parameter sets in it, all of them with networks: what takes the most stack, time and room.
-const SETS: usize = 4;
 /// Golden vectors: with more, an image of four networks is longer than a slot.
 const GOLDEN: usize = 6;
 /// What a joint's own configuration permits, Nm and Nm/Nm in Q16.16.
@@ -40,14 +39,15 @@ pub fn trials() -> Vec<Trial> {
         Trial::test("b_g431b_esc1_takes_an_image_and_starts_with_it", || takes_an_image(ESC1, BG431BEsc1::new)),
         Trial::test("moteus_r4_takes_an_image_and_starts_with_it", || takes_an_image(MoteusR4::NAME, MoteusR4::new)),
         Trial::test("b_g431b_esc1_refuses_an_image_that_computes_otherwise", refuses_an_image),
+        Trial::test("b_g431b_esc1_refuses_an_image_with_regimes", refuses_regimes),
     ]
 }
 
-/// The first image of a seed that a joint would take, with as many sets as there can be.
-fn sample() -> Image {
+/// The first image of a seed that a joint would take, with a network in each of `most_sets` sets.
+fn sample(most_sets: usize) -> Image {
     let mut random = ChaCha8Rng::seed_from_u64(11);
     loop {
-        let mut parameters = tame(&mut random);
+        let mut parameters = tame_within(&mut random, most_sets);
         for set in &mut parameters.sets {
             // The joint's own configuration permits 0.04 Nm.
             set.physical = PhysicalParameters::default();
@@ -57,7 +57,7 @@ fn sample() -> Image {
         }
         let sets = parameters.sets.iter().filter(|set| set.network.is_some()).count();
         let fits = |proved: Certificate| proved.output <= OUTPUT && proved.torque_gain <= TORQUE_GAIN;
-        if sets < SETS || !prove(&parameters).is_ok_and(fits) {
+        if sets < most_sets || !prove(&parameters).is_ok_and(fits) {
             continue;
         }
         let mut image = image(&mut random, parameters, GOLDEN);
@@ -82,7 +82,7 @@ fn takes_an_image<W: Wired>(name: &str, board: impl FnOnce(Drivetrain) -> W) -> 
     let program = program(name, env!("CARGO_TARGET_TMPDIR"))?;
     let mut bench = Bench::new(board, &program)?;
     let stack = PaintedStack::new(&mut bench.emulation, &program)?;
-    let bytes = encoded(&sample());
+    let bytes = encoded(&sample(W::CONFIGURATION.parameter_sets));
     take_part(&mut bench)?;
     expect("version before", bench.number(NODE, 0x2213, 1)?, 0)?;
     bench.download(NODE, 0x2210, 0, &bytes)?;
@@ -130,7 +130,7 @@ const MARGIN: u32 = 2 * 104;
 /// The golden vectors are evaluated on the device: one bit of one of them is enough.
 fn refuses_an_image() -> Result<(), Failed> {
     let mut bench = Bench::new(BG431BEsc1::new, &program(ESC1, env!("CARGO_TARGET_TMPDIR"))?)?;
-    let mut image = sample();
+    let mut image = sample(BG431BEsc1::CONFIGURATION.parameter_sets);
     let vector = image.golden.last_mut().ok_or("no golden vector")?;
     vector.expected.physical = Torque::from_bits(vector.expected.physical.to_bits() ^ 1);
     take_part(&mut bench)?;
@@ -140,6 +140,25 @@ fn refuses_an_image() -> Result<(), Failed> {
         other => return Err(format!("verified: {other:?}").into()),
     }
     expect("state", bench.number(NODE, 0x2212, 2)?, 1)?;
+    expect("version", bench.number(NODE, 0x2213, 1)?, 0)
+}
+
+/// It has no regimes: an image that has is refused before its first byte where it is too long, and else by what it is.
+fn refuses_regimes() -> Result<(), Failed> {
+    let mut bench = Bench::new(BG431BEsc1::new, &program(ESC1, env!("CARGO_TARGET_TMPDIR"))?)?;
+    take_part(&mut bench)?;
+    let aborted = |outcome: Result<(), Failed>| match outcome {
+        Err(refused) if refused.message().is_some_and(|text| text.contains("Aborted")) => Ok(()),
+        other => Err(Failed::from(format!("taken: {other:?}"))),
+    };
+    aborted(bench.download(NODE, 0x2210, 0, &encoded(&sample(MOST_SETS))))?;
+    expect("result of a long upload", bench.number(NODE, 0x2212, 3)?, 0x0101)?;
+    let mut friction = sample(2).friction;
+    friction.sets.iter_mut().for_each(|set| set.network = None);
+    let short = image(&mut ChaCha8Rng::seed_from_u64(12), friction, 1);
+    bench.download(NODE, 0x2210, 0, &encoded(&short))?;
+    aborted(bench.download(NODE, 0x2212, 1, &[VERIFY]))?;
+    expect("result of its verification", bench.number(NODE, 0x2212, 3)?, 0x0208)?;
     expect("version", bench.number(NODE, 0x2213, 1)?, 0)
 }
 

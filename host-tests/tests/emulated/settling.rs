@@ -23,7 +23,7 @@ pub fn trials() -> Vec<Trial> {
 /// The joint moves faster than the supply permits, until the duties have met their limit.
 fn settled<W: Observed>(name: &str, board: fn(Drivetrain) -> W) -> Result<(), Failed> {
     let program = program(name, env!("CARGO_TARGET_TMPDIR"))?;
-    let mut moving = Moving::start(board, &actuator(), &program, &acting_image())?;
+    let mut moving = Moving::start(board, &actuator(), &program, &acting_image::<W>())?;
     let supply = f64::from(moving.configuration.limits.bus_voltage.0) + 0.5;
     moving.bench.board().drivetrain().take_least_followed();
     moving.amplitude = f64::from(moving.configuration.limits.velocity);

@@ -31,24 +31,27 @@ pub fn trials(missing: &Missing) -> Vec<Trial> {
 /// What the program is built around, and the hashes of the runs on this machine.
 type Recorded = (Vec<u8>, Vec<u32>);
 
-fn recorded() -> Result<&'static Recorded, Failed> {
-    static RECORDED: OnceLock<Result<Recorded, String>> = OnceLock::new();
+fn recorded(board: &Board) -> Result<&'static Recorded, Failed> {
+    static WITH_REGIMES: OnceLock<Result<Recorded, String>> = OnceLock::new();
+    static WITHOUT: OnceLock<Result<Recorded, String>> = OnceLock::new();
+    let sets = board.parameter_sets;
+    let place = if sets == 1 { &WITHOUT } else { &WITH_REGIMES };
     let record = || {
-        let (image, steps) = (image_bytes(), record().map_err(|error| error.to_string())?);
+        let (image, steps) = (image_bytes(sets), record(sets).map_err(|error| error.to_string())?);
         let hashes = replayed_here(&image, &steps).ok_or("the image is refused")?;
         Ok((input(&image, &steps), hashes))
     };
-    RECORDED.get_or_init(record).as_ref().map_err(Failed::from)
+    place.get_or_init(record).as_ref().map_err(Failed::from)
 }
 
 fn build(board: &Board) -> Result<PathBuf, Failed> {
-    let (input, _) = recorded()?;
-    Ok(board.probe("step", Some(("PROBE_RUNS", input)), &[], env!("CARGO_TARGET_TMPDIR"))?)
+    let (input, _) = recorded(board)?;
+    Ok(board.probe("step", Some(("PROBE_RUNS", input)), board.room(), env!("CARGO_TARGET_TMPDIR"))?)
 }
 
 fn costs_what_it_may(board: &Board) -> Result<(), Failed> {
     let (hashes, runs) = counted(&build(board)?)?;
-    let (_, expected) = recorded()?;
+    let (_, expected) = recorded(board)?;
     if hashes != *expected {
         return Err(format!("core {hashes:08x?}, host {expected:08x?}").into());
     }
@@ -71,7 +74,7 @@ fn same_bits_on_qemu(board: &Board) -> Result<(), Failed> {
         .output()?;
     let text = format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
     let hashes: Vec<u32> = text.lines().filter_map(|line| u32::from_str_radix(line.trim(), 16).ok()).collect();
-    let (_, expected) = recorded()?;
+    let (_, expected) = recorded(board)?;
     match hashes == *expected {
         true => Ok(()),
         false => Err(format!("qemu {hashes:08x?}, host {expected:08x?}; {text}").into()),

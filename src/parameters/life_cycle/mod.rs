@@ -263,7 +263,7 @@ impl LifeCycle {
     /// An upload begins, of `announced` bytes where the client has said so. What was staged is forgotten.
     pub fn begin(&mut self, announced: Option<usize>) -> Result<(), Refusal> {
         let result = match announced {
-            Some(length) if length > STAGING => Err(Refusal::UploadTooLong { length }),
+            Some(length) if length > STAGING => Err(Refusal::UploadTooLong { length, room: STAGING }),
             _ => self.upload_possible(),
         };
         if result.is_ok() {
@@ -277,7 +277,7 @@ impl LifeCycle {
     pub fn receive(&mut self, staging: &mut [u8; STAGING], piece: &[u8]) -> Result<(), Refusal> {
         let result = self.upload_possible().and_then(|()| {
             let end = self.length.saturating_add(piece.len());
-            let place = staging.get_mut(self.length..end).ok_or(Refusal::UploadTooLong { length: end })?;
+            let place = staging.get_mut(self.length..end).ok_or(Refusal::UploadTooLong { length: end, room: STAGING })?;
             for (place, byte) in place.iter_mut().zip(piece) {
                 *place = *byte;
             }
@@ -426,7 +426,7 @@ impl LifeCycle {
         if let Some(announced) = self.announced.filter(|announced| *announced != length) {
             return Err(Refusal::UploadLength { length, announced });
         }
-        let upload = staging.get(..length).ok_or(Refusal::UploadTooLong { length })?;
+        let upload = staging.get(..length).ok_or(Refusal::UploadTooLong { length, room: STAGING })?;
         if !verification::authentic(upload, conditions.key)? {
             self.failures = self.failures.saturating_add(1);
             return Err(Refusal::TagWrong { failures: self.failures });

@@ -3,7 +3,6 @@
 //! The numbers are what a bus reads (result of the last command, object 2212:3). They never change their meaning; 0 is success.
 
 use super::{Command, MAX_TRIAL_MS, State};
-use crate::parameters::authentication::STAGING;
 use crate::parameters::certificate;
 use crate::parameters::image::{Effort, GoldenMismatch, ImageError};
 use crate::parameters::slots::SlotError;
@@ -15,6 +14,8 @@ pub enum Refusal {
     UploadTooLong {
         /// Bytes with those that were refused.
         length: usize,
+        /// Bytes of the staging buffer.
+        room: usize,
     },
     /// Not as many bytes arrived as were announced.
     UploadLength {
@@ -112,6 +113,7 @@ impl Refusal {
             Self::Image(ImageError::Checksum { .. }) => 0x0205,
             Self::Image(ImageError::Reserved { .. }) => 0x0206,
             Self::Image(ImageError::Field { .. }) => 0x0207,
+            Self::Image(ImageError::TooManySets { .. }) => 0x0208,
             Self::TagMissing => 0x0301,
             Self::TagWrong { .. } => 0x0302,
             // 0303h was a lock-out.
@@ -146,7 +148,7 @@ impl Refusal {
 impl core::fmt::Display for Refusal {
     fn fmt(&self, f: &mut core::fmt::Formatter) -> core::fmt::Result {
         match *self {
-            Self::UploadTooLong { length } => write!(f, "upload of {length} bytes, at most {STAGING} fit"),
+            Self::UploadTooLong { length, room } => write!(f, "upload of {length} bytes, at most {room} fit"),
             Self::UploadLength { length, announced } => {
                 write!(f, "upload ended after {length} bytes, {announced} were announced")
             }

@@ -330,11 +330,11 @@ fn what_changes_after_verification_is_neither_run_nor_stored() {
 #[test]
 fn uploads_that_do_not_fit_are_refused() {
     let mut joint = Joint::new();
-    assert_eq!(joint.life.begin(Some(STAGING + 1)), Err(Refusal::UploadTooLong { length: STAGING + 1 }));
+    assert_eq!(joint.life.begin(Some(STAGING + 1)), Err(Refusal::UploadTooLong { length: STAGING + 1, room: STAGING }));
     joint.life.begin(None).expect("an upload");
     joint.life.receive(&mut joint.staging, &[1; STAGING]).expect("fills the buffer");
     let refused = joint.life.receive(&mut joint.staging, &[1]);
-    assert_eq!(refused, Err(Refusal::UploadTooLong { length: STAGING + 1 }));
+    assert_eq!(refused, Err(Refusal::UploadTooLong { length: STAGING + 1, room: STAGING }));
     let bytes = encoded(&image(1));
     joint.life.begin(Some(bytes.len())).expect("an upload");
     joint.life.receive(&mut joint.staging, &bytes[1..]).expect("a piece");
@@ -478,7 +478,7 @@ fn every_refusal_has_a_number_and_a_text_of_its_own() {
     let (length, limit, needed, slot) = (3, 2, 4, Slot::First);
     let (bound, image_limit) = (9, 8);
     let all = [
-        Refusal::UploadTooLong { length },
+        Refusal::UploadTooLong { length, room: STAGING },
         Refusal::UploadLength { length, announced: 5 },
         Refusal::Image(ImageError::Truncated { length, needed }),
         Refusal::Image(ImageError::TooLong { length, limit }),

@@ -4,6 +4,7 @@ use super::store::{Guard, Store};
 use crate::board::{self, BoardConfiguration, Offering, Prepared, Subscriber, oscillator, shadow};
 use core::cell::RefCell;
 use joint_firmware::canopen::{Event, Reset};
+use joint_firmware::friction::regime::MAX_SETS;
 use joint_firmware::hardware::Hardware;
 use joint_firmware::joint::Active;
 use joint_firmware::joint::configuration::{BridgeConfiguration, Configuration, ConfigurationError};
@@ -15,6 +16,8 @@ use joint_firmware::parameters::authentication::Key;
 use joint_firmware::parameters::image::Image;
 use joint_firmware::parameters::slots::SlotError;
 use joint_firmware::reset_record::LastReset;
+
+const _: () = assert!(board::CONFIGURATION.parameter_sets == MAX_SETS, "the board's room for parameter sets is what was compiled");
 
 /// The program around the objects.
 pub struct BoardProgram {

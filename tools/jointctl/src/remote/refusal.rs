@@ -9,12 +9,12 @@ use joint_firmware::friction::FrictionModel;
 use joint_firmware::objects::field::{Field, ImageField};
 use joint_firmware::parameters::authentication::split;
 use joint_firmware::parameters::certificate::certify;
-use joint_firmware::parameters::image::Image;
+use joint_firmware::parameters::image::{Image, ImageError};
 use joint_firmware::parameters::life_cycle::{Command, Refusal, State};
 use joint_firmware::parameters::slots::SlotError;
 
 /// General words for every number of [`Refusal::code`].
-const WORDS: [(u16, &str); 32] = [
+const WORDS: [(u16, &str); 33] = [
     (0x0101, "the upload is longer than a joint's staging buffer"),
     (0x0102, "not as many bytes arrived as were announced"),
     (0x0201, "the image is cut off"),
@@ -24,6 +24,7 @@ const WORDS: [(u16, &str); 32] = [
     (0x0205, "the image is damaged: its checksum is wrong"),
     (0x0206, "reserved bytes of the image are not zero"),
     (0x0207, "a field of the image has a value that it cannot have"),
+    (0x0208, "the joint's program has room for one parameter set and no regimes: `jointctl fit` without --regimes"),
     (0x0301, "the joint has a key, but no tag of 32 bytes follows the image; `jointctl sign` puts one there"),
     (0x0302, "the tag is not that of this image and the joint's key"),
     (0x0304, "the joint's key is damaged: it takes no image, and keeps the one that it has"),
@@ -94,6 +95,7 @@ impl Attempt<'_> {
             {
                 format!("{refusal}; `jointctl discard` ends that")
             }
+            Ok(Some(refusal @ Refusal::Image(ImageError::TooManySets { .. }))) => refusal.to_string(),
             Ok(Some(refusal)) if refusal.code() == code => refusal.to_string(),
             // Whether its details can be read makes no difference to the refusal.
             _ => words(code).to_owned(),
@@ -114,7 +116,10 @@ impl Attempt<'_> {
         let (bytes, _) = split(self.upload);
         let image = Image::decode(bytes);
         Ok(Some(match (code, image) {
-            (0x0101, _) => Refusal::UploadTooLong { length: self.upload.len() },
+            // A joint with room for one parameter set has a shorter staging buffer.
+            (0x0101 | 0x0208, Ok(image)) if image.friction.selector.sets() > 1 => {
+                Refusal::Image(ImageError::TooManySets { sets: image.friction.selector.sets() as u8 })
+            }
             (0x0102, _) => {
                 Refusal::UploadLength { length: raw(ImageField::Length)? as usize, announced: self.upload.len() }
             }
