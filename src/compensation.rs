@@ -181,7 +181,7 @@ impl Default for Output {
 /// Compensation of one joint, from one evaluation to the next.
 ///
 /// An evaluation has four stages, none of them longer than the physical model, so that a control loop can do one in a step:
-/// [`begin`](Self::begin) with a state (its regime, pre-sliding, ripple), [`network`](Self::network), [`physical_model`](Self::physical_model),
+/// [`begin`](Self::begin) with a state (its regime, pre-sliding), [`network`](Self::network) (and the ripple), [`physical_model`](Self::physical_model),
 /// [`finish`](Self::finish) (the torque).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Compensation {
@@ -209,7 +209,7 @@ impl Compensation {
     /// Forgets the past. Field by field: the compiler would copy even what an absent value has no use for.
     #[inline(always)]
     pub fn reset(&mut self) {
-        self.memory = Memory::default();
+        self.memory.reset();
         self.last = Torque::ZERO;
         self.begun = None;
     }
@@ -222,23 +222,25 @@ impl Compensation {
         self.finish(model, settings)
     }
 
-    /// First stage: the regime of a state, and what all of an image's parameter sets have in common.
+    /// First stage: the regime of a state, and pre-sliding.
     #[inline]
     pub fn begin(&mut self, model: Option<&FrictionModel>, settings: &Settings, state: &JointState) {
         self.begun = match (settings.request, model) {
             (Request::Off, _) | (_, None) => None,
             (_, Some(model)) => {
-                let common = model.enter(state, &mut self.memory);
+                let pre_sliding = model.enter(state, &mut self.memory);
+                let common = CommonTorques { pre_sliding, ..CommonTorques::default() };
                 Some(Begun { signals: state.signals(), common, estimate: Estimate::default() })
             }
         };
     }
 
-    /// Second stage: what the regime's network gives. A model that came after the first stage goes on with what another one has begun, within
+    /// Second stage: what the regime's network gives, and the ripple. A model that came after the first stage goes on with what another one has begun, within
     /// clamp and slew limit.
     #[inline]
     pub fn network(&mut self, model: Option<&FrictionModel>) {
-        if let (Some(Begun { signals, estimate, .. }), Some(model)) = (&mut self.begun, model) {
+        if let (Some(Begun { signals, common, estimate }), Some(model)) = (&mut self.begun, model) {
+            common.ripple = model.ripple(signals);
             estimate.network = model.by_network(signals, &self.memory);
         }
     }

@@ -17,6 +17,7 @@ use host_tests::emulated::observed::Observed;
 use host_tests::image_bytes::encoded;
 use host_tests::parameters;
 use joint_firmware::compensation::Request;
+use joint_firmware::friction::regime::MOST_SETS;
 use joint_firmware::parameters::image::Image;
 use libtest_mimic::{Arguments, Failed, Trial};
 use node::{Served, serve};
@@ -55,7 +56,7 @@ fn main() {
 
 /// An image like the reference joint's friction, weaker or stronger in its Coulomb term.
 fn image(version: u32, part: f64) -> Image {
-    let mut friction = friction();
+    let mut friction = friction(MOST_SETS);
     for set in &mut friction.sets {
         let coefficients = &mut set.physical.coefficients;
         for torque in [&mut coefficients.coulomb_positive, &mut coefficients.coulomb_negative] {

@@ -62,14 +62,29 @@ impl Common {
     /// One evaluation, which bends the elements.
     #[inline(always)]
     pub fn step(&self, bent: &mut Bent, state: &JointState) -> CommonTorques {
-        if self.present { self.torques(bent, state) } else { CommonTorques::default() }
+        let pre_sliding = self.pre_sliding(bent, state.velocity.to_bits());
+        CommonTorques { pre_sliding, ripple: self.ripple(state.position.to_bits()) }
+    }
+
+    /// Pre-sliding friction at a velocity (Q16.16), which bends the elements.
+    #[inline(always)]
+    pub(super) fn pre_sliding(&self, bent: &mut Bent, velocity: i32) -> i32 {
+        if self.present { self.bend(bent, velocity) } else { 0 }
+    }
+
+    /// Ripple at a position (Q16.16).
+    #[inline(always)]
+    pub(super) fn ripple(&self, position: i32) -> Rippled {
+        if self.present { self.rippled(position) } else { Rippled::default() }
     }
 
     #[inline(never)]
-    fn torques(&self, bent: &mut Bent, state: &JointState) -> CommonTorques {
-        CommonTorques {
-            pre_sliding: self.slip.step(bent, state.velocity.to_bits()),
-            ripple: ripple(&self.ripples, state.position.to_bits()),
-        }
+    fn bend(&self, bent: &mut Bent, velocity: i32) -> i32 {
+        self.slip.step(bent, velocity)
+    }
+
+    #[inline(never)]
+    fn rippled(&self, position: i32) -> Rippled {
+        ripple(&self.ripples, position)
     }
 }

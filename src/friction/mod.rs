@@ -21,7 +21,8 @@ use maxwell_slip::Bent;
 use network::{Inputs, Layers, NetworkParameters};
 use physical::{PhysicalParameters, PreparedTerms, Scaling};
 use regime::{MAX_CRITERIA, MAX_SETS, Memory, Selector};
-use state::{JointState, SIGNALS};
+use ripple::Rippled;
+use state::{JointState, SIGNALS, Signal};
 
 /// One regime's parameters: the physical model and, where one helps, a network for what it leaves.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -156,17 +157,23 @@ impl FrictionModel {
     #[inline]
     pub fn step(&self, state: &JointState, memory: &mut Memory) -> Estimate {
         let signals = state.signals();
-        let common = self.enter(state, memory);
+        let common = CommonTorques { pre_sliding: self.enter(state, memory), ripple: self.ripple(&signals) };
         let network = self.by_network(&signals, memory);
         let physical = self.by_physical_model(&signals, &common, memory);
         self.fade_in(Estimate { physical, network }, memory)
     }
 
-    /// Chooses the regime's parameter set, and steps what all sets have in common.
+    /// Chooses the regime's parameter set, and bends the pre-sliding elements; their torque, Nm in Q16.16.
     #[inline]
-    pub fn enter(&self, state: &JointState, memory: &mut Memory) -> CommonTorques {
+    pub fn enter(&self, state: &JointState, memory: &mut Memory) -> i32 {
         memory.enter(self.selector.select(state, memory.set.unwrap_or(0)));
-        self.common.step(&mut memory.bent, state)
+        self.common.pre_sliding(&mut memory.bent, state.velocity.to_bits())
+    }
+
+    /// The ripple of all sets.
+    #[inline]
+    pub fn ripple(&self, signals: &[i32; SIGNALS]) -> Rippled {
+        self.common.ripple(signals[Signal::Position as usize])
     }
 
     /// What the regime's network gives; zero without one.

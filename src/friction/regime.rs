@@ -16,8 +16,7 @@ pub const MAX_CRITERIA: usize = 2;
 /// Most parameter sets that an image can hold: every combination of the criteria.
 pub const MOST_SETS: usize = 1 << MAX_CRITERIA;
 /// Most parameter sets that this program has room for. With the feature `one-parameter-set` a chip's program has no regimes; on the host nothing changes.
-pub const MAX_SETS: usize =
-    if cfg!(all(feature = "one-parameter-set", target_os = "none")) { 1 } else { MOST_SETS };
+pub const MAX_SETS: usize = if cfg!(all(feature = "one-parameter-set", target_os = "none")) { 1 } else { MOST_SETS };
 
 /// What a criterion looks at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -107,6 +106,16 @@ pub struct Memory {
 }
 
 impl Memory {
+    /// Forgets the past. Field by field: optimised for size the compiler would make a record of it and copy that, byte by byte.
+    #[inline(always)]
+    pub(crate) fn reset(&mut self) {
+        (self.set, self.weight) = (None, 0);
+        (self.held.physical, self.held.network) = (Torque::ZERO, Torque::ZERO);
+        (self.last.physical, self.last.network) = (Torque::ZERO, Torque::ZERO);
+        let [a, b, c, d] = &mut self.bent;
+        (*a, *b, *c, *d) = (0, 0, 0, 0);
+    }
+
     /// Takes note of the set for this step; a change starts a cross-fade from the last output.
     #[inline]
     pub(super) fn enter(&mut self, set: usize) {

@@ -108,14 +108,17 @@ impl MotionLaw {
     #[inline(never)]
     fn enter(&mut self, mode: Mode, motion: &JointMotion) {
         let ramps = |mode| matches!(mode, Mode::Velocity | Mode::Position | Mode::Hold);
-        let before = self.mode.filter(|before| ramps(*before) && ramps(mode));
-        let begun = Self { mode: Some(mode), position: motion.position, velocity: motion.velocity, ..Self::default() };
-        *self = match before {
-            None => begun,
-            Some(Mode::Velocity) => Self { position: motion.position, ..*self },
-            Some(_) if mode == Mode::Velocity => Self { velocity: motion.velocity, ..*self },
-            Some(_) => *self,
-        };
+        let goes_on = self.mode.is_some_and(ramps) && ramps(mode);
+        // Field by field: the compiler would copy the whole record, byte by byte where it is optimised for size.
+        if !goes_on {
+            (self.integral, self.bounds) = (0.0, Bounds::default());
+        }
+        if !goes_on || self.mode == Some(Mode::Velocity) {
+            self.position = motion.position;
+        }
+        if !goes_on || mode == Mode::Velocity {
+            self.velocity = motion.velocity;
+        }
         self.mode = Some(mode);
     }
 

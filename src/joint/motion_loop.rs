@@ -59,14 +59,18 @@ impl MotionLoop {
         command: &Command,
         seen: &Seen,
     ) -> f32 {
-        if state != self.state {
+        let begins = state != self.state;
+        if begins {
             self.begin(state);
         }
         if !state.makes_torque() {
             return 0.0;
         }
         let enabled = state == State::OperationEnabled;
-        self.stage::<COMPENSATION>(active, enabled, command, seen);
+        // Nobody waits for the first torque of an enabled joint, and the step of a new state has enough to do; a brake's comes at once.
+        if !(begins && enabled) {
+            self.stage::<COMPENSATION>(active, enabled, command, seen);
+        }
         match self.compensated.torque {
             0.0 => self.wanted.torque,
             compensation => self.law.bounds().hold(self.wanted.torque + compensation),
@@ -174,10 +178,12 @@ mod tests {
         for before in 0..2 * MOTION_STEPS {
             for state in [State::QuickStopActive, State::FaultReactionActive, State::SwitchedOn, State::Fault] {
                 let mut motion_loop = MotionLoop::default();
+                assert_eq!(step(&mut motion_loop, &active, State::OperationEnabled, 0.02), 0.0);
                 (0..=before).for_each(|_| {
                     assert_eq!(step(&mut motion_loop, &active, State::OperationEnabled, 0.02), 0.02);
                 });
                 assert_eq!(step(&mut motion_loop, &active, state, 0.02), 0.0, "{state:?} after {before} steps");
+                assert_eq!(step(&mut motion_loop, &active, State::OperationEnabled, 0.01), 0.0);
                 assert_eq!(step(&mut motion_loop, &active, State::OperationEnabled, 0.01), 0.01);
             }
         }
@@ -192,6 +198,7 @@ mod tests {
         let command = Command { mode: Mode::Velocity, velocity: 0.31, ..Command::default() };
         let mut motion_loop = MotionLoop::default();
         let mut step = |state| (motion_loop.step::<false>(&active, state, &command, &seen), *motion_loop.wanted());
+        assert_eq!(step(State::OperationEnabled).0, 0.0, "the step in which it is enabled");
         let (first, _) = step(State::OperationEnabled);
         let (last, _) = (1..1000).map(|_| step(State::OperationEnabled)).last().unwrap();
         assert!(last > 1.1 * first && first > 0.0, "the integral adds to the torque: {first} Nm, then {last} Nm");
@@ -199,6 +206,7 @@ mod tests {
             // Turned by hand.
             assert_eq!(step(State::SwitchedOn), (0.0, Wanted::default()));
         }
+        assert_eq!(step(State::OperationEnabled).0, 0.0);
         assert_eq!(step(State::OperationEnabled).0, first);
     }
 
@@ -207,6 +215,7 @@ mod tests {
         let active = active();
         let mut motion_loop = MotionLoop::default();
         let mut torque = |wanted| step(&mut motion_loop, &active, State::OperationEnabled, wanted);
+        torque(0.02);
         assert_eq!(torque(0.02), 0.02);
         (1..MOTION_STEPS).for_each(|n| assert_eq!(torque(0.01), 0.02, "step {n}"));
         assert_eq!(torque(0.01), 0.01);

@@ -231,7 +231,10 @@ impl core::fmt::Display for ImageError {
                 write!(f, "damaged: checksum {stored:08x} is stored, the content has {computed:08x}")
             }
             Self::TooManySets { sets } => {
-                write!(f, "{sets} parameter sets: the joint's program has room for one and no regimes (`jointctl fit` without --regimes)")
+                write!(
+                    f,
+                    "{sets} parameter sets: the joint's program has room for one and no regimes (`jointctl fit` without --regimes)"
+                )
             }
             Self::Reserved { offset } => write!(f, "reserved byte at offset {offset} is not zero"),
             Self::Field { name, offset, value, low, high } => {

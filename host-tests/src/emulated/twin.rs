@@ -301,6 +301,7 @@ impl<'v> Demanded<'v> {
             "Velocity" => Mode::Velocity,
             "Position" => Mode::Position,
             "Impedance" => Mode::Impedance,
+            "Hold" => Mode::Hold,
             other => return Err(format!("mode {other}").into()),
         };
         let mut numbers = [0.0; 5];

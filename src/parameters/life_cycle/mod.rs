@@ -277,7 +277,8 @@ impl LifeCycle {
     pub fn receive(&mut self, staging: &mut [u8; STAGING], piece: &[u8]) -> Result<(), Refusal> {
         let result = self.upload_possible().and_then(|()| {
             let end = self.length.saturating_add(piece.len());
-            let place = staging.get_mut(self.length..end).ok_or(Refusal::UploadTooLong { length: end, room: STAGING })?;
+            let place =
+                staging.get_mut(self.length..end).ok_or(Refusal::UploadTooLong { length: end, room: STAGING })?;
             for (place, byte) in place.iter_mut().zip(piece) {
                 *place = *byte;
             }

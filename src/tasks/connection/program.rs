@@ -17,7 +17,10 @@ use joint_firmware::parameters::image::Image;
 use joint_firmware::parameters::slots::SlotError;
 use joint_firmware::reset_record::LastReset;
 
-const _: () = assert!(board::CONFIGURATION.parameter_sets == MAX_SETS, "the board's room for parameter sets is what was compiled");
+const _: () = assert!(
+    board::CONFIGURATION.parameter_sets == MAX_SETS,
+    "the board's room for parameter sets is what was compiled"
+);
 
 /// The program around the objects.
 pub struct BoardProgram {

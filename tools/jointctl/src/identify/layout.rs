@@ -138,9 +138,9 @@ impl Layout {
             (0..limits.elements).for_each(|n| layout.own(P::Element(n), Role::Coefficient, POSITIVE));
         }
         for k in (0..limits.ripples).filter(|&k| on([Term::Ripple, Term::SecondRipple][k])) {
-            for parameter in
-                [P::RippleLevelSine(k), P::RippleLevelCosine(k), P::RippleTorqueSine(k), P::RippleTorqueCosine(k)]
-            {
+            let level = [P::RippleLevelSine(k), P::RippleLevelCosine(k)];
+            let torque = [P::RippleTorqueSine(k), P::RippleTorqueCosine(k)];
+            for parameter in level.into_iter().chain(torque.into_iter().filter(|_| limits.ripple_torques[k])) {
                 layout.own(parameter, Role::Coefficient, FREE);
             }
         }
@@ -349,7 +349,7 @@ mod tests {
 
     fn layout(structure: &Structure) -> Layout {
         let limits = Limits::of(&super::super::observations::rows(&motion(2_000)), 30.0);
-        let limits = Limits { elements: 4, ripples: 2, ..limits };
+        let limits = Limits { elements: 4, ripples: 2, ripple_torques: [true; 2], ..limits };
         Layout::new(structure, &RIGID.regressors(), &limits)
     }
 

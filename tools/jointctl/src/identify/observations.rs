@@ -1,7 +1,7 @@
 //! The samples as identification sees them: checked, train and validation rows only, and the limits that follow; host.
 
 use super::IdentifyError;
-use crate::friction_model::JointState;
+use crate::friction_model::{JointState, RIPPLES};
 use crate::rigid::{RigidModel, RigidParameters, RigidState};
 use crate::samples::{Part, Samples};
 
@@ -46,6 +46,8 @@ pub struct Limits {
     pub elements: usize,
     /// Ripples whose frequencies were chosen.
     pub ripples: usize,
+    /// Which of them may have a part whatever the direction.
+    pub ripple_torques: [bool; RIPPLES],
 }
 
 /// Reads what the rigid part depends on from the samples; mass and length are 0 where there are no such columns.
@@ -145,6 +147,7 @@ impl Limits {
             position_covered: covers_positions(rows, lowest, highest),
             elements: 0,
             ripples: 0,
+            ripple_torques: [false; RIPPLES],
         }
     }
 }

@@ -31,6 +31,10 @@ const DENSITY: f64 = 8.0;
 /// Fewest periods of a ripple over the position range.
 const PERIODS: f64 = 2.0;
 
+/// Fewest periods of a ripple over the position range with which it has a part that does not know the direction. A slower one is also what gravity
+/// leaves, or the motion of other joints; friction changes its sign with the direction, so its ripple is told apart at any frequency.
+const TORQUE_PERIODS: f64 = 8.0;
+
 /// Columns of the regression that the elements are offered beside: the rigid part's and those of [`friction_columns`].
 const BASE: usize = 6 + 11;
 
@@ -51,6 +55,10 @@ pub fn choose(problem: &mut Problem, samples: &mut Samples) {
     let frequencies = frequencies(problem, samples, &base);
     for (ripple, frequency) in problem.template.ripples.iter_mut().zip(&frequencies) {
         ripple.frequency = *frequency;
+    }
+    let range = problem.limits.position_range;
+    for (torque, frequency) in problem.limits.ripple_torques.iter_mut().zip(&frequencies) {
+        *torque = has_torque(*frequency, range);
     }
     problem.limits.ripples = frequencies.len();
 }
@@ -137,6 +145,11 @@ fn regression(at: &NormalEquations, elements: &[usize]) -> (Vec<(usize, f64)>, f
     (free.into_iter().zip(step.iter().copied()).collect(), cost)
 }
 
+/// True for a ripple that may have a part whatever the direction.
+fn has_torque(frequency: f64, range: f64) -> bool {
+    frequency * range >= TORQUE_PERIODS * TAU
+}
+
 /// One row of the search for frequencies.
 struct Residual {
     position: f64,
@@ -145,18 +158,19 @@ struct Residual {
 }
 
 impl Residual {
-    /// Sine and cosine of the Coulomb friction and whatever the direction.
-    fn columns(&self, frequency: f64) -> Vector4<f64> {
+    /// Sine and cosine of the Coulomb friction and, with `torque`, whatever the direction.
+    fn columns(&self, frequency: f64, torque: bool) -> Vector4<f64> {
         let (sine, cosine) = (frequency * self.position).sin_cos();
-        Vector4::new(self.direction * sine, self.direction * cosine, sine, cosine)
+        let part = if torque { 1.0 } else { 0.0 };
+        Vector4::new(self.direction * sine, self.direction * cosine, part * sine, part * cosine)
     }
 }
 
 /// The best amplitudes of a ripple, and what they take off the sum of squares.
-fn ripple(rows: &[Residual], frequency: f64) -> (Vector4<f64>, f64) {
+fn ripple(rows: &[Residual], frequency: f64, torque: bool) -> (Vector4<f64>, f64) {
     let (mut hessian, mut gradient) = (Matrix4::zeros(), Vector4::zeros());
     for row in rows {
-        let columns = row.columns(frequency);
+        let columns = row.columns(frequency, torque);
         hessian += columns * columns.transpose();
         gradient += row.left * columns;
     }
@@ -188,7 +202,7 @@ fn frequencies(problem: &Problem, samples: &Samples, base: &[[f64; BASE]]) -> Ve
     for _ in 0..RIPPLES {
         let grid: Vec<f64> = (0..).map(|n| lowest + f64::from(n) * step).take_while(|h| *h <= highest).collect();
         let apart = |h: &&f64| found.iter().all(|other| (**h - other).abs() > unit);
-        let gain = |frequency: &f64| (*frequency, ripple(&rows, *frequency).1);
+        let gain = |frequency: &f64| (*frequency, ripple(&rows, *frequency, has_torque(*frequency, range)).1);
         let offered: Vec<f64> = grid.iter().filter(apart).copied().collect();
         let best = offered.par_iter().map(gain).reduce(|| (0.0, 0.0), |a, b| if b.1 > a.1 { b } else { a });
         let fine = (-10..=10).map(|n| gain(&(best.0 + f64::from(n) * step / 10.0)));
@@ -196,8 +210,9 @@ fn frequencies(problem: &Problem, samples: &Samples, base: &[[f64; BASE]]) -> Ve
         if taken < RIPPLE_WORTH * total {
             break;
         }
-        let (amplitudes, _) = ripple(&rows, frequency);
-        rows.iter_mut().for_each(|row| row.left -= amplitudes.dot(&row.columns(frequency)));
+        let torque = has_torque(frequency, range);
+        let (amplitudes, _) = ripple(&rows, frequency, torque);
+        rows.iter_mut().for_each(|row| row.left -= amplitudes.dot(&row.columns(frequency, torque)));
         found.push(frequency);
     }
     found

@@ -1,3 +1,4 @@
+use super::*;
 use crate::friction_model::{Directional, FrictionModel, Ripple, Term, Terms};
 use crate::identify::synthetic::{RIGID, drive, motion, rigid};
 use crate::identify::{Options, identify};
@@ -46,4 +47,20 @@ fn neither_is_offered_to_a_joint_that_has_none() {
     drive(&mut samples, &rigid(), &plain, 0.02, 7);
     let found = identify(&mut samples, &RIGID, Preset::Full, &Options::default()).unwrap();
     assert_eq!(found.friction.terms, Terms::of(&[Term::Viscous, Term::Coulomb, Term::Constant]), "{:?}", found.notes);
+}
+
+#[test]
+fn a_ripple_has_a_part_whatever_the_direction_from_eight_periods_over_the_range_on() {
+    assert!(!has_torque(7.99 * TAU / 3.0, 3.0) && has_torque(8.01 * TAU / 3.0, 3.0));
+    // What gravity leaves looks like a slow ripple whatever the direction.
+    let (mut samples, slow) = (motion(12_000), Ripple { frequency: 5.0, torque_sine: 0.4, ..Ripple::default() });
+    let truth = FrictionModel {
+        terms: Terms::of(&[Term::Viscous, Term::Coulomb, Term::Ripple]),
+        ripples: [slow, Ripple::default()],
+        ..truth()
+    };
+    drive(&mut samples, &rigid(), &truth, 0.02, 7);
+    let found = identify(&mut samples, &RIGID, Preset::Full, &Options::default()).unwrap();
+    let slow = found.friction.ripples.iter().filter(|ripple| ripple.frequency < 10.0);
+    assert!(slow.into_iter().all(|ripple| ripple.torque_sine == 0.0 && ripple.torque_cosine == 0.0));
 }

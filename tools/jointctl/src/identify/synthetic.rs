@@ -96,7 +96,12 @@ pub fn drive(samples: &mut Samples, rigid: &RigidParameters, friction: &Friction
 pub fn problem(samples: &Samples, model: &RigidModel, theoretical: RigidParameters, truth: &FrictionModel) -> Problem {
     let mut train = rows(samples);
     train.iter_mut().for_each(|row| row.joint.load = rigid_effort(&theoretical, row));
-    let limits = Limits { elements: 2, ripples: 2, ..Limits::of(&train, truth.reference_temperature) };
+    let limits = Limits {
+        elements: 2,
+        ripples: 2,
+        ripple_torques: [true; 2],
+        ..Limits::of(&train, truth.reference_temperature)
+    };
     Problem {
         search: decimated(&train, 8_000),
         limits,

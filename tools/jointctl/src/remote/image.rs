@@ -11,6 +11,7 @@ use super::value::Value;
 use crate::progress::Progress;
 use bus::client::ClientError;
 use bus::client::sdo::Method;
+use joint_firmware::canopen::Abort;
 use joint_firmware::objects::field::{Actual, Field, ImageField, StoredField, Which};
 use joint_firmware::parameters::authentication::{STAGING, split};
 use joint_firmware::parameters::life_cycle::{Command, State};
@@ -107,8 +108,13 @@ impl RemoteJoint {
     }
 
     fn explain(&self, error: RemoteError, attempt: Attempt) -> RemoteError {
-        if !matches!(error, RemoteError::Client(ClientError::Aborted { .. })) {
-            return error;
+        match error {
+            // Before its first byte: the joint has no result of it.
+            RemoteError::Client(ClientError::Aborted { abort: Abort::TOO_LONG, .. }) => {
+                return attempt.refused(self, 0x0101);
+            }
+            RemoteError::Client(ClientError::Aborted { .. }) => {}
+            _ => return error,
         }
         match self.raw(Field::Image(ImageField::Result)) {
             Ok(code) if code != 0 => attempt.refused(self, code as u16),

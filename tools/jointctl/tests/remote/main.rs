@@ -34,7 +34,7 @@ fn main() {
     let trials = trials! {
         commands {
             a_joint_is_looked_at_set_moved_and_fed_from_the_command_line,
-            what_goes_wrong_ends_in_one_line_and_exit_code_1,
+            what_goes_wrong_ends_in_one_line_and_an_exit_code_that_tells_why,
             #[cfg(unix)] ctrl_c_and_termination_leave_the_joint_disabled,
             an_adapter_that_goes_away_while_the_joint_is_enabled_is_reported,
         }
@@ -65,7 +65,7 @@ fn main() {
             a_node_that_is_no_joint_is_left_alone,
             a_damaged_image_is_refused_and_the_one_in_use_stays,
             an_image_for_another_joint_or_of_the_past_is_refused_with_both_numbers,
-            a_wrong_key_is_refused_counted_and_locks_out,
+            a_wrong_key_is_refused_and_counted_and_keeps_no_right_one_out,
             a_signed_image_of_the_right_key_is_taken,
             a_bus_that_is_unplugged_at_any_frame_of_an_upload_leaves_the_old_image_or_the_new_one,
             two_clients_at_once_are_told_of_each_other_and_the_image_stays,

@@ -96,11 +96,14 @@ pub fn a_master_that_dies_leaves_a_fault_that_is_named_and_acknowledged_only_whe
     let served = Served::joints(&[NODE]);
     let joint = served.joint();
     let stream = Stream::begin(&joint, Mode::Torque, 100.0, false).unwrap();
-    // As if the program had been killed: nothing more is sent, nothing is said.
-    stream.play(|_| {
-        loop {
+    // As if the program had been killed after a few set-points: nothing more is sent, nothing is said.
+    let mut sent = 0;
+    stream.play(move |_| {
+        sent += 1;
+        while sent > 10 {
             std::thread::sleep(Duration::from_secs(1));
         }
+        Command { mode: Mode::Torque, ..Command::default() }
     });
     joint.await_state(State::Fault, Duration::from_secs(3)).unwrap();
     let message = stream.check().unwrap_err().to_string();
