@@ -81,7 +81,7 @@ impl MaxwellSlip {
 /// An element after a step.
 #[inline(always)]
 fn drag(bent: i32, gain: i32, velocity: i32) -> i32 {
-    bent.saturating_add(saturate(smull(gain, velocity) >> 12)).max(-SLIPPING).min(SLIPPING)
+    bent.saturating_add(saturate(smull(gain, velocity) >> 12)).clamp(-SLIPPING, SLIPPING)
 }
 
 #[cfg(test)]

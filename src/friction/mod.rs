@@ -219,6 +219,7 @@ impl FrictionModel {
     }
 
     #[inline(always)]
+    #[allow(clippy::modulo_one, reason = "a program may have room for one set")]
     fn set(&self, index: usize) -> &(PreparedTerms, Option<Layers>) {
         &self.sets[index % MAX_SETS]
     }

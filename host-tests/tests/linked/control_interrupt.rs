@@ -85,6 +85,7 @@ fn seldom_or_operating(name: &str) -> bool {
         "5joint7offsets",
         "11motion_loop10MotionLoop5begin",
         "10motion_law9MotionLaw4ramp",
+        "6number11square_root",
         "5joint12regeneration",
         "5motor15field_weakening",
         "19FrictionFeedforward5reset",

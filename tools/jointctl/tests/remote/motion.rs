@@ -100,8 +100,10 @@ pub fn a_master_that_dies_leaves_a_fault_that_is_named_and_acknowledged_only_whe
     let mut sent = 0;
     stream.play(move |_| {
         sent += 1;
-        while sent > 10 {
-            std::thread::sleep(Duration::from_secs(1));
+        if sent > 10 {
+            loop {
+                std::thread::sleep(Duration::from_secs(1));
+            }
         }
         Command { mode: Mode::Torque, ..Command::default() }
     });
