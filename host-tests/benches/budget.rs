@@ -117,7 +117,7 @@ fn main() -> Outcome<()> {
     println!(
         "\n## The flashed programs in motion\n\nCycles of the control interrupt, entry and return included, while the joint moves for {MOTION} s on the emulated board, over the \
          bus: a velocity of {AMPLITUDE} rad/s, a sine\nof 1 Hz, with the model of above. Rounds: those of the motion loop in which physical model and network acted. In the \
-         B-G431B-ESC1's program both lie in flash.\nWait states of the flash: none, as if all of it lay in SRAM; prefetched, those of branches and data, as everywhere \
+         B-G431B-ESC1's program the physical model lies in flash.\nWait states of the flash: none, as if all of it lay in SRAM; prefetched, those of branches and data, as everywhere \
          in this file; always, those of each line\nof code and of data as if prefetch and caches were of no use, which nothing can exceed. Targets: {WHOLE} cycles the whole \
          interrupt, {NETWORK} the network.\n"
     );
