@@ -30,7 +30,7 @@
 //! | 132 | 4 | limit of the absolute friction, Q16.16 of the effort's unit, unsigned |
 //! | 136 | 4 | limit of the absolute slope of the network over the measured torque, Q16.16, unsigned |
 //! | 140 | 4 | limit of the absolute slope of friction over velocity, unsigned, 1/256 Nm s/rad |
-//! | 144 | 4 x 8 | only in format 2: pre-sliding elements: stiffness, Q16.16 per rad, 0 to [`MAX_STIFFNESS`](crate::friction::maxwell_slip::MAX_STIFFNESS); level, Q16.16 of the effort's unit, not negative |
+//! | 144 | 4 x 8 | only in format 2: pre-sliding elements: stiffness, Q16.16 per rad, 0 to [`MAX_STIFFNESS`]; level, Q16.16 of the effort's unit, not negative |
 //! | 176 | 2 x 20 | only in format 2: ripple: periods in a rad; sine and cosine of the level, of the torque; Q16.16 |
 //! | 144, 216 | | parameter sets, one after another |
 //! | | | golden vectors, one after another |

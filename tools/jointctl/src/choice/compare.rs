@@ -17,7 +17,7 @@ pub const WORST_FOLD: f64 = 0.02;
 pub struct Comparison {
     /// Mean over the folds; negative where the second model is better.
     pub mean: f64,
-    /// Standard error of the mean, widened where there are few folds ([`ONE_STANDARD_ERROR`]); infinite with fewer than two.
+    /// Standard error of the mean, widened where there are few folds; infinite with fewer than two.
     pub standard_error: f64,
     /// Largest value of any fold.
     pub worst: f64,
