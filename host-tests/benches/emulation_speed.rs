@@ -1,7 +1,7 @@
 //! Prints how fast the emulated boards are on this machine, in multiples of real time on one core: `cargo bench -p host-tests --bench emulation_speed`.
 //! Needs the board's target.
 //!
-//! A joint of each board, switched off and then in motion with all of compensation: what a control step takes differs by half.
+//! A joint of each board, switched off and then in motion with all of compensation: their control steps differ by half.
 //! Each run is repeated from the same snapshot, because the machine's speed is not the same at any time.
 
 use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4};

@@ -38,7 +38,7 @@ struct Subject<'a> {
     parameters: &'a FrictionParameters,
     model: FrictionModel,
     certificate: Certificate,
-    /// How far the pre-sliding elements are bent before an evaluation.
+    /// Bending of the pre-sliding elements before an evaluation.
     bent: Bent,
     inputs: usize,
     worst: Tightness,
@@ -57,7 +57,7 @@ impl<'a> Subject<'a> {
         self.model.evaluate_with(set, &state, &self.common(&state))
     }
 
-    /// What the common terms give, from the same bending every time.
+    /// Torques of the common terms, from the same bending every time.
     fn common(&self, state: &JointState) -> CommonTorques {
         self.model.common(&mut { self.bent }, state)
     }

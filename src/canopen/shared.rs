@@ -187,7 +187,7 @@ impl Shared {
         self.long_sync.store(true, Ordering::Relaxed);
     }
 
-    /// Whether a SYNC had data since the last time.
+    /// True where a SYNC had data since the last time.
     pub(super) fn take_long_sync(&self) -> bool {
         let had = self.long_sync.load(Ordering::Relaxed);
         self.long_sync.store(false, Ordering::Relaxed);

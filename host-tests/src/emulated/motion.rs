@@ -1,4 +1,4 @@
-//! A joint in motion: a board's program, enabled and given a set-point every few milliseconds, until something goes wrong.
+//! A joint in motion: a board's program, enabled and given a set-point every few milliseconds, until a fault.
 
 use super::Bench;
 use super::kept::{Kept, configuration};

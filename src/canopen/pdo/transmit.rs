@@ -30,7 +30,7 @@ pub(crate) struct Synchronous {
 }
 
 impl Synchronous {
-    /// What TPDO `pdo` sends with this SYNC; `frame` assembles it.
+    /// The frame that TPDO `pdo` sends with this SYNC; `frame` assembles it.
     pub(crate) fn next(
         &mut self,
         shared: &Shared,
