@@ -181,7 +181,7 @@ impl Default for Output {
 /// Compensation of one joint, from one evaluation to the next.
 ///
 /// An evaluation has four stages, none of them longer than the physical model, so that a control loop can do one in a step:
-/// [`begin`](Self::begin) with a state (its regime, pre-sliding), [`network`](Self::network) (and the ripple), [`physical_model`](Self::physical_model),
+/// [`begin`](Self::begin) with a state (its regime, the ripple), [`network`](Self::network) (and pre-sliding), [`physical_model`](Self::physical_model),
 /// [`finish`](Self::finish) (the torque).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Compensation {
@@ -222,25 +222,26 @@ impl Compensation {
         self.finish(model, settings)
     }
 
-    /// First stage: the regime of a state, and pre-sliding.
+    /// First stage: the regime of a state, and the ripple.
     #[inline]
     pub fn begin(&mut self, model: Option<&FrictionModel>, settings: &Settings, state: &JointState) {
         self.begun = match (settings.request, model) {
             (Request::Off, _) | (_, None) => None,
             (_, Some(model)) => {
-                let pre_sliding = model.enter(state, &mut self.memory);
-                let common = CommonTorques { pre_sliding, ..CommonTorques::default() };
-                Some(Begun { signals: state.signals(), common, estimate: Estimate::default() })
+                model.enter(state, &mut self.memory);
+                let signals = state.signals();
+                let common = CommonTorques { ripple: model.ripple(&signals), ..CommonTorques::default() };
+                Some(Begun { signals, common, estimate: Estimate::default() })
             }
         };
     }
 
-    /// Second stage: what the regime's network gives, and the ripple. A model that came after the first stage goes on with what another one has begun, within
+    /// Second stage: what the regime's network gives, and pre-sliding. A model that came after the first stage goes on with what another one has begun, within
     /// clamp and slew limit.
     #[inline]
     pub fn network(&mut self, model: Option<&FrictionModel>) {
         if let (Some(Begun { signals, common, estimate }), Some(model)) = (&mut self.begun, model) {
-            common.ripple = model.ripple(signals);
+            common.pre_sliding = model.pre_sliding(signals, &mut self.memory);
             estimate.network = model.by_network(signals, &self.memory);
         }
     }

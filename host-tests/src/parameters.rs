@@ -3,7 +3,7 @@
 
 use joint_firmware::friction::common::CommonTerms;
 use joint_firmware::friction::domain::{Domain, Range};
-use joint_firmware::friction::maxwell_slip::{ELEMENTS, MAX_STIFFNESS, MaxwellElement};
+use joint_firmware::friction::maxwell_slip::{ELEMENTS, MAX_LEVEL, MAX_STIFFNESS, MaxwellElement};
 use joint_firmware::friction::network::{
     INPUTS, MAX_FRACTION, MAX_SCALE, MIN_FRACTION, NEURONS, NetworkParameters, Neuron,
 };
@@ -114,8 +114,8 @@ fn extreme_common(random: &mut ChaCha8Rng) -> CommonTerms {
     let calm = random.random_range(0..16);
     let mut common = CommonTerms::NONE;
     for element in &mut common.elements {
-        let (stiffness, level) = (bits(random).saturating_abs().min(MAX_STIFFNESS), bits(random).saturating_abs());
-        *element = MaxwellElement { stiffness, level: level >> calm };
+        let mut up_to = |most: i32| bits(random).saturating_abs().min(most);
+        *element = MaxwellElement { stiffness: up_to(MAX_STIFFNESS), level: up_to(MAX_LEVEL) >> calm };
     }
     for ripple in &mut common.ripples {
         let periods = bits(random);

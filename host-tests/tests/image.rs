@@ -4,6 +4,7 @@
 use host_tests::image_bytes::{encoded, sealed};
 use host_tests::parameters::{extreme, frictionless, image, tame, tame_common, to_format_1};
 use joint_firmware::friction::domain::Range;
+use joint_firmware::friction::maxwell_slip::{MAX_LEVEL, MAX_STIFFNESS};
 use joint_firmware::friction::network::{MAX_SCALE, NetworkParameters, Neuron};
 use joint_firmware::friction::physical::Terms;
 use joint_firmware::friction::regime::{Criterion, Measure};
@@ -246,6 +247,27 @@ fn without_golden_vectors_or_with_too_many_an_image_is_refused() {
         } else {
             let (name, value) = ("number of golden vectors", count as i64);
             assert_eq!(found, Err(ImageError::Field { name, offset: 31, value, low: 1, high: 8 }));
+        }
+    }
+}
+
+#[test]
+fn a_pre_sliding_element_is_as_stiff_and_as_strong_as_it_may_be_and_no_more() {
+    let mut random = ChaCha8Rng::seed_from_u64(9);
+    let parameters = parameters(&mut random, 2, 1, false);
+    let bytes = encoded(&image(&mut random, parameters, 1));
+    for (offset, name, limit) in
+        [(144, "stiffness of a pre-sliding element", MAX_STIFFNESS), (148, "level of a pre-sliding element", MAX_LEVEL)]
+    {
+        let with = |value: i32| {
+            let mut other = bytes.clone();
+            other[offset..offset + 4].copy_from_slice(&value.to_le_bytes());
+            Image::decode(&sealed(other))
+        };
+        assert!(with(limit).is_ok() && with(0).is_ok(), "{name}");
+        for value in [limit + 1, -1] {
+            let (low, high, value) = (0, i64::from(limit), i64::from(value));
+            assert_eq!(with(value as i32), Err(ImageError::Field { name, offset, value, low, high }));
         }
     }
 }

@@ -21,18 +21,21 @@ pub const ELEMENTS: usize = 4;
 pub struct MaxwellElement {
     /// 1 / d: the reciprocal of the way from rest to slip, 1/rad in Q16.16, 0 (absent) to [`MAX_STIFFNESS`].
     pub stiffness: i32,
-    /// Torque while it slips, Nm in Q16.16, not negative.
+    /// Torque while it slips, Nm in Q16.16, 0 to [`MAX_LEVEL`].
     pub level: i32,
 }
 
 /// Largest [`stiffness`](MaxwellElement::stiffness): an element slips after 61 microradians at the least.
 pub const MAX_STIFFNESS: i32 = 16_384 << 16;
 
-/// How far each element is bent, Q30: one is where it slips.
-pub type Bent = [i32; ELEMENTS];
+/// Largest [`level`](MaxwellElement::level), 8,191 Nm: the torque of all elements fits.
+pub const MAX_LEVEL: i32 = i32::MAX / ELEMENTS as i32;
 
-/// An element that slips.
-const SLIPPING: i32 = 1 << 30;
+/// Fewest steps a second at which the stiffest element bends as far as it should; below it a gain may be held at the end of its range.
+pub const LOWEST_RATE: u32 = 1_000;
+
+/// How far each element is bent, Q31: at the ends of the range it slips.
+pub type Bent = [i32; ELEMENTS];
 
 /// The elements ready to be stepped at a fixed rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,14 +49,14 @@ impl MaxwellSlip {
     /// Without any element.
     pub(super) const NONE: Self = Self { gains: [0; ELEMENTS], levels: [0; ELEMENTS] };
 
-    /// Prepares elements for `rate` steps a second (at least 1).
+    /// Prepares elements for `rate` steps a second (at least 1, and [`LOWEST_RATE`] for stiff elements).
     pub fn new(elements: &[MaxwellElement; ELEMENTS], rate: u32) -> Self {
         let rate = i64::from(rate.max(1));
         let mut slip = Self::NONE;
         let places = slip.gains.iter_mut().zip(&mut slip.levels);
         for ((gain, level), element) in places.zip(elements) {
             *gain = saturate((i64::from(element.stiffness) << 10).wrapping_div(rate));
-            *level = if element.stiffness == 0 { 0 } else { element.level };
+            *level = if element.stiffness == 0 { 0 } else { element.level.min(MAX_LEVEL) };
         }
         slip
     }
@@ -74,20 +77,25 @@ impl MaxwellSlip {
         // Written out: optimised for size, the compiler keeps a loop with bounds.
         let [a, b, c, d] = [drag(a, ga, velocity), drag(b, gb, velocity), drag(c, gc, velocity), drag(d, gd, velocity)];
         *bent = [a, b, c, d];
-        saturate(smlal(smlal(smlal(smull(la, a), lb, b), lc, c), ld, d) >> 30)
+        // Four levels fit.
+        (smlal(smlal(smlal(smull(la, a), lb, b), lc, c), ld, d) >> 31) as i32
     }
 }
 
-/// An element after a step.
+/// An element after a step: saturation is the slip. In halves, so that one step can take it from one end to the other.
 #[inline(always)]
 fn drag(bent: i32, gain: i32, velocity: i32) -> i32 {
-    bent.saturating_add(saturate(smull(gain, velocity) >> 12)).clamp(-SLIPPING, SLIPPING)
+    let half = saturate(smull(gain, velocity) >> 12);
+    bent.saturating_add(half).saturating_add(half)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    /// One, in Q31.
+    const ONE: f64 = (1u32 << 31) as f64;
 
     fn q16(value: f64) -> i32 {
         (value * 65_536.0).round() as i32
@@ -127,7 +135,7 @@ mod tests {
             let slip = MaxwellSlip::new(&[element(0.02, 1.0); ELEMENTS], rate);
             let bent = &mut Bent::default();
             (0..rate / 10).for_each(|_| _ = slip.step(bent, q16(0.1)));
-            let way = f64::from(bent[0]) / f64::from(SLIPPING);
+            let way = f64::from(bent[0]) / ONE;
             assert!((way - 0.5).abs() < 1e-3, "{rate}: {way}");
         }
     }
@@ -139,10 +147,11 @@ mod tests {
     }
 
     #[test]
-    fn the_stiffest_element_keeps_its_gain_at_a_thousand_steps_a_second() {
-        let gain =
-            |stiffness: i32| MaxwellSlip::new(&[MaxwellElement { stiffness, level: 1 }; ELEMENTS], 1_000).gains[0];
-        assert_eq!(i64::from(gain(MAX_STIFFNESS)), (i64::from(MAX_STIFFNESS) << 10) / 1_000);
+    fn the_stiffest_element_keeps_its_gain_at_the_lowest_rate() {
+        let gain = |stiffness: i32| {
+            MaxwellSlip::new(&[MaxwellElement { stiffness, level: 1 }; ELEMENTS], LOWEST_RATE).gains[0]
+        };
+        assert_eq!(i64::from(gain(MAX_STIFFNESS)), (i64::from(MAX_STIFFNESS) << 10) / i64::from(LOWEST_RATE));
         assert!(gain(MAX_STIFFNESS - 1) <= gain(MAX_STIFFNESS) && gain(MAX_STIFFNESS) < i32::MAX);
         assert_eq!(gain(i32::MAX), i32::MAX);
     }
@@ -150,18 +159,18 @@ mod tests {
     proptest! {
         #[test]
         fn the_state_is_bounded_and_follows_the_real_one(
-            stiffness in 0..=MAX_STIFFNESS, level in 0..1i32 << 24, start in -SLIPPING..=SLIPPING,
+            stiffness in 0..=MAX_STIFFNESS, level in 0..1i32 << 24, start: i32,
             velocities in prop::collection::vec(any::<i32>(), 1..20), rate in 1_000u32..20_000,
         ) {
             let slip = MaxwellSlip::new(&[MaxwellElement { stiffness, level }; ELEMENTS], rate);
             let mut bent = [start; ELEMENTS];
-            let mut exact = f64::from(start) / f64::from(SLIPPING);
+            let mut exact = f64::from(start) / ONE;
             for velocity in velocities {
                 let velocity = velocity >> (velocity as u32 % 31);
                 let torque = slip.step(&mut bent, velocity);
                 let way = f64::from(velocity) / 65_536.0 / f64::from(rate);
                 exact = (exact + way * f64::from(stiffness) / 65_536.0).clamp(-1.0, 1.0);
-                let now = f64::from(bent[0]) / f64::from(SLIPPING);
+                let now = f64::from(bent[0]) / ONE;
                 prop_assert!(now.abs() <= 1.0);
                 // The gain is cut to a unit of 2^-26, the step to one of 2^-30.
                 let error = 1e-7 + (velocity as f64).abs() / 65_536.0 / (1u64 << 26) as f64;
@@ -172,11 +181,11 @@ mod tests {
         }
 
         #[test]
-        fn no_bits_overflow(gain: i32, level in 0..i32::MAX, bent in -SLIPPING..=SLIPPING, velocity: i32) {
+        fn no_bits_overflow(gain: i32, level in 0..=MAX_LEVEL, bent: i32, velocity: i32) {
             let slip = MaxwellSlip { gains: [gain; ELEMENTS], levels: [level; ELEMENTS] };
             let mut state = [bent; ELEMENTS];
             let torque = slip.step(&mut state, velocity);
-            prop_assert!(i64::from(torque).abs() <= (4 * i64::from(level)).min(1 << 31));
+            prop_assert!(i64::from(torque).abs() <= 4 * i64::from(level));
         }
     }
 }

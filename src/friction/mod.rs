@@ -157,17 +157,23 @@ impl FrictionModel {
     #[inline]
     pub fn step(&self, state: &JointState, memory: &mut Memory) -> Estimate {
         let signals = state.signals();
-        let common = CommonTorques { pre_sliding: self.enter(state, memory), ripple: self.ripple(&signals) };
+        self.enter(state, memory);
+        let common = CommonTorques { pre_sliding: self.pre_sliding(&signals, memory), ripple: self.ripple(&signals) };
         let network = self.by_network(&signals, memory);
         let physical = self.by_physical_model(&signals, &common, memory);
         self.fade_in(Estimate { physical, network }, memory)
     }
 
-    /// Chooses the regime's parameter set, and bends the pre-sliding elements; their torque, Nm in Q16.16.
+    /// Chooses the regime's parameter set.
     #[inline]
-    pub fn enter(&self, state: &JointState, memory: &mut Memory) -> i32 {
+    pub fn enter(&self, state: &JointState, memory: &mut Memory) {
         memory.enter(self.selector.select(state, memory.set.unwrap_or(0)));
-        self.common.pre_sliding(&mut memory.bent, state.velocity.to_bits())
+    }
+
+    /// Bends the pre-sliding elements of all sets; their torque, Nm in Q16.16.
+    #[inline]
+    pub fn pre_sliding(&self, signals: &[i32; SIGNALS], memory: &mut Memory) -> i32 {
+        self.common.pre_sliding(&mut memory.bent, signals[Signal::Velocity as usize])
     }
 
     /// The ripple of all sets.

@@ -4,7 +4,7 @@ use super::certificate::Limits;
 use super::image::{CRC_LENGTH, Effort, GoldenVector, Image, ImageError, MAGIC, MAX_GOLDEN, Target};
 use crate::friction::common::CommonTerms;
 use crate::friction::domain::{Domain, Range};
-use crate::friction::maxwell_slip::{ELEMENTS, MAX_STIFFNESS, MaxwellElement};
+use crate::friction::maxwell_slip::{ELEMENTS, MAX_LEVEL, MAX_STIFFNESS, MaxwellElement};
 use crate::friction::network::{INPUTS, MAX_FRACTION, MAX_SCALE, MIN_FRACTION, NEURONS, NetworkParameters};
 use crate::friction::physical::{Coefficients, PhysicalParameters, Terms};
 use crate::friction::regime::{Criterion, MAX_SETS, MOST_SETS, Measure, Selector};
@@ -136,7 +136,7 @@ fn decode_common(reader: &mut Reader, common: &mut CommonTerms) {
     for element in &mut common.elements {
         let stiffness = reader.checked_i32("stiffness of a pre-sliding element", 0, MAX_STIFFNESS);
         *element =
-            MaxwellElement { stiffness, level: reader.checked_i32("level of a pre-sliding element", 0, i32::MAX) };
+            MaxwellElement { stiffness, level: reader.checked_i32("level of a pre-sliding element", 0, MAX_LEVEL) };
     }
     for ripple in &mut common.ripples {
         *ripple = Ripple {

@@ -30,7 +30,7 @@
 //! | 132 | 4 | limit of the absolute friction, Q16.16 of the effort's unit, unsigned |
 //! | 136 | 4 | limit of the absolute slope of the network over the measured torque, Q16.16, unsigned |
 //! | 140 | 4 | limit of the absolute slope of friction over velocity, unsigned, 1/256 Nm s/rad |
-//! | 144 | 4 x 8 | only in format 2: pre-sliding elements: stiffness, Q16.16 per rad, 0 to [`MAX_STIFFNESS`]; level, Q16.16 of the effort's unit, not negative |
+//! | 144 | 4 x 8 | only in format 2: pre-sliding elements: stiffness, Q16.16 per rad, 0 to [`MAX_STIFFNESS`]; level, Q16.16 of the effort's unit, 0 to [`MAX_LEVEL`] |
 //! | 176 | 2 x 20 | only in format 2: ripple: periods in a rad; sine and cosine of the level, of the torque; Q16.16 |
 //! | 144, 216 | | parameter sets, one after another |
 //! | | | golden vectors, one after another |
@@ -59,7 +59,7 @@
 use super::certificate::Limits;
 use super::codec::{Reader, Writer, decode_content, encode_content};
 use crate::friction::common::{Common, CommonTerms, CommonTorques};
-use crate::friction::maxwell_slip::{Bent, MAX_STIFFNESS};
+use crate::friction::maxwell_slip::{Bent, MAX_LEVEL, MAX_STIFFNESS};
 use crate::friction::network::{MAX_FRACTION, MAX_SCALE, MIN_FRACTION};
 use crate::friction::physical::Terms;
 use crate::friction::regime::MAX_SETS;
@@ -388,7 +388,7 @@ impl Image {
         }
         for element in &common.elements {
             field("stiffness of a pre-sliding element", element.stiffness as i64, 0, MAX_STIFFNESS as i64)?;
-            field("level of a pre-sliding element", element.level as i64, 0, i32::MAX as i64)?;
+            field("level of a pre-sliding element", element.level as i64, 0, MAX_LEVEL as i64)?;
         }
         let last = selector.sets() as i64 - 1;
         for (index, set) in sets.iter().enumerate() {
