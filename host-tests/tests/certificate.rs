@@ -133,7 +133,7 @@ impl<'a> Subject<'a> {
     /// Searches a set for the state that comes nearest to a bound: from the best of 100 random ones by changes of one signal that
     /// are kept when they take nothing away. Every state on the way is checked.
     fn climb(&mut self, random: &mut ChaCha8Rng, set: usize, quest: Quest) {
-        self.bent = core::array::from_fn(|_| random.random_range(-(1 << 30)..=1 << 30));
+        self.bent = random.random();
         let domain = self.parameters.domain;
         let mut best = (i64::MIN, [0; SIGNALS]);
         for step in 0..400 {
