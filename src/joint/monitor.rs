@@ -105,6 +105,8 @@ struct Voltage {
     last: Dq,
     /// Voltage less what resistance and the rotor's turning explain, V.
     unexplained: Dq,
+    /// The same across the magnet's flux in the last round alone, V.
+    last_unexplained: f32,
     /// What the rotor's turning explains, V.
     induced: Dq,
     /// Current of the rounds' last steps, A.
@@ -233,7 +235,12 @@ impl Monitor {
         let (resistance, inductance) = (active.resistance, active.inductance);
         let induced = Dq { d: -inductance.q * current.q, q: inductance.d * current.d + active.flux_linkage } * speed;
 
-        filter(&mut memory.unexplained, voltage - current * resistance - induced);
+        let unexplained = voltage - current * resistance - induced;
+        // The speed of two samples errs by up to two counts a round, and in the next round the other way: with a coarse encoder that is more voltage than all
+        // that counts as explained. A stuck encoder's voltage keeps its sign.
+        let keeps_sign = (unexplained.q.to_bits() ^ memory.last_unexplained.to_bits()) as i32 >= 0;
+        memory.last_unexplained = unexplained.q;
+        filter(&mut memory.unexplained, unexplained);
         filter(&mut memory.induced, induced);
         filter(&mut memory.error, reference - current);
 
@@ -252,7 +259,7 @@ impl Monitor {
         let rest = turning + greater(uncompensated, 0.0);
         let explained = |current: f32| rest + RESISTANCE_ERROR * resistance * magnitude(current);
         let contradicts = exceeds(left.d, active.implausible_voltage.d + explained(memory.current.d))
-            || exceeds(left.q, active.implausible_voltage.q + explained(memory.current.q));
+            || keeps_sign && exceeds(left.q, active.implausible_voltage.q + explained(memory.current.q));
         let found = memory.rounds.step(contradicts, UNEXPLAINED_ROUNDS);
 
         let permitted =

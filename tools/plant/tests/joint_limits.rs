@@ -90,14 +90,9 @@ fn a_torque_outwards_ends_within_half_the_margin() {
     }
 }
 
-/// Faults that a joint with a coarse encoder can have at a limit: the noise of its velocity times the limit damping is a torque.
-fn coarse(rig: &Rig, parameters: &ActuatorParameters) -> bool {
-    rig.latched() == [Fault::EncoderImplausible] && parameters.sensors.encoder.counts_per_turn == 1 << 12
-}
-
 #[test]
 fn random_joints_driven_outwards_with_all_they_have_stop_within_the_margin() {
-    let (mut noisy, mut worst) = (0, 0.0f64);
+    let mut worst = 0.0f64;
     for seed in 0..JOINTS {
         let parameters = ActuatorParameters::randomised(seed).aligned();
         let mut setup = Setup::of(&parameters);
@@ -106,15 +101,10 @@ fn random_joints_driven_outwards_with_all_they_have_stop_within_the_margin() {
         let limit = rig.joint.active().limits.torque;
         let farthest = largest(&mut rig, torque(limit), 2.0, passed);
         worst = worst.max(farthest);
-        if coarse(&rig, &parameters) {
-            noisy += 1;
-            continue;
-        }
         assert!(rig.latched().is_empty(), "{seed}: {:?} at {farthest} of the margin", rig.latched());
         assert!(farthest < 0.75, "{seed}: {farthest} of the margin");
     }
-    println!("{worst:.3} of the margin at the most, {noisy} coarse encoders");
-    assert!(noisy <= 3, "{noisy}");
+    println!("{worst:.3} of the margin at the most");
 }
 
 /// The quick stop's deceleration has to be possible: then the torque limit decides how far a joint gets, not the law.
@@ -154,22 +144,39 @@ fn fastest(parameters: ActuatorParameters, setup: &Setup, direction: f32) -> (f6
 
 #[test]
 fn random_joints_without_load_are_held_at_the_velocity_limit() {
-    let (mut noisy, mut slow) = (0, 0);
-    let mut most = 0.0f64;
+    let (mut slow, mut most) = (0, 0.0f64);
     for seed in 0..JOINTS {
         let parameters = weightless(ActuatorParameters::randomised(seed).aligned());
         let (speed, rig) = fastest(parameters, &endless(&parameters), if seed % 2 == 0 { 1.0 } else { -1.0 });
         most = most.max(speed);
         assert!(speed < 1.05, "{seed}: {speed} of the velocity limit");
-        if coarse(&rig, &parameters) {
-            noisy += 1;
-            continue;
-        }
         assert!(rig.latched().is_empty(), "{seed}: {:?}", rig.latched());
         slow += u32::from(speed < 0.95);
     }
-    println!("{most:.3} of the velocity limit at the most, {slow} do not come near it, {noisy} coarse encoders");
-    assert!(noisy <= 3 && slow <= 10, "{noisy} {slow}");
+    println!("{most:.3} of the velocity limit at the most, {slow} do not come near it");
+    assert!(slow <= 10, "{slow}");
+}
+
+/// The speed between two of its samples, a round of the motion loop apart, errs by two counts and more with the encoder's noise, and the limit damping makes
+/// torque of it. That is no contradiction between encoder and voltage.
+#[test]
+fn joints_with_a_coarse_encoder_behind_a_low_gear_reverse_at_any_damping_without_a_fault() {
+    let random = (0..400).map(|seed| ActuatorParameters::randomised(seed).aligned());
+    let coarse: Vec<_> = random.filter(|joint| joint.joint.motor.gear_ratio.abs() < 12.0).map(weightless).collect();
+    assert_eq!(coarse.len(), 91);
+    for damping in [1.0, 3.0, 10.0] {
+        for (number, mut parameters) in coarse.iter().copied().enumerate() {
+            parameters.sensors.encoder.counts_per_turn = 1 << 12;
+            let mut setup = endless(&parameters);
+            setup.configuration.limits.damping *= damping;
+            let mut rig = Rig::enabled(parameters, &setup);
+            let half = 0.5 * rig.joint.active().limits.torque;
+            for way in [1.0, -1.0, 1.0, -1.0, 1.0, -1.0] {
+                largest(&mut rig, torque(way * half), 0.35, |_| 0.0);
+            }
+            assert!(rig.latched().is_empty(), "{number}, {damping} times the damping: {:?}", rig.latched());
+        }
+    }
 }
 
 /// What stands in `limit_law` on stability: how much of the torque limit the torque ripples by (RMS) at the velocity limit.
@@ -210,7 +217,6 @@ fn speed_after_braking(rig: &mut Rig) -> f64 {
 
 #[test]
 fn joints_whose_gains_are_zero_brake_to_a_stop() {
-    let mut noisy = 0;
     for seed in 0..JOINTS / 4 {
         let parameters = match seed {
             0 => reference(),
@@ -232,10 +238,6 @@ fn joints_whose_gains_are_zero_brake_to_a_stop() {
         stopping.demand.controlword = Controlword::QUICK_STOP;
         let speed = speed_after_braking(&mut stopping);
         assert!(speed < 0.02, "{seed}: {speed} after a quick stop");
-        if coarse(&stopping, &parameters) {
-            noisy += 1;
-            continue;
-        }
         assert_eq!((stopping.state(), stopping.latched()), (State::SwitchOnDisabled, vec![]), "{seed}");
         // From here on the joint is driven by nothing but the torque of its last set-point.
         moving.silent = true;
@@ -243,14 +245,7 @@ fn joints_whose_gains_are_zero_brake_to_a_stop() {
             moving.step();
         }
         let speed = speed_after_braking(&mut moving);
-        // The same fault while it brakes switches the bridge off, and the joint coasts.
-        let implausible = moving.latched().contains(&Fault::EncoderImplausible);
-        if implausible && parameters.sensors.encoder.counts_per_turn == 1 << 12 {
-            noisy += 1;
-            continue;
-        }
         assert!(speed < 0.02, "{seed}: {speed} after a fault");
         assert_eq!((moving.state(), moving.latched()), (State::Fault, vec![Fault::StaleCommand]), "{seed}");
     }
-    assert!(noisy <= 2, "{noisy}");
 }
