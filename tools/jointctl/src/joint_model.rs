@@ -10,7 +10,7 @@ use crate::rigid::{RigidParameters, RigidState};
 use crate::samples::Samples;
 use joint_firmware::compensation::{Compensation, Request, Settings};
 use joint_firmware::friction::common::CommonTorques;
-use joint_firmware::friction::maxwell_slip::Bent as FirmwareBent;
+use joint_firmware::friction::maxwell_slip::{Bent as FirmwareBent, LOWEST_RATE};
 use joint_firmware::friction::regime::Selector;
 use joint_firmware::friction::state::JointState;
 use joint_firmware::friction::{FrictionModel as FirmwareModel, FrictionParameters};
@@ -126,9 +126,27 @@ pub fn regimes(selector: &Selector, states: &[JointState], samples: &Samples) ->
     sets
 }
 
-/// Evaluations a second at the rate of the samples, at least 1.
-fn rate(samples: &Samples) -> u32 {
-    (1.0 / crate::pre_sliding::period(samples)).round().max(1.0) as u32
+/// How often the firmware steps for one sample: as often as it takes to reach [`LOWEST_RATE`]. Between samples velocity is held, which bends an element as
+/// far as one long step does.
+struct Steps {
+    /// Steps a second.
+    rate: u32,
+    /// Steps for one sample, at least 1.
+    of_a_sample: u32,
+}
+
+impl Steps {
+    fn of(samples: &Samples) -> Self {
+        let sampled = (1.0 / samples.period()).clamp(f64::MIN_POSITIVE, f64::from(LOWEST_RATE) * 1e3);
+        let of_a_sample = (f64::from(LOWEST_RATE) / sampled).ceil().clamp(1.0, f64::from(LOWEST_RATE));
+        Self { rate: (sampled * of_a_sample).round() as u32, of_a_sample: of_a_sample as u32 }
+    }
+
+    /// What the last of a sample's steps gives.
+    fn step<T>(&self, mut step: impl FnMut() -> T) -> T {
+        (1..self.of_a_sample).for_each(|_| _ = step());
+        step()
+    }
 }
 
 /// Physical friction and the network's share of every sample, computed by the firmware. Every run begins anew.
@@ -138,14 +156,15 @@ pub fn fixed_point(
     sets: &[usize],
     samples: &Samples,
 ) -> Vec<(f64, f64)> {
-    let model = FirmwareModel::new(parameters, rate(samples));
+    let steps = Steps::of(samples);
+    let model = FirmwareModel::new(parameters, steps.rate);
     let mut bent = FirmwareBent::default();
     let common: Vec<CommonTorques> = (0..states.len())
         .map(|i| {
             if i > 0 && samples.run[i] != samples.run[i - 1] {
                 bent = FirmwareBent::default();
             }
-            model.common(&mut bent, &states[i])
+            steps.step(|| model.common(&mut bent, &states[i]))
         })
         .collect();
     let evaluate = |((state, set), common): ((&JointState, &usize), &CommonTorques)| {
@@ -158,7 +177,8 @@ pub fn fixed_point(
 /// Compensation torque of every sample, computed step by step as in the control loop: regimes with cross-fade, fades outside
 /// the trained box; full gain, no clamp, no slew limit. Every run begins anew.
 pub fn replay(parameters: &FrictionParameters, states: &[JointState], samples: &Samples) -> Vec<f64> {
-    let model = FirmwareModel::new(parameters, rate(samples));
+    let steps = Steps::of(samples);
+    let model = FirmwareModel::new(parameters, steps.rate);
     // The widest settings are always in range.
     let Ok(settings) = Settings::new(Request::PhysicalAndNetwork, 1 << 16, Torque::MAX, Torque::MAX, 1) else {
         return vec![0.0; states.len()];
@@ -169,7 +189,7 @@ pub fn replay(parameters: &FrictionParameters, states: &[JointState], samples: &
         if i > 0 && samples.run[i] != samples.run[i - 1] {
             compensation = Compensation::default();
         }
-        torques.push(compensation.step(Some(&model), &settings, state).torque.to_f64());
+        torques.push(steps.step(|| compensation.step(Some(&model), &settings, state)).torque.to_f64());
     }
     torques
 }

@@ -76,6 +76,23 @@ impl Samples {
         self.time.is_empty()
     }
 
+    /// The first sampling period, s.
+    pub fn period(&self) -> f64 {
+        let mut pairs = self.time.windows(2).map(|pair| pair[1] - pair[0]);
+        pairs.find(|period| *period > 0.0).unwrap_or(1.0)
+    }
+
+    /// Index of the sample that is later than sample `index` by `time`, s, at the first sampling period; held at the ends of its run.
+    pub fn shifted(&self, index: usize, time: f64) -> usize {
+        let by = (time.abs() / self.period()).round() as usize;
+        let same_run = |i: &usize| self.run[*i] == self.run[index];
+        let found = match time < 0.0 {
+            true => (index.saturating_sub(by)..=index).find(same_run),
+            false => (index..=index.saturating_add(by).min(self.len() - 1)).rev().find(same_run),
+        };
+        found.unwrap_or(index)
+    }
+
     /// Indices of the samples of one part, in order.
     pub fn indices(&self, part: Part) -> Vec<usize> {
         (0..self.len()).filter(|&i| self.part[i] == part).collect()
