@@ -116,7 +116,7 @@ pub fn rigid_beside(friction: &[f64], model: &RigidModel, samples: &Samples) -> 
     let (mut matrix, mut right) = (DMatrix::<f64>::zeros(n, n), DVector::<f64>::zeros(n));
     for i in samples.indices(Part::Train) {
         let all = RigidParameters::regressor_values(&rigid_state(samples, i));
-        let row: Vec<f64> = regressors.iter().map(|regressor| all[*regressor as usize]).collect();
+        let row: Vec<f64> = regressors.iter().map(|regressor| all[regressor.index()]).collect();
         for a in 0..n {
             right[a] += row[a] * (samples.effort[i] - friction[i]);
             for b in 0..n {

@@ -6,7 +6,7 @@
 use crate::friction_model::{FrictionModel, JointState as FloatState};
 use crate::network::Network;
 use crate::quantize::QuantizeError;
-use crate::rigid::{RigidParameters, RigidState};
+use crate::rigid::{LAGS, RigidParameters, RigidState};
 use crate::samples::Samples;
 use joint_firmware::compensation::{Compensation, Request, Settings};
 use joint_firmware::friction::common::CommonTorques;
@@ -81,14 +81,16 @@ fn load(samples: &Samples, index: usize) -> f64 {
     samples.load.get(index).copied().unwrap_or(0.0)
 }
 
-/// What the rigid part depends on in one sample.
+/// What the rigid part depends on in one sample; mass and length are 0 where there are no such columns.
 pub fn rigid_state(samples: &Samples, index: usize) -> RigidState {
     let extra = |name: &str| samples.extra.get(name).map_or(0.0, |column| column[index]);
+    let now = samples.acceleration[index];
     RigidState {
         position: samples.position[index],
-        acceleration: samples.acceleration[index],
+        acceleration: now,
         mass: extra("mass"),
         length: extra("length"),
+        lagged: LAGS.map(|lag| samples.acceleration[samples.shifted(index, -lag)] - now),
     }
 }
 

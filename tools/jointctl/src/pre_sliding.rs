@@ -6,7 +6,7 @@ use crate::samples::Samples;
 /// How far the elements of these stiffnesses (1/rad or 1/m) are bent after each sample. Every run begins at rest: nobody recorded what was before.
 pub fn bent(samples: &Samples, stiffness: &[f64]) -> Vec<Bent> {
     let mut elements = Bent::default();
-    let period = period(samples);
+    let period = samples.period();
     let step = |i: usize| {
         let begins = i == 0 || samples.run[i] != samples.run[i - 1];
         if begins {
@@ -24,12 +24,6 @@ pub fn bent(samples: &Samples, stiffness: &[f64]) -> Vec<Bent> {
 /// An element after a way, in parts of its distance; at rest where the way is not known.
 fn drag(bent: f64, way: f64) -> f64 {
     if way.is_finite() { (bent + way).clamp(-1.0, 1.0) } else { 0.0 }
-}
-
-/// The first sampling period, s.
-pub fn period(samples: &Samples) -> f64 {
-    let mut pairs = samples.time.windows(2).map(|pair| pair[1] - pair[0]);
-    pairs.find(|period| *period > 0.0).unwrap_or(1.0)
 }
 
 #[cfg(test)]

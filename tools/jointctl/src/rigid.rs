@@ -4,10 +4,18 @@
 //! position; where mass and length of the load are known run by run (pendulum rigs), each coefficient splits into a
 //! constant part (the joint itself) and a part in proportion to m l^2 or m l. A constant offset belongs to friction
 //! (`Term::Constant`), and a motor's back-EMF k_e v cannot be told from viscous friction: it is part of that coefficient.
+//!
+//! A joint behind an elastic gear, on an arm that gives way, is no rigid body: its effort answers to accelerations before and after, too. Where
+//! those pay on motions that were left out (`identify::lags`) they are regressors as well, each less the acceleration of now, so that the inertia
+//! stays that of slow motion. A linear filter of the acceleration is what small elastic deflections amount to (Spong 1987, Modeling and control
+//! of elastic joint robots); left out, friction terms would learn it.
 
 use crate::friction_parameter::Units;
 use serde::{Deserialize, Serialize};
 use std::fmt;
+
+/// Times before (positive) and after (negative) a sample whose accelerations may count, s; in pairs, the nearest first.
+pub const LAGS: [f64; 8] = [0.025, -0.025, 0.05, -0.05, 0.1, -0.1, 0.2, -0.2];
 
 /// Shape of the gravity term.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -31,6 +39,8 @@ pub struct RigidModel {
     pub gravity: Gravity,
     /// Adds regressors in proportion to m l^2 and m l; needs the columns `mass` (kg) and `length` (m) of the samples.
     pub mass_and_length: bool,
+    /// How many of [`LAGS`] have a regressor; not without inertia.
+    pub lags: usize,
 }
 
 /// One regressor of the rigid part.
@@ -48,36 +58,67 @@ pub enum RigidRegressor {
     LoadGravitySine,
     /// m l cos q.
     LoadGravityCosine,
+    /// a at one of [`LAGS`], by its number, less a of now.
+    LaggedAcceleration(usize),
 }
 
 impl RigidRegressor {
     /// All regressors, in the order of their index.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 6 + LAGS.len()] = [
         Self::Inertia,
         Self::GravitySine,
         Self::GravityCosine,
         Self::LoadInertia,
         Self::LoadGravitySine,
         Self::LoadGravityCosine,
+        Self::LaggedAcceleration(0),
+        Self::LaggedAcceleration(1),
+        Self::LaggedAcceleration(2),
+        Self::LaggedAcceleration(3),
+        Self::LaggedAcceleration(4),
+        Self::LaggedAcceleration(5),
+        Self::LaggedAcceleration(6),
+        Self::LaggedAcceleration(7),
     ];
 
-    /// Symbol of its coefficient.
-    pub fn symbol(self) -> &'static str {
+    /// Position in [`ALL`](Self::ALL).
+    #[inline]
+    pub const fn index(self) -> usize {
         match self {
+            Self::Inertia => 0,
+            Self::GravitySine => 1,
+            Self::GravityCosine => 2,
+            Self::LoadInertia => 3,
+            Self::LoadGravitySine => 4,
+            Self::LoadGravityCosine => 5,
+            Self::LaggedAcceleration(lag) => 6 + lag,
+        }
+    }
+
+    /// True for those that gravity has.
+    pub const fn is_gravity(self) -> bool {
+        !matches!(self, Self::Inertia | Self::LoadInertia | Self::LaggedAcceleration(_))
+    }
+
+    /// Symbol of its coefficient.
+    pub fn symbol(self) -> String {
+        let text = match self {
             Self::Inertia => "I",
             Self::GravitySine => "g_s",
             Self::GravityCosine => "g_c",
             Self::LoadInertia => "I_ml2",
             Self::LoadGravitySine => "g_s,ml",
             Self::LoadGravityCosine => "g_c,ml",
-        }
+            Self::LaggedAcceleration(lag) => return format!("I_{:+.0}", -1e3 * LAGS[lag]),
+        };
+        text.to_owned()
     }
 
     /// Unit of its coefficient, from those of the data set.
     pub fn unit(self, units: &Units) -> String {
         let Units { position, effort } = units;
         match self {
-            Self::Inertia => format!("{effort} s^2/{position}"),
+            Self::Inertia | Self::LaggedAcceleration(_) => format!("{effort} s^2/{position}"),
             Self::GravitySine | Self::GravityCosine => effort.clone(),
             Self::LoadInertia => format!("{effort} s^2/(kg m^2 {position})"),
             Self::LoadGravitySine | Self::LoadGravityCosine => format!("{effort}/(kg m)"),
@@ -89,6 +130,10 @@ impl RigidRegressor {
 impl fmt::Display for RigidRegressor {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
+            Self::LaggedAcceleration(lag) => {
+                let (time, side) = (1e3 * LAGS[*lag].abs(), if LAGS[*lag] > 0.0 { "before" } else { "after" });
+                return write!(f, "acceleration {time:.0} ms {side}");
+            }
             Self::Inertia => "inertia",
             Self::GravitySine => "gravity, sine of position",
             Self::GravityCosine => "gravity, cosine of position",
@@ -112,6 +157,7 @@ impl RigidModel {
                 RigidRegressor::LoadInertia => self.inertia && self.mass_and_length,
                 RigidRegressor::LoadGravitySine => sine && self.mass_and_length,
                 RigidRegressor::LoadGravityCosine => cosine && self.mass_and_length,
+                RigidRegressor::LaggedAcceleration(lag) => self.inertia && *lag < self.lags,
             })
             .collect()
     }
@@ -128,6 +174,8 @@ pub struct RigidState {
     pub mass: f64,
     /// Distance of the load from the axis l, m; 0 where it is not known.
     pub length: f64,
+    /// Acceleration at each of [`LAGS`] less that of now, rad/s^2 or m/s^2; 0 where it is not known.
+    pub lagged: [f64; LAGS.len()],
 }
 
 /// Coefficients of the rigid part; those that the model does not have are 0.
@@ -145,21 +193,28 @@ pub struct RigidParameters {
     pub load_gravity_sine: f64,
     /// Coefficient of m l cos q.
     pub load_gravity_cosine: f64,
+    /// Coefficients of the acceleration at each of [`LAGS`] less that of now.
+    #[serde(default)]
+    pub lagged: [f64; LAGS.len()],
 }
 
 impl RigidParameters {
     /// The rigid part of the effort.
     pub fn effort(&self, state: &RigidState) -> f64 {
         let by = Self::regressor_values(state);
-        RigidRegressor::ALL.into_iter().map(|regressor| self.coefficient(regressor) * by[regressor as usize]).sum()
+        RigidRegressor::ALL.into_iter().map(|regressor| self.coefficient(regressor) * by[regressor.index()]).sum()
     }
 
     /// The values of all regressors, in the order of `RigidRegressor::ALL`: the derivatives of the effort.
     #[inline]
-    pub fn regressor_values(state: &RigidState) -> [f64; 6] {
+    pub fn regressor_values(state: &RigidState) -> [f64; RigidRegressor::ALL.len()] {
         let (sine, cosine) = state.position.sin_cos();
         let (a, moment) = (state.acceleration, state.mass * state.length);
-        [a, sine, cosine, moment * state.length * a, moment * sine, moment * cosine]
+        let mut values = [0.0; RigidRegressor::ALL.len()];
+        let (rigid, lagged) = values.split_at_mut(6);
+        rigid.copy_from_slice(&[a, sine, cosine, moment * state.length * a, moment * sine, moment * cosine]);
+        lagged.copy_from_slice(&state.lagged);
+        values
     }
 
     /// The coefficient of one regressor.
@@ -177,6 +232,7 @@ impl RigidParameters {
             RigidRegressor::LoadInertia => &mut self.load_inertia,
             RigidRegressor::LoadGravitySine => &mut self.load_gravity_sine,
             RigidRegressor::LoadGravityCosine => &mut self.load_gravity_cosine,
+            RigidRegressor::LaggedAcceleration(lag) => &mut self.lagged[lag],
         }
     }
 }
@@ -187,18 +243,32 @@ mod tests {
 
     #[test]
     fn a_pendulum_with_known_load_has_a_constant_and_a_proportional_part() {
-        let model = RigidModel { inertia: true, gravity: Gravity::Sine, mass_and_length: true };
+        let model = RigidModel { inertia: true, gravity: Gravity::Sine, mass_and_length: true, lags: 0 };
         use RigidRegressor::*;
         assert_eq!(model.regressors(), [Inertia, GravitySine, LoadInertia, LoadGravitySine]);
         assert!(RigidModel::default().regressors().is_empty());
+        let elastic = RigidModel { lags: 2, ..model };
+        assert_eq!(elastic.regressors()[4..], [LaggedAcceleration(0), LaggedAcceleration(1)]);
+        assert!(RigidModel { inertia: false, ..elastic }.regressors().iter().all(|r| r.is_gravity()));
     }
 
     #[test]
     fn the_effort_of_a_pendulum_is_its_equation_of_motion() {
         let pendulum =
             RigidParameters { inertia: 0.02, load_inertia: 1.0, load_gravity_sine: 9.81, ..Default::default() };
-        let state = RigidState { position: 0.7, acceleration: -3.0, mass: 1.2, length: 0.15 };
+        let state = RigidState { position: 0.7, acceleration: -3.0, mass: 1.2, length: 0.15, ..RigidState::default() };
         let by_hand = (0.02 + 1.2 * 0.15 * 0.15) * -3.0 + 1.2 * 9.81 * 0.15 * 0.7f64.sin();
         assert!((pendulum.effort(&state) - by_hand).abs() < 1e-14);
+    }
+
+    #[test]
+    fn regressors_stand_at_their_index_and_are_the_derivatives_of_the_effort() {
+        let state = RigidState { position: 0.4, acceleration: 2.0, mass: 1.5, length: 0.3, lagged: [0.1; LAGS.len()] };
+        for (place, regressor) in RigidRegressor::ALL.into_iter().enumerate() {
+            assert_eq!(regressor.index(), place);
+            let mut one = RigidParameters::default();
+            *one.coefficient_mut(regressor) = 1.0;
+            assert_eq!(one.effort(&state), RigidParameters::regressor_values(&state)[place], "{regressor}");
+        }
     }
 }

@@ -74,8 +74,9 @@ fn columns<'a>(prepared: &'a Prepared, predictions: &'a [Prediction]) -> Vec<Col
     for prediction in predictions {
         number(format!("predicted {}", prediction.model), &prediction.effort);
     }
+    // Lagged accelerations are not among them: baselines have a rigid body.
     for regressor in rigid_model(&prepared.description.rigid).regressors() {
-        let value = move |i| RigidParameters::regressor_values(&rigid_state(samples, i))[regressor as usize];
+        let value = move |i| RigidParameters::regressor_values(&rigid_state(samples, i))[regressor.index()];
         text(&format!("rigid {}", key(regressor)), Box::new(move |i| value(i).to_string()));
     }
     columns
@@ -91,13 +92,15 @@ fn part(part: Part) -> &'static str {
 }
 
 /// A regressor's name in the table.
-fn key(regressor: RigidRegressor) -> &'static str {
-    match regressor {
+fn key(regressor: RigidRegressor) -> String {
+    let key = match regressor {
         RigidRegressor::Inertia => "inertia",
         RigidRegressor::GravitySine => "gravity_sine",
         RigidRegressor::GravityCosine => "gravity_cosine",
         RigidRegressor::LoadInertia => "load_inertia",
         RigidRegressor::LoadGravitySine => "load_gravity_sine",
         RigidRegressor::LoadGravityCosine => "load_gravity_cosine",
-    }
+        RigidRegressor::LaggedAcceleration(lag) => return format!("lagged_acceleration_{lag}"),
+    };
+    key.to_owned()
 }

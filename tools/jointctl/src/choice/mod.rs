@@ -15,4 +15,4 @@ pub mod overrule;
 
 pub use compare::{Comparison, LEAST_WORTH, WORST_FOLD, compare, rank};
 pub use folds::{Folds, MOST_FOLDS};
-pub use overrule::{NetworkRule, TermRule};
+pub use overrule::{Decision, TermRule};

@@ -5,16 +5,16 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 
-/// Who decides about the network.
+/// Who decides about a part of the model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
-pub enum NetworkRule {
+pub enum Decision {
     /// The error on motions that were left out decides
     #[default]
     Choose,
-    /// The network is kept, unless the certificate refuses it
+    /// It is there, whatever the error says
     Keep,
-    /// No network is trained
+    /// It is not there
     Never,
 }
 

@@ -52,15 +52,22 @@ impl Evaluate {
             let text = format!("the image speaks of {}, the data set of {unit}", image.effort.symbol());
             return Err(CommandError::Arguments(text));
         }
-        let rigid_model = rigid_model(&prepared.description.rigid);
-        let choices = identify::Options { units: units(&prepared), ..identify::Options::default() };
+        let described = rigid_model(&prepared.description.rigid);
+        let mut rigid_model = described;
+        let choices = identify::Options {
+            units: units(&prepared),
+            folds: Some(prepared.folds.clone()),
+            lags: prepared.description.choice.lags,
+            ..identify::Options::default()
+        };
         let mut predictions = Vec::new();
         progress.stage("identify");
         for preset in Preset::ALL {
             progress.detail(preset.name());
             let samples = &mut prepared.samples;
-            let identified = identify(samples, &rigid_model, preset, &choices)
+            let identified = identify(samples, &described, preset, &choices)
                 .map_err(|source| FitError::Identify { preset, source })?;
+            rigid_model = identified.rigid_model;
             let rigid = rigid_efforts(&identified.rigid, samples);
             predictions.push(Prediction::new(format!("{preset}, refitted"), Role::Preset, &rigid, |i| {
                 identified.friction(samples, i)

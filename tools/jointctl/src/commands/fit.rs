@@ -1,7 +1,7 @@
 //! `jointctl fit`: from a described data set to an image, its TOML twin and a report.
 
 use super::CommandError;
-use crate::choice::{NetworkRule, TermRule};
+use crate::choice::{Decision, TermRule};
 use crate::dataset::{Prepared, Warning, prepare};
 use crate::fit::{Fitted, Options, Trainer, fit};
 use crate::image_text;
@@ -111,7 +111,10 @@ pub struct Choices {
     regimes: Vec<RegimeChoice>,
     /// Who decides about the network: the error on motions that were left out, or you
     #[arg(long, value_enum, default_value_t)]
-    network: NetworkRule,
+    network: Decision,
+    /// Who decides about lagged accelerations beside the rigid body, for an elastic joint: the error on motions that were left out, or you
+    #[arg(long = "lagged-accelerations", value_enum, default_value_t)]
+    lags: Decision,
     /// Terms of the full model that are forced (+) or forbidden (-), as in +Stribeck,-Hysteresis
     #[arg(long = "term", value_name = "±NAME", value_delimiter = ',', allow_hyphen_values = true)]
     terms: Vec<TermRule>,
@@ -152,6 +155,7 @@ impl Choices {
             samples: self.samples,
             equalise: fraction("equalise", self.equalise, 1.0)?,
             network: self.network,
+            lags: self.lags,
             terms: self.terms.clone(),
             least_gain: fraction("least-gain", self.least_gain, 100.0)? / 100.0,
             margin: fraction("margin", self.margin, 100.0)?,

@@ -1,6 +1,6 @@
 //! The keys that govern how a model is chosen, as a description of a data set has them; host.
 
-use crate::choice::{NetworkRule, TermRule};
+use crate::choice::{Decision, TermRule};
 use serde::Deserialize;
 
 /// Grouping of the motions, and decisions of the choice that are overruled.
@@ -13,7 +13,10 @@ pub struct Choice {
     pub group_by: Vec<String>,
     /// The network is kept, never trained, or chosen.
     #[serde(default)]
-    pub network: NetworkRule,
+    pub network: Decision,
+    /// Lagged accelerations in the rigid part, likewise.
+    #[serde(default, rename = "lagged_accelerations")]
+    pub lags: Decision,
     /// Terms that are forced (`+Stribeck`) or forbidden (`-Hysteresis`).
     #[serde(default)]
     pub terms: Vec<TermRule>,

@@ -64,7 +64,7 @@ impl SimpleModel {
         let rigid = RigidParameters::regressor_values(&rigid_state(samples, index));
         let velocity = samples.velocity[index];
         let value = |term: &Term| match term {
-            Term::Rigid(regressor) => rigid[*regressor as usize],
+            Term::Rigid(regressor) => rigid[regressor.index()],
             Term::Viscous => velocity,
             Term::Coulomb => (velocity / self.edge).tanh(),
             Term::Offset => 1.0,

@@ -6,7 +6,7 @@ use super::trainer::{Trainer, curves};
 use super::uncovered::with_uncovered;
 use super::unseen::{self, Verdict};
 use crate::augment::augment;
-use crate::choice::NetworkRule;
+use crate::choice::Decision;
 use crate::classify::Thresholds;
 use crate::equalise::{Equalise, draw};
 use crate::identify::{Identified, overall};
@@ -90,7 +90,7 @@ pub fn inputs(samples: &Samples, static_load: bool) -> [bool; 5] {
 pub(super) fn learn(problem: &Problem) -> Result<Learned, FitError> {
     let Problem { samples, physical, options, progress, .. } = *problem;
     let alone = |outcome| Ok(Learned::physical(physical, outcome));
-    let Some(trainer) = options.trainer.filter(|_| options.network != NetworkRule::Never) else {
+    let Some(trainer) = options.trainer.filter(|_| options.network != Decision::Never) else {
         return alone(NetworkOutcome::NotTrained);
     };
     progress.stage("train");
@@ -112,7 +112,7 @@ pub(super) fn learn(problem: &Problem) -> Result<Learned, FitError> {
         return alone(NetworkOutcome::Rejected { reason });
     };
     let unseen_rmse = overall(&errors);
-    let kept = options.network == NetworkRule::Keep;
+    let kept = options.network == Decision::Keep;
     match &refusal {
         Some(reason) if !kept => {
             let outcome = NetworkOutcome::Rejected { reason: reason.clone() };

@@ -19,7 +19,7 @@ pub use trainer::Trainer;
 
 use crate::augment::Augment;
 use crate::certificate_search::search;
-use crate::choice::{NetworkRule, TermRule, rank};
+use crate::choice::{Decision, TermRule, rank};
 use crate::dataset::Prepared;
 use crate::dataset::checks::slope;
 use crate::dataset::choice_keys::Choice;
@@ -65,7 +65,9 @@ pub struct Options {
     /// those that pay of position, the theoretical torque where there is gravity, and the temperature where it varies by 10 K.
     pub inputs: Option<[bool; 5]>,
     /// Who decides about the network; `Choose`: as the description of the data set says.
-    pub network: NetworkRule,
+    pub network: Decision,
+    /// Who decides about lagged accelerations in the rigid part; `Choose`: as the description of the data set says.
+    pub lags: Decision,
     /// Terms of the full model that are forced or forbidden, beside those of the description.
     pub terms: Vec<TermRule>,
     /// Least fall of the error on motions that were left out, as a fraction, for which a network is kept.
@@ -96,7 +98,8 @@ impl Default for Options {
             equalise: 0.5,
             augment: Augment::default(),
             inputs: None,
-            network: NetworkRule::default(),
+            network: Decision::default(),
+            lags: Decision::default(),
             terms: vec![],
             least_gain: 0.02,
             regimes: vec![],
@@ -170,6 +173,7 @@ pub fn fit(prepared: &mut Prepared, options: &Options, progress: &dyn Progress) 
         units: units.clone(),
         folds: Some(prepared.folds.clone()),
         terms: options.terms.clone(),
+        lags: options.lags,
         ..identify::Options::default()
     };
     let identified = identify_all(samples, &rigid_model, &choices, options, progress)?;
@@ -286,8 +290,11 @@ fn identify_all(
 /// The options with what the description of the data set overrules; those of the caller go first.
 fn overruled(options: &Options, choice: &Choice) -> Options {
     let mut all = options.clone();
-    if all.network == NetworkRule::Choose {
+    if all.network == Decision::Choose {
         all.network = choice.network;
+    }
+    if all.lags == Decision::Choose {
+        all.lags = choice.lags;
     }
     let own = |rule: &&TermRule| !options.terms.iter().any(|own| own.term == rule.term);
     all.terms.extend(choice.terms.iter().filter(own));
@@ -334,6 +341,7 @@ pub fn rigid_model(description: &RigidDescription) -> RigidModel {
             DescribedGravity::Cosine | DescribedGravity::SineAndCosine => Gravity::SineAndCosine,
         },
         mass_and_length: description.mass_and_length,
+        lags: 0,
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::{Learned, Options};
 use crate::certificate_search::Found;
-use crate::choice::{Folds, NetworkRule, compare};
+use crate::choice::{Decision, Folds, compare};
 use crate::dataset::Prepared;
 use crate::evaluate::Prediction;
 use crate::friction_parameter::Units;
@@ -108,10 +108,17 @@ pub(super) fn choice(
     options: &Options,
 ) -> report::Choice {
     let mut overruled: Vec<String> = options.terms.iter().map(|rule| format!("term {rule}")).collect();
-    match options.network {
-        NetworkRule::Choose => {}
-        NetworkRule::Keep => overruled.push("network: keep".into()),
-        NetworkRule::Never => overruled.push("network: never".into()),
+    for (part, decision) in [("network", options.network), ("lagged accelerations", options.lags)] {
+        match decision {
+            Decision::Choose => {}
+            Decision::Keep => overruled.push(format!("{part}: keep")),
+            Decision::Never => overruled.push(format!("{part}: never")),
+        }
+    }
+    let Identified { friction, rigid_model, .. } = &identified[chosen];
+    let mut terms: Vec<String> = friction.terms.iter().map(|term| format!("{term:?}")).collect();
+    if rigid_model.lags > 0 {
+        terms.push(format!("{} lagged accelerations in the rigid part", rigid_model.lags));
     }
     let mut notes: Vec<String> = identified[chosen].notes.clone();
     notes.extend(learned.notes.iter().cloned());
@@ -126,7 +133,7 @@ pub(super) fn choice(
             })
             .collect(),
         models: identified.iter().map(|one| one.preset.name().to_owned()).collect(),
-        terms: identified[chosen].friction.terms.iter().map(|term| format!("{term:?}")).collect(),
+        terms,
         notes,
         overruled,
     }

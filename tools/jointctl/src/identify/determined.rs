@@ -38,7 +38,7 @@ fn own_part(hessian: &DMatrix<f64>, column: usize, others: &[usize]) -> f64 {
 pub fn own_part_of_offset(rows: &[Row], regressors: &[RigidRegressor]) -> f64 {
     let n = regressors.len() + 1;
     let sums = sum_over_rows(rows, normal_sums(n), |sums, row| {
-        let mut columns: Vec<f64> = regressors.iter().map(|&regressor| row.regressors[regressor as usize]).collect();
+        let mut columns: Vec<f64> = regressors.iter().map(|&regressor| row.regressors[regressor.index()]).collect();
         columns.push(1.0);
         add_to_normal_sums(sums, &columns, 0.0);
     });
@@ -79,8 +79,8 @@ mod tests {
         let row = |i: i32| {
             let position = range * (f64::from(i) / 999.0 - 0.5);
             let mut regressors = [0.0; RigidRegressor::ALL.len()];
-            regressors[RigidRegressor::GravitySine as usize] = position.sin();
-            regressors[RigidRegressor::GravityCosine as usize] = position.cos();
+            regressors[RigidRegressor::GravitySine.index()] = position.sin();
+            regressors[RigidRegressor::GravityCosine.index()] = position.cos();
             Row { joint: JointState::default(), regressors, effort: 0.0 }
         };
         let rows: Vec<Row> = (0..1000).map(row).collect();

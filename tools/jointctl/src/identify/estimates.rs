@@ -61,7 +61,7 @@ pub fn estimates(fit: &Fit, rows: usize, units: &Units) -> (Vec<Estimated>, Vec<
         let parameter = Parameter::Rigid(regressor);
         Estimated {
             name: regressor.to_string(),
-            symbol: regressor.symbol().into(),
+            symbol: regressor.symbol(),
             unit: regressor.unit(units),
             value: fit.rigid.coefficient(regressor),
             standard_error: linked(parameter).then(|| standard_error(parameter)).flatten(),

@@ -62,7 +62,7 @@ impl Parameter {
     /// Position in a table of all parameters, 0..PARAMETERS.
     pub fn index(self) -> usize {
         match self {
-            Self::Rigid(regressor) => regressor as usize,
+            Self::Rigid(regressor) => regressor.index(),
             Self::Friction(parameter) => RigidRegressor::ALL.len() + parameter.index(),
         }
     }
@@ -166,8 +166,7 @@ impl Layout {
                 layout.own(P::HarmonicNegative(j), Role::Coefficient, FREE);
             }
         }
-        let gravity = |r: &RigidRegressor| !matches!(r, RigidRegressor::Inertia | RigidRegressor::LoadInertia);
-        layout.shapes(structure, limits, regressors.iter().any(gravity));
+        layout.shapes(structure, limits, regressors.iter().any(|regressor| regressor.is_gravity()));
         layout
     }
 

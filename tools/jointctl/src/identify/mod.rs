@@ -1,12 +1,12 @@
 //! Identification of a joint: rigid part and physical friction from its train samples; host.
 //!
-//! 1. The rigid part is identified with viscous and Coulomb friction and an offset. Its effort is the theoretical torque of
+//! 1. The rigid part is identified with viscous and Coulomb friction and an offset, and gets lagged accelerations where they pay. Its effort is the theoretical torque of
 //!    every sample (`Samples::load`), frozen from then on: friction terms that depend on load never see the measured torque.
 //! 2. The terms of the chosen preset are identified, jointly with the rigid part once more.
 //!
 //! Training and validation samples are both used; what is chosen is chosen by folds over motions (`choice`).
 //!
-//! `observations` checks and thins the samples, `layout` maps parameters to the searched vector, `linear` and `nonlinear` fit,
+//! `observations` checks and thins the samples, `lags` chooses lagged accelerations, `layout` maps parameters to the searched vector, `linear` and `nonlinear` fit,
 //! `grid` finds where to start, `selection` chooses the terms of `Preset::Full`, `crossed` fits without each
 //! fold, `shapes` chooses distances and frequencies, `determined` says which terms the data determine, `estimates` adds standard errors.
 
@@ -14,6 +14,7 @@ mod crossed;
 mod determined;
 mod estimates;
 mod grid;
+mod lags;
 mod layout;
 mod linear;
 mod nonlinear;
@@ -25,14 +26,15 @@ pub use crossed::{FoldFit, overall};
 pub use estimates::Estimated;
 pub use selection::TEMPERATURE_RANGE;
 
-use crate::choice::{Folds, TermRule, grouping};
+use crate::choice::{Decision, Folds, TermRule, grouping};
 use crate::friction_model::{FrictionModel, Term};
 use crate::friction_parameter::{FrictionParameter, Units};
+use crate::joint_model::{float_state, rigid_efforts, rigid_state};
 use crate::presets::Preset;
 use crate::rigid::{RigidModel, RigidParameters};
 use crate::samples::Samples;
 use nonlinear::{Fit, Problem};
-use observations::{Limits, Row, joint_state, rigid_state};
+use observations::{Limits, Row};
 
 /// Train samples below which nothing is identified.
 const MINIMUM_SAMPLES: usize = 200;
@@ -50,6 +52,8 @@ pub struct Options {
     pub search_samples: usize,
     /// Motions that are left out in turn; None: blocks of time.
     pub folds: Option<Folds>,
+    /// Who decides about lagged accelerations in the rigid part.
+    pub lags: Decision,
     /// Terms of `Preset::Full` that are forced or forbidden.
     pub terms: Vec<TermRule>,
 }
@@ -62,6 +66,7 @@ impl Default for Options {
             hysteresis_acceleration_slope: None,
             search_samples: 8_000,
             folds: None,
+            lags: Decision::Choose,
             terms: vec![],
         }
     }
@@ -119,6 +124,8 @@ pub enum IdentifyError {
 pub struct Identified {
     /// Preset that was asked for.
     pub preset: Preset,
+    /// Regressors of the rigid part, with the lagged accelerations that were chosen.
+    pub rigid_model: RigidModel,
     /// Rigid part, identified together with the friction.
     pub rigid: RigidParameters,
     /// Rigid part whose effort is the theoretical torque in `Samples::load`.
@@ -153,7 +160,7 @@ impl Identified {
 
     /// Friction of one sample, whose load must have been filled in by `identify`.
     pub fn friction(&self, samples: &Samples, index: usize) -> f64 {
-        self.friction.friction(&joint_state(samples, index))
+        self.friction.friction(&float_state(samples, index))
     }
 }
 
@@ -166,12 +173,13 @@ pub fn identify(
     preset: Preset,
     options: &Options,
 ) -> Result<Identified, IdentifyError> {
-    let mut problem = theoretical_torque(samples, rigid, options)?;
+    let folds = options.folds.clone().unwrap_or_else(|| grouping::of_time(samples));
+    let (mut problem, rigid, lags) = theoretical_torque(samples, rigid, &folds, options)?;
     if preset == Preset::Full {
         shapes::choose(&mut problem, samples);
     }
-    problem.leave_out(samples, options);
-    let (fit, folds, mut notes) = match preset.structure(rigid) {
+    problem.leave_out(samples, &folds);
+    let (fit, folds, mut notes) = match preset.structure(&rigid) {
         Some(structure) => {
             let structure = problem.determined(structure);
             let found = grid::search(&problem, &structure);
@@ -181,8 +189,9 @@ pub fn identify(
         None if problem.folds.len() < 2 => {
             return Err(IdentifyError::TooFewFolds { found: problem.train.len(), folds: problem.folds.len() });
         }
-        None => selection::select(&problem, rigid, &options.terms),
+        None => selection::select(&problem, &rigid, &options.terms),
     };
+    notes.extend(lags);
     let (parameters, undetermined) = estimates::estimates(&fit, problem.train.len(), &options.units);
     if problem.own_part_of_offset < determined::OWN_PART && !fit.friction.terms.contains(Term::Constant) {
         notes.push(format!(
@@ -197,6 +206,7 @@ pub fn identify(
     }
     Ok(Identified {
         preset,
+        rigid_model: rigid,
         rigid: fit.rigid,
         theoretical: problem.theoretical,
         train_rmse: fit.at.cost.sqrt(),
@@ -207,8 +217,14 @@ pub fn identify(
     })
 }
 
-/// Step 1: the rigid part with viscous and Coulomb friction; fills in the load of all samples.
-fn theoretical_torque(samples: &mut Samples, rigid: &RigidModel, options: &Options) -> Result<Problem, IdentifyError> {
+/// Step 1: the rigid part with viscous and Coulomb friction; fills in the load of all samples. With the problem come the rigid part with the lagged
+/// accelerations that were chosen, and what is to be said of them.
+fn theoretical_torque(
+    samples: &mut Samples,
+    rigid: &RigidModel,
+    folds: &Folds,
+    options: &Options,
+) -> Result<(Problem, RigidModel, Option<String>), IdentifyError> {
     observations::check(samples, rigid)?;
     let train = observations::rows(samples);
     if train.len() < MINIMUM_SAMPLES {
@@ -235,25 +251,38 @@ fn theoretical_torque(samples: &mut Samples, rigid: &RigidModel, options: &Optio
         theoretical: RigidParameters::default(),
         template,
     };
-    if let Some(structure) = Preset::CoulombViscous.structure(rigid) {
-        let first: Fit = grid::search(&problem, &problem.determined(structure)).polished(&problem);
+    let (mut rigid, mut note) = (*rigid, None);
+    if let Some(structure) = Preset::CoulombViscous.structure(&rigid) {
+        let fitted =
+            |problem: &Problem| -> Fit { grid::search(problem, &problem.determined(structure)).polished(problem) };
+        let mut first = fitted(&problem);
+        let slope = first.friction.parameter(FrictionParameter::CoulombSlope);
+        let left_out = left_out(samples, folds);
+        (rigid.lags, note) = lags::choose(&problem.train, &left_out, folds, &rigid, slope, options.lags);
+        if rigid.lags > 0 {
+            problem.regressors = rigid.regressors();
+            first = fitted(&problem);
+        }
         problem.theoretical = first.rigid;
         problem.template.coulomb_slope = first.friction.parameter(FrictionParameter::CoulombSlope);
     }
-    samples.load = (0..samples.len()).map(|i| problem.theoretical.effort(&rigid_state(samples, i))).collect();
+    samples.load = rigid_efforts(&problem.theoretical, samples);
     for rows in [&mut problem.train, &mut problem.search] {
         rows.iter_mut().for_each(|row| row.joint.load = nonlinear::rigid_effort(&problem.theoretical, row));
     }
     problem.limits = Limits::of(&problem.train, reference_temperature);
-    Ok(problem)
+    Ok((problem, rigid, note))
+}
+
+/// For each row the folds that leave it out, one bit each.
+fn left_out(samples: &Samples, folds: &Folds) -> Vec<u8> {
+    observations::used(samples).into_iter().map(|i| folds.left_out[i]).collect()
 }
 
 impl Problem {
     /// Fills in the rows of every fold.
-    fn leave_out(&mut self, samples: &Samples, options: &Options) {
-        let folds = options.folds.clone().unwrap_or_else(|| grouping::of_time(samples));
-        let left_out: Vec<u8> = observations::used(samples).into_iter().map(|i| folds.left_out[i]).collect();
-        self.folds = crossed::fold_rows(&self.train, &left_out, &folds);
+    fn leave_out(&mut self, samples: &Samples, folds: &Folds) {
+        self.folds = crossed::fold_rows(&self.train, &left_out(samples, folds), folds);
     }
 }
 

@@ -130,7 +130,7 @@ impl LeastSquares for Residuals<'_> {
 
 /// Rigid part of the effort of one row.
 pub fn rigid_effort(rigid: &RigidParameters, row: &Row) -> f64 {
-    RigidRegressor::ALL.into_iter().map(|r| rigid.coefficient(r) * row.regressors[r as usize]).sum()
+    RigidRegressor::ALL.into_iter().map(|r| rigid.coefficient(r) * row.regressors[r.index()]).sum()
 }
 
 impl Candidate {

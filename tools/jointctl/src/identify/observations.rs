@@ -2,7 +2,8 @@
 
 use super::IdentifyError;
 use crate::friction_model::{JointState, RIPPLES};
-use crate::rigid::{RigidModel, RigidParameters, RigidState};
+use crate::joint_model::{float_state, rigid_state};
+use crate::rigid::{RigidModel, RigidParameters, RigidRegressor};
 use crate::samples::{Part, Samples};
 
 /// Intervals of position that must be visited for position harmonics to be considered.
@@ -18,7 +19,7 @@ pub struct Row {
     /// What friction depends on.
     pub joint: JointState,
     /// Values of all regressors of the rigid part.
-    pub regressors: [f64; 6],
+    pub regressors: [f64; RigidRegressor::ALL.len()],
     /// Measured effort.
     pub effort: f64,
 }
@@ -48,29 +49,6 @@ pub struct Limits {
     pub ripples: usize,
     /// Which of them may have a part whatever the direction.
     pub ripple_torques: [bool; RIPPLES],
-}
-
-/// Reads what the rigid part depends on from the samples; mass and length are 0 where there are no such columns.
-pub fn rigid_state(samples: &Samples, index: usize) -> RigidState {
-    let extra = |name| samples.extra.get(name).map_or(0.0, |column| column[index]);
-    RigidState {
-        position: samples.position[index],
-        acceleration: samples.acceleration[index],
-        mass: extra("mass"),
-        length: extra("length"),
-    }
-}
-
-/// Reads what friction depends on from the samples; the load is 0 as long as the rigid body is not identified.
-pub fn joint_state(samples: &Samples, index: usize) -> JointState {
-    JointState {
-        position: samples.position[index],
-        velocity: samples.velocity[index],
-        acceleration: samples.acceleration[index],
-        load: samples.load.get(index).copied().unwrap_or(0.0),
-        temperature: samples.temperature[index],
-        bent: samples.bent.get(index).copied().unwrap_or_default(),
-    }
 }
 
 /// Checks that all columns the model needs exist, are of one length and finite in the train and validation rows.
@@ -110,7 +88,7 @@ pub fn used(samples: &Samples) -> Vec<usize> {
 /// The rows of the samples that identification uses, in order, without a load.
 pub fn rows(samples: &Samples) -> Vec<Row> {
     let row = |i| Row {
-        joint: JointState { load: 0.0, ..joint_state(samples, i) },
+        joint: JointState { load: 0.0, ..float_state(samples, i) },
         regressors: RigidParameters::regressor_values(&rigid_state(samples, i)),
         effort: samples.effort[i],
     };
@@ -169,7 +147,11 @@ mod tests {
     use super::*;
 
     fn row(position: f64, velocity: f64) -> Row {
-        Row { joint: JointState { position, velocity, ..Default::default() }, regressors: [0.0; 6], effort: 0.0 }
+        Row {
+            joint: JointState { position, velocity, ..Default::default() },
+            regressors: [0.0; RigidRegressor::ALL.len()],
+            effort: 0.0,
+        }
     }
 
     #[test]

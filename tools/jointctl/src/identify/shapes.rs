@@ -10,6 +10,7 @@ use super::observations::{self, Row};
 use crate::friction_model::RIPPLES;
 use crate::levenberg_marquardt::NormalEquations;
 use crate::pre_sliding;
+use crate::rigid::RigidRegressor;
 use crate::samples::Samples;
 use joint_firmware::friction::maxwell_slip::{ELEMENTS, MAX_STIFFNESS};
 use nalgebra::{Matrix4, Vector4};
@@ -36,7 +37,9 @@ const PERIODS: f64 = 2.0;
 const TORQUE_PERIODS: f64 = 8.0;
 
 /// Columns of the regression that the elements are offered beside: the rigid part's and those of [`friction_columns`].
-const BASE: usize = 6 + 11;
+const BASE: usize = RIGID + 11;
+/// Columns of the rigid part.
+const RIGID: usize = RigidRegressor::ALL.len();
 
 /// Chooses distances and frequencies from the rows for training and validation; fills in how far the elements are bent at all samples and rows.
 pub fn choose(problem: &mut Problem, samples: &mut Samples) {
@@ -75,7 +78,7 @@ fn columns(problem: &Problem, row: &Row) -> [f64; BASE] {
     };
     let mut columns = [0.0; BASE];
     for &regressor in &problem.regressors {
-        columns[regressor as usize] = row.regressors[regressor as usize];
+        columns[regressor.index()] = row.regressors[regressor.index()];
     }
     let friction = [
         1.0,
@@ -90,7 +93,7 @@ fn columns(problem: &Problem, row: &Row) -> [f64; BASE] {
         bump(0.1),
         bump(0.4),
     ];
-    columns[6..].copy_from_slice(&friction);
+    columns[RIGID..].copy_from_slice(&friction);
     columns
 }
 
@@ -187,7 +190,7 @@ fn frequencies(problem: &Problem, samples: &Samples, base: &[[f64; BASE]]) -> Ve
     let range = problem.limits.position_range;
     let mut speeds: Vec<f64> = problem.train.iter().map(|row| row.joint.velocity.abs()).collect();
     speeds.sort_by(f64::total_cmp);
-    let way = speeds[speeds.len() / 2] * pre_sliding::period(samples);
+    let way = speeds[speeds.len() / 2] * samples.period();
     let unit = TAU / range.max(f64::MIN_POSITIVE);
     let step = unit / DENSITY;
     // A sample must not pass more than a quarter of a period at the middle speed.

@@ -1,8 +1,9 @@
 //! Synthetic joints with known parameters, for the tests of the identification.
 
 use super::nonlinear::{Problem, rigid_effort};
-use super::observations::{Limits, decimated, joint_state, rigid_state, rows};
+use super::observations::{Limits, decimated, rows};
 use crate::friction_model::{Directional, FrictionModel, Ripple, Terms};
+use crate::joint_model::{float_state, rigid_efforts};
 use crate::pre_sliding;
 use crate::rigid::{Gravity, RigidModel, RigidParameters};
 use crate::samples::{MotionState, Part, Samples};
@@ -11,7 +12,8 @@ use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, Normal};
 
 /// Inertia, and gravity of unknown direction.
-pub const RIGID: RigidModel = RigidModel { inertia: true, gravity: Gravity::SineAndCosine, mass_and_length: false };
+pub const RIGID: RigidModel =
+    RigidModel { inertia: true, gravity: Gravity::SineAndCosine, mass_and_length: false, lags: 0 };
 
 /// The rigid part that belongs to it.
 pub fn rigid() -> RigidParameters {
@@ -83,10 +85,10 @@ pub fn motion(count: usize) -> Samples {
 pub fn drive(samples: &mut Samples, rigid: &RigidParameters, friction: &FrictionModel, noise: f64, seed: u64) {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let normal = Normal::new(0.0, noise).unwrap();
-    samples.load = (0..samples.len()).map(|i| rigid.effort(&rigid_state(samples, i))).collect();
+    samples.load = rigid_efforts(rigid, samples);
     samples.bent = pre_sliding::bent(samples, &friction.element_stiffness);
     for i in 0..samples.len() {
-        let lost = friction.friction(&joint_state(samples, i));
+        let lost = friction.friction(&float_state(samples, i));
         samples.effort[i] = samples.load[i] + lost + normal.sample(&mut random);
     }
     samples.load.clear();

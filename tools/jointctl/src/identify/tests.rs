@@ -57,7 +57,7 @@ fn the_load_of_every_sample_is_the_rigid_part_and_not_the_measured_effort() {
     let found = identify(&mut samples, &RIGID, Preset::CoulombViscous, &Options::default()).unwrap();
     assert_eq!(found.rigid, found.theoretical);
     for i in 0..samples.len() {
-        assert_eq!(samples.load[i], found.theoretical.effort(&rigid_state(&samples, i)));
+        assert_eq!(samples.load[i], found.theoretical.effort(&crate::joint_model::rigid_state(&samples, i)));
     }
     assert!((found.theoretical.inertia - rigid().inertia).abs() < 0.05, "{:?}", found.theoretical);
 }
@@ -207,7 +207,7 @@ fn a_known_load_splits_inertia_and_gravity() {
     samples.extra.insert("length".into(), column([0.20, 0.15, 0.10]));
     let truth = RigidParameters { inertia: 0.02, load_inertia: 1.0, load_gravity_sine: 9.81, ..Default::default() };
     drive(&mut samples, &truth, &friction(Terms::of(&[Term::Viscous, Term::Coulomb])), 0.01, 9);
-    let model = RigidModel { inertia: true, gravity: Gravity::Sine, mass_and_length: true };
+    let model = RigidModel { inertia: true, gravity: Gravity::Sine, mass_and_length: true, lags: 0 };
     let found = identify(&mut samples, &model, Preset::Nscf, &Options::default()).unwrap();
     for (symbol, value) in [("I", 0.02), ("g_s", 0.0), ("I_ml2", 1.0), ("g_s,ml", 9.81)] {
         let e = of(&found, symbol);

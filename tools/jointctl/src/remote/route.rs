@@ -83,8 +83,8 @@ impl Way {
 
     fn command(&self, time: f64) -> Command {
         let reference = self.at(time);
-        let state =
-            RigidState { position: reference.position, acceleration: reference.acceleration, mass: 0.0, length: 0.0 };
+        let (position, acceleration) = (reference.position, reference.acceleration);
+        let state = RigidState { position, acceleration, ..RigidState::default() };
         Command {
             mode: Mode::Impedance,
             position: reference.position as f32,
