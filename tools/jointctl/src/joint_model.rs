@@ -195,3 +195,22 @@ pub fn replay(parameters: &FrictionParameters, states: &[JointState], samples: &
     }
     torques
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn steps(period: f64) -> (u32, u32) {
+        let steps = Steps::of(&Samples { time: vec![0.0, period], ..Samples::default() });
+        (steps.of_a_sample, steps.rate)
+    }
+
+    #[test]
+    fn a_sample_takes_as_many_steps_as_make_a_thousand_a_second() {
+        assert_eq!(steps(1.0 / 1_001.0), (1, 1_001));
+        assert_eq!(steps(0.001), (1, 1_000));
+        assert_eq!(steps(1.0 / 999.0), (2, 1_998));
+        assert_eq!(steps(0.01), (10, 1_000));
+        assert_eq!(steps(10.0), (1_000, 100), "no more than a thousand, however slow the recording");
+    }
+}

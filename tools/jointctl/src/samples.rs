@@ -98,3 +98,19 @@ impl Samples {
         (0..self.len()).filter(|&i| self.part[i] == part).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sample_that_is_later_or_earlier_is_the_nearest_of_the_same_run() {
+        let time: Vec<f64> = [0.0, 0.01, 0.02, 0.03, 0.04].repeat(2);
+        let samples = Samples { time, run: [[0; 5], [1; 5]].concat(), ..Samples::default() };
+        let shifted = |time| samples.shifted(6, time);
+        assert_eq!([0.0, 0.0049, 0.0051, -0.0049, -0.0051].map(shifted), [6, 6, 7, 6, 5]);
+        // The ends of the run, and of the recording.
+        assert_eq!([0.03, 0.04, 1e3, -0.01, -0.02, -1e3].map(shifted), [9, 9, 9, 5, 5, 5]);
+        assert_eq!(samples.shifted(3, 0.02), 4);
+    }
+}
