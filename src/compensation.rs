@@ -181,7 +181,8 @@ impl Default for Output {
 /// Compensation of one joint, from one evaluation to the next.
 ///
 /// An evaluation has four stages, none of them longer than the physical model, so that a control loop can do one in a step:
-/// [`begin`](Self::begin) with a state (its regime, the ripple), [`network`](Self::network) (and pre-sliding), [`physical_model`](Self::physical_model),
+/// [`begin`](Self::begin) with a state (its regime, the ripple), [`network`](Self::network) (and pre-sliding),
+/// [`physical_model`](Self::physical_model),
 /// [`finish`](Self::finish) (the torque).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Compensation {
@@ -236,8 +237,8 @@ impl Compensation {
         };
     }
 
-    /// Second stage: what the regime's network gives, and pre-sliding. A model that came after the first stage goes on with what another one has begun, within
-    /// clamp and slew limit.
+    /// Second stage: the torque of the regime's network, and pre-sliding. A model that came after the first stage goes on
+    /// with what another one has begun, within clamp and slew limit.
     #[inline]
     pub fn network(&mut self, model: Option<&FrictionModel>) {
         if let (Some(Begun { signals, common, estimate }), Some(model)) = (&mut self.begun, model) {

@@ -31,10 +31,11 @@ pub const MAX_STIFFNESS: i32 = 16_384 << 16;
 /// Largest [`level`](MaxwellElement::level), 8,191 Nm: the torque of all elements fits.
 pub const MAX_LEVEL: i32 = i32::MAX / ELEMENTS as i32;
 
-/// Fewest steps a second at which the stiffest element bends as far as it should; below it a gain may be held at the end of its range.
+/// Fewest steps a second at which the stiffest element bends as far as it should; below it a gain may be held at the end
+/// of its range.
 pub const LOWEST_RATE: u32 = 1_000;
 
-/// How far each element is bent, Q31: at the ends of the range it slips.
+/// Bending of each element, Q31: at the ends of the range it slips.
 pub type Bent = [i32; ELEMENTS];
 
 /// The elements ready to be stepped at a fixed rate.

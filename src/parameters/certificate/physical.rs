@@ -171,7 +171,8 @@ fn common_bounds(common: &CommonTerms, factor: Interval) -> Option<Common> {
     let per_step = Interval { low: 0, high: stiffness / (1_000 << 24) + 1 };
     fit.then(|| Common {
         level: Interval::symmetric(level),
-        // A unit of each sum, and half a one of each element's bending. The factor of dry friction multiplies all but that of the torque.
+        // A unit of each sum, and half a one of each element's bending. The factor of dry friction multiplies all but
+        // that of the torque.
         roundings: match (pre_sliding, level, torque) {
             (0, 0, 0) => 0,
             _ => 4 * ((factor.abs().high >> 16) + 1) + 1,

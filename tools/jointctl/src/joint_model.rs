@@ -81,7 +81,7 @@ fn load(samples: &Samples, index: usize) -> f64 {
     samples.load.get(index).copied().unwrap_or(0.0)
 }
 
-/// What the rigid part depends on in one sample; mass and length are 0 where there are no such columns.
+/// State of the rigid part in one sample; mass and length are 0 where there are no such columns.
 pub fn rigid_state(samples: &Samples, index: usize) -> RigidState {
     let extra = |name: &str| samples.extra.get(name).map_or(0.0, |column| column[index]);
     let now = samples.acceleration[index];
@@ -128,8 +128,8 @@ pub fn regimes(selector: &Selector, states: &[JointState], samples: &Samples) ->
     sets
 }
 
-/// How often the firmware steps for one sample: as often as it takes to reach [`LOWEST_RATE`]. Between samples velocity is held, which bends an element as
-/// far as one long step does.
+/// Steps of the firmware for one sample: as many as it takes to reach [`LOWEST_RATE`]. Between samples velocity is held,
+/// which bends an element as far as one long step does.
 struct Steps {
     /// Steps a second.
     rate: u32,
@@ -144,7 +144,7 @@ impl Steps {
         Self { rate: (sampled * of_a_sample).round() as u32, of_a_sample: of_a_sample as u32 }
     }
 
-    /// What the last of a sample's steps gives.
+    /// The result of the last of a sample's steps.
     fn step<T>(&self, mut step: impl FnMut() -> T) -> T {
         (1..self.of_a_sample).for_each(|_| _ = step());
         step()

@@ -1,7 +1,9 @@
-//! How many lagged accelerations the rigid part has: as many as pay on motions that were left out, beside Coulomb and viscous friction; host.
+//! Number of lagged accelerations in the rigid part: as many as pay on motions that were left out, beside Coulomb and
+//! viscous friction; host.
 //!
-//! All is linear once the slope of the Coulomb friction is known, so every fold is solved from sums over its rows. Accelerations of one motion explain
-//! each other, and what they explain there they do not explain elsewhere: without motions to leave out there are none.
+//! All is linear once the slope of the Coulomb friction is known, so every fold is solved from sums over its rows.
+//! Accelerations of one motion explain each other, and what they explain there they do not explain elsewhere: without
+//! motions to leave out there are none.
 
 use super::linear::{add_to_normal_sums, bounded_step, dependences, normal_equations, normal_sums, sum_over_rows};
 use super::observations::Row;
@@ -15,7 +17,8 @@ const FRICTION: usize = 3;
 /// All columns.
 const COLUMNS: usize = FRICTION + RigidRegressor::ALL.len();
 
-/// Number of [`LAGS`] that the rigid part gets, and what to say about it. `left_out` tells for each row which folds leave it out, one bit each.
+/// Number of [`LAGS`] that the rigid part gets, and what to say about it. `left_out` tells for each row which folds leave
+/// it out, one bit each.
 pub fn choose(
     rows: &[Row],
     left_out: &[u8],
@@ -108,7 +111,7 @@ mod tests {
     use crate::rigid::RigidParameters;
     use crate::samples::Samples;
 
-    /// A joint whose link lags 60 ms behind its motor, or one without, and folds of four pieces of its motion.
+    /// A joint whose link lags 60 ms behind its motor, or one without, and folds over its motion.
     fn joint(elastic: bool) -> (Samples, Folds) {
         let friction = FrictionModel { viscous: 0.9, terms: Terms::of(&[Term::Viscous]), ..FrictionModel::default() };
         let rigid = RigidParameters { inertia: 0.5, ..RigidParameters::default() };

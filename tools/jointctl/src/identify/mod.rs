@@ -217,8 +217,8 @@ pub fn identify(
     })
 }
 
-/// Step 1: the rigid part with viscous and Coulomb friction; fills in the load of all samples. With the problem come the rigid part with the lagged
-/// accelerations that were chosen, and what is to be said of them.
+/// Step 1: the rigid part with viscous and Coulomb friction; fills in the load of all samples. With the problem come the
+/// rigid part with the lagged accelerations that were chosen, and what is to be said of them.
 fn theoretical_torque(
     samples: &mut Samples,
     rigid: &RigidModel,
