@@ -12,9 +12,9 @@ pub enum Decision {
     /// The error on motions that were left out decides
     #[default]
     Choose,
-    /// It is there, whatever the error says
+    /// It is kept, unless the certificate refuses it
     Keep,
-    /// It is not there
+    /// It is left out
     Never,
 }
 
