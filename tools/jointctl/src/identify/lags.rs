@@ -12,6 +12,9 @@ use crate::levenberg_marquardt::NormalEquations;
 use crate::rigid::{LAGS, RigidModel, RigidRegressor};
 use nalgebra::DVector;
 
+/// Least fall of the error, as a fraction. Below it lie filters and sampling, which differ between acceleration and effort on a
+/// rigid joint, too.
+const LEAST_GAIN: f64 = 0.02;
 /// Columns of Coulomb and viscous friction with an offset, before those of the rigid part.
 const FRICTION: usize = 3;
 /// All columns.
@@ -40,13 +43,7 @@ pub fn choose(
             sums.iter().map(|sums| sums.error(&columns)).collect()
         })
         .collect();
-    let best = match decision {
-        Decision::Keep => {
-            let mean = |i: &usize| compare(&errors[0], &errors[*i]).mean;
-            (1..numbers.len()).min_by(|a, b| mean(a).total_cmp(&mean(b))).unwrap_or(0)
-        }
-        _ => rank(&errors, &numbers)[0],
-    };
+    let best = best(&errors, &numbers, decision);
     let change = compare(&errors[0], &errors[best]);
     let note = format!(
         "{} lagged accelerations in the rigid part, up to {:.0} ms to either side: error on left-out motions {:+.1} +- {:.1} %",
@@ -56,6 +53,16 @@ pub fn choose(
         100.0 * change.standard_error
     );
     (numbers[best], (best > 0).then_some(note))
+}
+
+/// The place of the number that is taken, from the errors of every number in every fold.
+fn best(errors: &[Vec<f64>], numbers: &[usize], decision: Decision) -> usize {
+    let mean = |i: usize| compare(&errors[0], &errors[i]).mean;
+    match decision {
+        Decision::Never => 0,
+        Decision::Keep => (1..numbers.len()).min_by(|a, b| mean(*a).total_cmp(&mean(*b))).unwrap_or(0),
+        Decision::Choose => Some(rank(errors, numbers)[0]).filter(|i| mean(*i) <= (1.0 - LEAST_GAIN).ln()).unwrap_or(0),
+    }
 }
 
 /// The columns of a rigid part beside Coulomb and viscous friction, in order.
@@ -146,6 +153,14 @@ mod tests {
         assert_eq!(chosen(true, false, Decision::Choose), 0);
         assert!(chosen(true, false, Decision::Keep) >= 4 && chosen(false, false, Decision::Keep) >= 2);
         assert_eq!(chosen(true, true, Decision::Never), 0);
+    }
+
+    #[test]
+    fn less_than_two_percent_are_not_taken_unless_they_are_asked_for() {
+        let errors = |gain: f64| [vec![1.0; 4], vec![1.0 - gain; 4]];
+        assert_eq!(best(&errors(0.0201), &[0, 2], Decision::Choose), 1);
+        assert_eq!(best(&errors(0.0199), &[0, 2], Decision::Choose), 0);
+        assert_eq!(best(&errors(0.0199), &[0, 2], Decision::Keep), 1);
     }
 
     #[test]
