@@ -1,7 +1,7 @@
 //! A configuration as the control step uses it: gains, limits and scales prepared, nothing left to divide; task, host.
 
 use super::configuration::{
-    AdaptationRequest, BridgeConfiguration, Configuration, ConfigurationError, GearConfiguration, Limits, MOTION_STEPS,
+    BridgeConfiguration, Configuration, ConfigurationError, GearConfiguration, Limits, MOTION_STEPS,
     MotorConfiguration, VelocitySource,
 };
 use super::limit_law::LimitGains;
@@ -168,16 +168,6 @@ impl GuardGains {
 pub struct CompensationGains {
     /// Gain, clamp, slew.
     pub settings: Settings,
-    /// What adaptation does.
-    pub adaptation: AdaptationRequest,
-    /// The gain, 0 to 1.
-    pub gain: f32,
-    /// The clamp, Nm.
-    pub clamp: f32,
-    /// Part of the compensation that the energy guard may take, 0 to 1.
-    pub uncertainty: f32,
-    /// Largest change of what adaptation adds, Nm a round.
-    pub slew: f32,
     /// Which velocity.
     pub source: VelocitySource,
     /// 1 / standstill velocity, s/rad.
@@ -448,11 +438,6 @@ impl Checked {
             compensation: CompensationGains {
                 settings: self.settings,
                 source: compensation.velocity_source,
-                adaptation: compensation.adaptation,
-                gain: compensation.gain,
-                clamp: compensation.clamp,
-                uncertainty: compensation.uncertainty,
-                slew: compensation.slew * period,
                 inverse_standstill: 1.0 / compensation.standstill_velocity,
                 standstill: compensation.standstill_velocity,
                 period,

@@ -9,13 +9,12 @@
 //! compensation backs off within milliseconds, and it comes back only while the command pushes.
 
 use super::active::{Active, JointMotion};
-use super::adaptation::Factors;
 use super::configuration::VelocitySource;
 use super::motion_law::Wanted;
-use crate::compensation::{Acting, Compensation, Output};
+use crate::compensation::{Compensation, Output};
 use crate::friction::FrictionModel;
 use crate::friction::state::JointState;
-use crate::motor::number::{greater, lesser, limited, or_zero, within};
+use crate::motor::number::{greater, or_zero, within};
 use crate::quantity::{Acceleration, Position, Temperature, Torque, Velocity};
 
 /// Time over which the reference's acceleration is taken, s: several commands of a bus at 1 kHz.
@@ -54,8 +53,6 @@ pub struct Surroundings {
     pub temperature: f32,
     /// Of the joint that shares the drive, rad/s.
     pub coupled_velocity: f32,
-    /// What friction is in service beside what the image says.
-    pub factors: Factors,
 }
 
 /// Compensation, from one round of the motion loop to the next.
@@ -68,8 +65,6 @@ pub struct FrictionFeedforward {
     speed: f32,
     /// Part that the fade at standstill let through in the round before, 0 to 1.
     moving: f32,
-    /// What adaptation adds to the image's torque, Nm.
-    adapted: f32,
     /// Reference velocity, rad/s, as a first-order lag follows it; what it lacks is its acceleration.
     reference: Option<f32>,
 }
@@ -93,7 +88,7 @@ impl FrictionFeedforward {
     #[inline(never)]
     pub fn reset(&mut self) {
         self.compensation.reset();
-        (self.withheld, self.speed, self.moving, self.adapted, self.reference) = (0.0, 0.0, 0.0, 0.0, None);
+        (self.withheld, self.speed, self.moving, self.reference) = (0.0, 0.0, 0.0, None);
     }
 
     /// First stage of a round: the state that friction is computed for, and its regime. `measured_torque` is the torque of the measured current, Nm.
@@ -136,13 +131,7 @@ impl FrictionFeedforward {
 
     /// Last stage: the torque to add until the next round's.
     #[inline(always)]
-    pub fn compensate(
-        &mut self,
-        active: &Active,
-        motion: &JointMotion,
-        wanted: &Wanted,
-        factors: &Factors,
-    ) -> Compensated {
+    pub fn compensate(&mut self, active: &Active, motion: &JointMotion, wanted: &Wanted) -> Compensated {
         let gains = &active.compensation;
         let output = self.compensation.finish(active.friction.as_ref(), &gains.settings);
         let reference = reference(active, wanted);
@@ -157,20 +146,11 @@ impl FrictionFeedforward {
                 self.moving = standstill;
                 1.0
             }
-            None => {
-                let commanded = wanted.velocity.unwrap_or(wanted.torque);
-                1.0 - lesser(factors.uncertainty, gains.uncertainty) * self.guard(active, motion, commanded)
-            }
+            None => self.guard(active, motion, wanted.velocity.unwrap_or(wanted.torque)),
         };
         let permitted = or_zero(standstill * guarded);
-        let image = output.torque.to_bits() as f32 * (1.0 / 65536.0);
-        let wanted = match output.acting {
-            Acting::Nothing => image,
-            _ => limited(image * factors.dry + factors.viscous * velocity, gains.clamp),
-        };
-        self.adapted += limited(wanted - image - self.adapted, gains.slew);
         // Where nothing is added, not even the sign of a zero changes.
-        let torque = (image + self.adapted) * permitted;
+        let torque = output.torque.to_bits() as f32 * (1.0 / 65536.0) * permitted;
         Compensated { torque, output, permitted }
     }
 
@@ -203,7 +183,7 @@ impl FrictionFeedforward {
             self.withheld -= gains.guard.recovery;
         }
         self.withheld = within(self.withheld, 0.0, 1.0);
-        self.withheld
+        greater(1.0 - self.withheld, 0.0)
     }
 
     /// What the guard withholds, 0 to 1.
@@ -224,8 +204,6 @@ mod tests {
     use crate::friction::state::SIGNALS;
     use crate::friction::{FrictionModel, FrictionParameters, ParameterSet};
 
-    const SURROUNDINGS: Surroundings =
-        Surroundings { temperature: 25.0, coupled_velocity: 0.0, factors: Factors::IMAGE };
     /// Below it compensation fades, rad/s.
     const STANDSTILL: f32 = 0.1;
     /// Offset of the models that have one, Nm.
@@ -248,8 +226,6 @@ mod tests {
             slew: 32e3,
             velocity_source: source,
             standstill_velocity: STANDSTILL,
-            uncertainty: 0.35,
-            adaptation: crate::joint::configuration::AdaptationRequest::Off,
         };
         let range = Range { low: q16(-100.0), high: q16(100.0) };
         let domain = Domain { ranges: [range; SIGNALS], margin: 1 << 13, reference_temperature: q16(25.0) };
@@ -274,10 +250,10 @@ mod tests {
     ) -> Compensated {
         let motion = JointMotion { velocity, ..JointMotion::default() };
         let wanted = Wanted { torque, velocity: reference };
-        feedforward.begin(active, &motion, &wanted, 0.0, &SURROUNDINGS);
+        feedforward.begin(active, &motion, &wanted, 0.0, &Surroundings { temperature: 25.0, coupled_velocity: 0.0 });
         feedforward.network(active);
         feedforward.physical_model(active);
-        feedforward.compensate(active, &motion, &wanted, &Factors::IMAGE)
+        feedforward.compensate(active, &motion, &wanted)
     }
 
     /// A joint that has moved at a velocity, rad/s, for 0.5 s, with a command that pushes it.

@@ -18,7 +18,6 @@
 //! the step.
 
 pub mod active;
-pub mod adaptation;
 pub mod board_limits;
 pub mod command;
 pub mod configuration;
@@ -51,7 +50,6 @@ use crate::motor::phases::Phases;
 use crate::motor::thermal::MeanSquareCurrent;
 use crate::motor::transform::Dq;
 use active::DERATING;
-use adaptation::Factors;
 use fault::{Fault, Faults, Reaction};
 use friction_feedforward::{Compensated, Surroundings};
 use history::{History, Snapshot};
@@ -74,13 +72,11 @@ pub struct Slow {
     pub derating: f32,
     /// Temperature of the gear, °C: for friction.
     pub gear_temperature: f32,
-    /// What friction is in service beside what the image says.
-    pub factors: Factors,
 }
 
 impl Default for Slow {
     fn default() -> Self {
-        Self { derating: 1.0, gear_temperature: 25.0, factors: Factors::IMAGE }
+        Self { derating: 1.0, gear_temperature: 25.0 }
     }
 }
 
@@ -241,7 +237,7 @@ impl Joint {
         let derating = greater(lesser(bridge, winding), 0.0);
         let mut measured_torque = or_zero(self.found.current.q * active.scales.torque_per_current);
         let coupled_velocity = self.coupled(active, demand);
-        let surroundings = Surroundings { temperature: slow.gear_temperature, coupled_velocity, factors: slow.factors };
+        let surroundings = Surroundings { temperature: slow.gear_temperature, coupled_velocity };
         let seen = Seen { motion: &motion, derating, measured_torque, surroundings };
         let torque = self.motion_loop.step::<COMPENSATION>(active, state, &demand.command, &seen);
 

@@ -122,7 +122,7 @@ impl MotionLoop {
             }
             Stage::Compensation => {
                 if compensates {
-                    self.compensated = self.friction.compensate(active, motion, &self.wanted, &surroundings.factors);
+                    self.compensated = self.friction.compensate(active, motion, &self.wanted);
                 }
                 Stage::Law
             }
@@ -156,7 +156,6 @@ impl MotionLoop {
 
 #[cfg(test)]
 mod tests {
-    use super::super::adaptation::Factors;
     use super::super::command::Mode;
     use super::super::configuration::MOTION_STEPS;
     use super::*;
@@ -167,7 +166,7 @@ mod tests {
     }
 
     fn step(motion_loop: &mut MotionLoop, active: &Active, state: State, torque: f32) -> f32 {
-        let surroundings = Surroundings { temperature: 25.0, coupled_velocity: 0.0, factors: Factors::IMAGE };
+        let surroundings = Surroundings { temperature: 25.0, coupled_velocity: 0.0 };
         let motion = JointMotion::default();
         let seen = Seen { motion: &motion, derating: 1.0, measured_torque: 0.0, surroundings };
         motion_loop.step::<false>(active, state, &Command { torque, ..Command::default() }, &seen)
@@ -193,7 +192,7 @@ mod tests {
     #[test]
     fn a_joint_whose_bridge_is_off_wants_no_torque_and_forgets_what_its_integral_held() {
         let active = active();
-        let surroundings = Surroundings { temperature: 25.0, coupled_velocity: 0.0, factors: Factors::IMAGE };
+        let surroundings = Surroundings { temperature: 25.0, coupled_velocity: 0.0 };
         let motion = JointMotion { velocity: 0.3, ..JointMotion::default() };
         let seen = Seen { motion: &motion, derating: 1.0, measured_torque: 0.0, surroundings };
         let command = Command { mode: Mode::Velocity, velocity: 0.31, ..Command::default() };
@@ -230,7 +229,7 @@ mod tests {
         let half = limits.position.1 + 0.5 * limits.position_margin;
         for (position, velocity) in [(half, 0.0), (0.0, limits.velocity)] {
             let motion = JointMotion { position, velocity, acceleration: 0.0 };
-            let surroundings = Surroundings { temperature: 25.0, coupled_velocity: 0.0, factors: Factors::IMAGE };
+            let surroundings = Surroundings { temperature: 25.0, coupled_velocity: 0.0 };
             let seen = Seen { motion: &motion, derating: 1.0, measured_torque: 0.0, surroundings };
             let mut motion_loop = MotionLoop::default();
             let mut torque = || {

@@ -2,7 +2,7 @@
 //! and nowhere else.
 
 use crate::compensation::Request;
-use crate::joint::configuration::{AdaptationRequest, Configuration, VelocitySource};
+use crate::joint::configuration::{Configuration, VelocitySource};
 use crate::motor::angle::Direction;
 
 /// Declares the settings: their names, and the members that are real numbers.
@@ -65,7 +65,6 @@ settings! {
     Clamp => compensation.clamp,
     Slew => compensation.slew,
     StandstillVelocity => compensation.standstill_velocity,
-    Uncertainty => compensation.uncertainty,
     WindingCapacity => thermal.winding_capacity,
     HousingCapacity => thermal.housing_capacity,
     WindingToHousing => thermal.winding_to_housing,
@@ -79,7 +78,6 @@ settings! {
     Request,
     VelocitySource,
     OscillatorTrim,
-    Adaptation,
 }
 
 impl Setting {
@@ -97,7 +95,6 @@ impl Setting {
             Self::ElectricalZero => copy.motor.alignment.electrical_zero.0,
             Self::Request => copy.compensation.request as u32,
             Self::OscillatorTrim => copy.oscillator_trim.into(),
-            Self::Adaptation => copy.compensation.adaptation as u32,
             _ => (copy.compensation.velocity_source == VelocitySource::Measured).into(),
         }
     }
@@ -123,9 +120,6 @@ impl Setting {
             (Self::Request, 3) => configuration.compensation.request = Request::NetworkInShadow,
             (Self::VelocitySource, 0) => configuration.compensation.velocity_source = VelocitySource::Reference,
             (Self::VelocitySource, 1) => configuration.compensation.velocity_source = VelocitySource::Measured,
-            (Self::Adaptation, 0) => configuration.compensation.adaptation = AdaptationRequest::Off,
-            (Self::Adaptation, 1) => configuration.compensation.adaptation = AdaptationRequest::Shadow,
-            (Self::Adaptation, 2) => configuration.compensation.adaptation = AdaptationRequest::On,
             _ => return false,
         }
         true

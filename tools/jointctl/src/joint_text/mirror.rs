@@ -5,8 +5,8 @@
 
 use joint_firmware::compensation::Request;
 use joint_firmware::joint::configuration::{
-    AdaptationRequest, CompensationConfiguration, Configuration, FACTORY_TRIM, Gains, GearConfiguration, Limits,
-    MotorConfiguration, ThermalConfiguration, VelocitySource,
+    CompensationConfiguration, Configuration, FACTORY_TRIM, Gains, GearConfiguration, Limits, MotorConfiguration,
+    ThermalConfiguration, VelocitySource,
 };
 use joint_firmware::motor::angle::{Direction, ElectricalAngle, EncoderAlignment};
 use serde::{Deserialize, Serialize};
@@ -135,24 +135,6 @@ struct CompensationText {
     #[serde(with = "VelocitySourceText")]
     velocity_source: VelocitySource,
     standstill_velocity: f32,
-    // Files of earlier programs have neither.
-    #[serde(default = "uncertainty")]
-    uncertainty: f32,
-    #[serde(default, with = "AdaptationText")]
-    adaptation: AdaptationRequest,
-}
-
-/// As boards have it.
-fn uncertainty() -> f32 {
-    joint_firmware::default_configuration::B_G431B_ESC1.joint.compensation.uncertainty
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(remote = "AdaptationRequest", rename_all = "kebab-case")]
-enum AdaptationText {
-    Off,
-    Shadow,
-    On,
 }
 
 #[derive(Serialize, Deserialize)]

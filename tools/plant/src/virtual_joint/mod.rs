@@ -10,7 +10,6 @@ use crate::actuator::{Actuator, ActuatorParameters};
 use crate::error::ParameterError;
 use joint_firmware::friction::FrictionModel;
 use joint_firmware::joint::active::SLOW_RATE;
-use joint_firmware::joint::adaptation::{Adaptation, LOOK_RATE};
 use joint_firmware::joint::configuration::ConfigurationError;
 use joint_firmware::joint::state_machine::{Controlword, State};
 use joint_firmware::joint::{Active, Bridge, BridgeState, Demand, Joint, Measurements, Slow, Telemetry};
@@ -70,8 +69,6 @@ pub struct VirtualJoint {
     active: Active,
     winding: WindingTemperature,
     slow: Slow,
-    adaptation: Adaptation,
-    look_divider: u64,
     build: Build,
     period: f64,
     steps: u64,
@@ -102,9 +99,7 @@ impl VirtualJoint {
             joint: Joint::new(),
             active,
             winding,
-            slow: Slow { derating: 1.0, gear_temperature: temperature as f32, ..Slow::default() },
-            adaptation: Adaptation::NOTHING,
-            look_divider: (rate / f64::from(LOOK_RATE)).round() as u64,
+            slow: Slow { derating: 1.0, gear_temperature: temperature as f32 },
             build: Build::Whole,
             period: 1.0 / rate,
             steps: 0,
@@ -154,13 +149,9 @@ impl VirtualJoint {
         self.steps += 1;
         if self.steps.is_multiple_of(self.slow_divider) {
             self.winding.step(self.joint.take_mean_square_current(), self.measured.winding_temperature);
-            (self.slow.derating, self.slow.gear_temperature) = (self.winding.derating(), self.winding.housing());
+            self.slow = Slow { derating: self.winding.derating(), gear_temperature: self.winding.housing() };
         }
-        let telemetry = self.joint.telemetry();
-        if self.steps.is_multiple_of(self.look_divider) {
-            self.slow.factors = self.adaptation.look(&self.active, &telemetry);
-        }
-        telemetry
+        self.joint.telemetry()
     }
 
     /// Starts the joint and enables operation, in torque mode without torque.
@@ -231,12 +222,6 @@ impl VirtualJoint {
     #[must_use]
     pub fn bridge(&self) -> &Bridge {
         &self.bridge
-    }
-
-    /// What friction is in service.
-    #[must_use]
-    pub fn adaptation(&self) -> &Adaptation {
-        &self.adaptation
     }
 
     /// What the slow task knows.
