@@ -148,8 +148,6 @@ pub struct MotionGains {
 /// The energy guard's time constants as parts of a round of the motion loop: what would be divisions in every round.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GuardGains {
-    /// Part of a round's velocity that goes into its slow mean.
-    pub drift: f32,
     /// Part of a round's speed that goes into its mean.
     pub mean: f32,
     /// What is taken away in a round.
@@ -161,12 +159,7 @@ pub struct GuardGains {
 impl GuardGains {
     /// For a motion loop with rounds of `period` s.
     fn new(period: f32) -> Self {
-        Self {
-            drift: period / 0.05,
-            mean: within(period / MEMORY, 0.0, 1.0),
-            back_off: period / BACK_OFF,
-            recovery: period / RECOVERY,
-        }
+        Self { mean: within(period / MEMORY, 0.0, 1.0), back_off: period / BACK_OFF, recovery: period / RECOVERY }
     }
 }
 
@@ -183,8 +176,6 @@ pub struct CompensationGains {
     pub standstill: f32,
     /// Time from one round of the motion loop to the next, s.
     pub period: f32,
-    /// Part of the compensation that the energy guard may take, 0 to 1.
-    pub uncertainty: f32,
     /// The energy guard, per round.
     pub guard: GuardGains,
 }
@@ -449,7 +440,6 @@ impl Checked {
                 source: compensation.velocity_source,
                 inverse_standstill: 1.0 / compensation.standstill_velocity,
                 standstill: compensation.standstill_velocity,
-                uncertainty: compensation.uncertainty,
                 period,
                 guard: GuardGains::new(period),
             },
