@@ -2,11 +2,12 @@
 //! then moved with and without the image that came out.
 
 use crate::commission::{Commissioned, commission};
-use crate::driving::follow;
+use crate::driving::{COMMAND_STEPS, follow};
 use crate::variant::{DEFAULT, Variant};
 use joint_firmware::compensation::{Reason, Request};
 use joint_firmware::friction::FrictionModel;
-use joint_firmware::joint::Telemetry;
+use joint_firmware::joint::state_machine::{Controlword, State};
+use joint_firmware::joint::{Demand, Telemetry};
 use jointctl::metrics::relative_floor;
 use plant::actuator::ActuatorParameters;
 use plant::excitation::{Segment, Trajectory, slow_reversals};
@@ -66,6 +67,20 @@ pub struct RandomJoint {
     reversals: Trajectory,
 }
 
+/// What of friction is left in torque mode, % of its RMS while the joint moves.
+#[derive(Clone, Copy, Debug)]
+pub struct InTorqueMode {
+    /// The command holds gravity, a hand leads the joint.
+    pub guided: f64,
+    /// The command holds gravity and moves the joint, a controller 1,000 times a second.
+    pub moved: f64,
+}
+
+/// Bandwidth of a hand, and of a controller around torque mode, rad/s.
+const LEADING: f64 = 25.0;
+/// Time for which the joint is led, s; the first tenth is not counted.
+const LED: f64 = 10.0;
+
 /// A joint's errors with one kind of compensation.
 #[derive(Clone, Copy, Debug)]
 pub struct Moved {
@@ -113,6 +128,56 @@ impl RandomJoint {
     pub fn with(&self, variant: &Variant) -> Result<Moved, String> {
         let on = self.off.compensating(Request::PhysicalAndNetwork);
         self.run(&on, variant, Some(&self.found.model))
+    }
+
+    /// Moves in torque mode, to and fro over half of the travel at up to half of the speed limit.
+    ///
+    /// # Errors
+    /// A fault on the way.
+    pub fn in_torque_mode(&self, variant: &Variant) -> Result<InTorqueMode, String> {
+        let left = |by_hand| self.led(variant, by_hand);
+        Ok(InTorqueMode { guided: left(true)?, moved: left(false)? })
+    }
+
+    /// What of friction is left, % of its RMS, while a hand or the command leads the joint.
+    fn led(&self, variant: &Variant, by_hand: bool) -> Result<f64, String> {
+        let failed = |error: String| format!("joint {}, {}, torque mode: {error}", self.seed, variant.name);
+        let setup = self.off.compensating(Request::PhysicalAndNetwork);
+        let joint = variant.enabled(&self.parameters, &setup, Some(self.found.model.clone()), 10.0, 99);
+        let mut joint = joint.map_err(|error| failed(error.to_string()))?;
+        let (plant, limits) = (&self.parameters.joint, &self.parameters.joint.limits);
+        let amplitude = 0.25 * limits.travel;
+        let fastest = (0.3 * plant.usable_acceleration().min(20.0) / amplitude).sqrt();
+        let omega = fastest.min(0.5 * limits.speed / amplitude);
+        let mut demand = Demand { controlword: Controlword::ENABLE_OPERATION, ..Demand::default() };
+        let (mut hand, mut left, mut all) = (0.0, 0.0, 0.0);
+        for n in 0..(LED / joint.period()) as u64 {
+            let time = n as f64 * joint.period();
+            if n % COMMAND_STEPS == 0 {
+                let now = joint.actuator().state().joint;
+                let (sin, cos) = (omega * time).sin_cos();
+                let position = amplitude * (1.0 - cos) - now.position;
+                let velocity = amplitude * omega * sin - now.velocity;
+                let acceleration = amplitude * omega * omega * cos;
+                let leading = acceleration + LEADING * (LEADING * position + 2.0 * velocity);
+                let leading = plant.inertia() * leading;
+                let gravity = plant.load.gravity_torque(now.position);
+                let torque;
+                (hand, torque) = if by_hand { (leading, gravity) } else { (0.0, gravity + leading) };
+                demand.command.torque = torque as f32;
+                demand.sequence += 1;
+            }
+            let telemetry = joint.step(&demand, hand);
+            if telemetry.state != State::OperationEnabled {
+                return Err(failed(format!("ended in {:?}: {:?}", telemetry.state, telemetry.faults)));
+            }
+            let now = joint.actuator().state().joint;
+            if time > 0.1 * LED && now.velocity.abs() > 0.02 * limits.speed {
+                left += (now.friction_torque - f64::from(telemetry.compensated.torque)).powi(2);
+                all += now.friction_torque.powi(2);
+            }
+        }
+        Ok(100.0 * (left / all).sqrt())
     }
 
     fn run(&self, setup: &Setup, variant: &Variant, model: Option<&FrictionModel>) -> Result<Moved, String> {
