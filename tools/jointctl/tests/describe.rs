@@ -1,4 +1,4 @@
-//! What `jointctl eds` and `jointctl dbc` write, loaded by python-canopen and cantools and compared with a virtual joint.
+//! What `jointctl eds`, `dbc` and `bus-yml` write, loaded by python-canopen, cantools and dcf-tools and compared with a virtual joint.
 //!
 //! Without Python, or where these cannot be installed, this is reported as ignored by name; with `CI` set it runs, and fails.
 
@@ -25,7 +25,7 @@ fn main() {
     let lely = if arguments.list { None } else { DCF_TOOLS.python(env!("CARGO_TARGET_TMPDIR")) };
     let without = !must_run && lely.is_none();
     let strict = Trial::test(
-        "lelys_dcfchk_finds_nothing_in_the_eds_and_dcfgen_makes_a_masters_configuration_of_it",
+        "lelys_dcfchk_finds_nothing_in_the_eds_and_dcfgen_makes_a_masters_configuration_of_bus_yml",
         move || configure(lely.as_deref()),
     );
     libtest_mimic::run(&arguments, vec![trial.with_ignored_flag(ignored), strict.with_ignored_flag(without)]).exit();
@@ -41,43 +41,25 @@ const PACKAGES: Packages = Packages {
 /// Lely's tools, with which ros2_canopen makes its configuration.
 const DCF_TOOLS: Packages = Packages { folder: "python-dcf", install: &["dcf-tools==2.4.2"], import: "dcf, dcfgen" };
 
-/// A master with a joint, as ros2_canopen has it.
-const BUS: &str = "\
-master:
-  node_id: 1
-  sync_period: 10000
-  heartbeat_producer: 100
-joint_7:
-  dcf: joint.eds
-  node_id: 7
-  heartbeat_producer: 100
-  boot: true
-  sdo:
-    - {index: 0x6060, sub_index: 0, value: 8}
-  tpdo:
-    1:
-      enabled: true
-      transmission: 1
-      mapping: [{index: 0x6041, sub_index: 0}, {index: 0x6061, sub_index: 0}, {index: 0x6064, sub_index: 0}]
-    2:
-      enabled: true
-      transmission: 1
-      mapping: [{index: 0x606C, sub_index: 0}, {index: 0x6077, sub_index: 0}]
-  rpdo:
-    1:
-      enabled: true
-      mapping: [{index: 0x6040, sub_index: 0}, {index: 0x6060, sub_index: 0}, {index: 0x607A, sub_index: 0}]
-";
-
 fn configure(python: Option<&Path>) -> Result<(), Failed> {
     let python = DCF_TOOLS.required(python)?;
     let folder = tempfile::tempdir()?;
-    let written =
-        Command::new(env!("CARGO_BIN_EXE_jointctl")).current_dir(&folder).args(["eds", "joint.eds"]).output()?;
+    let write = |force: &[&str]| {
+        let arguments = [&["bus-yml", "--node", "7", "--node", "8"], force].concat();
+        Command::new(env!("CARGO_BIN_EXE_jointctl")).current_dir(&folder).args(arguments).output()
+    };
+    let written = write(&[])?;
     if !written.status.success() {
         return Err(String::from_utf8_lossy(&written.stderr).into_owned().into());
     }
-    std::fs::write(folder.path().join("bus.yml"), BUS)?;
+    let refused = write(&[])?;
+    if refused.status.code() != Some(1) || !String::from_utf8_lossy(&refused.stderr).contains("bus.yml exists: --force")
+    {
+        return Err(format!("bus-yml replaces a file without --force: {refused:?}").into());
+    }
+    if !write(&["--force"])?.status.success() {
+        return Err("bus-yml --force replaces nothing".into());
+    }
     for (program, arguments) in [("dcfchk", &["-n", "7", "joint.eds"][..]), ("dcfgen", &["-rS", "bus.yml"])] {
         // Beside its Python; a warning is on the error output, and too much.
         let output = Command::new(python.with_file_name(program)).current_dir(&folder).args(arguments).output()?;
@@ -86,7 +68,7 @@ fn configure(python: Option<&Path>) -> Result<(), Failed> {
             return Err(format!("{program}: {}\n{said}", output.status).into());
         }
     }
-    for file in ["master.dcf", "joint_7.bin"] {
+    for file in ["master.dcf", "joint_7.bin", "joint_8.bin"] {
         if std::fs::metadata(folder.path().join(file))?.len() == 0 {
             return Err(format!("dcfgen left {file} empty").into());
         }

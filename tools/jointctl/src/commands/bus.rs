@@ -210,7 +210,7 @@ impl Scan {
 }
 
 /// Nodes that answer. All are asked at once: a node on a busy machine may take its time without the others having to wait for it.
-fn present(network: &Network) -> Result<BTreeSet<u8>, ClientError> {
+pub(super) fn present(network: &Network) -> Result<BTreeSet<u8>, ClientError> {
     let answers = network.subscribe(|frame| matches!(frame.id(), 0x581..=0x5FF));
     for id in 1..=127u16 {
         if let Some(request) = Frame::new(cob_id::SDO_RECEIVE | id, &ASK) {

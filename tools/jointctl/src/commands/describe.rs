@@ -39,7 +39,8 @@ impl Eds {
     }
 }
 
-fn identity(joint: &RemoteJoint) -> Result<eds::Identity, CommandError> {
+/// Vendor, product and revision of a joint, as its object 1018h says.
+pub(super) fn identity(joint: &RemoteJoint) -> Result<eds::Identity, CommandError> {
     let number = |sub_index| joint.node().number(0x1018, sub_index).map(u32::from_le_bytes);
     let read = || Ok(eds::Identity { vendor: number(1)?, product: number(2)?, revision: number(3)? });
     read().map_err(|error: ClientError| crate::remote::RemoteError::from(error).into())

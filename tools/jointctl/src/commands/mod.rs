@@ -1,6 +1,7 @@
 //! The commands of `jointctl`, one file each: arguments in, files and a few lines of text out; host.
 
 pub mod bus;
+pub mod bus_yml;
 pub mod commission;
 pub mod demo;
 pub mod describe;
@@ -90,6 +91,8 @@ pub enum Command {
     Eds(describe::Eds),
     /// Write the frames of joints as a DBC file, for what shows CAN traffic
     Dbc(describe::Dbc),
+    /// Write the configuration of ros2_canopen for the joints on a bus: bus.yml, and the EDS beside it
+    BusYml(bus_yml::BusYml),
     /// Write a motion that identifies a joint, or check one
     Excite(excite::Excite),
 }
@@ -154,6 +157,9 @@ pub enum CommandError {
         /// Why.
         source: std::io::Error,
     },
+    /// A file that would be replaced.
+    #[error("{} exists: --force replaces it", .0.display())]
+    Exists(PathBuf),
     /// An image that cannot be used.
     #[error("{}: {reason}", path.display())]
     Image {
@@ -223,6 +229,7 @@ pub fn run(arguments: Arguments) -> Result<(), CommandError> {
         Command::Restore(keep) => keep.restore(),
         Command::Eds(eds) => eds.run(),
         Command::Dbc(dbc) => dbc.run(),
+        Command::BusYml(bus_yml) => bus_yml.run(),
         Command::Excite(excite) => excite.run(),
     }
 }
