@@ -134,8 +134,10 @@ impl Set {
         }
         let joint = self.on.joint()?;
         configuration::set(&joint, &wanted)?;
-        for (entry, _) in wanted.iter().filter(|(entry, _)| entry.is_readable()) {
-            println!("{:<32} {}", entry.described(), info::show_entry(&joint, *entry)?);
+        for (entry, _) in wanted {
+            // What cannot be read is a command.
+            let shown = if entry.is_readable() { info::show_entry(&joint, entry)? } else { "done".into() };
+            println!("{:<32} {shown}", entry.described());
         }
         Ok(())
     }

@@ -72,6 +72,7 @@ pub fn a_joint_is_looked_at_set_moved_and_fed_from_the_command_line() {
         &["bus-voltage (2021h:1)", " V\n", "gear-ratio", "statusword (6041h:0)"],
     );
     desk.prints(&["set", "gain", "0.5", "requested-model", "1"], &["gain (2200h:3)", " 0.5\n"]);
+    desk.prints(&["set", "2100:1", "2"], &["(2100h:1)", " done\n"]);
     desk.prints(&["store"], &["node 5: stored"]);
     desk.prints(&["move", "velocity", "-0.4", "--duration", "1"], &["rad/s", "node 5: disabled"]);
     desk.prints(&["monitor", "--once"], &["state         disabled", "position      ", "gear "]);
