@@ -3,7 +3,7 @@
 //! `cargo bench -p host-tests --bench in_the_loop > docs/in-the-loop.md`; some minutes.
 
 use host_tests::in_the_loop::{Moved, RandomJoint, for_seeds, median};
-use host_tests::left_alone::{ERRORS, judged};
+use host_tests::left_alone::{ERROR, judged};
 use host_tests::variant::{ALL, DEFAULT, Variant};
 use plant::actuator::ActuatorParameters;
 use std::ops::Range;
@@ -22,10 +22,8 @@ fn main() {
     };
     let without = run(None);
     let with: Vec<Vec<Moved>> = ALL.iter().map(|variant| run(Some(variant))).collect();
-    let alone: Vec<usize> = ALL
-        .iter()
-        .map(|variant| for_seeds(ALONE, |seed| judged(seed, variant, ERRORS[0]).1.len()).into_iter().sum())
-        .collect();
+    let alone: Vec<usize> =
+        ALL.iter().map(|variant| for_seeds(ALONE, |seed| judged(seed, variant).1.len()).into_iter().sum()).collect();
 
     println!("# In the loop\n");
     println!(
@@ -104,7 +102,7 @@ fn layers(without: &[Moved], with: &[Vec<Moved>], alone: &[usize]) {
          the source that feeds back; cases that start, keep or gain motion, judged by energy.\n",
         ALONE.end - ALONE.start,
         2 * (ALONE.end - ALONE.start),
-        100.0 * ERRORS[0]
+        100.0 * ERROR
     );
     println!("| | torque error, median, % | worst, % | slow reversals, median | moves by itself |");
     println!("|---|---|---|---|---|");

@@ -11,8 +11,8 @@ use plant::actuator::ActuatorParameters;
 use plant::friction_factors::FrictionFactors;
 use plant::virtual_joint::Setup;
 
-/// Errors of every parameter of the model that nothing may move by itself with.
-pub const ERRORS: [f64; 2] = [0.3, 0.5];
+/// Error of every parameter of the model.
+pub const ERROR: f64 = 0.3;
 
 /// What a joint did in a scenario.
 #[derive(Clone, Copy, Debug, Default)]
@@ -40,19 +40,18 @@ pub enum Alone {
     Held,
 }
 
-/// Leaves joint `seed` alone, pushes it once, and leaves it alone again; with a compensation that differs from the default in `variant` and a model of
-/// that `error` in every parameter, or none.
+/// Leaves joint `seed` alone, pushes it once, and leaves it alone again; with a compensation that differs from the default in `variant`, or none.
 /// Friction is computed for the measured velocity, the source that feeds back; the command's has nothing to add while nothing is commanded.
 ///
 /// # Errors
 /// A joint that does not stay enabled.
-pub fn run(seed: u64, alone: Alone, variant: Option<&Variant>, error: f64, steps: u32) -> Result<Seen, String> {
+pub fn run(seed: u64, alone: Alone, variant: Option<&Variant>, steps: u32) -> Result<Seen, String> {
     let parameters = ActuatorParameters::randomised(seed).aligned().without_payload();
     // Half of the models are wrong at the corners of the range, with most of them too strong.
     let factors = match seed % 4 {
-        0 => FrictionFactors::drawn(seed, error),
-        1 => FrictionFactors::extreme(seed, error),
-        _ => FrictionFactors::uniform(1.0 + error),
+        0 => FrictionFactors::drawn(seed, ERROR),
+        1 => FrictionFactors::extreme(seed, ERROR),
+        _ => FrictionFactors::uniform(1.0 + ERROR),
     };
     let wrong = parameters.joint.friction.scaled(&factors).map_err(|error| error.to_string())?;
     let request = if variant.is_some() { Request::Physical } else { Request::Off };
@@ -125,24 +124,24 @@ const STEPS: (u32, u32) = (30_000, 120_000);
 /// Control steps in which friction's work is counted.
 const LAST: u32 = 10_000;
 
-/// Joint `seed` in both situations with a compensation and a model of that error: the largest drift, rad, and what moved by itself.
-pub fn judged(seed: u64, variant: &Variant, error: f64) -> (f64, Vec<String>) {
+/// Joint `seed` in both situations with a compensation: the largest drift, rad, and what moved by itself.
+pub fn judged(seed: u64, variant: &Variant) -> (f64, Vec<String>) {
     let (mut drift, mut bad) = (0.0f64, Vec::new());
     for alone in [Alone::Free, Alone::Held] {
         // With less friction a joint creeps for longer. What is a limit cycle goes on; creep comes to rest.
         let (short, long) = STEPS;
-        let (largest, moves) = compared(seed, alone, variant, error, short);
+        let (largest, moves) = compared(seed, alone, variant, short);
         drift = drift.max(largest);
         if moves.is_some() {
-            bad.extend(compared(seed, alone, variant, error, long).1);
+            bad.extend(compared(seed, alone, variant, long).1);
         }
     }
     (drift, bad)
 }
 
 /// The drift with compensation, and what joint and compensation did where that moves by itself.
-fn compared(seed: u64, alone: Alone, variant: &Variant, error: f64, steps: u32) -> (f64, Option<String>) {
-    let (with, without) = (run(seed, alone, Some(variant), error, steps), run(seed, alone, None, error, steps));
+fn compared(seed: u64, alone: Alone, variant: &Variant, steps: u32) -> (f64, Option<String>) {
+    let (with, without) = (run(seed, alone, Some(variant), steps), run(seed, alone, None, steps));
     let moves = match (&with, &without) {
         (Ok(with), Ok(without)) => moves_by_itself(with, without),
         _ => true,

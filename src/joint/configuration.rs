@@ -118,9 +118,6 @@ pub enum VelocitySource {
     Measured,
 }
 
-/// Friction's uncertainty where nobody has set another one: a model may have half too much of it, at a gain of 0.98.
-pub const FRICTION_UNCERTAINTY: f32 = 0.5;
-
 /// How much compensation acts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CompensationConfiguration {
@@ -136,9 +133,6 @@ pub struct CompensationConfiguration {
     pub velocity_source: VelocitySource,
     /// Velocity below which compensation fades out in proportion, rad/s; 0.0001 to 10.
     pub standstill_velocity: f32,
-    /// By how much friction may be less than gain times the model, as a part of it; 0 to 1. It is what the energy guard may take of a compensation for
-    /// the measured velocity; see [`super::friction_feedforward`].
-    pub uncertainty: f32,
 }
 
 /// The bridge and its timing: what the board knows.
@@ -252,7 +246,7 @@ impl core::fmt::Display for ConfigurationError {
 impl core::error::Error for ConfigurationError {}
 
 /// Name and range of each number whose range does not depend on another: as a table they take a third less flash than as calls.
-static RANGES: [(Name, f32, f32); 21] = [
+static RANGES: [(Name, f32, f32); 20] = [
     (Name::of("control rate", "Hz"), 1e3, 100e3),
     (Name::of("dead time", "s"), 0.0, 5e-6),
     (Name::of("torque constant", "Nm/A"), 1e-3, 5.0),
@@ -273,7 +267,6 @@ static RANGES: [(Name, f32, f32); 21] = [
     (Name::of("compensation gain", ""), 0.0, 1.0),
     (Name::of("compensation slew limit", "Nm/s"), 0.5, 32e3),
     (Name::of("standstill velocity", "rad/s"), 1e-4, 10.0),
-    (Name::of("friction uncertainty", ""), 0.0, 1.0),
 ];
 
 impl Configuration {
@@ -313,7 +306,6 @@ impl Configuration {
             compensation.gain,
             compensation.slew,
             compensation.standstill_velocity,
-            compensation.uncertainty,
         ];
         for ((name, low, high), value) in RANGES.iter().zip(values) {
             within_range(*name, value, *low, *high)?;

@@ -7,19 +7,14 @@
 //! Where there is none (torque mode), friction is computed for the measured velocity, and that is a positive feedback. It is held by the
 //! fade near standstill and by the guard: while the joint speeds up although its command does not push it that way, the
 //! compensation backs off within milliseconds, and it comes back only while the command pushes.
-//!
-//! The guard takes no more than what is uncertain. Let friction be at least `1 - u` of gain times the model at every velocity, with the uncertainty `u` of the
-//! configuration. Then the rest, `1 - u` of the compensation, never gives more power than friction takes at the same instant: joint and compensation
-//! together are passive, and no hand, spring or gravity that leads them is answered by motion of their own. The guard decides about the part `u` alone,
-//! where friction may or may not be there. With `u` = 1 it decides about all.
 
-use super::active::{Active, CompensationGains, JointMotion};
+use super::active::{Active, JointMotion};
 use super::configuration::VelocitySource;
 use super::motion_law::Wanted;
 use crate::compensation::{Compensation, Output};
 use crate::friction::FrictionModel;
 use crate::friction::state::JointState;
-use crate::motor::number::{greater, lesser, magnitude, or_zero, within};
+use crate::motor::number::{greater, or_zero, within};
 use crate::quantity::{Acceleration, Position, Temperature, Torque, Velocity};
 
 /// Time over which the reference's acceleration is taken, s: several commands of a bus at 1 kHz.
@@ -64,12 +59,10 @@ pub struct Surroundings {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FrictionFeedforward {
     compensation: Compensation,
-    /// What the guard has taken away of the part that is uncertain, 0 to 1.
+    /// What the guard has taken away, 0 to 1.
     withheld: f32,
     /// Slow mean of the speed, rad/s.
     speed: f32,
-    /// Slow mean of the velocity, rad/s.
-    drift: f32,
     /// Part that the fade at standstill let through in the round before, 0 to 1.
     moving: f32,
     /// Reference velocity, rad/s, as a first-order lag follows it; what it lacks is its acceleration.
@@ -95,7 +88,7 @@ impl FrictionFeedforward {
     #[inline(never)]
     pub fn reset(&mut self) {
         self.compensation.reset();
-        (self.withheld, self.speed, self.drift, self.moving, self.reference) = (0.0, 0.0, 0.0, 0.0, None);
+        (self.withheld, self.speed, self.moving, self.reference) = (0.0, 0.0, 0.0, None);
     }
 
     /// First stage of a round: the state that friction is computed for, and its regime. `measured_torque` is the torque of the measured current, Nm.
@@ -153,7 +146,7 @@ impl FrictionFeedforward {
                 self.moving = standstill;
                 1.0
             }
-            None => self.guard(gains, velocity, speed, wanted.velocity.unwrap_or(wanted.torque)),
+            None => self.guard(active, motion, wanted.velocity.unwrap_or(wanted.torque)),
         };
         let permitted = or_zero(standstill * guarded);
         // Where nothing is added, not even the sign of a zero changes.
@@ -174,25 +167,26 @@ impl FrictionFeedforward {
         acceleration
     }
 
-    /// Part of the compensation that the energy guard lets through, 0 to 1. `commanded` says by its sign which way the command pushes: the
+    /// Part of the compensation that the energy guard lets through. `commanded` says by its sign which way the command pushes: the
     /// velocity that it asks for, or in torque mode its torque. A spring's torque does not count: around a held position
     /// it pushes back and forth, and too much compensation makes it hunt.
     #[inline(never)]
-    fn guard(&mut self, gains: &CompensationGains, velocity: f32, speed: f32, commanded: f32) -> f32 {
+    fn guard(&mut self, active: &Active, motion: &JointMotion, commanded: f32) -> f32 {
+        let gains = &active.compensation;
+        let speed = if motion.velocity < 0.0 { -motion.velocity } else { motion.velocity };
         let growing = speed > (1.0 + GROWTH) * self.speed && speed > gains.standstill;
         self.speed += gains.guard.mean * (or_zero(speed) - self.speed);
-        self.drift = or_zero(self.drift + gains.guard.drift * (velocity - self.drift));
-        let pushed = commanded * velocity > 0.0;
+        let pushed = if motion.velocity < 0.0 { commanded < 0.0 } else { commanded > 0.0 };
         if growing && !pushed {
-            self.withheld = lesser(self.withheld + gains.guard.back_off, 1.0);
+            self.withheld += gains.guard.back_off;
         } else if pushed {
-            self.withheld = greater(self.withheld - gains.guard.recovery, 0.0);
+            self.withheld -= gains.guard.recovery;
         }
-        let moves = lesser(greater(magnitude(self.drift) * gains.guard.moves - 1.0, 0.0), 1.0);
-        1.0 - self.withheld * (1.0 - gains.certain * moves)
+        self.withheld = within(self.withheld, 0.0, 1.0);
+        greater(1.0 - self.withheld, 0.0)
     }
 
-    /// What the guard withholds of the part that is uncertain, 0 to 1.
+    /// What the guard withholds, 0 to 1.
     pub fn withheld(&self) -> f32 {
         self.withheld
     }
@@ -232,7 +226,6 @@ mod tests {
             slew: 32e3,
             velocity_source: source,
             standstill_velocity: STANDSTILL,
-            uncertainty: 1.0,
         };
         let range = Range { low: q16(-100.0), high: q16(100.0) };
         let domain = Domain { ranges: [range; SIGNALS], margin: 1 << 13, reference_temperature: q16(25.0) };
@@ -370,32 +363,6 @@ mod tests {
             velocity += (torque - friction * velocity) / inertia * period;
         }
         velocity
-    }
-
-    #[test]
-    fn the_guard_takes_what_is_uncertain_and_no_more() {
-        for uncertainty in [0.0, 0.35, 1.0] {
-            let mut active = active(VelocitySource::Measured, 0.0, 0.01);
-            active.compensation.certain = 1.0 - uncertainty;
-            let mut feedforward = pushed(&active, 1.0);
-            let mut velocity = 2.0;
-            let permitted = (0..100).map(|_| {
-                velocity *= 1.01;
-                round(&mut feedforward, &active, velocity, 0.0, None).permitted
-            });
-            assert_eq!(permitted.last(), Some(1.0 - uncertainty));
-        }
-    }
-
-    #[test]
-    fn what_is_certain_gives_less_than_friction_takes_up_to_the_stated_uncertainty() {
-        // A model of half as much again, all of what the guard may take gone: 1.5 (1 - u) of friction comes back.
-        for (uncertainty, comes_to_rest) in [(0.34, true), (0.32, false)] {
-            let mut active = active(VelocitySource::Measured, 0.0, 1.5 * 0.05);
-            active.compensation.certain = 1.0 - uncertainty;
-            let velocity = let_go(&active, 0.05);
-            assert_eq!(velocity < 0.5, comes_to_rest, "uncertainty {uncertainty}: {velocity} rad/s");
-        }
     }
 
     #[test]

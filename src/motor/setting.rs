@@ -2,7 +2,7 @@
 
 /// Names of settings and units of their numbers, in the order of their numbers on the bus (object 2100h:3), and index and sub-index of the object that sets it or
 /// what it is computed from; zeros where that is nobody's to set over the bus. New ones come last.
-const NAMES: [(&str, &str, u16, u8); 66] = [
+const NAMES: [(&str, &str, u16, u8); 65] = [
     ("", "", 0x0000, 0),
     ("control rate", "Hz", 0x0000, 0),
     ("dead time", "s", 0x0000, 0),
@@ -32,7 +32,6 @@ const NAMES: [(&str, &str, u16, u8); 66] = [
     ("compensation clamp", "Nm", 0x2200, 4),
     ("compensation slew limit", "Nm/s", 0x2200, 5),
     ("standstill velocity", "rad/s", 0x2200, 10),
-    ("friction uncertainty", "", 0x2200, 11),
     ("current loop's bandwidth", "Hz", 0x2104, 1),
     ("phase resistance", "Ω", 0x2101, 1),
     ("inductance along d", "H", 0x2101, 2),
