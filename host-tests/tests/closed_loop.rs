@@ -41,8 +41,8 @@ fn the_torque_that_friction_takes_is_given_back_and_slow_reversals_track() {
     );
     assert!(after <= TORQUE_ERROR.0 && worst <= TORQUE_ERROR.1, "torque error {after} % median, {worst} % worst");
     assert!(gain >= TRACKING_GAIN, "tracking {gain}x");
-    let left: [(&str, fn(&InTorqueMode) -> f64); 2] =
-        [("led by hand", |left| left.guided), ("moved", |left| left.moved)];
+    type Left = fn(&InTorqueMode) -> f64;
+    let left: [(&str, Left); 2] = [("led by hand", |left| left.guided), ("moved", |left| left.moved)];
     for ((what, left), (middle, worst)) in left.iter().zip(TORQUE_MODE) {
         let left: Vec<f64> = torque_mode.iter().map(left).collect();
         let found = (median(left.clone()), left.iter().fold(0.0f64, |worst, left| worst.max(*left)));
