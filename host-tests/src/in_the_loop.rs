@@ -67,7 +67,7 @@ pub struct RandomJoint {
     reversals: Trajectory,
 }
 
-/// What of friction is left in torque mode, % of its RMS while the joint moves.
+/// Friction that is left in torque mode, % of its RMS while the joint moves.
 #[derive(Clone, Copy, Debug)]
 pub struct InTorqueMode {
     /// The command holds gravity, a hand leads the joint.
@@ -139,7 +139,7 @@ impl RandomJoint {
         Ok(InTorqueMode { guided: left(true)?, moved: left(false)? })
     }
 
-    /// What of friction is left, % of its RMS, while a hand or the command leads the joint.
+    /// Friction that is left, % of its RMS, while a hand or the command leads the joint.
     fn led(&self, variant: &Variant, by_hand: bool) -> Result<f64, String> {
         let failed = |error: String| format!("joint {}, {}, torque mode: {error}", self.seed, variant.name);
         let setup = self.off.compensating(Request::PhysicalAndNetwork);
@@ -159,12 +159,10 @@ impl RandomJoint {
                 let position = amplitude * (1.0 - cos) - now.position;
                 let velocity = amplitude * omega * sin - now.velocity;
                 let acceleration = amplitude * omega * omega * cos;
-                let leading = acceleration + LEADING * (LEADING * position + 2.0 * velocity);
-                let leading = plant.inertia() * leading;
-                let gravity = plant.load.gravity_torque(now.position);
-                let torque;
-                (hand, torque) = if by_hand { (leading, gravity) } else { (0.0, gravity + leading) };
-                demand.command.torque = torque as f32;
+                let leading = plant.inertia() * (acceleration + LEADING * (LEADING * position + 2.0 * velocity));
+                let by_command = if by_hand { 0.0 } else { leading };
+                hand = leading - by_command;
+                demand.command.torque = (plant.load.gravity_torque(now.position) + by_command) as f32;
                 demand.sequence += 1;
             }
             let telemetry = joint.step(&demand, hand);

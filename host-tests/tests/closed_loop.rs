@@ -1,5 +1,6 @@
 //! Compensation in the loop, on random joints that are not our model: each is excited without compensation, recorded as a user would,
-//! fitted, and moved with the image that came out. The torque that friction would have taken arrives, and slow reversals track; in torque mode little is gained.
+//! fitted, and moved with the image that came out. The torque that friction would have taken arrives, and slow reversals track; in
+//! torque mode little is gained.
 
 use host_tests::in_the_loop::{InTorqueMode, Moved, RandomJoint, for_seeds, median};
 use host_tests::variant::DEFAULT;
@@ -11,7 +12,8 @@ const TORQUE_ERROR: (f64, f64) = (4.4, 11.7);
 /// Least factor by which the position error of slow reversals falls, median: README's 5.3 less a tenth.
 const TRACKING_GAIN: f64 = 4.8;
 
-/// What is left of friction in torque mode at most, led by hand and moved by the command, median and worst, %: README's figures and a tenth of them.
+/// Friction left in torque mode at most, led by hand and moved by the command, median and worst, %: README's figures and a tenth of
+/// them.
 const TORQUE_MODE: [(f64, f64); 2] = [(85.1, 91.9), (77.2, 87.8)];
 
 /// A joint without compensation, and with it; and in torque mode.

@@ -1,4 +1,5 @@
-//! What `jointctl eds`, `dbc` and `bus-yml` write, loaded by python-canopen, cantools and dcf-tools and compared with a virtual joint.
+//! Files of `jointctl eds`, `dbc` and `bus-yml`, loaded by python-canopen, cantools and dcf-tools and compared with a virtual
+//! joint.
 //!
 //! Without Python, or where these cannot be installed, this is reported as ignored by name; with `CI` set it runs, and fails.
 
@@ -44,8 +45,8 @@ const DCF_TOOLS: Packages = Packages { folder: "python-dcf", install: &["dcf-too
 fn configure(python: Option<&Path>) -> Result<(), Failed> {
     let python = DCF_TOOLS.required(python)?;
     let folder = tempfile::tempdir()?;
-    let write = |force: &[&str]| {
-        let arguments = [&["bus-yml", "--node", "7", "--node", "8"], force].concat();
+    let write = |more: &[&str]| {
+        let arguments = [&["bus-yml", "--node", "7", "--node", "8"], more].concat();
         Command::new(env!("CARGO_BIN_EXE_jointctl")).current_dir(&folder).args(arguments).output()
     };
     let written = write(&[])?;
@@ -53,12 +54,28 @@ fn configure(python: Option<&Path>) -> Result<(), Failed> {
         return Err(String::from_utf8_lossy(&written.stderr).into_owned().into());
     }
     let refused = write(&[])?;
-    if refused.status.code() != Some(1) || !String::from_utf8_lossy(&refused.stderr).contains("bus.yml exists: --force")
+    if refused.status.code() != Some(2)
+        || !String::from_utf8_lossy(&refused.stderr).contains("bus.yml exists; --replace")
     {
-        return Err(format!("bus-yml replaces a file without --force: {refused:?}").into());
+        return Err(format!("bus-yml replaces a file without being told to: {refused:?}").into());
     }
-    if !write(&["--force"])?.status.success() {
-        return Err("bus-yml --force replaces nothing".into());
+    for (more, code) in [
+        (["--period", "0"], 2),
+        (["--period", "1"], 0),
+        (["--period", "50"], 0),
+        (["--period", "51"], 2),
+        (["--node", "0"], 2),
+        (["--node", "127"], 0),
+        (["--node", "128"], 2),
+        (["--master", "8"], 2),
+        (["--master", "9"], 0),
+        // The last one is what dcfgen takes below.
+        (["--period", "10"], 0),
+    ] {
+        let output = write(&[&more[..], &["--replace"]].concat())?;
+        if output.status.code() != Some(code) {
+            return Err(format!("{more:?}: {output:?}, wanted {code}").into());
+        }
     }
     for (program, arguments) in [("dcfchk", &["-n", "7", "joint.eds"][..]), ("dcfgen", &["-rS", "bus.yml"])] {
         // Beside its Python; a warning is on the error output, and too much.

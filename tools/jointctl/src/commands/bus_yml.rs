@@ -15,11 +15,12 @@ use std::time::{SystemTime, UNIX_EPOCH};
 /// Arguments of `bus-yml`.
 #[derive(Debug, Args)]
 pub struct BusYml {
-    /// The bus to scan: an entry for every joint that answers, with its identity and serial number, which the master then insists on: a joint that is
-    /// replaced needs the file anew
+    /// The bus to scan: an entry for every joint that answers, with its identity and serial number. The master then insists on
+    /// them: a joint that is replaced needs the file anew
     #[arg(long, value_name = "BUS", required_unless_present = "node")]
     bus: Option<String>,
-    /// Node id of a joint, 1 to 127; repeatable. With --bus only these [default: all]; without it, joints of any identity
+    /// Node id of a joint, 1 to 127; repeatable. With --bus only these [default: all]; without it, joints of any
+    /// identity
     #[arg(long, value_name = "N")]
     node: Vec<u8>,
     /// Node id of the master, 1 to 127
@@ -33,7 +34,7 @@ pub struct BusYml {
     out: PathBuf,
     /// Replace files that exist
     #[arg(long)]
-    force: bool,
+    replace: bool,
 }
 
 impl BusYml {
@@ -87,14 +88,15 @@ impl BusYml {
     /// A joint's identity, where it bears the period.
     fn asked(&self, remote: &RemoteJoint) -> Result<Joint, CommandError> {
         let deadline = Entry::one("command-deadline")?;
-        let seconds = remote.read(deadline)?.number().unwrap_or(f64::NAN);
-        if f64::from(2 * self.period) > 1000.0 * seconds {
+        // A REAL32: as f64 it would be less than the number that was meant.
+        let seconds = remote.read(deadline)?.number().unwrap_or(0.0) as f32;
+        let least = f32::from(2 * self.period) / 1000.0;
+        if least > seconds {
             return Err(CommandError::Bus(format!(
-                "node {}: {} is {seconds} s; with --period {} ms it must be {} s or more, or the joint brakes where one set-point is late",
+                "node {}: {} is {seconds} s; with --period {} ms it must be {least} s or more, or the joint brakes where one set-point is late",
                 remote.id(),
                 deadline.described(),
-                self.period,
-                f64::from(2 * self.period) / 1000.0
+                self.period
             )));
         }
         let serial = remote.node().number(0x1018, 4).map(u32::from_le_bytes);
@@ -115,8 +117,8 @@ impl BusYml {
             }
         }
         let paths = files.iter().map(|file| self.out.join(&file.path)).collect::<Vec<_>>();
-        if let Some(path) = paths.iter().find(|path| !self.force && path.symlink_metadata().is_ok()) {
-            return Err(CommandError::Exists(path.clone()));
+        if let Some(path) = paths.iter().find(|path| !self.replace && path.exists()) {
+            return Err(CommandError::Arguments(format!("{} exists; --replace replaces it", path.display())));
         }
         write_directory(&self.out, &files)?;
         for path in paths {

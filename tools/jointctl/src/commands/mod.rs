@@ -157,9 +157,6 @@ pub enum CommandError {
         /// Why.
         source: std::io::Error,
     },
-    /// A file that would be replaced.
-    #[error("{} exists: --force replaces it", .0.display())]
-    Exists(PathBuf),
     /// An image that cannot be used.
     #[error("{}: {reason}", path.display())]
     Image {

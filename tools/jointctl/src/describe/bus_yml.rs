@@ -1,7 +1,7 @@
 //! The configuration of a ros2_canopen master, bus.yml, for joints on a bus; host.
 //!
-//! Written by a few lines of its own: a YAML serializer writes no hexadecimal numbers and no comments, and all values here are numbers
-//! and names that are made here. ros2_canopen reads it with yaml-cpp, dcfgen with PyYAML.
+//! Written by a few lines of its own: a YAML serializer writes no comments, and all values here are numbers and names that are
+//! made here. ros2_canopen reads it with yaml-cpp, dcfgen with PyYAML.
 //!
 //! The PDOs are not those of a joint that nobody has set up. There the controlword is part of two RPDOs: a master that writes it into
 //! one of them only sends 0 in the other, which switches the joint off. Here an object is part of one RPDO at most.

@@ -73,6 +73,20 @@ pub fn a_joint_is_looked_at_set_moved_and_fed_from_the_command_line() {
     );
     desk.prints(&["set", "gain", "0.5", "requested-model", "1"], &["gain (2200h:3)", " 0.5\n"]);
     desk.prints(&["set", "2100:1", "2"], &["(2100h:1)", " done\n"]);
+    desk.prints(
+        &["bus-yml", "--out", "master", "--period", "50"],
+        &["written: master/bus.yml", "written: master/joint-"],
+    );
+    let text = std::fs::read_to_string(desk.folder.path().join("master/bus.yml")).unwrap();
+    assert!(text.contains("joint_5:\n") && text.contains("  revision_number: 0x"), "{text}");
+    // Two periods have to fit into the command deadline.
+    desk.prints(&["set", "command-deadline", "0.06"], &["command-deadline (2103h:"]);
+    desk.prints(&["bus-yml", "--out", "master", "--replace", "--period", "30"], &["written: master/bus.yml"]);
+    desk.fails(
+        &["bus-yml", "--out", "master", "--replace", "--period", "31"],
+        &["node 5", "0.06 s", "0.062 s or more"],
+    );
+    desk.prints(&["set", "command-deadline", "0.1"], &["command-deadline (2103h:"]);
     desk.prints(&["store"], &["node 5: stored"]);
     desk.prints(&["move", "velocity", "-0.4", "--duration", "1"], &["rad/s", "node 5: disabled"]);
     desk.prints(&["monitor", "--once"], &["state         disabled", "position      ", "gear "]);
