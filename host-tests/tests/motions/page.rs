@@ -133,7 +133,9 @@ only time can be left out. Of the iiwa's ten speeds five are left out; the STS32
 take. The image's network gets {restarts} restarts instead of the 8 of `jointctl fit`, for the time that it takes; all else is as a user gets it.
 
 `UPDATE_DOCS=1 cargo test -p host-tests --test motions` writes this page, and without `UPDATE_DOCS` fails where a figure departs by
-more than {margin} % from the one here ({margin_of_c} % for c), in either direction, or where the image holds another model.
+more than {margin} % from the one here ({margin_of_c} % for c), in either direction, or where the image holds another model. The last bit of
+a sum decides where c's training ends, so that OpenBLAS is given the same kernels everywhere (`OPENBLAS_CORETYPE=Haswell`). With other
+kernels c differed by less than 5 % on most rows and by a third on one (ur10e_joint2, 16 s from 48 s: 4.1 to 6.0 %).
 
 Aims: image / best of a, b, c at most {of_best}; image / simplest at most {of_simplest}. They are not reached everywhere: the table shows where.
 
