@@ -9,8 +9,8 @@ use crate::compensation::Request;
 use crate::friction::regime::MOST_SETS;
 use crate::joint::BoardLimits;
 use crate::joint::configuration::{
-    BridgeConfiguration, CompensationConfiguration, Configuration, FACTORY_TRIM, Gains, GearConfiguration, Limits,
-    MotorConfiguration, ThermalConfiguration, VelocitySource,
+    BridgeConfiguration, CompensationConfiguration, Configuration, FACTORY_TRIM, FRICTION_UNCERTAINTY, Gains,
+    GearConfiguration, Limits, MotorConfiguration, ThermalConfiguration, VelocitySource,
 };
 use crate::motor::angle::{Direction, ElectricalAngle, EncoderAlignment};
 use crate::sensors::analog::Analog;
@@ -197,6 +197,7 @@ const fn uncommissioned(bus_voltage: (f32, f32), regeneration_band: f32, encoder
             slew: 1.0,
             velocity_source: VelocitySource::Reference,
             standstill_velocity: 0.1,
+            uncertainty: FRICTION_UNCERTAINTY,
         },
         thermal: ThermalConfiguration {
             winding_capacity: 10.0,

@@ -3,7 +3,7 @@
 //! `cargo bench -p host-tests --bench in_the_loop > docs/in-the-loop.md`; some minutes.
 
 use host_tests::in_the_loop::{Moved, RandomJoint, for_seeds, median};
-use host_tests::left_alone::{ERROR, judged};
+use host_tests::left_alone::{Alone, ERROR, judged};
 use host_tests::variant::{ALL, DEFAULT, Variant};
 use plant::actuator::ActuatorParameters;
 use std::ops::Range;
@@ -97,11 +97,11 @@ fn layers(without: &[Moved], with: &[Vec<Moved>], alone: &[usize]) {
         (median(errors.clone()), errors.into_iter().fold(0.0, f64::max))
     };
     println!(
-        "\n## Every layer\n\nThe same with one layer taken away. \"Moves by itself\": {} joints ({} cases: free, and held by a spring) that nobody \
-         commands,\npushed once, with a physical model that is {:.0} % wrong in every parameter and friction computed for the measured velocity,\n\
+        "\n## Every layer\n\nThe same with one layer taken away. \"Moves by itself\": {} joints ({} cases: free, held by a spring, with a payload) that nobody \
+         moves,\npushed once, with a physical model that is {:.0} % wrong in every parameter and friction computed for the measured velocity,\n\
          the source that feeds back; cases that start, keep or gain motion, judged by energy.\n",
         ALONE.end - ALONE.start,
-        2 * (ALONE.end - ALONE.start),
+        Alone::ALL.len() as u64 * (ALONE.end - ALONE.start),
         100.0 * ERROR
     );
     println!("| | torque error, median, % | worst, % | slow reversals, median | moves by itself |");

@@ -72,8 +72,10 @@ pub struct RandomJoint {
 pub struct InTorqueMode {
     /// The command holds gravity, a hand leads the joint.
     pub guided: f64,
-    /// The command holds gravity and moves the joint, a controller 1,000 times a second.
+    /// A controller holds gravity and moves the joint, 1,000 times a second, and tells which is which.
     pub moved: f64,
+    /// The same without telling.
+    pub moved_untold: f64,
 }
 
 /// Bandwidth of a hand, and of a controller around torque mode, rad/s.
@@ -135,12 +137,13 @@ impl RandomJoint {
     /// # Errors
     /// A fault on the way.
     pub fn in_torque_mode(&self, variant: &Variant) -> Result<InTorqueMode, String> {
-        let left = |by_hand| self.led(variant, by_hand);
-        Ok(InTorqueMode { guided: left(true)?, moved: left(false)? })
+        let left = |by_hand, told| self.led(variant, by_hand, told);
+        Ok(InTorqueMode { guided: left(true, true)?, moved: left(false, true)?, moved_untold: left(false, false)? })
     }
 
-    /// Friction that is left, % of its RMS, while a hand or the command leads the joint.
-    fn led(&self, variant: &Variant, by_hand: bool) -> Result<f64, String> {
+    /// Friction that is left, % of its RMS, while a hand or the command leads the joint; the command tells what of it pushes, or
+    /// does not.
+    fn led(&self, variant: &Variant, by_hand: bool, told: bool) -> Result<f64, String> {
         let failed = |error: String| format!("joint {}, {}, torque mode: {error}", self.seed, variant.name);
         let setup = self.off.compensating(Request::PhysicalAndNetwork);
         let joint = variant.enabled(&self.parameters, &setup, Some(self.found.model.clone()), 10.0, 99);
@@ -160,9 +163,11 @@ impl RandomJoint {
                 let velocity = amplitude * omega * sin - now.velocity;
                 let acceleration = amplitude * omega * omega * cos;
                 let leading = plant.inertia() * (acceleration + LEADING * (LEADING * position + 2.0 * velocity));
+                let gravity = plant.load.gravity_torque(now.position);
                 let by_command = if by_hand { 0.0 } else { leading };
                 hand = leading - by_command;
-                demand.command.torque = (plant.load.gravity_torque(now.position) + by_command) as f32;
+                demand.command.torque = (gravity + by_command) as f32;
+                demand.command.push = if told { by_command as f32 } else { 0.0 };
                 demand.sequence += 1;
             }
             let telemetry = joint.step(&demand, hand);

@@ -1,6 +1,7 @@
 //! A joint that nobody commands, with a model that is wrong in every parameter and sensors up to two periods late: what it does by itself.
 //! Judged by energy.
 
+use crate::driving::COMMAND_STEPS;
 use crate::informed::informed;
 use crate::variant::{DEFAULT, Variant, measured};
 use joint_firmware::compensation::Request;
@@ -12,7 +13,7 @@ use plant::friction_factors::FrictionFactors;
 use plant::virtual_joint::Setup;
 
 /// Error of every parameter of the model.
-pub const ERROR: f64 = 0.3;
+pub const ERROR: f64 = 0.5;
 
 /// What a joint did in a scenario.
 #[derive(Clone, Copy, Debug, Default)]
@@ -38,7 +39,26 @@ pub enum Alone {
     Free,
     /// A spring and a damper hold the position.
     Held,
+    /// Torque mode: a controller holds the position by such a spring and damper, 1,000 times a second, and says that it pushes.
+    Sprung,
+    /// Torque mode: a controller bears the payload's gravity.
+    Borne,
+    /// Torque mode, no torque: the payload swings.
+    Swinging,
 }
+
+impl Alone {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::Free, Self::Held, Self::Sprung, Self::Borne, Self::Swinging];
+
+    /// Whether the joint has its payload.
+    const fn loaded(self) -> bool {
+        matches!(self, Self::Borne | Self::Swinging)
+    }
+}
+
+/// Part of the mode's damping beside the spring that holds the position.
+const DAMPING: f32 = 0.2;
 
 /// Leaves joint `seed` alone, pushes it once, and leaves it alone again; with a compensation that differs from the default in `variant`, or none.
 /// Friction is computed for the measured velocity, the source that feeds back; the command's has nothing to add while nothing is commanded.
@@ -46,7 +66,10 @@ pub enum Alone {
 /// # Errors
 /// A joint that does not stay enabled.
 pub fn run(seed: u64, alone: Alone, variant: Option<&Variant>, steps: u32) -> Result<Seen, String> {
-    let parameters = ActuatorParameters::randomised(seed).aligned().without_payload();
+    let mut parameters = ActuatorParameters::randomised(seed).aligned();
+    if !alone.loaded() {
+        parameters = parameters.without_payload();
+    }
     // Half of the models are wrong at the corners of the range, with most of them too strong.
     let factors = match seed % 4 {
         0 => FrictionFactors::drawn(seed, ERROR),
@@ -65,7 +88,7 @@ pub fn run(seed: u64, alone: Alone, variant: Option<&Variant>, steps: u32) -> Re
     let mut command = Command::default();
     if alone == Alone::Held {
         command =
-            Command { mode: Mode::Impedance, stiffness: gains.stiffness, damping: 0.2 * gains.damping, ..command };
+            Command { mode: Mode::Impedance, stiffness: gains.stiffness, damping: DAMPING * gains.damping, ..command };
     }
     let friction = &parameters.joint.friction;
     let strength = 3.0 * friction.breakaway.forward.max(friction.breakaway.backward);
@@ -77,19 +100,33 @@ pub fn run(seed: u64, alone: Alone, variant: Option<&Variant>, steps: u32) -> Re
     let speed = parameters.joint.limits.speed;
     let mut pushing = false;
     for n in 0..steps {
-        demand.sequence = n / 20;
+        demand.sequence = n / COMMAND_STEPS as u32;
         // Quiet for 0.3 s, then a push until a quarter of the speed limit, a tenth of a second at most.
         let state = joint.actuator().state().joint;
         pushing = (n == 6_000 || pushing) && n < 8_000 && state.velocity < 0.25 * speed;
         let external = if pushing { strength } else { 0.0 };
+        let gravity = parameters.joint.load.gravity_torque(state.position) as f32;
+        let asks = n % COMMAND_STEPS as u32 == 0;
+        if asks && alone == Alone::Borne {
+            demand.command.torque = gravity;
+        } else if asks && alone == Alone::Sprung {
+            let (position, velocity) = (state.position as f32, state.velocity as f32);
+            demand.command.torque = -gains.stiffness * position - DAMPING * gains.damping * velocity;
+            demand.command.push = demand.command.torque;
+        }
         let telemetry = joint.step(&demand, external);
         if telemetry.state != State::OperationEnabled {
             return Err(format!("{:?} {:?}", telemetry.state, telemetry.faults));
         }
         let state = joint.actuator().state().joint;
-        let spring =
-            if alone == Alone::Held { 0.5 * f64::from(gains.stiffness) * state.position * state.position } else { 0.0 };
-        let energy = joint.actuator().joint().stored_energy() + spring;
+        let position = state.position;
+        let held = match alone {
+            Alone::Held | Alone::Sprung => 0.5 * f64::from(gains.stiffness) * position * position,
+            // What the command bears is no energy of the joint's.
+            Alone::Borne => -parameters.joint.load.gravity_amplitude() * (1.0 - position.cos()),
+            Alone::Free | Alone::Swinging => 0.0,
+        };
+        let energy = joint.actuator().joint().stored_energy() + held;
         seen.withheld = seen.withheld.max(1.0 - f64::from(telemetry.compensated.permitted));
         if n < 6_000 {
             seen.drift = seen.drift.max((state.position - start).abs());
@@ -124,10 +161,10 @@ const STEPS: (u32, u32) = (30_000, 120_000);
 /// Control steps in which friction's work is counted.
 const LAST: u32 = 10_000;
 
-/// Joint `seed` in both situations with a compensation: the largest drift, rad, and what moved by itself.
+/// Joint `seed` in every situation with a compensation: the largest drift, rad, and what moved by itself.
 pub fn judged(seed: u64, variant: &Variant) -> (f64, Vec<String>) {
     let (mut drift, mut bad) = (0.0f64, Vec::new());
-    for alone in [Alone::Free, Alone::Held] {
+    for alone in Alone::ALL {
         // With less friction a joint creeps for longer. What is a limit cycle goes on; creep comes to rest.
         let (short, long) = STEPS;
         let (largest, moves) = compared(seed, alone, variant, short);

@@ -27,7 +27,7 @@ pub struct Variant {
 pub const DEFAULT: Variant = Variant { name: "all layers", configure: |_| {}, prepare: |_| {} };
 
 /// The default and everything that can be taken away from it.
-pub const ALL: [Variant; 8] = [
+pub const ALL: [Variant; 9] = [
     DEFAULT,
     Variant { name: "velocity always the measured one", configure: |s| measured(&mut s.configuration), ..DEFAULT },
     Variant { name: "no network", configure: |s| s.configuration.compensation.request = Request::Physical, ..DEFAULT },
@@ -41,6 +41,11 @@ pub const ALL: [Variant; 8] = [
     Variant {
         name: "no fade at standstill",
         prepare: |active| active.compensation.inverse_standstill = f32::INFINITY,
+        ..DEFAULT
+    },
+    Variant {
+        name: "energy guard may take all",
+        configure: |s| s.configuration.compensation.uncertainty = 1.0,
         ..DEFAULT
     },
     Variant {

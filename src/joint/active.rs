@@ -58,6 +58,10 @@ const BACK_OFF: f32 = 0.005;
 const RECOVERY: f32 = 0.1;
 /// Time over which the energy guard compares the speed, s.
 const MEMORY: f32 = 0.01;
+/// Time over which it takes the mean velocity, s.
+const DRIFT: f32 = 0.05;
+/// Mean velocity from which on the joint moves, over the standstill velocity.
+const MOVES: f32 = 5.0;
 /// What is left of a voltage in its filter from one control step to the next: a time constant of 8 steps.
 const LEFT: f32 = 0.875;
 /// Part of the voltage of a round of the motion loop that goes into the filter.
@@ -148,8 +152,12 @@ pub struct MotionGains {
 /// The energy guard's time constants as parts of a round of the motion loop: what would be divisions in every round.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GuardGains {
+    /// Part of a round's velocity that goes into its slow mean.
+    pub drift: f32,
     /// Part of a round's speed that goes into its mean.
     pub mean: f32,
+    /// s/rad: the joint moves where its mean velocity times this is above 1, and at 2 for certain.
+    pub moves: f32,
     /// What is taken away in a round.
     pub back_off: f32,
     /// What comes back in a round.
@@ -157,9 +165,15 @@ pub struct GuardGains {
 }
 
 impl GuardGains {
-    /// For a motion loop with rounds of `period` s.
-    fn new(period: f32) -> Self {
-        Self { mean: within(period / MEMORY, 0.0, 1.0), back_off: period / BACK_OFF, recovery: period / RECOVERY }
+    /// For a motion loop with rounds of `period` s, and a standstill velocity, rad/s.
+    fn new(period: f32, standstill: f32) -> Self {
+        Self {
+            drift: within(period / DRIFT, 0.0, 1.0),
+            moves: 1.0 / (MOVES * standstill),
+            mean: within(period / MEMORY, 0.0, 1.0),
+            back_off: period / BACK_OFF,
+            recovery: period / RECOVERY,
+        }
     }
 }
 
@@ -176,6 +190,8 @@ pub struct CompensationGains {
     pub standstill: f32,
     /// Time from one round of the motion loop to the next, s.
     pub period: f32,
+    /// Part of the compensation that the energy guard leaves alone where the joint moves, 0 to 1.
+    pub certain: f32,
     /// The energy guard, per round.
     pub guard: GuardGains,
 }
@@ -440,8 +456,9 @@ impl Checked {
                 source: compensation.velocity_source,
                 inverse_standstill: 1.0 / compensation.standstill_velocity,
                 standstill: compensation.standstill_velocity,
+                certain: 1.0 - compensation.uncertainty,
                 period,
-                guard: GuardGains::new(period),
+                guard: GuardGains::new(period, compensation.standstill_velocity),
             },
             encoder_speed: TAU / STEPS * rate,
             has_bridge_sensor: bridge.has_bridge_sensor,

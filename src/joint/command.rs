@@ -32,6 +32,10 @@ pub struct Command {
     pub velocity: f32,
     /// Nm; torque mode, and added in every other one.
     pub torque: f32,
+    /// The part of the torque that pushes the joint to where it is to go, Nm, by its sign for the
+    /// [energy guard](super::friction_feedforward) in torque mode. What holds gravity is none of it; zero where nobody said
+    /// what holds.
+    pub push: f32,
     /// Nm/rad; impedance mode, 0 to 1e5.
     pub stiffness: f32,
     /// Nm s/rad; impedance mode, 0 to 1e4.
@@ -47,6 +51,7 @@ impl Command {
         position: 0.0,
         velocity: 0.0,
         torque: 0.0,
+        push: 0.0,
         stiffness: 0.0,
         damping: 0.0,
         open_loop: Frame { voltage: 0, speed: 0, along: 0, across: 0 },

@@ -118,6 +118,11 @@ pub enum VelocitySource {
     Measured,
 }
 
+/// Friction's uncertainty where nobody has set another one. A model whose every parameter is half too large, its Stribeck
+/// velocity too, has up to twice the joint's friction at some velocities; with less, some such joints keep moving
+/// (docs/energy-guard.md).
+pub const FRICTION_UNCERTAINTY: f32 = 0.6;
+
 /// How much compensation acts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CompensationConfiguration {
@@ -133,6 +138,9 @@ pub struct CompensationConfiguration {
     pub velocity_source: VelocitySource,
     /// Velocity below which compensation fades out in proportion, rad/s; 0.0001 to 10.
     pub standstill_velocity: f32,
+    /// By how much friction may be less than gain times the model, as a part of it; 0 to 1. It is what the energy guard may
+    /// take of a compensation for the measured velocity; see [`super::friction_feedforward`].
+    pub uncertainty: f32,
 }
 
 /// The bridge and its timing: what the board knows.
@@ -246,7 +254,7 @@ impl core::fmt::Display for ConfigurationError {
 impl core::error::Error for ConfigurationError {}
 
 /// Name and range of each number whose range does not depend on another: as a table they take a third less flash than as calls.
-static RANGES: [(Name, f32, f32); 20] = [
+static RANGES: [(Name, f32, f32); 21] = [
     (Name::of("control rate", "Hz"), 1e3, 100e3),
     (Name::of("dead time", "s"), 0.0, 5e-6),
     (Name::of("torque constant", "Nm/A"), 1e-3, 5.0),
@@ -267,6 +275,7 @@ static RANGES: [(Name, f32, f32); 20] = [
     (Name::of("compensation gain", ""), 0.0, 1.0),
     (Name::of("compensation slew limit", "Nm/s"), 0.5, 32e3),
     (Name::of("standstill velocity", "rad/s"), 1e-4, 10.0),
+    (Name::of("friction uncertainty", ""), 0.0, 1.0),
 ];
 
 impl Configuration {
@@ -306,6 +315,7 @@ impl Configuration {
             compensation.gain,
             compensation.slew,
             compensation.standstill_velocity,
+            compensation.uncertainty,
         ];
         for ((name, low, high), value) in RANGES.iter().zip(values) {
             within_range(*name, value, *low, *high)?;

@@ -7,14 +7,22 @@
 //! Where there is none (torque mode), friction is computed for the measured velocity, and that is a positive feedback. It is held by the
 //! fade near standstill and by the guard: while the joint speeds up although its command does not push it that way, the
 //! compensation backs off within milliseconds, and it comes back only while the command pushes.
+//!
+//! The guard takes no more than what is uncertain. Let friction be at least `1 - u` of gain times the model at every
+//! velocity, with the uncertainty `u` of the configuration. Then the rest, `1 - u` of the compensation, never gives more
+//! power than friction takes at the same instant: joint and compensation together are passive, and no hand, spring or
+//! gravity that leads them is answered by motion of their own. The guard decides about the part `u` alone, where friction
+//! may or may not be there. With `u` = 1 it decides about all, and so it does near standstill, where the delay of the
+//! sensors lets compensation act after the joint has turned back: until the mean velocity is five times the standstill
+//! velocity, and in part until it is ten times.
 
-use super::active::{Active, JointMotion};
+use super::active::{Active, CompensationGains, JointMotion};
 use super::configuration::VelocitySource;
 use super::motion_law::Wanted;
 use crate::compensation::{Compensation, Output};
 use crate::friction::FrictionModel;
 use crate::friction::state::JointState;
-use crate::motor::number::{greater, or_zero, within};
+use crate::motor::number::{greater, lesser, magnitude, or_zero, within};
 use crate::quantity::{Acceleration, Position, Temperature, Torque, Velocity};
 
 /// Time over which the reference's acceleration is taken, s: several commands of a bus at 1 kHz.
@@ -59,10 +67,12 @@ pub struct Surroundings {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FrictionFeedforward {
     compensation: Compensation,
-    /// What the guard has taken away, 0 to 1.
+    /// What the guard has taken away of the part that is uncertain, 0 to 1.
     withheld: f32,
     /// Slow mean of the speed, rad/s.
     speed: f32,
+    /// Slow mean of the velocity, rad/s.
+    drift: f32,
     /// Part that the fade at standstill let through in the round before, 0 to 1.
     moving: f32,
     /// Reference velocity, rad/s, as a first-order lag follows it; what it lacks is its acceleration.
@@ -88,7 +98,7 @@ impl FrictionFeedforward {
     #[inline(never)]
     pub fn reset(&mut self) {
         self.compensation.reset();
-        (self.withheld, self.speed, self.moving, self.reference) = (0.0, 0.0, 0.0, None);
+        (self.withheld, self.speed, self.drift, self.moving, self.reference) = (0.0, 0.0, 0.0, 0.0, None);
     }
 
     /// First stage of a round: the state that friction is computed for, and its regime. `measured_torque` is the torque of the measured current, Nm.
@@ -136,8 +146,7 @@ impl FrictionFeedforward {
         let output = self.compensation.finish(active.friction.as_ref(), &gains.settings);
         let reference = reference(active, wanted);
         let velocity = reference.unwrap_or(motion.velocity);
-        let speed = if velocity < 0.0 { -velocity } else { velocity };
-        let mut standstill = within(speed * gains.inverse_standstill, 0.0, 1.0);
+        let mut standstill = within(magnitude(velocity) * gains.inverse_standstill, 0.0, 1.0);
         let guarded = match reference {
             Some(_) => {
                 if active.friction.as_ref().is_some_and(FrictionModel::pre_slides) {
@@ -146,7 +155,7 @@ impl FrictionFeedforward {
                 self.moving = standstill;
                 1.0
             }
-            None => self.guard(active, motion, wanted.velocity.unwrap_or(wanted.torque)),
+            None => self.guard(gains, velocity, wanted),
         };
         let permitted = or_zero(standstill * guarded);
         // Where nothing is added, not even the sign of a zero changes.
@@ -167,26 +176,31 @@ impl FrictionFeedforward {
         acceleration
     }
 
-    /// Part of the compensation that the energy guard lets through. `commanded` says by its sign which way the command pushes: the
-    /// velocity that it asks for, or in torque mode its torque. A spring's torque does not count: around a held position
-    /// it pushes back and forth, and too much compensation makes it hunt.
+    /// Part of the compensation that the energy guard lets through, 0 to 1. The command pushes towards the velocity that it
+    /// asks for, or in torque mode by its torque without the offset. A spring's torque does not count: around a held
+    /// position it pushes back and forth, and too much compensation makes it hunt. Nor does what holds gravity: it works on
+    /// every way up, also where the joint swings by itself.
     #[inline(never)]
-    fn guard(&mut self, active: &Active, motion: &JointMotion, commanded: f32) -> f32 {
-        let gains = &active.compensation;
-        let speed = if motion.velocity < 0.0 { -motion.velocity } else { motion.velocity };
+    fn guard(&mut self, gains: &CompensationGains, velocity: f32, wanted: &Wanted) -> f32 {
+        let speed = magnitude(velocity);
         let growing = speed > (1.0 + GROWTH) * self.speed && speed > gains.standstill;
         self.speed += gains.guard.mean * (or_zero(speed) - self.speed);
-        let pushed = if motion.velocity < 0.0 { commanded < 0.0 } else { commanded > 0.0 };
+        self.drift = or_zero(self.drift + gains.guard.drift * (velocity - self.drift));
+        let moves = lesser(greater(magnitude(self.drift) * gains.guard.moves - 1.0, 0.0), 1.0);
+        // In torque mode the push may be a spring's, on which the joint hunts: it counts where the joint moves.
+        let moves_or_asked = moves > 0.0 || wanted.velocity.is_some();
+        let pushed = wanted.velocity.unwrap_or(wanted.push) * velocity > 0.0;
         if growing && !pushed {
-            self.withheld += gains.guard.back_off;
-        } else if pushed {
-            self.withheld -= gains.guard.recovery;
+            self.withheld = lesser(self.withheld + gains.guard.back_off, 1.0);
+        } else if pushed && moves_or_asked {
+            self.withheld = greater(self.withheld - gains.guard.recovery, 0.0);
+        } else if !moves_or_asked {
+            self.withheld = lesser(self.withheld + gains.guard.recovery, 1.0);
         }
-        self.withheld = within(self.withheld, 0.0, 1.0);
-        greater(1.0 - self.withheld, 0.0)
+        1.0 - self.withheld * (1.0 - gains.certain * moves)
     }
 
-    /// What the guard withholds, 0 to 1.
+    /// What the guard withholds of the part that is uncertain, 0 to 1.
     pub fn withheld(&self) -> f32 {
         self.withheld
     }
@@ -226,6 +240,7 @@ mod tests {
             slew: 32e3,
             velocity_source: source,
             standstill_velocity: STANDSTILL,
+            uncertainty: 1.0,
         };
         let range = Range { low: q16(-100.0), high: q16(100.0) };
         let domain = Domain { ranges: [range; SIGNALS], margin: 1 << 13, reference_temperature: q16(25.0) };
@@ -249,7 +264,7 @@ mod tests {
         reference: Option<f32>,
     ) -> Compensated {
         let motion = JointMotion { velocity, ..JointMotion::default() };
-        let wanted = Wanted { torque, velocity: reference };
+        let wanted = Wanted { torque, velocity: reference, push: torque };
         feedforward.begin(active, &motion, &wanted, 0.0, &Surroundings { temperature: 25.0, coupled_velocity: 0.0 });
         feedforward.network(active);
         feedforward.physical_model(active);
@@ -273,9 +288,12 @@ mod tests {
             (VelocitySource::Measured, false),
         ] {
             let active = active(source, OFFSET, 0.0);
+            // In torque mode a round so near to standstill is the first in which the guard takes something.
+            let left = if reference { 1.0 } else { 1.0 - active.compensation.guard.recovery };
             for (part, expected) in [(0.0, 0.0), (0.25, 0.25), (0.5, 0.5), (0.999, 0.999), (1.0, 1.0), (1.001, 1.0)] {
                 for velocity in [part * STANDSTILL, -part * STANDSTILL] {
                     let mut feedforward = FrictionFeedforward::default();
+                    let expected = left * expected;
                     let found = round(&mut feedforward, &active, velocity, velocity, reference.then_some(velocity));
                     let whole = found.output.torque.to_bits() as f32 / 65536.0;
                     assert!((whole - OFFSET).abs() < 1e-4, "{whole} Nm");
@@ -351,11 +369,11 @@ mod tests {
         }
     }
 
-    /// Speed, rad/s, of a joint that was let go at 0.5 rad/s, with a viscous friction (Nm s/rad) and a model of more of it, after 3 s.
-    fn let_go(active: &Active, friction: f32) -> f32 {
+    /// Speed, rad/s, of a joint that was let go at a velocity, with a viscous friction (Nm s/rad) and a model of more of it,
+    /// after 3 s.
+    fn let_go(active: &Active, friction: f32, mut velocity: f32) -> f32 {
         // Without the guard it would run away with a time constant of 0.3 s: inertia over what the model has too much.
         let inertia = 0.3 * 0.3 * friction;
-        let mut velocity = 0.5;
         let mut feedforward = pushed(active, velocity);
         let period = active.compensation.period;
         for _ in 0..(3.0 / period) as u32 {
@@ -365,10 +383,73 @@ mod tests {
         velocity
     }
 
+    /// What the guard lets through of a compensation with the uncertainty, once a speed has grown to this one (in standstill
+    /// velocities) without a push.
+    fn left_by_the_guard(uncertainty: f32, speed: f32) -> f32 {
+        let mut active = active(VelocitySource::Measured, 0.0, 0.01);
+        active.compensation.certain = 1.0 - uncertainty;
+        let mut feedforward = pushed(&active, 1.0);
+        let mut permitted = f32::NAN;
+        for n in 0..2_000u16 {
+            let grown = lesser(0.5 + f32::from(n) / 1_000.0, 1.0);
+            permitted = round(&mut feedforward, &active, grown * speed * STANDSTILL, 0.0, None).permitted;
+        }
+        permitted
+    }
+
+    #[test]
+    fn the_guard_takes_what_is_uncertain_and_no_more_where_the_joint_moves() {
+        for uncertainty in [0.0, 0.35, 1.0] {
+            assert_eq!(left_by_the_guard(uncertainty, 12.0), 1.0 - uncertainty);
+            let between = left_by_the_guard(uncertainty, 7.5);
+            assert!((between - 0.5 * (1.0 - uncertainty)).abs() < 1e-3, "{uncertainty}: {between}");
+            assert!(left_by_the_guard(uncertainty, 5.1) > 0.0 || uncertainty == 1.0);
+            assert_eq!(left_by_the_guard(uncertainty, 4.9), 0.0);
+        }
+    }
+
+    #[test]
+    fn a_push_counts_in_torque_mode_where_the_joint_moves_and_a_velocity_that_is_asked_for_always() {
+        let active = active(VelocitySource::Measured, 0.0, 0.01);
+        for (part, asked, withheld) in [(4.9, false, 1.0), (5.1, false, 0.0), (4.9, true, 0.0)] {
+            let mut feedforward = FrictionFeedforward { withheld: 0.5, ..FrictionFeedforward::default() };
+            let velocity = part * STANDSTILL;
+            for _ in 0..4_000 {
+                round(&mut feedforward, &active, velocity, velocity, asked.then_some(velocity));
+            }
+            assert_eq!(feedforward.withheld(), withheld, "{part} times the standstill velocity, asked for: {asked}");
+        }
+    }
+
+    #[test]
+    fn what_holds_gravity_is_no_push() {
+        for (push, withheld) in [(0.0, true), (-0.1, true), (0.1, false)] {
+            let active = active(VelocitySource::Measured, 0.0, 0.01);
+            let mut feedforward = pushed(&active, 1.0);
+            for n in 0..100u8 {
+                let velocity = 1.0 + 0.01 * f32::from(n);
+                let motion = JointMotion { velocity, ..JointMotion::default() };
+                feedforward.compensate(&active, &motion, &Wanted { torque: 1.0, velocity: None, push });
+            }
+            assert_eq!(feedforward.withheld() > 0.5, withheld, "push {push}: {}", feedforward.withheld());
+        }
+    }
+
+    #[test]
+    fn what_is_certain_gives_less_than_friction_takes_up_to_the_stated_uncertainty() {
+        // A model of half as much again, all of what the guard may take gone: 1.5 (1 - u) of friction comes back.
+        for (uncertainty, slows) in [(0.34, true), (0.32, false)] {
+            let mut active = active(VelocitySource::Measured, 0.0, 1.5 * 0.05);
+            active.compensation.certain = 1.0 - uncertainty;
+            let velocity = let_go(&active, 0.05, 4.0);
+            assert_eq!(velocity < 4.0, slows, "uncertainty {uncertainty}: {velocity} rad/s");
+        }
+    }
+
     #[test]
     fn a_joint_whose_friction_is_30_percent_less_than_its_models_does_not_run_away() {
         let active = active(VelocitySource::Measured, 0.0, 1.3 * 0.05);
-        let velocity = let_go(&active, 0.05);
+        let velocity = let_go(&active, 0.05, 1.0);
         assert!((0.0..0.5).contains(&velocity), "{velocity} rad/s");
     }
 }

@@ -117,7 +117,7 @@ impl Telemetry {
         state: State::NotReadyToSwitchOn,
         faults: Faults::NONE,
         motion: JointMotion { position: 0.0, velocity: 0.0, acceleration: 0.0 },
-        wanted: Wanted { torque: 0.0, velocity: None },
+        wanted: Wanted { torque: 0.0, velocity: None, push: 0.0 },
         compensated: Compensated::NOTHING,
         measured_torque: 0.0,
         gear_temperature: 0.0,

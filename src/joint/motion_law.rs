@@ -14,6 +14,8 @@ pub struct Wanted {
     pub torque: f32,
     /// Velocity that the command asks for at this instant, rad/s; none in torque mode.
     pub velocity: Option<f32>,
+    /// The command's push, Nm.
+    pub push: f32,
 }
 
 /// Ramps and integrals, from one round of the motion loop to the next.
@@ -72,7 +74,7 @@ impl MotionLaw {
         // Two opposite infinities add up to no number.
         let torque = or_zero(or_zero(torque) + or_zero(command.torque));
         self.bounds = Bounds::at(active, motion, limit);
-        Wanted { torque: self.bounds.hold(torque), velocity }
+        Wanted { torque: self.bounds.hold(torque), velocity, push: command.push }
     }
 
     /// What the torque of this round must not exceed, compensation included.
@@ -95,7 +97,7 @@ impl MotionLaw {
         let torque = limited(damped + self.integral + gains.braking_integral * error, limit);
         // What the limit has cut off is not integrated: it would drive the joint back after its stop.
         self.integral = torque - damped;
-        Wanted { torque, velocity: Some(self.velocity) }
+        Wanted { torque, velocity: Some(self.velocity), push: 0.0 }
     }
 
     /// Whether braking's ramp has come to its end.

@@ -2,7 +2,7 @@
 
 /// Names of settings and units of their numbers, in the order of their numbers on the bus (object 2100h:3), and index and sub-index of the object that sets it or
 /// what it is computed from; zeros where that is nobody's to set over the bus. New ones come last.
-const NAMES: [(&str, &str, u16, u8); 65] = [
+const NAMES: [(&str, &str, u16, u8); 66] = [
     ("", "", 0x0000, 0),
     ("control rate", "Hz", 0x0000, 0),
     ("dead time", "s", 0x0000, 0),
@@ -68,6 +68,7 @@ const NAMES: [(&str, &str, u16, u8); 65] = [
     ("field-weakening current", "A", 0x2101, 13),
     ("voltage induced where over-speed is a fault", "V", 0x2103, 2),
     ("oscillator trim", "", 0x2105, 1),
+    ("friction uncertainty", "", 0x2200, 11),
 ];
 
 /// The name of a setting. A board has its number only: texts and units are linked where somebody formats them, on a host.

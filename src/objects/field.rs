@@ -122,10 +122,12 @@ pub enum SetPoint {
     CoupledVelocity = 7,
     /// Open loop: all of its four set-points.
     OpenLoop = 8,
+    /// Added in every mode but the open loop: what holds the joint.
+    TorqueOffset = 9,
 }
 
 /// Number of [`SetPoint`]s.
-pub(super) const SET_POINTS: usize = 9;
+pub(super) const SET_POINTS: usize = 10;
 
 /// A part of the impedance frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -13,6 +13,7 @@ pub(super) struct SetPoints {
     pub(super) mode: Mode,
     pub(super) counter: Option<u8>,
     torque: i16,
+    torque_offset: i16,
     position: i32,
     velocity: i32,
     impedance: u64,
@@ -27,6 +28,7 @@ pub(super) struct SetPoints {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Targets {
     torque: bool,
+    torque_offset: bool,
     position: bool,
     velocity: bool,
     impedance: bool,
@@ -40,10 +42,17 @@ impl SetPoints {
             mode,
             counter: None,
             torque: 0,
+            torque_offset: 0,
             position: 0,
             velocity: 0,
             impedance: 0,
-            targets: Targets { torque: false, position: false, velocity: false, impedance: false },
+            targets: Targets {
+                torque: false,
+                torque_offset: false,
+                position: false,
+                velocity: false,
+                impedance: false,
+            },
             coupled: 0,
             open_loop: Frame { voltage: 0, speed: 0, along: 0, across: 0 },
         }
@@ -71,6 +80,7 @@ impl SetPoints {
             SetPoint::Mode => self.mode = mode(value as i8).unwrap_or(self.mode),
             SetPoint::Counter => self.counter = Some(value as u8),
             SetPoint::TargetTorque => (self.torque, self.targets.torque) = (value as i16, true),
+            SetPoint::TorqueOffset => (self.torque_offset, self.targets.torque_offset) = (value as i16, true),
             SetPoint::TargetPosition => {
                 self.targets.position |= self.position != value as i32;
                 self.position = value as i32;
@@ -111,6 +121,7 @@ impl SetPoints {
             (SetPoint::ImpedanceFrame, self.impedance),
             (SetPoint::CoupledVelocity, self.coupled as u64),
             (SetPoint::OpenLoop, self.open_loop.to_bits()),
+            (SetPoint::TorqueOffset, self.torque_offset as u64),
         ] {
             shared.copy(set_point, value);
         }
@@ -119,21 +130,27 @@ impl SetPoints {
 
     /// The command in SI units: to hold, where the mode's target has not come or halt is set.
     pub(super) fn command(&self, shared: &Shared) -> Command {
-        let torque = match self.targets.torque {
-            true => f32::from(self.torque) * (1e-3 * shared.rated_torque()),
-            false => 0.0,
+        let torque = |counts: bool, value: i16| {
+            if counts { f32::from(value) * (1e-3 * shared.rated_torque()) } else { 0.0 }
         };
-        let plain = Command { mode: self.mode, torque, ..Command::default() };
+        let target = torque(self.targets.torque, self.torque);
+        let offset = torque(self.targets.torque_offset, self.torque_offset);
+        // Who does not say what holds the joint may mean gravity by the target.
+        let push = if self.targets.torque_offset { target } else { 0.0 };
+        let plain = Command { mode: self.mode, torque: target + offset, push, ..Command::NOTHING };
         match self.mode {
-            Mode::OpenLoop if Controlword(self.controlword).halts() => Command { torque: 0.0, ..plain },
-            Mode::OpenLoop => Command { open_loop: self.open_loop, torque: 0.0, ..plain },
+            Mode::OpenLoop if Controlword(self.controlword).halts() => Command { mode: self.mode, ..Command::NOTHING },
+            Mode::OpenLoop => Command { mode: self.mode, open_loop: self.open_loop, ..Command::NOTHING },
             // What bears a load goes on bearing it.
             Mode::Velocity | Mode::Position if !self.follows() => Command { mode: Mode::Hold, ..plain },
-            _ if !self.follows() => Command { mode: Mode::Hold, torque: 0.0, ..plain },
+            _ if !self.follows() => Command { mode: Mode::Hold, torque: offset, ..Command::NOTHING },
             Mode::Torque | Mode::Hold => plain,
             Mode::Velocity => Command { velocity: 1e-3 * self.velocity as f32, ..plain },
             Mode::Position => Command { position: 1e-6 * self.position as f32, ..plain },
-            Mode::Impedance => impedance(self.impedance, |range| shared.range(range)),
+            Mode::Impedance => {
+                let framed = impedance(self.impedance, |range| shared.range(range));
+                Command { torque: framed.torque + offset, ..framed }
+            }
         }
     }
 

@@ -65,6 +65,7 @@ settings! {
     Clamp => compensation.clamp,
     Slew => compensation.slew,
     StandstillVelocity => compensation.standstill_velocity,
+    Uncertainty => compensation.uncertainty,
     WindingCapacity => thermal.winding_capacity,
     HousingCapacity => thermal.housing_capacity,
     WindingToHousing => thermal.winding_to_housing,

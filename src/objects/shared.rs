@@ -102,6 +102,7 @@ impl Shared {
             5 => SetPoint::TargetVelocity,
             6 => SetPoint::ImpedanceFrame,
             8 => SetPoint::OpenLoop,
+            9 => SetPoint::TorqueOffset,
             _ => SetPoint::CoupledVelocity,
         };
         let value = self.value.get();

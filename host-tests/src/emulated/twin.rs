@@ -269,8 +269,8 @@ struct Fields<'v> {
 struct Demanded<'v> {
     controlword: Variable<'v>,
     mode: Variable<'v>,
-    /// Position, velocity, torque, stiffness, damping.
-    command: [Variable<'v>; 5],
+    /// Position, velocity, torque, push, stiffness, damping.
+    command: [Variable<'v>; 6],
     sequence: Variable<'v>,
     coupled_velocity: Variable<'v>,
     coupled_sequence: Variable<'v>,
@@ -286,6 +286,7 @@ impl<'v> Demanded<'v> {
                 part("command.position")?,
                 part("command.velocity")?,
                 part("command.torque")?,
+                part("command.push")?,
                 part("command.stiffness")?,
                 part("command.damping")?,
             ],
@@ -304,14 +305,14 @@ impl<'v> Demanded<'v> {
             "Hold" => Mode::Hold,
             other => return Err(format!("mode {other}").into()),
         };
-        let mut numbers = [0.0; 5];
+        let mut numbers = [0.0; 6];
         for (number, variable) in numbers.iter_mut().zip(&self.command) {
             *number = memory.real(variable)?;
         }
-        let [position, velocity, torque, stiffness, damping] = numbers;
+        let [position, velocity, torque, push, stiffness, damping] = numbers;
         Ok(Demand {
             controlword: Controlword(memory.bits(&self.controlword)? as u16),
-            command: Command { mode, position, velocity, torque, stiffness, damping, ..Command::NOTHING },
+            command: Command { mode, position, velocity, torque, push, stiffness, damping, ..Command::NOTHING },
             sequence: memory.bits(&self.sequence)? as u32,
             coupled: Coupled {
                 velocity: memory.real(&self.coupled_velocity)?,

@@ -26,5 +26,7 @@ room! {
             "Which velocity friction is computed for: 0 the command's where it has one, 1 always the measured one"
         10, "standstill velocity", F32, RW, UNMAPPED, S(Setting::StandstillVelocity); "rad/s", 1.0, within(1e-4, 10.0);
             "Velocity below which compensation fades out in proportion"
+        11, "friction uncertainty", F32, RW, UNMAPPED, S(Setting::Uncertainty); "", 1.0, within(0.0, 1.0);
+            "By how much friction may be less than gain times the model, as a part of it: what the energy guard may take of a compensation for the measured velocity; 1: all of it"
     }
 }

@@ -66,6 +66,10 @@ room! {
         0, "target position", I32, RW, RECEIVE, Set(SetPoint::TargetPosition); "rad", 1e-6, ANY;
             "Position mode. In a PDO it counts once it is another one than when the mode was entered or operation enabled, or with the release of halt"
     }
+    0x60B2 "torque offset" {
+        0, "torque offset", I16, RW, RECEIVE, Set(SetPoint::TorqueOffset); "of 6076h", 1e-3, ANY;
+            "Added in every mode but the open loop: what holds the joint, gravity above all. In torque mode the energy guard takes the sign of 6071h alone for a push"
+    }
     0x60FF "target velocity" {
         0, "target velocity", I32, RW, RECEIVE, Set(SetPoint::TargetVelocity); "rad/s", 1e-3, ANY;
             "Velocity mode"

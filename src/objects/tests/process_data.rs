@@ -171,6 +171,50 @@ fn halt_holds_in_every_mode_and_keeps_only_the_torque_that_bears_a_load() {
 }
 
 #[test]
+fn what_holds_is_added_in_every_mode_but_the_open_loop_once_it_came_and_through_a_halt() {
+    let offset = |node: &mut Node| node.download(0x60B2, 0, &(-250i16).to_le_bytes()).unwrap();
+    for mode in [8, 9, 10, -1, 0, -2] {
+        let [mut node, mut without] = [(); 2].map(|()| Node::operational());
+        set_mode(&mut node, mode);
+        set_mode(&mut without, mode);
+        offset(&mut node);
+        for (n, controlword) in [0x0F, 0x0F, 0x10F, 0x0F].into_iter().enumerate() {
+            for node in [&mut node, &mut without] {
+                node.receive(0x205, &rpdo1(controlword, 100, n as i32));
+                node.receive(0x405, &[1, 2, 3, 4, 5, 6, 7, 8]);
+            }
+            // What came before operation was enabled is nothing to go by.
+            let held = if n == 0 || mode == -2 { 0.0 } else { -0.25 * node.shared.rated_torque() };
+            let (with, without) = (node.image.demand().command, without.image.demand().command);
+            assert!((with.torque - without.torque - held).abs() < 1e-6, "mode {mode}, {n}: {with:?}");
+            assert_eq!(with, Command { torque: with.torque, push: with.push, ..without }, "mode {mode}, {n}");
+            if n == 0 {
+                offset(&mut node);
+            }
+        }
+        node.receive(0, &[0x80, NODE]);
+        assert_eq!(node.image.demand().command, Command::default());
+    }
+}
+
+#[test]
+fn the_target_pushes_where_the_offset_says_what_holds() {
+    let mut node = Node::operational();
+    set_mode(&mut node, 10);
+    node.receive(0x205, &rpdo1(0x0F, 0, 0));
+    node.receive(0x205, &rpdo1(0x0F, 100, 0));
+    let rated = node.shared.rated_torque();
+    let asked = |node: &Node| [node.image.demand().command.torque, node.image.demand().command.push];
+    assert_eq!(asked(&node), [0.1 * rated, 0.0]);
+    for (offset, torque) in [(0i16, 0.1), (-300, -0.2)] {
+        node.download(0x60B2, 0, &offset.to_le_bytes()).unwrap();
+        for (found, expected) in asked(&node).into_iter().zip([torque * rated, 0.1 * rated]) {
+            assert!((found - expected).abs() < 1e-6 * rated, "{found} Nm, expected {expected}");
+        }
+    }
+}
+
+#[test]
 fn the_statusword_tells_whether_the_target_is_followed() {
     let mut node = Node::operational();
     set_mode(&mut node, 9);

@@ -60,12 +60,13 @@ fn mode() -> impl Strategy<Value = Mode> {
 }
 
 fn command(mode: impl Strategy<Value = Mode>) -> impl Strategy<Value = Command> {
-    (mode, number(), number(), number(), number(), number(), any::<u64>()).prop_map(
-        |(mode, position, velocity, torque, stiffness, damping, frame)| Command {
+    (mode, number(), number(), number(), number(), number(), number(), any::<u64>()).prop_map(
+        |(mode, position, velocity, torque, push, stiffness, damping, frame)| Command {
             mode,
             position,
             velocity,
             torque,
+            push,
             stiffness,
             damping,
             open_loop: Frame::from_bits(frame),

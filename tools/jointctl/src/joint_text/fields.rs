@@ -42,7 +42,7 @@ const fn field(
 }
 
 /// All keys.
-pub const FIELDS: [Field; 47] = [
+pub const FIELDS: [Field; 48] = [
     field("", "node_id", "", None, "Node on the CAN bus, 1 to 127; 255 where none is assigned yet"),
     field("", "oscillator_trim", "", Some((54.0, 74.0)), "Trim of the board's oscillator, steps of some 0.3 %"),
     field("motor", "resistance", "Ohm", Some((1e-3, 100.0)), "Resistance of a phase at 25 °C"),
@@ -210,6 +210,13 @@ pub const FIELDS: [Field; 47] = [
         "rad/s",
         Some((1e-4, 10.0)),
         "Velocity below which compensation fades out",
+    ),
+    field(
+        "compensation",
+        "uncertainty",
+        "",
+        Some((0.0, 1.0)),
+        "By how much friction may be less than gain times the model; what the energy guard may take",
     ),
     field("thermal", "winding_capacity", "J/K", None, "Heat capacity of the winding; to 10000"),
     field("thermal", "housing_capacity", "J/K", None, "Heat capacity of the housing; to 100000"),

@@ -5,8 +5,8 @@
 
 use joint_firmware::compensation::Request;
 use joint_firmware::joint::configuration::{
-    CompensationConfiguration, Configuration, FACTORY_TRIM, Gains, GearConfiguration, Limits, MotorConfiguration,
-    ThermalConfiguration, VelocitySource,
+    CompensationConfiguration, Configuration, FACTORY_TRIM, FRICTION_UNCERTAINTY, Gains, GearConfiguration, Limits,
+    MotorConfiguration, ThermalConfiguration, VelocitySource,
 };
 use joint_firmware::motor::angle::{Direction, ElectricalAngle, EncoderAlignment};
 use serde::{Deserialize, Serialize};
@@ -135,6 +135,13 @@ struct CompensationText {
     #[serde(with = "VelocitySourceText")]
     velocity_source: VelocitySource,
     standstill_velocity: f32,
+    #[serde(default = "uncertainty")]
+    uncertainty: f32,
+}
+
+/// Files of earlier programs have none.
+fn uncertainty() -> f32 {
+    FRICTION_UNCERTAINTY
 }
 
 #[derive(Serialize, Deserialize)]

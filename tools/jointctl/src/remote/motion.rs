@@ -73,7 +73,7 @@ impl Motion {
         if joint.raw(Field::Configuration(ConfigurationField::Changed))? != 0 {
             return Err(RemoteError::Staged { node: joint.id() });
         }
-        let Command { mode, position, velocity, torque, stiffness, damping, open_loop: _ } = self.command;
+        let Command { mode, position, velocity, torque, stiffness, damping, .. } = self.command;
         let both = |what, value: f32, unit, setting| {
             let high = joint.number(Field::Setting(setting))?;
             within(joint, what, value.into(), [-high, high], unit, &[Field::Setting(setting)])
