@@ -28,7 +28,7 @@ pub struct Rtt {
 pub enum RttError {
     /// Its memory does not answer.
     Memory(Refusal),
-    /// The offsets lie outside of the buffer: it is not set up, or overwritten.
+    /// The offsets lie outside of the buffer, or it outside of the address space: it is not set up, or overwritten.
     Damaged {
         /// Bytes of the buffer.
         size: u32,
@@ -72,13 +72,15 @@ impl Rtt {
         if size == 0 || write == start {
             return Ok(Vec::new());
         }
-        if write >= size || start >= size {
+        // Memory that has just got its power holds anything.
+        if write >= size || start >= size || buffer.checked_add(size).is_none() {
             return Err(RttError::Damaged { size, write, read: start });
         }
         let length = if write > start { write - start } else { size - start + write };
         let bytes = (0..length).map(|i| {
-            let at = buffer + (start + i) % size;
-            bus.read(now, at, Width::Byte).map(|byte| byte as u8)
+            let to_end = size - start;
+            let offset = if i < to_end { start + i } else { i - to_end };
+            bus.read(now, buffer + offset, Width::Byte).map(|byte| byte as u8)
         });
         let bytes = bytes.collect::<Result<Vec<u8>, Refusal>>()?;
         bus.write(now, self.channel + READ, Width::Word, write)?;
@@ -177,6 +179,21 @@ mod tests {
     fn offsets_that_cannot_be_are_told() {
         let (mut memory, rtt) = channel(9, 0);
         assert_eq!(rtt.read(&mut memory, 0), Err(RttError::Damaged { size: 8, write: 9, read: 0 }));
+        // As memory comes up: a buffer that ends beyond the address space, one that ends with it, and one as large as it.
+        for (buffer, size, write, read) in [
+            (u32::MAX - 6, 8, 5, 2),
+            (u32::MAX - 8, 8, 5, 2),
+            (TEXT, u32::MAX - TEXT, 0xC000_0000, 1),
+            (0, u32::MAX, 1, 0xC000_0000),
+        ] {
+            let (mut memory, rtt) = channel(0, 0);
+            let words = [0, buffer, size, write, read, 0].map(u32::to_le_bytes).concat();
+            assert!(memory.set(BLOCK + CHANNEL, &words));
+            let ends_beyond = buffer.checked_add(size).is_none();
+            let damaged = RttError::Damaged { size, write, read };
+            let expected = if ends_beyond { damaged } else { RttError::Memory(Refusal::NoAnswer) };
+            assert_eq!(rtt.read(&mut memory, 0), Err(expected), "{buffer:#x}, {size:#x}");
+        }
         let (_, rtt) = channel(1, 0);
         let mut nothing = Memory::new();
         assert_eq!(rtt.read(&mut nothing, 0), Err(RttError::Memory(Refusal::NoAnswer)));

@@ -1,0 +1,114 @@
+//! Examples at the end of every command's help.
+
+use clap::{ArgMatches, Command};
+
+/// What a command is called below `jointctl`, and lines as one types them. `JOINTCTL_BUS` and `JOINTCTL_NODE` stand for `--bus` and
+/// `--node`.
+const EXAMPLES: [(&str, &[&str]); 33] = [
+    ("demo", &["jointctl demo", "jointctl demo --seed 7 --out demo-7"]),
+    ("fit", &["jointctl fit elbow.toml", "jointctl fit elbow.toml --all"]),
+    ("evaluate", &["jointctl evaluate elbow/friction.img other.toml"]),
+    ("image inspect", &["jointctl image inspect elbow/friction.img"]),
+    ("image verify", &["jointctl image verify elbow/friction.signed --key joint.key"]),
+    ("image convert", &["jointctl image convert elbow/friction.img friction.toml"]),
+    ("key new", &["jointctl key new joint.key"]),
+    ("key give", &["jointctl key give joint.key --bus can0 --node 5"]),
+    ("key number", &["jointctl key number joint.key"]),
+    ("sign", &["jointctl sign elbow/friction.img --key joint.key --version 2 --serial 12"]),
+    (
+        "sim",
+        &[
+            "jointctl sim --image demo/friction.img",
+            "jointctl sim --config joint.toml --plant plant.toml --scenario slow-reversal",
+            "jointctl sim --bus udp:239.74.163.2:43113 --node 5 --node 6",
+        ],
+    ),
+    ("scan", &["jointctl scan --bus can0"]),
+    ("address", &["jointctl address --bus can0 --first 5 --wait 300"]),
+    ("info", &["jointctl info --bus can0 --node 5"]),
+    ("get", &["jointctl get torque-limit limits 6064 --bus can0 --node 5", "jointctl get --json --bus can0 --node 5"]),
+    ("set", &["jointctl set requested-model 2 --bus can0 --node 5"]),
+    ("enable", &["jointctl enable --bus can0 --node 5"]),
+    ("disable", &["jointctl disable --bus can0 --node 5"]),
+    (
+        "move",
+        &[
+            "jointctl move position 0.5 --duration 2 --bus can0 --node 5",
+            "jointctl move velocity -0.3 --duration 2 --bus can0 --node 5",
+        ],
+    ),
+    ("commission", &["jointctl commission --current 8 --current-limit 12 --bus can0 --node 5"]),
+    ("monitor", &["jointctl monitor --bus can0 --node 5"]),
+    ("record", &["jointctl record --out elbow.csv --duration 60 --bus can0 --node 5"]),
+    ("retrain", &["jointctl retrain --bus can0 --node 5"]),
+    (
+        "upload",
+        &[
+            "jointctl upload elbow/friction.img --trial 60 --bus can0 --node 5",
+            "jointctl upload elbow/friction.img --commit --bus can0 --node 5",
+        ],
+    ),
+    ("rollback", &["jointctl rollback --bus can0 --node 5"]),
+    ("discard", &["jointctl discard --bus can0 --node 5"]),
+    ("store", &["jointctl store --bus can0 --node 5"]),
+    ("restore", &["jointctl restore --bus can0 --node 5"]),
+    ("eds", &["jointctl eds", "jointctl eds elbow.eds --bus can0 --node 5"]),
+    ("dbc", &["jointctl dbc arm.dbc --node 5 --node 6"]),
+    ("bus-yml", &["jointctl bus-yml --bus can0"]),
+    ("excite", &["jointctl excite --config joint.toml", "jointctl excite --config joint.toml --check my-motion.csv"]),
+    ("completions", &["jointctl completions bash > ~/.local/share/bash-completion/completions/jointctl"]),
+];
+
+/// The commands with their examples.
+pub fn with_examples(command: Command) -> Command {
+    EXAMPLES.iter().fold(command, |command, (path, lines)| {
+        let help = lines.iter().fold("Examples:".to_owned(), |help, line| format!("{help}\n  {line}"));
+        below(command, &path.split(' ').collect::<Vec<_>>(), help)
+    })
+}
+
+fn below(command: Command, path: &[&str], help: String) -> Command {
+    match path.split_first() {
+        Some((name, rest)) => command.mut_subcommand(name, |command| below(command, rest, help)),
+        None => command.after_help(help),
+    }
+}
+
+/// The deepest command that was asked for, and its name below `jointctl`.
+#[cfg(test)]
+fn path(matches: &ArgMatches) -> Vec<&str> {
+    matches.subcommand().map_or_else(Vec::new, |(name, matches)| [&[name], &path(matches)[..]].concat())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::commands::arguments;
+
+    fn leaves(command: &Command, above: &str, found: &mut Vec<String>) {
+        for command in command.get_subcommands() {
+            let name = format!("{above} {}", command.get_name()).trim().to_owned();
+            match command.has_subcommands() {
+                true => leaves(command, &name, found),
+                false => found.push(name),
+            }
+        }
+    }
+
+    #[test]
+    fn every_command_has_examples_and_they_are_valid() {
+        let command = arguments();
+        let mut names = Vec::new();
+        leaves(&command, "", &mut names);
+        let mut with: Vec<&str> = EXAMPLES.iter().map(|(path, _)| *path).collect();
+        (names.sort(), with.sort_unstable());
+        assert_eq!(names, with);
+        for (name, lines) in EXAMPLES {
+            for line in lines {
+                let words = line.split(" > ").next().unwrap_or_default().split(' ');
+                let matches = command.clone().try_get_matches_from(words).unwrap_or_else(|error| panic!("{line}: {error}"));
+                assert_eq!(path(&matches).join(" "), name);
+            }
+        }
+    }
+}
