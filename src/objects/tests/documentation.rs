@@ -11,18 +11,27 @@ The object dictionary of the joint, made from the tables in `src/objects/table/`
 be mapped into RPDOs, T into TPDOs.
 ";
 
-fn row(text: &mut String, (object, words): (&Object, &Text)) {
-    let access = match object.access {
+/// What an SDO client may do with it.
+pub fn access(object: &Object) -> &'static str {
+    match object.access {
         Access::ReadOnly => "ro",
         Access::WriteOnly => "wo",
         Access::ReadWrite => "rw",
-    };
-    let pdo = match (object.mappable.receive, object.mappable.transmit) {
+    }
+}
+
+/// The PDOs that it may be part of.
+pub fn pdo(object: &Object) -> &'static str {
+    match (object.mappable.receive, object.mappable.transmit) {
         (true, true) => "RT",
         (true, false) => "R",
         (false, true) => "T",
         (false, false) => "",
-    };
+    }
+}
+
+fn row(text: &mut String, (object, words): (&Object, &Text)) {
+    let (access, pdo) = (access(object), pdo(object));
     let step = match (words.unit, words.scale) {
         ("", 1.0) => String::new(),
         (unit, 1.0) if object.data_type == DataType::F32 => unit.to_string(),
@@ -53,13 +62,17 @@ fn document() -> String {
     text
 }
 
+/// Fails where the file says anything else; writes it with `UPDATE_DOCS`.
+pub fn held_to(file: &str, expected: &str) {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
+    if std::env::var_os("UPDATE_DOCS").is_some() {
+        std::fs::write(&path, expected).unwrap();
+    }
+    let found = std::fs::read_to_string(&path).unwrap_or_default();
+    assert!(found == expected, "{file} is not what the table says; UPDATE_DOCS=1 writes it anew");
+}
+
 #[test]
 fn the_file_says_what_the_table_says() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/objects.md");
-    let expected = document();
-    if std::env::var_os("UPDATE_DOCS").is_some() {
-        std::fs::write(path, &expected).unwrap();
-    }
-    let found = std::fs::read_to_string(path).unwrap_or_default();
-    assert!(found == expected, "docs/objects.md is not what the table says; UPDATE_DOCS=1 writes it anew");
+    held_to("docs/objects.md", &document());
 }

@@ -5,6 +5,7 @@ mod documentation;
 mod hardware;
 mod hostile;
 mod images;
+mod masters;
 mod open_loop;
 mod process_data;
 mod settings;

@@ -382,3 +382,30 @@ fn a_commissioning_that_nobody_can_agree_to_is_refused_before_the_bus_is_opened(
     let refused = stderr(&run(&["--yes"]));
     assert!(refused.contains("none"), "the bus comes after both: {refused}");
 }
+
+#[test]
+fn completions_of_every_shell_name_the_commands_and_bash_completes_one() {
+    let folder = tempfile::tempdir().unwrap();
+    for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
+        let output = jointctl(folder.path(), &["completions", shell]);
+        assert!(output.status.success(), "{shell}: {}", stderr(&output));
+        let script = String::from_utf8(output.stdout).unwrap();
+        assert!(script.contains("bus-yml") && script.contains("completions"), "{shell}");
+        std::fs::write(folder.path().join(shell), script).unwrap();
+    }
+    assert_eq!(jointctl(folder.path(), &["completions", "tcsh"]).status.code(), Some(2));
+    let completed = "source ./bash; COMP_WORDS=(jointctl comm); COMP_CWORD=1; _jointctl jointctl comm jointctl; echo ${COMPREPLY[*]}";
+    let output = Command::new("bash").current_dir(folder.path()).args(["-c", completed]).output().expect("bash starts");
+    assert_eq!(String::from_utf8_lossy(&output.stdout), "commission\n", "{}", stderr(&output));
+}
+
+#[test]
+fn the_help_of_a_command_ends_with_examples() {
+    let folder = tempfile::tempdir().unwrap();
+    for arguments in [&["move", "--help"][..], &["image", "verify", "--help"], &["help", "retrain"]] {
+        let output = jointctl(folder.path(), arguments);
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        let examples = text.split("\nExamples:\n").nth(1).unwrap_or_default();
+        assert!(!examples.is_empty() && examples.lines().all(|line| line.starts_with("  jointctl ")), "{text}");
+    }
+}

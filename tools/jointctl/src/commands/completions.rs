@@ -3,8 +3,9 @@
 use super::{CommandError, arguments};
 use clap::Args;
 use clap_complete::Shell;
+use std::io::Write;
 
-/// Write the completions of a shell to standard output.
+/// Arguments of `completions`.
 #[derive(Clone, Copy, Debug, Args)]
 pub struct Completions {
     /// The shell
@@ -12,9 +13,12 @@ pub struct Completions {
 }
 
 impl Completions {
-    pub(super) fn run(self) -> Result<(), CommandError> {
+    /// Runs the command.
+    pub fn run(self) -> Result<(), CommandError> {
         let mut script = Vec::new();
         clap_complete::generate(self.shell, &mut arguments(), "jointctl", &mut script);
-        crate::output::print(&script)
+        // Whoever closes the pipe, as `head` does, has seen enough.
+        let _ = std::io::stdout().write_all(&script);
+        Ok(())
     }
 }

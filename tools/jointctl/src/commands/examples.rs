@@ -1,6 +1,6 @@
 //! Examples at the end of every command's help.
 
-use clap::{ArgMatches, Command};
+use clap::Command;
 
 /// What a command is called below `jointctl`, and lines as one types them. `JOINTCTL_BUS` and `JOINTCTL_NODE` stand for `--bus` and
 /// `--node`.
@@ -12,7 +12,7 @@ const EXAMPLES: [(&str, &[&str]); 33] = [
     ("image verify", &["jointctl image verify elbow/friction.signed --key joint.key"]),
     ("image convert", &["jointctl image convert elbow/friction.img friction.toml"]),
     ("key new", &["jointctl key new joint.key"]),
-    ("key give", &["jointctl key give joint.key --bus can0 --node 5"]),
+    ("key give", &["jointctl key give joint.key --bus socketcan:can0 --node 5"]),
     ("key number", &["jointctl key number joint.key"]),
     ("sign", &["jointctl sign elbow/friction.img --key joint.key --version 2 --serial 12"]),
     (
@@ -23,38 +23,44 @@ const EXAMPLES: [(&str, &[&str]); 33] = [
             "jointctl sim --bus udp:239.74.163.2:43113 --node 5 --node 6",
         ],
     ),
-    ("scan", &["jointctl scan --bus can0"]),
-    ("address", &["jointctl address --bus can0 --first 5 --wait 300"]),
-    ("info", &["jointctl info --bus can0 --node 5"]),
-    ("get", &["jointctl get torque-limit limits 6064 --bus can0 --node 5", "jointctl get --json --bus can0 --node 5"]),
-    ("set", &["jointctl set requested-model 2 --bus can0 --node 5"]),
-    ("enable", &["jointctl enable --bus can0 --node 5"]),
-    ("disable", &["jointctl disable --bus can0 --node 5"]),
+    ("scan", &["jointctl scan --bus socketcan:can0"]),
+    ("address", &["jointctl address --bus socketcan:can0 --first 5 --wait 300"]),
+    ("info", &["jointctl info --bus socketcan:can0 --node 5"]),
+    (
+        "get",
+        &[
+            "jointctl get torque-limit limits 6064 --bus socketcan:can0 --node 5",
+            "jointctl get --json --bus can0 --node 5",
+        ],
+    ),
+    ("set", &["jointctl set requested-model 2 --bus socketcan:can0 --node 5"]),
+    ("enable", &["jointctl enable --bus socketcan:can0 --node 5"]),
+    ("disable", &["jointctl disable --bus socketcan:can0 --node 5"]),
     (
         "move",
         &[
-            "jointctl move position 0.5 --duration 2 --bus can0 --node 5",
-            "jointctl move velocity -0.3 --duration 2 --bus can0 --node 5",
+            "jointctl move position 0.5 --duration 2 --bus socketcan:can0 --node 5",
+            "jointctl move velocity -0.3 --duration 2 --bus socketcan:can0 --node 5",
         ],
     ),
-    ("commission", &["jointctl commission --current 8 --current-limit 12 --bus can0 --node 5"]),
-    ("monitor", &["jointctl monitor --bus can0 --node 5"]),
-    ("record", &["jointctl record --out elbow.csv --duration 60 --bus can0 --node 5"]),
-    ("retrain", &["jointctl retrain --bus can0 --node 5"]),
+    ("commission", &["jointctl commission --current 8 --current-limit 12 --bus socketcan:can0 --node 5"]),
+    ("monitor", &["jointctl monitor --bus socketcan:can0 --node 5"]),
+    ("record", &["jointctl record --out elbow.csv --duration 60 --bus socketcan:can0 --node 5"]),
+    ("retrain", &["jointctl retrain --bus socketcan:can0 --node 5"]),
     (
         "upload",
         &[
-            "jointctl upload elbow/friction.img --trial 60 --bus can0 --node 5",
-            "jointctl upload elbow/friction.img --commit --bus can0 --node 5",
+            "jointctl upload elbow/friction.img --trial 60 --bus socketcan:can0 --node 5",
+            "jointctl upload elbow/friction.img --commit --bus socketcan:can0 --node 5",
         ],
     ),
-    ("rollback", &["jointctl rollback --bus can0 --node 5"]),
-    ("discard", &["jointctl discard --bus can0 --node 5"]),
-    ("store", &["jointctl store --bus can0 --node 5"]),
-    ("restore", &["jointctl restore --bus can0 --node 5"]),
-    ("eds", &["jointctl eds", "jointctl eds elbow.eds --bus can0 --node 5"]),
+    ("rollback", &["jointctl rollback --bus socketcan:can0 --node 5"]),
+    ("discard", &["jointctl discard --bus socketcan:can0 --node 5"]),
+    ("store", &["jointctl store --bus socketcan:can0 --node 5"]),
+    ("restore", &["jointctl restore --bus socketcan:can0 --node 5"]),
+    ("eds", &["jointctl eds", "jointctl eds elbow.eds --bus socketcan:can0 --node 5"]),
     ("dbc", &["jointctl dbc arm.dbc --node 5 --node 6"]),
-    ("bus-yml", &["jointctl bus-yml --bus can0"]),
+    ("bus-yml", &["jointctl bus-yml --node 5 --node 6 --out arm"]),
     ("excite", &["jointctl excite --config joint.toml", "jointctl excite --config joint.toml --check my-motion.csv"]),
     ("completions", &["jointctl completions bash > ~/.local/share/bash-completion/completions/jointctl"]),
 ];
@@ -74,17 +80,18 @@ fn below(command: Command, path: &[&str], help: String) -> Command {
     }
 }
 
-/// The deepest command that was asked for, and its name below `jointctl`.
-#[cfg(test)]
-fn path(matches: &ArgMatches) -> Vec<&str> {
-    matches.subcommand().map_or_else(Vec::new, |(name, matches)| [&[name], &path(matches)[..]].concat())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::commands::arguments;
+    use clap::ArgMatches;
 
+    /// What was asked for, below `jointctl`.
+    fn path(matches: &ArgMatches) -> Vec<&str> {
+        matches.subcommand().map_or_else(Vec::new, |(name, matches)| [&[name], &path(matches)[..]].concat())
+    }
+
+    /// Names of all commands without commands of their own.
     fn leaves(command: &Command, above: &str, found: &mut Vec<String>) {
         for command in command.get_subcommands() {
             let name = format!("{above} {}", command.get_name()).trim().to_owned();
@@ -106,7 +113,8 @@ mod tests {
         for (name, lines) in EXAMPLES {
             for line in lines {
                 let words = line.split(" > ").next().unwrap_or_default().split(' ');
-                let matches = command.clone().try_get_matches_from(words).unwrap_or_else(|error| panic!("{line}: {error}"));
+                let matches =
+                    command.clone().try_get_matches_from(words).unwrap_or_else(|error| panic!("{line}: {error}"));
                 assert_eq!(path(&matches).join(" "), name);
             }
         }

@@ -3,11 +3,13 @@
 pub mod bus;
 pub mod bus_yml;
 pub mod commission;
+pub mod completions;
 pub mod demo;
 pub mod describe;
 pub mod drive;
 mod elf;
 pub mod evaluate;
+mod examples;
 pub mod excite;
 pub mod fit;
 pub mod image;
@@ -22,7 +24,7 @@ pub mod retrain;
 pub mod sim;
 pub mod upload;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use std::path::PathBuf;
 
 /// Identify, train, certify and judge the friction model of a robot joint.
@@ -95,6 +97,14 @@ pub enum Command {
     BusYml(bus_yml::BusYml),
     /// Write a motion that identifies a joint, or check one
     Excite(excite::Excite),
+    /// Write the completions of a shell to standard output
+    Completions(completions::Completions),
+}
+
+/// The program's arguments, with examples at the end of every command's help.
+#[must_use]
+pub fn arguments() -> clap::Command {
+    examples::with_examples(Arguments::command())
 }
 
 /// Anything that ends a command.
@@ -228,5 +238,6 @@ pub fn run(arguments: Arguments) -> Result<(), CommandError> {
         Command::Dbc(dbc) => dbc.run(),
         Command::BusYml(bus_yml) => bus_yml.run(),
         Command::Excite(excite) => excite.run(),
+        Command::Completions(completions) => completions.run(),
     }
 }
