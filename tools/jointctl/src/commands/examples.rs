@@ -30,7 +30,7 @@ const EXAMPLES: [(&str, &[&str]); 33] = [
         "get",
         &[
             "jointctl get torque-limit limits 6064 --bus socketcan:can0 --node 5",
-            "jointctl get --json --bus can0 --node 5",
+            "jointctl get limits --json --bus socketcan:can0 --node 5",
         ],
     ),
     ("set", &["jointctl set requested-model 2 --bus socketcan:can0 --node 5"]),
