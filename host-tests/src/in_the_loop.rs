@@ -78,6 +78,8 @@ pub struct InTorqueMode {
     pub moved_untold: f64,
 }
 
+/// How much warmer than its ambient a joint begins, K.
+const WARMTH: f64 = 10.0;
 /// Bandwidth of a hand, and of a controller around torque mode, rad/s.
 const LEADING: f64 = 25.0;
 /// Time for which the joint is led, s; the first tenth is not counted.
@@ -132,6 +134,17 @@ impl RandomJoint {
         self.run(&on, variant, Some(&self.found.model))
     }
 
+    /// Torque errors of moves that begin at 0 °C, without compensation and with it, %.
+    ///
+    /// # Errors
+    /// A fault on the way.
+    pub fn in_the_cold(&self, variant: &Variant) -> Result<[f64; 2], String> {
+        let on = self.off.compensating(Request::PhysicalAndNetwork);
+        let warmth = -self.parameters.joint.thermal.ambient;
+        let torque = |setup, model| Ok::<_, String>(self.errors(setup, variant, model, &self.moves, warmth)?.torque);
+        Ok([torque(&self.off, None)?, torque(&on, Some(&self.found.model))?])
+    }
+
     /// Moves in torque mode, to and fro over half of the travel at up to half of the speed limit.
     ///
     /// # Errors
@@ -146,7 +159,7 @@ impl RandomJoint {
     fn led(&self, variant: &Variant, by_hand: bool, told: bool) -> Result<f64, String> {
         let failed = |error: String| format!("joint {}, {}, torque mode: {error}", self.seed, variant.name);
         let setup = self.off.compensating(Request::PhysicalAndNetwork);
-        let joint = variant.enabled(&self.parameters, &setup, Some(self.found.model.clone()), 10.0, 99);
+        let joint = variant.enabled(&self.parameters, &setup, Some(self.found.model.clone()), WARMTH, 99);
         let mut joint = joint.map_err(|error| failed(error.to_string()))?;
         let (plant, limits) = (&self.parameters.joint, &self.parameters.joint.limits);
         let amplitude = 0.25 * limits.travel;
@@ -184,20 +197,21 @@ impl RandomJoint {
     }
 
     fn run(&self, setup: &Setup, variant: &Variant, model: Option<&FrictionModel>) -> Result<Moved, String> {
-        let errors = |trajectory| self.errors(setup, variant, model, trajectory);
+        let errors = |trajectory| self.errors(setup, variant, model, trajectory, WARMTH);
         Ok(Moved { moves: errors(&self.moves)?, reversals: errors(&self.reversals)? })
     }
 
-    /// Follows the trajectory 10 K above the ambient temperature.
+    /// Follows the trajectory, at first `warmth` (K) above the ambient temperature.
     fn errors(
         &self,
         setup: &Setup,
         variant: &Variant,
         model: Option<&FrictionModel>,
         trajectory: &Trajectory,
+        warmth: f64,
     ) -> Result<Errors, String> {
         let failed = |error: String| format!("joint {}, {}: {error}", self.seed, variant.name);
-        let joint = variant.enabled(&self.parameters, setup, model.cloned(), 10.0, 99);
+        let joint = variant.enabled(&self.parameters, setup, model.cloned(), warmth, 99);
         let mut joint = joint.map_err(|error| failed(error.to_string()))?;
         let mut torques: Vec<(f64, f64)> = Vec::new();
         let (mut squares, mut shares) = (0.0, Shares::default());

@@ -12,20 +12,26 @@ const TORQUE_ERROR: (f64, f64) = (4.4, 11.7);
 /// Least factor by which the position error of slow reversals falls, median: README's 5.3 less a tenth.
 const TRACKING_GAIN: f64 = 4.8;
 
+/// The same for moves that begin at 0 °C: README's 10.6 and 29.9, and a tenth of them.
+const COLD: (f64, f64) = (11.7, 32.9);
+
 /// Friction left in torque mode at most, led by hand, and moved by a command that tells its offset and one that does not, median
 /// and worst, %: README's figures and a tenth of them.
 const TORQUE_MODE: [(f64, f64); 3] = [(69.6, 74.1), (10.3, 44.1), (68.9, 70.3)];
 
-/// A joint without compensation, and with it; and in torque mode.
-fn moved(seed: u64) -> Result<([Moved; 2], InTorqueMode), String> {
+/// A joint without compensation, and with it; in torque mode; and from 0 °C.
+fn moved(seed: u64) -> Result<([Moved; 2], InTorqueMode, [f64; 2]), String> {
     let joint = RandomJoint::commissioned(seed).map_err(|error| format!("joint {seed}: {error}"))?;
-    Ok(([joint.without()?, joint.with(&DEFAULT)?], joint.in_torque_mode(&DEFAULT)?))
+    let moved = [joint.without()?, joint.with(&DEFAULT)?];
+    Ok((moved, joint.in_torque_mode(&DEFAULT)?, joint.in_the_cold(&DEFAULT)?))
 }
 
 #[test]
 fn the_torque_that_friction_takes_is_given_back_and_slow_reversals_track() {
-    let (rows, torque_mode): (Vec<[Moved; 2]>, Vec<InTorqueMode>) =
-        for_seeds(SEEDS, moved).into_iter().map(Result::unwrap).unzip();
+    let found: Vec<_> = for_seeds(SEEDS, moved).into_iter().map(Result::unwrap).collect();
+    let rows: Vec<[Moved; 2]> = found.iter().map(|found| found.0).collect();
+    let torque_mode: Vec<InTorqueMode> = found.iter().map(|found| found.1).collect();
+    let cold: Vec<[f64; 2]> = found.iter().map(|found| found.2).collect();
     println!("joint  moves: torque error [%]   slow reversals: RMS position error [mrad]");
     for (seed, moved) in SEEDS.zip(&rows) {
         let [slow_before, slow_after] = moved.map(|moved| 1e3 * moved.reversals.tracking);
@@ -43,6 +49,14 @@ fn the_torque_that_friction_takes_is_given_back_and_slow_reversals_track() {
     );
     assert!(after <= TORQUE_ERROR.0 && worst <= TORQUE_ERROR.1, "torque error {after} % median, {worst} % worst");
     assert!(gain >= TRACKING_GAIN, "tracking {gain}x");
+    let [_, (middle, worst)] = [0, 1].map(|with| {
+        let errors = cold.iter().map(|errors| errors[with]);
+        let found = (median(errors.clone().collect()), errors.fold(0.0f64, f64::max));
+        println!("torque error from 0 °C, {}: median {:.1} %, worst {:.1} %", ["off", "on"][with], found.0, found.1);
+        found
+    });
+    assert!(middle <= COLD.0 && worst <= COLD.1, "from 0 °C: torque error {middle} % median, {worst} % worst");
+    assert!(cold.iter().all(|[off, on]| on < off), "better off from 0 °C: {cold:?}");
     type Left = fn(&InTorqueMode) -> f64;
     let left: [(&str, Left); 3] = [
         ("led by hand", |left| left.guided),

@@ -167,9 +167,13 @@ impl Fade {
     pub(super) const NONE: Self =
         Self { edges: [Edge { range: Range { low: 0, high: 0 }, margin: 0, factor: 0, per_step: 0 }; SIGNALS] };
 
-    /// Prepares the fade of `domain`.
+    /// Prepares the fade of `domain`. Nothing fades towards the cold: a joint that is colder than it was in training has more
+    /// friction, its lubricant being stiffer, so what the coldest trained temperature (the physical model: one margin below)
+    /// gives is less than friction takes.
     pub fn new(domain: &Domain) -> Self {
-        Self { edges: domain.ranges.map(|range| Edge::new(range, domain.margin)) }
+        let mut edges = domain.ranges.map(|range| Edge::new(range, domain.margin));
+        edges[Signal::Temperature as usize].range.low = i32::MIN;
+        Self { edges }
     }
 
     /// The weights in a state.
@@ -229,6 +233,26 @@ mod tests {
         assert_eq!(at(3.75), (0, 25, velocity));
         assert_eq!(at(-4.0), (0, 0, velocity));
         assert_eq!(at(32_000.0), (0, 0, velocity));
+    }
+
+    #[test]
+    fn nothing_fades_towards_the_cold_and_all_of_it_towards_the_heat() {
+        let mut domain = Domain { ranges: [Range::ANY; SIGNALS], margin: 1 << 15, reference_temperature: 0 };
+        domain.ranges[Signal::Temperature as usize] = Range { low: 20 << 16, high: 40 << 16 };
+        let fade = Fade::new(&domain);
+        let at = |temperature: i32| {
+            let mut signals = [0; SIGNALS];
+            signals[Signal::Temperature as usize] = temperature;
+            let Weights { network, physical, outside } = fade.weights(&signals);
+            (network > 0, physical > 0, outside)
+        };
+        let temperature = Some(Signal::Temperature);
+        for cold in [i32::MIN, 0, (20 << 16) - 1, 20 << 16, 40 << 16] {
+            assert_eq!(at(cold), (true, true, None), "{cold}");
+        }
+        assert_eq!(at((40 << 16) + 1), (true, true, temperature));
+        assert_eq!(at(46 << 16), (false, true, temperature));
+        assert_eq!(at(50 << 16), (false, false, temperature));
     }
 
     #[test]

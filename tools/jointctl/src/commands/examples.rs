@@ -108,7 +108,8 @@ mod tests {
         let mut names = Vec::new();
         leaves(&command, "", &mut names);
         let mut with: Vec<&str> = EXAMPLES.iter().map(|(path, _)| *path).collect();
-        (names.sort(), with.sort_unstable());
+        names.sort();
+        with.sort_unstable();
         assert_eq!(names, with);
         for (name, lines) in EXAMPLES {
             for line in lines {
