@@ -78,7 +78,7 @@ pub struct InTorqueMode {
     pub moved_untold: f64,
 }
 
-/// How much warmer than its ambient a joint begins, K.
+/// Warmth of a joint above its ambient at the beginning, K.
 const WARMTH: f64 = 10.0;
 /// Bandwidth of a hand, and of a controller around torque mode, rad/s.
 const LEADING: f64 = 25.0;
@@ -154,8 +154,7 @@ impl RandomJoint {
         Ok(InTorqueMode { guided: left(true, true)?, moved: left(false, true)?, moved_untold: left(false, false)? })
     }
 
-    /// Friction that is left, % of its RMS, while a hand or the command leads the joint; the command tells what of it pushes, or
-    /// does not.
+    /// Friction that is left, % of its RMS, while a hand or the command leads the joint; the command tells its push or not.
     fn led(&self, variant: &Variant, by_hand: bool, told: bool) -> Result<f64, String> {
         let failed = |error: String| format!("joint {}, {}, torque mode: {error}", self.seed, variant.name);
         let setup = self.off.compensating(Request::PhysicalAndNetwork);

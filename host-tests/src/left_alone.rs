@@ -39,7 +39,8 @@ pub enum Alone {
     Free,
     /// A spring and a damper hold the position.
     Held,
-    /// Torque mode: a controller holds the position by such a spring and damper, 1,000 times a second, and says that it pushes.
+    /// Torque mode: a controller holds the position by such a spring and damper, 1,000 times a second, and says that it
+    /// pushes.
     Sprung,
     /// Torque mode: a controller bears the payload's gravity.
     Borne,
@@ -51,7 +52,7 @@ impl Alone {
     /// All of them.
     pub const ALL: [Self; 5] = [Self::Free, Self::Held, Self::Sprung, Self::Borne, Self::Swinging];
 
-    /// Whether the joint has its payload.
+    /// True where the joint has its payload.
     const fn loaded(self) -> bool {
         matches!(self, Self::Borne | Self::Swinging)
     }

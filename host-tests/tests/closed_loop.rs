@@ -1,6 +1,6 @@
 //! Compensation in the loop, on random joints that are not our model: each is excited without compensation, recorded as a user would,
-//! fitted, and moved with the image that came out. The torque that friction would have taken arrives, and slow reversals track; in
-//! torque mode little is gained.
+//! fitted, and moved with the image that came out. The torque that friction would have taken arrives, slow reversals
+//! track, and what is left in torque mode and in the cold is as published.
 
 use host_tests::in_the_loop::{InTorqueMode, Moved, RandomJoint, for_seeds, median};
 use host_tests::variant::DEFAULT;
@@ -15,8 +15,8 @@ const TRACKING_GAIN: f64 = 4.8;
 /// The same for moves that begin at 0 °C: README's 10.6 and 29.9, and a tenth of them.
 const COLD: (f64, f64) = (11.7, 32.9);
 
-/// Friction left in torque mode at most, led by hand, and moved by a command that tells its offset and one that does not, median
-/// and worst, %: README's figures and a tenth of them.
+/// Friction left in torque mode at most, led by hand, and moved by a command that tells its offset and one that does
+/// not, median and worst, %: README's figures and a tenth of them.
 const TORQUE_MODE: [(f64, f64); 3] = [(69.6, 74.1), (10.3, 44.1), (68.9, 70.3)];
 
 /// A joint without compensation, and with it; in torque mode; and from 0 °C.

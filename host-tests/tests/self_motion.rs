@@ -1,6 +1,6 @@
-//! Compensation never moves a joint by itself: over many random joints, with a model that is wrong by 50 % in every parameter and sensors
-//! up to two periods late, a joint that is not commanded to move does not start, and one that was pushed comes to rest: free, held
-//! by a spring of its own or of its master's, with a payload that swings or is borne.
+//! Compensation never moves a joint by itself: over many random joints, with a model that is wrong by 50 % in every
+//! parameter and sensors up to two periods late, a joint that is not commanded to move does not start, and one that was
+//! pushed comes to rest: free, held by a spring of its own or of its master's, with a payload that swings or is borne.
 
 use host_tests::in_the_loop::for_seeds;
 use host_tests::left_alone::{Alone, ERROR, judged};

@@ -6,7 +6,7 @@
 //! pre-sliding has friction at a velocity of zero, too, where motion turns back: there the feedforward fades over [`RELEASE`] instead of at once.
 //! Where there is none (torque mode), friction is computed for the measured velocity, and that is a positive feedback. It is held by the
 //! fade near standstill and by the guard: while the joint speeds up although its command does not push it that way, the
-//! compensation backs off within milliseconds, and it comes back only while the command pushes.
+//! compensation backs off within milliseconds, and it comes back only while the command pushes (docs/energy-guard.md).
 //!
 //! The guard takes no more than what is uncertain. Let friction be at least `1 - u` of gain times the model at every
 //! velocity, with the uncertainty `u` of the configuration. Then the rest, `1 - u` of the compensation, never gives more
@@ -67,7 +67,7 @@ pub struct Surroundings {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FrictionFeedforward {
     compensation: Compensation,
-    /// What the guard has taken away of the part that is uncertain, 0 to 1.
+    /// Share of the uncertain part that the guard has taken away, 0 to 1.
     withheld: f32,
     /// Slow mean of the speed, rad/s.
     speed: f32,
@@ -200,7 +200,7 @@ impl FrictionFeedforward {
         1.0 - self.withheld * (1.0 - gains.certain * moves)
     }
 
-    /// What the guard withholds of the part that is uncertain, 0 to 1.
+    /// Share of the uncertain part that the guard withholds, 0 to 1.
     pub fn withheld(&self) -> f32 {
         self.withheld
     }
@@ -383,8 +383,8 @@ mod tests {
         velocity
     }
 
-    /// What the guard lets through of a compensation with the uncertainty, once a speed has grown to this one (in standstill
-    /// velocities) without a push.
+    /// Part of a compensation with the uncertainty that the guard lets through, once a speed has grown to this one (in
+    /// standstill velocities) without a push.
     fn left_by_the_guard(uncertainty: f32, speed: f32) -> f32 {
         let mut active = active(VelocitySource::Measured, 0.0, 0.01);
         active.compensation.certain = 1.0 - uncertainty;
