@@ -9,8 +9,8 @@ use crate::compensation::Request;
 use crate::friction::regime::MOST_SETS;
 use crate::joint::BoardLimits;
 use crate::joint::configuration::{
-    BridgeConfiguration, CompensationConfiguration, Configuration, FACTORY_TRIM, FRICTION_UNCERTAINTY, Gains,
-    GearConfiguration, Limits, MotorConfiguration, ThermalConfiguration, VelocitySource,
+    AdaptationRequest, BridgeConfiguration, CompensationConfiguration, Configuration, FACTORY_TRIM,
+    FRICTION_UNCERTAINTY, Gains, GearConfiguration, Limits, MotorConfiguration, ThermalConfiguration, VelocitySource,
 };
 use crate::motor::angle::{Direction, ElectricalAngle, EncoderAlignment};
 use crate::sensors::analog::Analog;
@@ -198,6 +198,7 @@ const fn uncommissioned(bus_voltage: (f32, f32), regeneration_band: f32, encoder
             velocity_source: VelocitySource::Reference,
             standstill_velocity: 0.1,
             uncertainty: FRICTION_UNCERTAINTY,
+            adaptation: AdaptationRequest::Off,
         },
         thermal: ThermalConfiguration {
             winding_capacity: 10.0,

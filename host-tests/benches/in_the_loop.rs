@@ -3,7 +3,7 @@
 //! `cargo bench -p host-tests --bench in_the_loop > docs/in-the-loop.md`; some minutes.
 
 use host_tests::in_the_loop::{Moved, RandomJoint, for_seeds, median};
-use host_tests::left_alone::{Alone, ERROR, judged};
+use host_tests::left_alone::{Alone, ERROR, Experience, judged};
 use host_tests::variant::{ALL, DEFAULT, Variant};
 use plant::actuator::ActuatorParameters;
 use std::ops::Range;
@@ -22,8 +22,10 @@ fn main() {
     };
     let without = run(None);
     let with: Vec<Vec<Moved>> = ALL.iter().map(|variant| run(Some(variant))).collect();
-    let alone: Vec<usize> =
-        ALL.iter().map(|variant| for_seeds(ALONE, |seed| judged(seed, variant).1.len()).into_iter().sum()).collect();
+    let alone: Vec<usize> = ALL
+        .iter()
+        .map(|variant| for_seeds(ALONE, |seed| judged(seed, variant, Experience::None).1.len()).into_iter().sum())
+        .collect();
 
     println!("# In the loop\n");
     println!(

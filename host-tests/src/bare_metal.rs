@@ -34,7 +34,7 @@ pub const BOARDS: [Board; 2] = [
 impl Board {
     /// Features of the probe with which it has the room that the board's program has.
     pub fn room(&self) -> &'static [&'static str] {
-        if self.parameter_sets == 1 { &["one-parameter-set"] } else { &[] }
+        if self.parameter_sets == 1 { &["little-room"] } else { &[] }
     }
 
     /// Builds a program of `probe/src/bin` as this board's is, below a test's temporary folder; its path. `input` is a variable of the program's

@@ -4,7 +4,7 @@ use joint_firmware::joint::state_machine::{Controlword, State};
 use joint_firmware::joint::{Command, Demand, Mode, Telemetry};
 use plant::VirtualJoint;
 use plant::actuator::{ActuatorParameters, ActuatorState};
-use plant::excitation::Trajectory;
+use plant::excitation::{Segment, Trajectory};
 use plant::virtual_joint::{Setup, VirtualJointError};
 
 /// Control steps between two commands: a bus at 1 kHz.
@@ -30,6 +30,27 @@ pub fn demand(joint: &VirtualJoint, trajectory: &Trajectory, n: u64) -> Demand {
         sequence: command as u32 + 1,
         ..Demand::default()
     }
+}
+
+/// Moves over most of a joint's travel and speed, again and again, for at least `duration` (s).
+///
+/// # Errors
+/// What the plant refuses.
+pub fn moves(parameters: &ActuatorParameters, duration: f64) -> Result<Trajectory, String> {
+    let limits = &parameters.joint.limits;
+    let acceleration = parameters.joint.usable_acceleration().min(20.0);
+    // Shares of speed limit and travel.
+    let once = [(0.5, 0.6), (0.5, -0.6), (0.2, 0.3), (0.7, -0.3), (0.05, 0.0)].map(|(speed, to)| Segment::Move {
+        to: to * limits.travel,
+        speed: speed * limits.speed,
+        acceleration: 0.5 * acceleration,
+    });
+    let trajectory = |times| {
+        let many = core::iter::repeat_n(&once, times).flatten().cloned().collect();
+        Trajectory::new(many).map_err(|error| error.to_string())
+    };
+    let times = (duration / trajectory(1)?.duration()).ceil().max(1.0) as usize;
+    trajectory(times)
 }
 
 /// Follows a trajectory; `look` sees every control step. The state where the joint does not stay enabled.

@@ -2,16 +2,18 @@
 //! then moved with and without the image that came out.
 
 use crate::commission::{Commissioned, commission};
-use crate::driving::{COMMAND_STEPS, follow};
+use crate::driving::{self, COMMAND_STEPS, follow};
 use crate::variant::{DEFAULT, Variant};
 use joint_firmware::compensation::{Reason, Request};
 use joint_firmware::friction::FrictionModel;
 use joint_firmware::joint::state_machine::{Controlword, State};
 use joint_firmware::joint::{Demand, Telemetry};
 use jointctl::metrics::relative_floor;
+use plant::VirtualJoint;
 use plant::actuator::ActuatorParameters;
-use plant::excitation::{Segment, Trajectory, slow_reversals};
-use plant::virtual_joint::Setup;
+use plant::excitation::{Trajectory, slow_reversals};
+use plant::friction_factors::FrictionFactors;
+use plant::virtual_joint::{Setup, VirtualJointError};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 
@@ -78,6 +80,10 @@ pub struct InTorqueMode {
     pub moved_untold: f64,
 }
 
+/// Time for which a joint in service moves at least before it is judged, s.
+const SERVICE: f64 = 20.0;
+/// Time for which a hand touches it then, s.
+const TOUCH: f64 = 8.0;
 /// Warmth of a joint above its ambient at the beginning, K.
 const WARMTH: f64 = 10.0;
 /// Bandwidth of a hand, and of a controller around torque mode, rad/s.
@@ -105,15 +111,9 @@ impl RandomJoint {
         let found = commission(&parameters, &off, seed)?;
         let limits = &parameters.joint.limits;
         let acceleration = parameters.joint.usable_acceleration().min(20.0);
-        // Shares of speed limit and travel.
-        let moves = [(0.5, 0.6), (0.5, -0.6), (0.2, 0.3), (0.7, -0.3), (0.05, 0.0)].map(|(speed, to)| Segment::Move {
-            to: to * limits.travel,
-            speed: speed * limits.speed,
-            acceleration: 0.5 * acceleration,
-        });
-        let trajectory = |segments| Trajectory::new(segments).map_err(|error| error.to_string());
-        let moves = trajectory(moves.to_vec())?;
-        let reversals = trajectory(slow_reversals(0.01 * limits.speed, 1.0, acceleration, 6))?;
+        let moves = driving::moves(&parameters, 0.0)?;
+        let reversals = Trajectory::new(slow_reversals(0.01 * limits.speed, 1.0, acceleration, 6));
+        let reversals = reversals.map_err(|error| error.to_string())?;
         Ok(Self { seed, parameters, off, found, moves, reversals })
     }
 
@@ -143,6 +143,59 @@ impl RandomJoint {
         let warmth = -self.parameters.joint.thermal.ambient;
         let torque = |setup, model| Ok::<_, String>(self.errors(setup, variant, model, &self.moves, warmth)?.torque);
         Ok([torque(&self.off, None)?, torque(&on, Some(&self.found.model))?])
+    }
+
+    /// Errors of moves with friction that is no more what the image was made for, after 20 s of such moves.
+    ///
+    /// # Errors
+    /// A fault on the way.
+    pub fn in_service(&self, variant: &Variant, factors: &FrictionFactors) -> Result<Moved, String> {
+        let failed = |error: String| format!("joint {}, {}, in service: {error}", self.seed, variant.name);
+        let mut parameters = self.parameters;
+        let friction = parameters.joint.friction.scaled(factors);
+        parameters.joint.friction = friction.map_err(|error| failed(error.to_string()))?;
+        let on = self.off.compensating(Request::PhysicalAndNetwork);
+        let joint = variant.enabled(&parameters, &on, Some(self.found.model.clone()), WARMTH, 99);
+        let mut joint = joint.map_err(|error| failed(error.to_string()))?;
+        let service = driving::moves(&parameters, SERVICE)?;
+        follow(&mut joint, &service, |_, _, _| ()).map_err(|state| failed(format!("ended in {state:?}")))?;
+        let mut errors = |trajectory| self.followed(&mut joint, variant, trajectory);
+        Ok(Moved { moves: errors(&self.moves)?, reversals: errors(&self.reversals)? })
+    }
+
+    /// By how much a hand changes what adaptation adds, root of the mean square as a part of Coulomb friction, %: after 20 s the joint moves on,
+    /// and for 8 s a torque as large as Coulomb friction acts on the link, forward, or against the motion.
+    ///
+    /// # Errors
+    /// A fault on the way.
+    pub fn touched(&self, variant: &Variant, against: bool) -> Result<f64, String> {
+        let failed = |error: String| format!("joint {}, {}, touched: {error}", self.seed, variant.name);
+        let on = self.off.compensating(Request::PhysicalAndNetwork);
+        let joint = variant.enabled(&self.parameters, &on, Some(self.found.model.clone()), WARMTH, 99);
+        let mut joint = joint.map_err(|error| failed(error.to_string()))?;
+        let service = driving::moves(&self.parameters, SERVICE)?;
+        follow(&mut joint, &service, |_, _, _| ()).map_err(|state| failed(format!("ended in {state:?}")))?;
+        let frozen = joint.adaptation().factors;
+        let coulomb = self.parameters.joint.friction.coulomb.forward;
+        let slow = 0.02 * self.parameters.joint.limits.speed;
+        let steps = (service.duration() / joint.period()) as u64;
+        let (mut squares, mut count) = (0.0f64, 0.0);
+        for n in 0..steps {
+            let velocity = joint.actuator().state().joint.velocity;
+            let hand = if against { -(velocity / slow).clamp(-1.0, 1.0) } else { 1.0 };
+            let holds = (steps / 4..steps / 4 + (TOUCH / joint.period()) as u64).contains(&n);
+            let demand = driving::demand(&joint, &service, n);
+            let telemetry = joint.step(&demand, if holds { coulomb * hand } else { 0.0 });
+            if telemetry.state != State::OperationEnabled {
+                return Err(failed(format!("ended in {:?}", telemetry.state)));
+            }
+            let now = joint.adaptation().factors;
+            let image = f64::from(telemetry.compensated.output.torque.to_bits()) / 65_536.0;
+            let viscous = f64::from(now.viscous - frozen.viscous) * f64::from(telemetry.motion.velocity);
+            squares += (f64::from(now.factor - frozen.factor) * image + viscous).powi(2);
+            count += 1.0;
+        }
+        Ok(100.0 * (squares / count).sqrt() / coulomb)
     }
 
     /// Moves in torque mode, to and fro over half of the travel at up to half of the speed limit.
@@ -209,12 +262,17 @@ impl RandomJoint {
         trajectory: &Trajectory,
         warmth: f64,
     ) -> Result<Errors, String> {
-        let failed = |error: String| format!("joint {}, {}: {error}", self.seed, variant.name);
+        let failed = |error: VirtualJointError| format!("joint {}, {}: {error}", self.seed, variant.name);
         let joint = variant.enabled(&self.parameters, setup, model.cloned(), warmth, 99);
-        let mut joint = joint.map_err(|error| failed(error.to_string()))?;
+        self.followed(&mut joint.map_err(failed)?, variant, trajectory)
+    }
+
+    /// Errors of a joint that follows the trajectory.
+    fn followed(&self, joint: &mut VirtualJoint, variant: &Variant, trajectory: &Trajectory) -> Result<Errors, String> {
+        let failed = |error: String| format!("joint {}, {}: {error}", self.seed, variant.name);
         let mut torques: Vec<(f64, f64)> = Vec::new();
         let (mut squares, mut shares) = (0.0, Shares::default());
-        let outcome = follow(&mut joint, trajectory, |time, telemetry, state| {
+        let outcome = follow(joint, trajectory, |time, telemetry, state| {
             let left = state.joint.friction_torque - f64::from(telemetry.compensated.torque);
             torques.push((state.joint.motor_torque, left));
             squares += (trajectory.at(time).position - state.joint.position).powi(2);

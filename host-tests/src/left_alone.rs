@@ -1,17 +1,20 @@
 //! A joint that nobody commands, with a model that is wrong in every parameter and sensors up to two periods late: what it does by itself.
 //! Judged by energy.
 
-use crate::driving::COMMAND_STEPS;
+use crate::driving::{COMMAND_STEPS, follow, moves};
 use crate::informed::informed;
 use crate::variant::{DEFAULT, Variant, measured};
 use joint_firmware::compensation::Request;
 use joint_firmware::friction::FrictionModel;
+use joint_firmware::joint::adaptation::Adaptation;
 use joint_firmware::joint::state_machine::{Controlword, State};
 use joint_firmware::joint::{Command, Demand, Mode};
 use plant::actuator::ActuatorParameters;
 use plant::friction_factors::FrictionFactors;
 use plant::virtual_joint::Setup;
 
+/// Time for which a joint moves at least before it is left alone with experience, s.
+const LEARNED: f64 = 10.0;
 /// Error of every parameter of the model.
 pub const ERROR: f64 = 0.5;
 
@@ -58,6 +61,30 @@ impl Alone {
     }
 }
 
+/// What a joint did before it was left alone.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Experience {
+    /// Nothing.
+    None,
+    /// It moved on command, with adaptation on.
+    Moved,
+}
+
+/// What a joint learns of its friction in moves over its travel.
+fn learned(
+    parameters: &ActuatorParameters,
+    setup: &Setup,
+    model: &FrictionModel,
+    variant: &Variant,
+    seed: u64,
+) -> Result<Adaptation, String> {
+    let joint = variant.enabled(parameters, setup, Some(model.clone()), 0.0, seed);
+    let mut joint = joint.map_err(|error| error.to_string())?;
+    let trajectory = moves(parameters, LEARNED)?;
+    follow(&mut joint, &trajectory, |_, _, _| ()).map_err(|state| format!("learning ended in {state:?}"))?;
+    Ok(*joint.learned())
+}
+
 /// Part of the mode's damping beside the spring that holds the position.
 const DAMPING: f32 = 0.2;
 
@@ -66,7 +93,13 @@ const DAMPING: f32 = 0.2;
 ///
 /// # Errors
 /// A joint that does not stay enabled.
-pub fn run(seed: u64, alone: Alone, variant: Option<&Variant>, steps: u32) -> Result<Seen, String> {
+pub fn run(
+    seed: u64,
+    alone: Alone,
+    variant: Option<&Variant>,
+    experience: Experience,
+    steps: u32,
+) -> Result<Seen, String> {
     let mut parameters = ActuatorParameters::randomised(seed).aligned();
     if !alone.loaded() {
         parameters = parameters.without_payload();
@@ -83,7 +116,11 @@ pub fn run(seed: u64, alone: Alone, variant: Option<&Variant>, steps: u32) -> Re
     measured(&mut setup.configuration);
     let model = FrictionModel::new(&informed(&parameters, &wrong), setup.bridge.motion_rate());
     let variant = variant.unwrap_or(&DEFAULT);
-    let mut joint = variant.enabled(&parameters, &setup, Some(model), 0.0, seed).map_err(|error| error.to_string())?;
+    let mut joint =
+        variant.enabled(&parameters, &setup, Some(model.clone()), 0.0, seed).map_err(|error| error.to_string())?;
+    if request != Request::Off && experience == Experience::Moved {
+        joint.set_adaptation(learned(&parameters, &setup, &model, variant, seed)?);
+    }
 
     let gains = setup.configuration.gains;
     let mut command = Command::default();
@@ -163,23 +200,24 @@ const STEPS: (u32, u32) = (30_000, 120_000);
 const LAST: u32 = 10_000;
 
 /// Joint `seed` in every situation with a compensation: the largest drift, rad, and what moved by itself.
-pub fn judged(seed: u64, variant: &Variant) -> (f64, Vec<String>) {
+pub fn judged(seed: u64, variant: &Variant, experience: Experience) -> (f64, Vec<String>) {
     let (mut drift, mut bad) = (0.0f64, Vec::new());
     for alone in Alone::ALL {
         // With less friction a joint creeps for longer. What is a limit cycle goes on; creep comes to rest.
         let (short, long) = STEPS;
-        let (largest, moves) = compared(seed, alone, variant, short);
+        let (largest, moves) = compared(seed, alone, variant, experience, short);
         drift = drift.max(largest);
         if moves.is_some() {
-            bad.extend(compared(seed, alone, variant, long).1);
+            bad.extend(compared(seed, alone, variant, experience, long).1);
         }
     }
     (drift, bad)
 }
 
 /// The drift with compensation, and what joint and compensation did where that moves by itself.
-fn compared(seed: u64, alone: Alone, variant: &Variant, steps: u32) -> (f64, Option<String>) {
-    let (with, without) = (run(seed, alone, Some(variant), steps), run(seed, alone, None, steps));
+fn compared(seed: u64, alone: Alone, variant: &Variant, experience: Experience, steps: u32) -> (f64, Option<String>) {
+    let (with, without) =
+        (run(seed, alone, Some(variant), experience, steps), run(seed, alone, None, experience, steps));
     let moves = match (&with, &without) {
         (Ok(with), Ok(without)) => moves_by_itself(with, without),
         _ => true,

@@ -4,7 +4,7 @@ use crate::driving::enabled;
 use joint_firmware::compensation::Request;
 use joint_firmware::friction::FrictionModel;
 use joint_firmware::joint::active::Active;
-use joint_firmware::joint::configuration::{Configuration, VelocitySource};
+use joint_firmware::joint::configuration::{AdaptationRequest, Configuration, VelocitySource};
 use plant::VirtualJoint;
 use plant::actuator::ActuatorParameters;
 use plant::virtual_joint::{Setup, VirtualJointError};
@@ -25,6 +25,13 @@ pub struct Variant {
 
 /// As [`Setup::of`] configures it, physical model and network.
 pub const DEFAULT: Variant = Variant { name: "all layers", configure: |_| {}, prepare: |_| {} };
+
+/// The default with adaptation.
+pub const ADAPTIVE: Variant = Variant {
+    name: "adaptation",
+    configure: |s| s.configuration.compensation.adaptation = AdaptationRequest::On,
+    ..DEFAULT
+};
 
 /// The default and everything that can be taken away from it.
 pub const ALL: [Variant; 9] = [

@@ -1,9 +1,10 @@
 //! Compensation in the loop, on random joints that are not our model: each is excited without compensation, recorded as a user would,
 //! fitted, and moved with the image that came out. The torque that friction would have taken arrives, slow reversals
-//! track, and what is left in torque mode and in the cold is as published.
+//! track, what is left in torque mode and in the cold is as published, and adaptation makes up for friction that has changed.
 
 use host_tests::in_the_loop::{InTorqueMode, Moved, RandomJoint, for_seeds, median};
-use host_tests::variant::DEFAULT;
+use host_tests::variant::{ADAPTIVE, DEFAULT};
+use plant::friction_factors::FrictionFactors;
 
 /// Seeds of the random joints.
 const SEEDS: std::ops::Range<u64> = 1..21;
@@ -19,19 +20,105 @@ const COLD: (f64, f64) = (11.7, 32.9);
 /// not, median and worst, %: README's figures and a tenth of them.
 const TORQUE_MODE: [(f64, f64); 3] = [(69.6, 74.1), (10.3, 44.1), (68.9, 70.3)];
 
-/// A joint without compensation, and with it; in torque mode; and from 0 °C.
-fn moved(seed: u64) -> Result<([Moved; 2], InTorqueMode, [f64; 2]), String> {
+/// Torque errors in service, moves and slow reversals, median and worst, %, with adaptation: docs/adaptation.md's figures and a tenth of them. As
+/// commissioned; all of friction's torques times 0.7, 1.3, 0.4 and 2; viscous friction times 4.
+const IN_SERVICE: [(f64, f64, f64, f64); 6] = [
+    (5.6, 11.8, 13.0, 30.5),
+    (5.0, 7.8, 14.1, 33.0),
+    (6.9, 17.8, 13.0, 29.9),
+    (2.9, 6.7, 12.7, 30.4),
+    (12.8, 27.5, 12.5, 35.1),
+    (6.7, 12.7, 13.0, 37.5),
+];
+
+/// Change of what adaptation adds while a hand pushes the link, and while it resists, % of Coulomb friction, median and worst; likewise.
+const TOUCHED: [(f64, f64); 2] = [(1.1, 9.0), (1.5, 34.9)];
+
+fn factors() -> [(&'static str, FrictionFactors); 6] {
+    let torques = FrictionFactors::torques;
+    [
+        ("as commissioned", torques(1.0)),
+        ("x 0.7", torques(0.7)),
+        ("x 1.3", torques(1.3)),
+        ("x 0.4", torques(0.4)),
+        ("x 2", torques(2.0)),
+        ("viscous x 4", FrictionFactors::viscous(4.0)),
+    ]
+}
+
+/// What a joint does.
+struct Found {
+    /// Without compensation, and with it.
+    moved: [Moved; 2],
+    torque_mode: InTorqueMode,
+    /// Torque errors from 0 °C, without compensation and with it, %.
+    cold: [f64; 2],
+    /// In service, by [`factors`], without adaptation and with it.
+    in_service: Vec<[Moved; 2]>,
+    /// Pushed, and resisted.
+    touched: [f64; 2],
+}
+
+fn found(seed: u64) -> Result<Found, String> {
     let joint = RandomJoint::commissioned(seed).map_err(|error| format!("joint {seed}: {error}"))?;
-    let moved = [joint.without()?, joint.with(&DEFAULT)?];
-    Ok((moved, joint.in_torque_mode(&DEFAULT)?, joint.in_the_cold(&DEFAULT)?))
+    let in_service = |(_, factors): &(_, FrictionFactors)| {
+        Ok::<_, String>([joint.in_service(&DEFAULT, factors)?, joint.in_service(&ADAPTIVE, factors)?])
+    };
+    Ok(Found {
+        moved: [joint.without()?, joint.with(&DEFAULT)?],
+        torque_mode: joint.in_torque_mode(&DEFAULT)?,
+        cold: joint.in_the_cold(&DEFAULT)?,
+        in_service: factors().iter().map(in_service).collect::<Result<_, _>>()?,
+        touched: [joint.touched(&ADAPTIVE, false)?, joint.touched(&ADAPTIVE, true)?],
+    })
+}
+
+/// Median and worst.
+fn both(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    let values: Vec<f64> = values.collect();
+    (median(values.clone()), values.into_iter().fold(0.0, f64::max))
+}
+
+/// Adaptation in service is as published.
+fn adapts(found: &[Found]) {
+    println!("torque errors in service [%]: moves, slow reversals, median (worst)");
+    for (n, (what, _)) in factors().iter().enumerate() {
+        let row = |with: usize| {
+            let of = |errors: fn(&Moved) -> f64| both(found.iter().map(|found| errors(&found.in_service[n][with])));
+            (of(|moved| moved.moves.torque), of(|moved| moved.reversals.torque))
+        };
+        for with in 0..2 {
+            let ((moves, worst), (reversals, worst_reversals)) = row(with);
+            let how = ["image", "adaptation"][with];
+            println!("{what:>16} {how:>10}: {moves:6.1} ({worst:5.1}) {reversals:6.1} ({worst_reversals:5.1})");
+        }
+    }
+    for (n, (what, _)) in factors().iter().enumerate() {
+        let (moves, worst) = both(found.iter().map(|found| found.in_service[n][1].moves.torque));
+        let (reversals, worst_reversals) = both(found.iter().map(|found| found.in_service[n][1].reversals.torque));
+        let limit = IN_SERVICE[n];
+        assert!(moves <= limit.0 && worst <= limit.1, "{what}: moves {moves} %, worst {worst} %");
+        assert!(
+            reversals <= limit.2 && worst_reversals <= limit.3,
+            "{what}: slow reversals {reversals} %, worst {worst_reversals} %"
+        );
+    }
+    for (n, what) in ["pushed", "resisted"].iter().enumerate() {
+        let (middle, worst) = both(found.iter().map(|found| found.touched[n]));
+        println!(
+            "{what} by a hand: adaptation changes by {middle:.1} % of Coulomb friction (median), worst {worst:.1} %"
+        );
+        assert!(middle <= TOUCHED[n].0 && worst <= TOUCHED[n].1, "{what}: {middle} %, worst {worst} %");
+    }
 }
 
 #[test]
 fn the_torque_that_friction_takes_is_given_back_and_slow_reversals_track() {
-    let found: Vec<_> = for_seeds(SEEDS, moved).into_iter().map(Result::unwrap).collect();
-    let rows: Vec<[Moved; 2]> = found.iter().map(|found| found.0).collect();
-    let torque_mode: Vec<InTorqueMode> = found.iter().map(|found| found.1).collect();
-    let cold: Vec<[f64; 2]> = found.iter().map(|found| found.2).collect();
+    let found: Vec<Found> = for_seeds(SEEDS, found).into_iter().map(Result::unwrap).collect();
+    let rows: Vec<[Moved; 2]> = found.iter().map(|found| found.moved).collect();
+    let torque_mode: Vec<InTorqueMode> = found.iter().map(|found| found.torque_mode).collect();
+    let cold: Vec<[f64; 2]> = found.iter().map(|found| found.cold).collect();
+    adapts(&found);
     println!("joint  moves: torque error [%]   slow reversals: RMS position error [mrad]");
     for (seed, moved) in SEEDS.zip(&rows) {
         let [slow_before, slow_after] = moved.map(|moved| 1e3 * moved.reversals.tracking);

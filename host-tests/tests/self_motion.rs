@@ -3,21 +3,32 @@
 //! pushed comes to rest: free, held by a spring of its own or of its master's, with a payload that swings or is borne.
 
 use host_tests::in_the_loop::for_seeds;
-use host_tests::left_alone::{Alone, ERROR, judged};
-use host_tests::variant::DEFAULT;
+use host_tests::left_alone::{Alone, ERROR, Experience, judged};
+use host_tests::variant::{ADAPTIVE, DEFAULT, Variant};
 
 /// Random joints.
 const JOINTS: u64 = 1000;
+/// Random joints that have learned before.
+const EXPERIENCED: u64 = 200;
 
 #[test]
 fn no_joint_starts_to_move_or_keeps_moving_by_itself() {
-    let judged = for_seeds(0..JOINTS, |seed| judged(seed, &DEFAULT));
+    leave_alone(JOINTS, &DEFAULT, Experience::None);
+}
+
+#[test]
+fn neither_does_one_that_has_learned_its_friction_before() {
+    leave_alone(EXPERIENCED, &ADAPTIVE, Experience::Moved);
+}
+
+fn leave_alone(joints: u64, variant: &Variant, experience: Experience) {
+    let judged = for_seeds(0..joints, |seed| judged(seed, variant, experience));
     let drift = judged.iter().fold(0.0f64, |largest, (drift, _)| largest.max(*drift));
     let bad: Vec<String> = judged.into_iter().flat_map(|(_, bad)| bad).collect();
     println!(
-        "{JOINTS} joints, model wrong by {ERROR} in every parameter: largest drift {drift:.2e} rad, bad cases {} of {}",
+        "{joints} joints, {experience:?}, model wrong by {ERROR} in every parameter: largest drift {drift:.2e} rad, bad {} of {}",
         bad.len(),
-        JOINTS as usize * Alone::ALL.len()
+        joints as usize * Alone::ALL.len()
     );
     assert!(bad.is_empty(), "{}", bad.join("\n"));
 }

@@ -11,6 +11,7 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use cortex_m::peripheral::{DWT, NVIC};
 use critical_section::Mutex;
 use embassy_stm32::pac::Interrupt;
+use joint_firmware::joint::adaptation::{ADAPTS, Factors};
 use joint_firmware::joint::fault::Faults;
 use joint_firmware::joint::history::History;
 use joint_firmware::joint::state_machine::Controlword;
@@ -66,6 +67,9 @@ struct Words {
     /// [`Slow`]; until the thermal model has spoken no current is permitted.
     derating: Real,
     gear_temperature: Real,
+    /// [`Factors`].
+    factor: Real,
+    viscous: Real,
     mean_square_current: Real,
     /// The mean square current is taken anew in the next control step.
     mean_square_wanted: AtomicBool,
@@ -103,6 +107,8 @@ static WORDS: Words = Words {
     winding_temperature: Real::new(f32::NAN),
     derating: Real::new(0.0),
     gear_temperature: Real::new(25.0),
+    factor: Real::new(Factors::IMAGE.factor),
+    viscous: Real::new(Factors::IMAGE.viscous),
     mean_square_current: Real::new(0.0),
     mean_square_wanted: AtomicBool::new(false),
     held_off: AtomicBool::new(false),
@@ -209,10 +215,16 @@ pub fn set_temperatures(bridge: f32, winding: f32) {
     WORDS.winding_temperature.store(winding, Ordering::Relaxed);
 }
 
-/// What the thermal model says, for the next control steps.
-pub fn set_slow(slow: &Slow) {
-    WORDS.derating.store(slow.derating, Ordering::Relaxed);
-    WORDS.gear_temperature.store(slow.gear_temperature, Ordering::Relaxed);
+/// What the thermal model says, for the next control steps: part of the current that is permitted, and °C of the gear.
+pub fn set_thermal(derating: f32, gear_temperature: f32) {
+    WORDS.derating.store(derating, Ordering::Relaxed);
+    WORDS.gear_temperature.store(gear_temperature, Ordering::Relaxed);
+}
+
+/// What adaptation says, for the next control steps. One of them may see the factor and not yet the viscous friction: each is sound by itself.
+pub fn set_factors(factors: &Factors) {
+    WORDS.factor.store(factors.factor, Ordering::Relaxed);
+    WORDS.viscous.store(factors.viscous, Ordering::Relaxed);
 }
 
 /// Mean square of the current between the two calls before this one, A²; for one task only.
@@ -292,6 +304,12 @@ extern "C" fn ADC1_2() {
     let slow = Slow {
         derating: WORDS.derating.load(Ordering::Relaxed),
         gear_temperature: WORDS.gear_temperature.load(Ordering::Relaxed),
+        factors: match ADAPTS {
+            true => {
+                Factors { factor: WORDS.factor.load(Ordering::Relaxed), viscous: WORDS.viscous.load(Ordering::Relaxed) }
+            }
+            false => Factors::IMAGE,
+        },
     };
 
     let demand = control.ends.demand.newest();

@@ -1,7 +1,7 @@
 //! A configuration as the control step uses it: gains, limits and scales prepared, nothing left to divide; task, host.
 
 use super::configuration::{
-    BridgeConfiguration, Configuration, ConfigurationError, GearConfiguration, Limits, MOTION_STEPS,
+    AdaptationRequest, BridgeConfiguration, Configuration, ConfigurationError, GearConfiguration, Limits, MOTION_STEPS,
     MotorConfiguration, VelocitySource,
 };
 use super::limit_law::LimitGains;
@@ -149,6 +149,9 @@ pub struct MotionGains {
     pub braking_steps: u32,
 }
 
+/// Time over which the mean torque is taken, s.
+const MEAN: f32 = 1e-3;
+
 /// The energy guard's time constants as parts of a round of the motion loop: what would be divisions in every round.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GuardGains {
@@ -196,9 +199,26 @@ pub struct CompensationGains {
     pub guard: GuardGains,
 }
 
+/// What adaptation in service uses, beside what all use.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AdaptationGains {
+    /// What it does.
+    pub request: AdaptationRequest,
+    /// The compensation's gain, 0 to 1.
+    pub gain: f32,
+    /// The compensation's clamp, Nm.
+    pub clamp: f32,
+    /// Largest change of what it adds, Nm a round.
+    pub slew: f32,
+    /// Control steps of a mean torque: a millisecond's.
+    pub mean_steps: u32,
+    /// 1 / them.
+    pub mean_share: f32,
+}
+
 /// Everything prepared that the control step reads. It is replaced as a whole between two steps.
 ///
-/// In this order, the friction model last: the core's floating-point loads reach no further than 1020 bytes.
+/// In this order, the friction model and what follows it last: the core's floating-point loads reach no further than 1020 bytes.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub struct Active {
@@ -264,6 +284,8 @@ pub struct Active {
     pub thermal: ThermalSettings,
     /// The verified friction model; none: no compensation.
     pub friction: Option<FrictionModel>,
+    /// For adaptation, where a program has it.
+    pub adaptation: AdaptationGains,
 }
 
 impl Configuration {
@@ -404,6 +426,7 @@ impl Checked {
         let limits = bridge.limits.hold(&configuration.limits);
         let current_limit = lesser(motor.current_limit, bridge.limits.current);
         let (rate, motion_rate) = (bridge.rate, bridge.motion_rate() as f32);
+        let mean_steps = (MEAN * rate + 0.5) as u32;
         let period = 1.0 / motion_rate;
         let pole_pairs = motor.alignment.pole_pairs as f32;
         let (_, highest_voltage) = limits.bus_voltage;
@@ -463,6 +486,14 @@ impl Checked {
             encoder_speed: TAU / STEPS * rate,
             has_bridge_sensor: bridge.has_bridge_sensor,
             has_winding_sensor: bridge.has_winding_sensor,
+            adaptation: AdaptationGains {
+                request: compensation.adaptation,
+                gain: compensation.gain,
+                clamp: compensation.clamp,
+                slew: compensation.slew * period,
+                mean_steps,
+                mean_share: 1.0 / mean_steps as f32,
+            },
             friction: None,
             thermal: self.thermal,
         }

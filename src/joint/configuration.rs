@@ -123,6 +123,19 @@ pub enum VelocitySource {
 /// (docs/energy-guard.md).
 pub const FRICTION_UNCERTAINTY: f32 = 0.6;
 
+/// What adaptation in service does ([`super::adaptation`]).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum AdaptationRequest {
+    /// Nothing.
+    #[default]
+    Off = 0,
+    /// It learns and reports, and does not act.
+    Shadow = 1,
+    /// It learns and acts.
+    On = 2,
+}
+
 /// How much compensation acts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CompensationConfiguration {
@@ -141,6 +154,8 @@ pub struct CompensationConfiguration {
     /// By how much friction may be less than gain times the model, as a part of it; 0 to 1. It is what the energy guard may
     /// take of a compensation for the measured velocity; see [`super::friction_feedforward`].
     pub uncertainty: f32,
+    /// What adaptation does.
+    pub adaptation: AdaptationRequest,
 }
 
 /// The bridge and its timing: what the board knows.

@@ -16,13 +16,14 @@
 //! sensors lets compensation act after the joint has turned back: until the mean velocity is five times the standstill
 //! velocity, and in part until it is ten times.
 
-use super::active::{Active, CompensationGains, JointMotion};
+use super::active::{Active, AdaptationGains, CompensationGains, JointMotion};
+use super::adaptation::{ADAPTS, Factors};
 use super::configuration::VelocitySource;
 use super::motion_law::Wanted;
-use crate::compensation::{Compensation, Output};
+use crate::compensation::{Acting, Compensation, Output, Reason};
 use crate::friction::FrictionModel;
 use crate::friction::state::JointState;
-use crate::motor::number::{greater, lesser, magnitude, or_zero, within};
+use crate::motor::number::{greater, lesser, limited, magnitude, or_zero, within};
 use crate::quantity::{Acceleration, Position, Temperature, Torque, Velocity};
 
 /// Time over which the reference's acceleration is taken, s: several commands of a bus at 1 kHz.
@@ -75,6 +76,8 @@ pub struct FrictionFeedforward {
     drift: f32,
     /// Part that the fade at standstill let through in the round before, 0 to 1.
     moving: f32,
+    /// What adaptation adds to the image's torque, Nm.
+    adapted: f32,
     /// Reference velocity, rad/s, as a first-order lag follows it; what it lacks is its acceleration.
     reference: Option<f32>,
 }
@@ -98,7 +101,8 @@ impl FrictionFeedforward {
     #[inline(never)]
     pub fn reset(&mut self) {
         self.compensation.reset();
-        (self.withheld, self.speed, self.drift, self.moving, self.reference) = (0.0, 0.0, 0.0, 0.0, None);
+        (self.withheld, self.speed, self.drift, self.moving) = (0.0, 0.0, 0.0, 0.0);
+        (self.adapted, self.reference) = (0.0, None);
     }
 
     /// First stage of a round: the state that friction is computed for, and its regime. `measured_torque` is the torque of the measured current, Nm.
@@ -127,9 +131,20 @@ impl FrictionFeedforward {
         self.compensation.begin(active.friction.as_ref(), &gains.settings, &state);
     }
 
-    /// Second stage: friction by the network.
+    /// Second stage: friction by the network; and what adaptation adds, by the torque of the round before, because this step has room for it.
     #[inline(always)]
-    pub fn network(&mut self, active: &Active) {
+    pub fn network(
+        &mut self,
+        active: &Active,
+        motion: &JointMotion,
+        wanted: &Wanted,
+        last: &Output,
+        factors: &Factors,
+    ) {
+        if ADAPTS {
+            let velocity = reference(active, wanted).unwrap_or(motion.velocity);
+            self.adapt(&active.adaptation, velocity, last, factors);
+        }
         self.compensation.network(active.friction.as_ref());
     }
 
@@ -159,8 +174,24 @@ impl FrictionFeedforward {
         };
         let permitted = or_zero(standstill * guarded);
         // Where nothing is added, not even the sign of a zero changes.
-        let torque = output.torque.to_bits() as f32 * (1.0 / 65536.0) * permitted;
+        let image = output.torque.to_bits() as f32 * (1.0 / 65536.0);
+        let torque = match ADAPTS {
+            true => (image + self.adapted) * permitted,
+            false => image * permitted,
+        };
         Compensated { torque, output, permitted }
+    }
+
+    /// What adaptation adds to the image's torque: within clamp and slew limit, and nothing of its own where the image fades.
+    #[inline(always)]
+    fn adapt(&mut self, gains: &AdaptationGains, velocity: f32, output: &Output, factors: &Factors) {
+        let image = output.torque.to_bits() as f32 * (1.0 / 65536.0);
+        let whole =
+            matches!(output.reason, Reason::AsRequested | Reason::NoNetwork) && output.acting != Acting::Nothing;
+        let viscous = if whole { factors.viscous * velocity } else { 0.0 };
+        // Exactly the image's where nothing was learned: it lies within the clamp.
+        let wanted = limited(image * factors.factor + viscous, gains.clamp);
+        self.adapted += limited(wanted - image - self.adapted, gains.slew);
     }
 
     /// Acceleration for the model, rad/s²: the reference's, where there is one. The measured one is mostly noise, and a sign of noise
@@ -217,6 +248,7 @@ mod tests {
     use crate::friction::regime::Selector;
     use crate::friction::state::SIGNALS;
     use crate::friction::{FrictionModel, FrictionParameters, ParameterSet};
+    use crate::joint::configuration::AdaptationRequest;
 
     /// Below it compensation fades, rad/s.
     const STANDSTILL: f32 = 0.1;
@@ -241,6 +273,7 @@ mod tests {
             velocity_source: source,
             standstill_velocity: STANDSTILL,
             uncertainty: 1.0,
+            adaptation: AdaptationRequest::On,
         };
         let range = Range { low: q16(-100.0), high: q16(100.0) };
         let domain = Domain { ranges: [range; SIGNALS], margin: 1 << 13, reference_temperature: q16(25.0) };
@@ -263,12 +296,30 @@ mod tests {
         torque: f32,
         reference: Option<f32>,
     ) -> Compensated {
+        adapted_round(feedforward, active, velocity, torque, reference, &Factors::IMAGE)
+    }
+
+    /// The same with what was learned.
+    fn adapted_round(
+        feedforward: &mut FrictionFeedforward,
+        active: &Active,
+        velocity: f32,
+        torque: f32,
+        reference: Option<f32>,
+        factors: &Factors,
+    ) -> Compensated {
         let motion = JointMotion { velocity, ..JointMotion::default() };
         let wanted = Wanted { torque, velocity: reference, push: torque };
-        feedforward.begin(active, &motion, &wanted, 0.0, &Surroundings { temperature: 25.0, coupled_velocity: 0.0 });
-        feedforward.network(active);
-        feedforward.physical_model(active);
-        feedforward.compensate(active, &motion, &wanted)
+        let surroundings = Surroundings { temperature: 25.0, coupled_velocity: 0.0 };
+        let stages = |feedforward: &mut FrictionFeedforward, last: &Output| {
+            feedforward.begin(active, &motion, &wanted, 0.0, &surroundings);
+            feedforward.network(active, &motion, &wanted, last, factors);
+            feedforward.physical_model(active);
+            feedforward.compensate(active, &motion, &wanted)
+        };
+        // As if the round before had been like this one.
+        let last = stages(&mut feedforward.clone(), &Output::NOTHING).output;
+        stages(feedforward, &last)
     }
 
     /// A joint that has moved at a velocity, rad/s, for 0.5 s, with a command that pushes it.
@@ -419,6 +470,46 @@ mod tests {
             }
             assert_eq!(feedforward.withheld(), withheld, "{part} times the standstill velocity, asked for: {asked}");
         }
+    }
+
+    #[test]
+    fn where_nothing_was_learned_the_images_torque_has_its_bits() {
+        let active = active(VelocitySource::Reference, 0.1, 0.7);
+        let mut feedforward = FrictionFeedforward::default();
+        for n in -500..500i16 {
+            let velocity = 0.01 * f32::from(n);
+            let found = round(&mut feedforward, &active, velocity, 0.0, Some(velocity));
+            let image = found.output.torque.to_bits() as f32 * (1.0 / 65536.0) * found.permitted;
+            assert_eq!(found.torque.to_bits(), image.to_bits(), "{velocity}");
+        }
+    }
+
+    #[test]
+    fn what_was_learned_acts_within_clamp_and_slew_limit_and_fades_with_the_image() {
+        let settled = |active: &Active, velocity: f32, factors: Factors| {
+            let mut feedforward = FrictionFeedforward::default();
+            let mut torque = round(&mut feedforward, active, velocity, 0.0, Some(velocity)).torque;
+            for _ in 0..10_000 {
+                let now = adapted_round(&mut feedforward, active, velocity, 0.0, Some(velocity), &factors).torque;
+                let change = (now - torque).abs();
+                assert!(change <= 1.001 * active.adaptation.slew, "{change} Nm in a round");
+                torque = now;
+            }
+            torque
+        };
+        let mut slow = active(VelocitySource::Reference, 0.0, 0.5);
+        slow.adaptation.slew = 1e-3;
+        // The image says 0.5 Nm at 1 rad/s; the clamp is 2 Nm.
+        for (factor, viscous, expected) in
+            [(1.0, 0.0, 0.5), (0.4, 0.0, 0.2), (2.0, 0.0, 1.0), (1.0, -0.2, 0.3), (2.5, 0.7, 1.95), (2.5, 0.8, 2.0)]
+        {
+            for sign in [1.0, -1.0] {
+                let found = settled(&slow, sign, Factors { factor, viscous });
+                assert!((found - sign * expected).abs() < 1e-3, "{factor}, {viscous}: {found} Nm for {expected}");
+            }
+        }
+        // Far outside the trained box, 100 rad/s and a margin, nothing acts, whatever was learned.
+        assert_eq!(settled(&slow, 150.0, Factors { factor: 2.0, viscous: 1.0 }), 0.0);
     }
 
     #[test]

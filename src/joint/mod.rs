@@ -18,6 +18,7 @@
 //! the step.
 
 pub mod active;
+pub mod adaptation;
 pub mod board_limits;
 pub mod command;
 pub mod configuration;
@@ -50,6 +51,7 @@ use crate::motor::phases::Phases;
 use crate::motor::thermal::MeanSquareCurrent;
 use crate::motor::transform::Dq;
 use active::DERATING;
+use adaptation::{ADAPTS, Factors};
 use fault::{Fault, Faults, Reaction};
 use friction_feedforward::{Compensated, Surroundings};
 use history::{History, Snapshot};
@@ -72,11 +74,13 @@ pub struct Slow {
     pub derating: f32,
     /// Temperature of the gear, °C: for friction.
     pub gear_temperature: f32,
+    /// What friction is in service beside what the image says.
+    pub factors: Factors,
 }
 
 impl Default for Slow {
     fn default() -> Self {
-        Self { derating: 1.0, gear_temperature: 25.0 }
+        Self { derating: 1.0, gear_temperature: 25.0, factors: Factors::IMAGE }
     }
 }
 
@@ -95,6 +99,8 @@ pub struct Telemetry {
     pub compensated: Compensated,
     /// Torque of the measured current, Nm.
     pub measured_torque: f32,
+    /// Its mean over the last whole millisecond, Nm; where a program does not adapt, nothing.
+    pub mean_torque: f32,
     /// Temperature that friction was computed for, °C.
     pub gear_temperature: f32,
     /// Wanted current, A.
@@ -120,11 +126,17 @@ impl Telemetry {
         wanted: Wanted { torque: 0.0, velocity: None, push: 0.0 },
         compensated: Compensated::NOTHING,
         measured_torque: 0.0,
+        mean_torque: 0.0,
         gear_temperature: 0.0,
         reference: Dq { d: 0.0, q: 0.0 },
         current: Dq { d: 0.0, q: 0.0 },
         bus_voltage: 0.0,
     };
+
+    /// Torque of the current, Nm: the mean over a millisecond, where the program takes it.
+    pub const fn torque(&self) -> f32 {
+        if ADAPTS { self.mean_torque } else { self.measured_torque }
+    }
 
     /// The statusword, object 6041h: state, voltage present, and that the joint follows its commands.
     pub fn statusword(&self) -> u16 {
@@ -136,7 +148,7 @@ impl Telemetry {
     }
 }
 
-/// A joint, from one control step to the next. In this order, the history last, for the same reason as [`Active`].
+/// A joint, from one control step to the next. In this order, the history and what follows it last, for the same reason as [`Active`].
 #[derive(Clone, Debug, Default)]
 #[repr(C)]
 pub struct Joint {
@@ -163,6 +175,7 @@ pub struct Joint {
     mean_square: MeanSquareCurrent,
     found: Found,
     history: History,
+    mean_torque: MeanTorque,
 }
 
 /// What the last step found and did, besides what other parts remember.
@@ -175,6 +188,26 @@ struct Found {
     reference: Dq,
     current: Dq,
     bus_voltage: f32,
+}
+
+/// The measured torque's mean over a millisecond. A controller on a bus moves the torque in saw teeth of about that length, and whoever samples them in step
+/// with the bus takes the place in a tooth for torque: with a stiffness of 1,000 Nm/rad half a newton metre for each rad/s.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct MeanTorque {
+    sum: f32,
+    steps: u32,
+    mean: f32,
+}
+
+impl MeanTorque {
+    #[inline(always)]
+    fn add(&mut self, active: &Active, torque: f32) {
+        self.sum += torque;
+        self.steps += 1;
+        if self.steps >= active.adaptation.mean_steps {
+            *self = Self { sum: 0.0, steps: 0, mean: self.sum * active.adaptation.mean_share };
+        }
+    }
 }
 
 /// How long a joint has been braking and standing.
@@ -238,7 +271,7 @@ impl Joint {
         let mut measured_torque = or_zero(self.found.current.q * active.scales.torque_per_current);
         let coupled_velocity = self.coupled(active, demand);
         let surroundings = Surroundings { temperature: slow.gear_temperature, coupled_velocity };
-        let seen = Seen { motion: &motion, derating, measured_torque, surroundings };
+        let seen = Seen { motion: &motion, derating, measured_torque, surroundings, factors: &slow.factors };
         let torque = self.motion_loop.step::<COMPENSATION>(active, state, &demand.command, &seen);
 
         let (bridge, reference, current) = if state.makes_torque() {
@@ -279,6 +312,9 @@ impl Joint {
             }
         };
 
+        if ADAPTS {
+            self.mean_torque.add(active, measured_torque);
+        }
         self.found = Found {
             faults,
             motion,
@@ -309,6 +345,9 @@ impl Joint {
         telemetry.wanted = *self.motion_loop.wanted();
         telemetry.compensated = *self.motion_loop.compensated();
         telemetry.measured_torque = found.measured_torque;
+        if ADAPTS {
+            telemetry.mean_torque = self.mean_torque.mean;
+        }
         telemetry.gear_temperature = found.gear_temperature;
         telemetry.reference = found.reference;
         telemetry.current = found.current;

@@ -5,6 +5,7 @@
 //! held until the next round comes by. A new state of the joint begins a round: a quick stop waits for nothing.
 
 use super::active::{Active, JointMotion};
+use super::adaptation::Factors;
 use super::command::Command;
 use super::friction_feedforward::{Compensated, FrictionFeedforward, Surroundings};
 use super::motion_law::{MotionLaw, Wanted};
@@ -47,6 +48,8 @@ pub struct Seen<'a> {
     pub measured_torque: f32,
     /// What else friction depends on.
     pub surroundings: Surroundings,
+    /// What friction is in service beside what the image says.
+    pub factors: &'a Factors,
 }
 
 impl MotionLoop {
@@ -92,7 +95,7 @@ impl MotionLoop {
     /// One stage, and which one is next.
     #[inline(always)]
     fn stage<const COMPENSATION: bool>(&mut self, active: &Active, enabled: bool, command: &Command, seen: &Seen) {
-        let Seen { motion, derating, measured_torque, surroundings } = seen;
+        let Seen { motion, derating, measured_torque, surroundings, factors } = seen;
         let compensates = COMPENSATION && enabled;
         self.stage = match self.stage {
             Stage::Law => {
@@ -110,7 +113,7 @@ impl MotionLoop {
             }
             Stage::Network => {
                 if compensates {
-                    self.friction.network(active);
+                    self.friction.network(active, motion, &self.wanted, &self.compensated.output, factors);
                 }
                 Stage::PhysicalModel
             }
@@ -168,7 +171,8 @@ mod tests {
     fn step(motion_loop: &mut MotionLoop, active: &Active, state: State, torque: f32) -> f32 {
         let surroundings = Surroundings { temperature: 25.0, coupled_velocity: 0.0 };
         let motion = JointMotion::default();
-        let seen = Seen { motion: &motion, derating: 1.0, measured_torque: 0.0, surroundings };
+        let seen =
+            Seen { motion: &motion, derating: 1.0, measured_torque: 0.0, surroundings, factors: &Factors::IMAGE };
         motion_loop.step::<false>(active, state, &Command { torque, ..Command::default() }, &seen)
     }
 
@@ -194,7 +198,8 @@ mod tests {
         let active = active();
         let surroundings = Surroundings { temperature: 25.0, coupled_velocity: 0.0 };
         let motion = JointMotion { velocity: 0.3, ..JointMotion::default() };
-        let seen = Seen { motion: &motion, derating: 1.0, measured_torque: 0.0, surroundings };
+        let seen =
+            Seen { motion: &motion, derating: 1.0, measured_torque: 0.0, surroundings, factors: &Factors::IMAGE };
         let command = Command { mode: Mode::Velocity, velocity: 0.31, ..Command::default() };
         let mut motion_loop = MotionLoop::default();
         let mut step = |state| (motion_loop.step::<false>(&active, state, &command, &seen), *motion_loop.wanted());
@@ -230,7 +235,8 @@ mod tests {
         for (position, velocity) in [(half, 0.0), (0.0, limits.velocity)] {
             let motion = JointMotion { position, velocity, acceleration: 0.0 };
             let surroundings = Surroundings { temperature: 25.0, coupled_velocity: 0.0 };
-            let seen = Seen { motion: &motion, derating: 1.0, measured_torque: 0.0, surroundings };
+            let seen =
+                Seen { motion: &motion, derating: 1.0, measured_torque: 0.0, surroundings, factors: &Factors::IMAGE };
             let mut motion_loop = MotionLoop::default();
             let mut torque = || {
                 let command = Command { torque: limits.torque, ..Command::default() };

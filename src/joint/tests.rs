@@ -200,3 +200,21 @@ fn a_joint_that_bears_a_load_goes_on_bearing_it_from_mode_to_mode() {
     law.step(&active, &command(Mode::Torque), &pulled, 1.0);
     assert_eq!(law.step(&active, &command(Mode::Hold), &pulled, 1.0).torque, 0.0);
 }
+
+#[test]
+fn the_torque_that_is_reported_is_a_mean_over_a_millisecond_and_not_what_a_tooth_of_a_saw_holds() {
+    let board = crate::default_configuration::MOTEUS_R4;
+    let mut active = board.joint.prepare(&board.bridge).unwrap();
+    active.scales.torque_per_current = 1.0;
+    let steps = active.adaptation.mean_steps;
+    assert_eq!(steps, 40);
+    let mut mean = MeanTorque::default();
+    for n in 0..10 * steps {
+        let before = mean.mean;
+        // From 3 to 5 Nm in each millisecond.
+        mean.add(&active, 3.0 + 2.0 * (n % steps) as f32 / (steps - 1) as f32);
+        let done = (n + 1) % steps == 0;
+        assert!(done || mean.mean == before);
+        assert!(!done || (mean.mean - 4.0).abs() < 1e-5, "{}", mean.mean);
+    }
+}

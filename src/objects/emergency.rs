@@ -1,5 +1,6 @@
 //! Errors as EMCY messages: which code, which bits of the error register; the task.
 
+use super::number::to_u16;
 use super::observed::{Observed, fault_bits, reason_number};
 use crate::hardware::GateDriver;
 use crate::joint::fault::{Fault, Faults};
@@ -7,6 +8,8 @@ use crate::parameters::life_cycle::Refusal;
 
 /// The joint left the range that its friction was learned in. Information: [`reason`](super::table), number of departures (u16).
 pub const ENVELOPE: u16 = 0xFF01;
+/// Friction is no more what the image says, as adaptation has found. Information: friction factor and its deviation in thousandths (u16 each).
+pub const MISFIT: u16 = 0xFF03;
 /// An image with a wrong tag, or none, or for a joint whose key is damaged. Information: code of the refusal (u16).
 pub const AUTHENTICATION: u16 = 0xFF02;
 /// An image was refused for another reason. Information: code of the refusal (u16).
@@ -60,10 +63,11 @@ pub(super) struct Reports {
     faults: Faults,
     violations: u16,
     quiet_until: u64,
+    misfits: bool,
 }
 
 impl Reports {
-    /// The next thing to report: a fault that is new, the end of all, a departure from the trained range. Information of a fault: its
+    /// The next thing to report: a fault that is new, the end of all, a departure from the trained range, an image that no more fits. Information of a fault: its
     /// number, and the bits of object 2021h:4 (u16); of the gate driver's: its number, and both its status words (u16 each), for which it waits.
     pub(super) fn next(&mut self, observed: &Observed, driver: &GateDriver, now: u64) -> Option<Emergency> {
         let latched = observed.latched;
@@ -89,6 +93,15 @@ impl Reports {
             let information = [reason, low, high, 0, 0];
             return Some(Emergency { code: ENVELOPE, register: register(latched), information });
         }
+        let misfits = observed.adaptation.misfits();
+        if misfits && !self.misfits {
+            self.misfits = true;
+            let permille = |value: f32| to_u16(1e3 * value).to_le_bytes();
+            let [a, b] = permille(observed.adaptation.factors.factor);
+            let [c, d] = permille(observed.adaptation.deviation);
+            return Some(Emergency { code: MISFIT, register: register(latched), information: [a, b, c, d, 0] });
+        }
+        self.misfits &= !observed.adaptation.fits();
         None
     }
 }

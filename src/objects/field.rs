@@ -207,6 +207,14 @@ pub enum Actual {
     ShadowRms,
     /// Part of the compensation that standstill and energy guard let through.
     Permitted,
+    /// Whether adaptation learns, or why not.
+    Learning,
+    /// Factor of the image's friction.
+    AdaptedFactor,
+    /// Its standard deviation.
+    FactorDeviation,
+    /// Added viscous friction.
+    AdaptedViscous,
     /// Version of the image in use.
     ImageVersion,
     /// Where a staged image stands.

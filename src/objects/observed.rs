@@ -6,6 +6,7 @@ use super::number::{temperature, to_i16, to_i32, to_u16, to_u32};
 use super::shared::Shared;
 use crate::compensation::Reason;
 use crate::joint::Telemetry;
+use crate::joint::adaptation;
 use crate::joint::fault::Faults;
 use crate::joint::state_machine::State;
 
@@ -24,6 +25,8 @@ pub struct Observed {
     pub bridge_temperature: f32,
     /// Of the compensation.
     pub friction: FrictionStatistics,
+    /// Of adaptation.
+    pub adaptation: adaptation::Report,
 }
 
 impl Default for Observed {
@@ -36,6 +39,7 @@ impl Default for Observed {
             winding_temperature: f32::NAN,
             bridge_temperature: f32::NAN,
             friction: FrictionStatistics::default(),
+            adaptation: adaptation::Report::default(),
         }
     }
 }
@@ -44,7 +48,7 @@ impl Observed {
     /// Torque that neither the command's feed-forward nor compensation explain, Nm: in position, velocity and impedance mode what is
     /// left for the controller, which is what a better friction model would take over.
     pub fn residual(&self) -> f32 {
-        self.telemetry.measured_torque - self.feedforward_torque - self.telemetry.compensated.torque
+        self.telemetry.torque() - self.feedforward_torque - self.telemetry.compensated.torque
     }
 
     /// The value as its object carries it, sign-extended.
@@ -65,7 +69,7 @@ impl Observed {
             Actual::Mode => shared.set_point(SetPoint::Mode),
             Actual::Position => signed(to_i32(1e6 * t.motion.position)),
             Actual::Velocity => signed(to_i32(1e3 * t.motion.velocity)),
-            Actual::Torque => permille(t.measured_torque),
+            Actual::Torque => permille(t.torque()),
             Actual::TorqueDemand => permille(t.wanted.torque),
             Actual::RatedTorque => to_u32(1e3 * shared.rated_torque()).into(),
             Actual::ErrorCode => self.latched.iter().next().map_or(0, |fault| fault.error_code().into()),
@@ -81,6 +85,10 @@ impl Observed {
             Actual::Violations => self.friction.violations().into(),
             Actual::ShadowRms => self.friction.shadow_rms().to_bits().into(),
             Actual::Permitted => to_u16(1e3 * t.compensated.permitted).into(),
+            Actual::Learning => self.adaptation.learning as u64,
+            Actual::AdaptedFactor => self.adaptation.factors.factor.to_bits().into(),
+            Actual::FactorDeviation => self.adaptation.deviation.to_bits().into(),
+            Actual::AdaptedViscous => self.adaptation.factors.viscous.to_bits().into(),
             Actual::ImageVersion => shared.image_version().into(),
             Actual::ImageState => shared.image_state().into(),
         }

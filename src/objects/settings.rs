@@ -2,7 +2,8 @@
 //! and nowhere else.
 
 use crate::compensation::Request;
-use crate::joint::configuration::{Configuration, VelocitySource};
+use crate::joint::adaptation::ADAPTS;
+use crate::joint::configuration::{AdaptationRequest, Configuration, VelocitySource};
 use crate::motor::angle::Direction;
 
 /// Declares the settings: their names, and the members that are real numbers.
@@ -79,6 +80,7 @@ settings! {
     Request,
     VelocitySource,
     OscillatorTrim,
+    Adaptation,
 }
 
 impl Setting {
@@ -96,6 +98,7 @@ impl Setting {
             Self::ElectricalZero => copy.motor.alignment.electrical_zero.0,
             Self::Request => copy.compensation.request as u32,
             Self::OscillatorTrim => copy.oscillator_trim.into(),
+            Self::Adaptation => copy.compensation.adaptation as u32,
             _ => (copy.compensation.velocity_source == VelocitySource::Measured).into(),
         }
     }
@@ -121,6 +124,9 @@ impl Setting {
             (Self::Request, 3) => configuration.compensation.request = Request::NetworkInShadow,
             (Self::VelocitySource, 0) => configuration.compensation.velocity_source = VelocitySource::Reference,
             (Self::VelocitySource, 1) => configuration.compensation.velocity_source = VelocitySource::Measured,
+            (Self::Adaptation, 0) => configuration.compensation.adaptation = AdaptationRequest::Off,
+            (Self::Adaptation, 1) if ADAPTS => configuration.compensation.adaptation = AdaptationRequest::Shadow,
+            (Self::Adaptation, 2) if ADAPTS => configuration.compensation.adaptation = AdaptationRequest::On,
             _ => return false,
         }
         true

@@ -1,5 +1,6 @@
 //! Start of the board's program and its tasks; thread mode and the interrupt executor.
 
+mod adaptation;
 mod connection;
 
 use crate::board::watchdog::{self, Watchdog};
@@ -8,7 +9,6 @@ use connection::Watching;
 use embassy_executor::{SendSpawner, Spawner};
 use embassy_stm32::gpio::Input;
 use embassy_time::{Duration, Instant, Ticker};
-use joint_firmware::joint::Slow;
 use joint_firmware::joint::active::SLOW_RATE;
 use joint_firmware::joint::configuration::ConfigurationError;
 use joint_firmware::joint::fault::Fault;
@@ -128,7 +128,7 @@ async fn keep_cool(mut winding: WindingTemperature) {
         winding.step(mean_square, sensor);
         gear.step(mean_square, sensor);
         // The gear has no sensor; it is bolted to the motor's housing.
-        control::set_slow(&Slow { derating: winding.derating(), gear_temperature: gear.housing() });
+        control::set_thermal(winding.derating(), gear.housing());
     }
 }
 

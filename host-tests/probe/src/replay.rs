@@ -7,6 +7,7 @@
 use joint_firmware::compensation::Request;
 use joint_firmware::default_configuration::B_G431B_ESC1;
 use joint_firmware::friction::FrictionModel;
+use joint_firmware::joint::adaptation::Factors;
 use joint_firmware::joint::configuration::{BridgeConfiguration, Configuration, VelocitySource};
 use joint_firmware::joint::state_machine::Controlword;
 use joint_firmware::joint::{
@@ -40,7 +41,7 @@ pub const START: u32 = OFFSET_STEPS + 4;
 /// Control steps of a run: 10 ms.
 pub const STEPS: u32 = 200;
 /// Words of a recorded step.
-pub const WORDS: usize = 10;
+pub const WORDS: usize = 12;
 /// Steps between two commands: a bus at 1 kHz.
 const COMMAND_STEPS: u32 = 20;
 
@@ -128,12 +129,14 @@ pub fn words(measured: &Measurements, slow: &Slow) -> [u32; WORDS] {
         u32::from(measured.encoder_valid) | u32::from(measured.bridge_fault) << 1 | u32::from(measured.overrun) << 2;
     let [a, b, c, bus_voltage] = [a, b, c, bus_voltage].map(f32::to_bits);
     let [winding, bridge] = [measured.winding_temperature, measured.bridge_temperature].map(f32::to_bits);
-    [a, b, c, bus_voltage, encoder, flags, winding, bridge, slow.derating.to_bits(), slow.gear_temperature.to_bits()]
+    let Slow { derating, gear_temperature, factors: Factors { factor, viscous } } = *slow;
+    let [derating, gear, factor, viscous] = [derating, gear_temperature, factor, viscous].map(f32::to_bits);
+    [a, b, c, bus_voltage, encoder, flags, winding, bridge, derating, gear, factor, viscous]
 }
 
 /// The step of these words.
 pub fn measured(words: &[u32; WORDS]) -> (Measurements, Slow) {
-    let [a, b, c, bus_voltage, encoder, flags, winding, bridge, derating, gear] = *words;
+    let [a, b, c, bus_voltage, encoder, flags, winding, bridge, derating, gear, factor, viscous] = *words;
     let [a, b, c, bus_voltage] = [a, b, c, bus_voltage].map(f32::from_bits);
     let measurements = Measurements {
         phase_currents: Phases { a, b, c },
@@ -146,7 +149,8 @@ pub fn measured(words: &[u32; WORDS]) -> (Measurements, Slow) {
         bridge_fault: flags & 2 != 0,
         overrun: flags & 4 != 0,
     };
-    (measurements, Slow { derating: f32::from_bits(derating), gear_temperature: f32::from_bits(gear) })
+    let [derating, gear_temperature, factor, viscous] = [derating, gear, factor, viscous].map(f32::from_bits);
+    (measurements, Slow { derating, gear_temperature, factors: Factors { factor, viscous } })
 }
 
 /// FNV-1a over what a step leads to.

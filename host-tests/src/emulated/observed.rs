@@ -16,6 +16,8 @@ pub trait Observed: Wired + Sized {
     const CODES: [u32; 4];
     /// Whether there is a sensor on the motor's winding; where there is none, its temperature is not a number.
     const WINDING_SENSOR: bool;
+    /// The program adapts friction in service.
+    const ADAPTS: bool;
     /// Whether the encoder has to meet its index before the joint can be enabled.
     const INDEX: bool;
     /// Variable that tells whether the gate driver is ready, 1, or has not been since the start, 0; none where there is
@@ -63,6 +65,7 @@ impl Observed for MoteusR4 {
     // ADC3, ADC1 and ADC2 rank 1, ADC1 rank 2 (RM0440, 21.7.22).
     const CODES: [u32; 4] = [0x5000_0480, 0x5000_0080, 0x5000_0180, 0x5000_0084];
     const WINDING_SENSOR: bool = true;
+    const ADAPTS: bool = true;
     const INDEX: bool = false;
     const GATE: Option<&'static str> = Some("gate::STATE");
     const ENCODER: &'static [&'static str] = &["sensors.answer"];
@@ -87,6 +90,7 @@ impl Observed for BG431BEsc1 {
     // ADC1 rank 1, ADC2 rank 1 and 2, ADC1 rank 2 (RM0440, 21.7.22).
     const CODES: [u32; 4] = [0x5000_0080, 0x5000_0180, 0x5000_0184, 0x5000_0084];
     const WINDING_SENSOR: bool = false;
+    const ADAPTS: bool = false;
     const INDEX: bool = true;
     const GATE: Option<&'static str> = None;
     const ENCODER: &'static [&'static str] = &[

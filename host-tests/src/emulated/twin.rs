@@ -12,6 +12,7 @@ use emulator::emulation::Emulation;
 use emulator::variables::{Variable, VariableError, Variables};
 use joint_firmware::compensation::Output;
 use joint_firmware::default_configuration::BoardConfiguration;
+use joint_firmware::joint::adaptation::Factors;
 use joint_firmware::joint::state_machine::Controlword;
 use joint_firmware::joint::{
     Active, Bridge, BridgeState, Command, Coupled, Demand, Joint, Measurements, Mode, Slow, Telemetry,
@@ -126,8 +127,15 @@ impl<'v> Twin<'v> {
             bridge_fault: bridge_fault || stopped,
             overrun: memory.bits(&fields.overrun)? != 0,
         };
-        let slow =
-            Slow { derating: memory.real(&fields.derating)?, gear_temperature: memory.real(&fields.gear_temperature)? };
+        let [factor, viscous] = match &fields.factors {
+            Some([factor, viscous]) => [memory.real(factor)?, memory.real(viscous)?],
+            None => [Factors::IMAGE.factor, Factors::IMAGE.viscous],
+        };
+        let slow = Slow {
+            derating: memory.real(&fields.derating)?,
+            gear_temperature: memory.real(&fields.gear_temperature)?,
+            factors: Factors { factor, viscous },
+        };
         Ok(Given {
             demand: fields.demand(memory)?,
             slow,
@@ -251,6 +259,8 @@ struct Fields<'v> {
     winding_temperature: Option<Variable<'v>>,
     derating: Variable<'v>,
     gear_temperature: Variable<'v>,
+    /// None in a program that does not adapt.
+    factors: Option<[Variable<'v>; 2]>,
     mean_square_wanted: Variable<'v>,
     mean_square_current: Variable<'v>,
     switching: Variable<'v>,
@@ -341,6 +351,7 @@ impl<'v> Fields<'v> {
             winding_temperature: W::WINDING_SENSOR.then(|| word("winding_temperature")).transpose()?,
             derating: word("derating")?,
             gear_temperature: word("gear_temperature")?,
+            factors: W::ADAPTS.then(|| Ok::<_, VariableError>([word("factor")?, word("viscous")?])).transpose()?,
             mean_square_wanted: word("mean_square_wanted")?,
             mean_square_current: word("mean_square_current")?,
             switching: word("switching")?,

@@ -1,4 +1,4 @@
-//! 2200h: friction compensation. Its settings act at once, also while the joint moves; 1010h stores them with the configuration.
+//! 2200h and 2201h: friction compensation, and its adaptation. Its settings act at once, also while the joint moves; 1010h stores them with the configuration.
 
 use super::*;
 use crate::objects::field::{Actual, Field::Actual as A, Field::Compensation as S};
@@ -28,5 +28,17 @@ room! {
             "Velocity below which compensation fades out in proportion"
         11, "friction uncertainty", F32, RW, UNMAPPED, S(Setting::Uncertainty); "", 1.0, within(0.0, 1.0);
             "By how much friction may be less than gain times the model, as a part of it: what the energy guard may take of a compensation for the measured velocity; 1: all of it"
+    }
+    0x2201 "adaptation" {
+        1, "requested adaptation", U8, RW, UNMAPPED, S(Setting::Adaptation); "", 1.0, within(0.0, 2.0);
+            "0 off, and all is forgotten, 1 learns without effect, 2 learns and acts; where a program has no room for it, 0 alone"
+        2, "learning", U8, RO, TRANSMIT, A(Actual::Learning); "", 1.0, ANY;
+            "0 learns; or why not: 1 off, 2 no image acts, 3 operation not enabled, 4 outside the trained range, 5 standstill, 6 not moved by its command, 7 torque or compensation at a limit, 8 something touches the joint"
+        3, "friction factor", F32, RO, TRANSMIT, A(Actual::AdaptedFactor); "", 1.0, ANY;
+            "What is left of the image's friction, or more; 0.25 to 2.5"
+        4, "deviation of the factor", F32, RO, TRANSMIT, A(Actual::FactorDeviation); "", 1.0, ANY;
+            "Its standard deviation; 0.5 before anything is learned"
+        5, "added viscous friction", F32, RO, TRANSMIT, A(Actual::AdaptedViscous); "Nm s/rad", 1.0, ANY;
+            "What acts beside the image's"
     }
 }

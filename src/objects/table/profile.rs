@@ -60,7 +60,7 @@ room! {
     }
     0x6077 "torque actual value" {
         0, "torque actual value", I16, RO, TRANSMIT, A(Actual::Torque); "of 6076h", 1e-3, ANY;
-            "Torque of the measured current at the joint; in the open loop the most that it can make"
+            "Torque of the measured current at the joint, mean over the last millisecond (where a program does not adapt, of one control step); in the open loop the most that it can make"
     }
     0x607A "target position" {
         0, "target position", I32, RW, RECEIVE, Set(SetPoint::TargetPosition); "rad", 1e-6, ANY;

@@ -1,6 +1,7 @@
 //! An SDO client: expedited and segmented.
 
 use super::*;
+use crate::joint::adaptation::{Factors, Learning, Report};
 
 impl Node {
     fn ask(&mut self, request: [u8; 8]) -> Result<[u8; 8], u32> {
@@ -102,4 +103,26 @@ fn a_watchdog_s_reset_is_an_emcy() {
     assert_eq!(node.task(), []);
     assert_eq!(node.number(0x1003, 0), 1);
     assert_eq!(node.number(0x2301, 1), 0x12);
+}
+
+#[test]
+fn an_image_that_no_more_fits_is_told_once_and_shown() {
+    let mut node = Node::operational();
+    let mut tell = |factor: f32, deviation: f32| {
+        node.observed.adaptation =
+            Report { factors: Factors { factor, viscous: 0.125 }, deviation, learning: Learning::Learns };
+        let sent = node.task();
+        assert_eq!(node.real(0x2201, 3), factor);
+        assert_eq!((node.real(0x2201, 4), node.real(0x2201, 5), node.number(0x2201, 2)), (deviation, 0.125, 0));
+        sent.into_iter().filter(|frame| frame.id() == 0x85).collect::<Vec<_>>()
+    };
+    assert_eq!(tell(0.71, 0.05), [], "within a fifth and two deviations");
+    let [low, high] = 690u16.to_le_bytes();
+    assert_eq!(tell(0.69, 0.05), [Frame::new(0x85, &[3, 0xFF, 0, low, high, 50, 0, 0]).unwrap()]);
+    // Around the limit it is told no more, nor before it may fit again.
+    for (factor, deviation) in [(0.71, 0.05), (0.69, 0.05), (0.79, 0.05), (0.5, 0.05)] {
+        assert_eq!(tell(factor, deviation), [], "{factor}");
+    }
+    assert_eq!(tell(0.81, 0.05), []);
+    assert_eq!(tell(1.4, 0.05).len(), 1);
 }

@@ -35,7 +35,7 @@ proptest! {
         for ((id, data), value, time) in frames {
             node.now = node.now.wrapping_add(time);
             node.observed.telemetry.motion.position = value;
-            node.observed.telemetry.measured_torque = value;
+            (node.observed.telemetry.measured_torque, node.observed.telemetry.mean_torque) = (value, value);
             let before = (node.bus.state(), node.image.demand());
             node.receive(id, &data);
             let demand = node.image.demand();

@@ -343,7 +343,7 @@ fn telemetry_is_scaled_as_the_table_says_and_held_at_the_ends() {
     t.state = State::OperationEnabled;
     t.motion.position = -1.234_567;
     t.motion.velocity = 2.5;
-    t.measured_torque = 0.01;
+    t.mean_torque = 0.01;
     t.compensated.torque = -0.0125;
     t.bus_voltage = 23.456;
     node.observed.feedforward_torque = 0.02;

@@ -5,6 +5,7 @@ mod node;
 mod program;
 mod store;
 
+use super::adaptation::Adapting;
 use super::{NotStarted, Started};
 use crate::board::control::{Commands, Report};
 use crate::board::flash::Parameters;
@@ -50,7 +51,7 @@ impl Connection {
     pub fn spawn(self, slow: Spawner) -> Watching {
         // Spawned once, so its only place is free.
         slow.spawn(defmt::unwrap!(bus::serve(self.node)));
-        Watching { statistics: FrictionStatistics::default(), memory: Memory::default() }
+        Watching { statistics: FrictionStatistics::default(), memory: Memory::default(), adapting: Adapting::NOTHING }
     }
 }
 
@@ -59,10 +60,11 @@ pub struct Watching {
     statistics: FrictionStatistics,
     /// Of the model in shadow.
     memory: Memory,
+    adapting: Adapting,
 }
 
 impl Watching {
-    /// Every millisecond: computes the model in shadow, and leaves for the bus what is known of the joint. Temperatures in °C.
+    /// Every millisecond: computes the model in shadow, adapts the one that acts, and leaves for the bus what is known of the joint. Temperatures in °C.
     pub fn look(&mut self, bridge_temperature: f32, winding_temperature: f32) {
         let Some(Report { telemetry, latched, .. }) = control::report() else { return };
         let mut seen = telemetry;
@@ -77,6 +79,7 @@ impl Watching {
             winding_temperature,
             bridge_temperature,
             friction: self.statistics,
+            adaptation: self.adapting.look(&telemetry),
         });
     }
 }

@@ -1,5 +1,6 @@
 //! What the board does for the objects: configurations and friction models to the control step, records to flash. Thread mode.
 
+use super::super::adaptation;
 use super::store::{Guard, Store};
 use crate::board::{self, BoardConfiguration, Offering, Prepared, Subscriber, oscillator, shadow};
 use core::cell::RefCell;
@@ -66,6 +67,7 @@ impl BoardProgram {
         // Nothing has been offered, so there is a place.
         let prepared = defmt::unwrap!(prepare(&mut self.active, configuration, image))?;
         let thermal = prepared.value().thermal;
+        adaptation::prepared(prepared.value(), true);
         prepared.offer();
         Ok(thermal)
     }
@@ -87,6 +89,7 @@ impl BoardProgram {
 fn offer(active: &mut Offering<Active>, configuration: &Configuration, image: &[u8]) -> bool {
     match prepare(active, configuration, image) {
         Some(Ok(prepared)) => {
+            adaptation::prepared(prepared.value(), true);
             prepared.offer();
             true
         }
@@ -120,7 +123,9 @@ impl Program for BoardProgram {
                 }
             },
         );
-        prepared.ok_or(NotConfigured::Busy)?.map_err(NotConfigured::Refused)?.offer();
+        let prepared = prepared.ok_or(NotConfigured::Busy)?.map_err(NotConfigured::Refused)?;
+        adaptation::prepared(prepared.value(), false);
+        prepared.offer();
         oscillator::trim(configuration.oscillator_trim);
         Ok(())
     }

@@ -405,6 +405,7 @@ impl VirtualNode {
             winding_temperature: measured.winding_temperature,
             bridge_temperature: measured.bridge_temperature,
             friction: self.statistics,
+            adaptation: self.joint.adaptation(),
         };
         let history = if latched.is_empty() { None } else { Some(*joint.history()) };
         let window = *joint.window();

@@ -38,6 +38,18 @@ impl FrictionFactors {
         Self::from_fn(|| factor)
     }
 
+    /// `factor` for every torque; Stribeck velocity and the way in which temperature acts stay. So is a gear that is worn, or has run in.
+    #[must_use]
+    pub fn torques(factor: f64) -> Self {
+        Self { stribeck_velocity: 1.0, viscous_thinning: 1.0, coulomb_thinning: 1.0, ..Self::uniform(factor) }
+    }
+
+    /// `factor` for the viscous friction alone. So is a gear in the cold, or with another grease.
+    #[must_use]
+    pub fn viscous(factor: f64) -> Self {
+        Self { viscous: Directional { forward: factor, backward: factor }, ..Self::uniform(1.0) }
+    }
+
     /// Every factor drawn on its own between 1 - `share` and 1 + `share`.
     #[must_use]
     pub fn drawn(seed: u64, share: f64) -> Self {

@@ -3,6 +3,7 @@
 
 mod rig;
 
+use joint_firmware::joint::adaptation::Factors;
 use joint_firmware::joint::configuration::MOTION_STEPS;
 use joint_firmware::joint::monitor::UNEXPLAINED_STEPS;
 use joint_firmware::joint::state_machine::{Controlword, State};
@@ -86,8 +87,9 @@ fn demand() -> impl Strategy<Value = Demand> {
 }
 
 fn slow() -> impl Strategy<Value = Slow> {
-    (prop_oneof![number(), Just(1.0)], number())
-        .prop_map(|(derating, gear_temperature)| Slow { derating, gear_temperature })
+    let factors = (number(), number()).prop_map(|(factor, viscous)| Factors { factor, viscous });
+    (prop_oneof![number(), Just(1.0)], number(), prop_oneof![factors, Just(Factors::IMAGE)])
+        .prop_map(|(derating, gear_temperature, factors)| Slow { derating, gear_temperature, factors })
 }
 
 /// A joint at rest with everything in order.

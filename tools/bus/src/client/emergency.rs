@@ -125,6 +125,7 @@ mod tests {
             0x6100,
             0x6320,
             0xFF01,
+            0xFF03,
         ] {
             let emergency = Emergency { node: 1, code, register: 0, information: [0; 5] };
             assert!(!emergency.meaning().contains("not list"), "{code:04X}");

@@ -42,7 +42,7 @@ const fn field(
 }
 
 /// All keys.
-pub const FIELDS: [Field; 48] = [
+pub const FIELDS: [Field; 49] = [
     field("", "node_id", "", None, "Node on the CAN bus, 1 to 127; 255 where none is assigned yet"),
     field("", "oscillator_trim", "", Some((54.0, 74.0)), "Trim of the board's oscillator, steps of some 0.3 %"),
     field("motor", "resistance", "Ohm", Some((1e-3, 100.0)), "Resistance of a phase at 25 °C"),
@@ -217,6 +217,13 @@ pub const FIELDS: [Field; 48] = [
         "",
         Some((0.0, 1.0)),
         "By how much friction may be less than gain times the model; what the energy guard may take",
+    ),
+    field(
+        "compensation",
+        "adaptation",
+        "",
+        None,
+        "Adaptation in service: \"off\", \"shadow\" (without effect) or \"on\"",
     ),
     field("thermal", "winding_capacity", "J/K", None, "Heat capacity of the winding; to 10000"),
     field("thermal", "housing_capacity", "J/K", None, "Heat capacity of the housing; to 100000"),

@@ -5,8 +5,8 @@
 
 use joint_firmware::compensation::Request;
 use joint_firmware::joint::configuration::{
-    CompensationConfiguration, Configuration, FACTORY_TRIM, FRICTION_UNCERTAINTY, Gains, GearConfiguration, Limits,
-    MotorConfiguration, ThermalConfiguration, VelocitySource,
+    AdaptationRequest, CompensationConfiguration, Configuration, FACTORY_TRIM, FRICTION_UNCERTAINTY, Gains,
+    GearConfiguration, Limits, MotorConfiguration, ThermalConfiguration, VelocitySource,
 };
 use joint_firmware::motor::angle::{Direction, ElectricalAngle, EncoderAlignment};
 use serde::{Deserialize, Serialize};
@@ -137,6 +137,16 @@ struct CompensationText {
     standstill_velocity: f32,
     #[serde(default = "uncertainty")]
     uncertainty: f32,
+    #[serde(default, with = "AdaptationText")]
+    adaptation: AdaptationRequest,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "AdaptationRequest", rename_all = "kebab-case")]
+enum AdaptationText {
+    Off,
+    Shadow,
+    On,
 }
 
 /// Files of earlier programs have none.

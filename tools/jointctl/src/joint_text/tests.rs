@@ -1,6 +1,6 @@
 use super::*;
 use joint_firmware::compensation::Request;
-use joint_firmware::joint::configuration::VelocitySource;
+use joint_firmware::joint::configuration::{AdaptationRequest, VelocitySource};
 use joint_firmware::motor::angle::{Direction, ElectricalAngle};
 use plant::ActuatorParameters;
 use plant::virtual_joint::Setup;
@@ -23,6 +23,8 @@ fn a_configuration_comes_back_from_its_text_bit_by_bit() {
             if seed % 3 == 0 { VelocitySource::Measured } else { VelocitySource::Reference };
         configuration.compensation.request =
             [Request::Off, Request::Physical, Request::PhysicalAndNetwork, Request::NetworkInShadow][seed as usize % 4];
+        configuration.compensation.adaptation =
+            [AdaptationRequest::Off, AdaptationRequest::Shadow, AdaptationRequest::On][seed as usize % 3];
         configuration.gear.ratio *= if seed % 5 == 0 { -1.0 } else { 1.0 };
         let text = to_text(&configuration).unwrap();
         assert_eq!(from_text(&text, Path::new("joint.toml"), &bridge).unwrap(), configuration, "{text}");

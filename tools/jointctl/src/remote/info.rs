@@ -7,6 +7,7 @@ use super::image::{ImageStatus, StoredImage};
 use super::joint::RemoteJoint;
 use super::motion;
 use super::value::Value;
+use joint_firmware::joint::adaptation::{Factors, Learning, Report};
 use joint_firmware::objects::field::{Actual, Field, ImageField, ResetField, SetPoint};
 use joint_firmware::objects::settings::Setting;
 use joint_firmware::parameters::life_cycle::State;
@@ -91,6 +92,7 @@ pub fn page(joint: &RemoteJoint) -> Result<String, RemoteError> {
             actual(Actual::ShadowRms)?
         ),
     );
+    line("adaptation", adaptation(joint)?);
     line(
         "limits",
         format!(
@@ -123,6 +125,42 @@ pub fn page(joint: &RemoteJoint) -> Result<String, RemoteError> {
         ),
     );
     Ok(page)
+}
+
+/// Why a joint does not learn, by the number of object 2201h:2.
+const LEARNING: [&str; 9] = [
+    "learns",
+    "off",
+    "no image acts",
+    "operation is not enabled",
+    "outside the trained range",
+    "the joint stands",
+    "its command does not move it",
+    "torque or compensation at a limit",
+    "something touches the joint",
+];
+
+/// Object 2201h in words.
+fn adaptation(joint: &RemoteJoint) -> Result<String, RemoteError> {
+    let request = match joint.raw(Field::Compensation(Setting::Adaptation))? {
+        0 => return Ok("off".into()),
+        1 => "in shadow",
+        _ => "on",
+    };
+    let learning = joint.raw(Field::Actual(Actual::Learning))?;
+    let factor = joint.number(Field::Actual(Actual::AdaptedFactor))?;
+    let deviation = joint.number(Field::Actual(Actual::FactorDeviation))?;
+    let found = Report {
+        factors: Factors { factor: factor as f32, viscous: 0.0 },
+        deviation: deviation as f32,
+        learning: Learning::Off,
+    };
+    Ok(format!(
+        "{request}: {}; friction {factor:.2} times the image's, deviation {deviation:.2}, and {} more{}",
+        LEARNING.get(learning as usize).copied().unwrap_or("unknown"),
+        show(joint, Field::Actual(Actual::AdaptedViscous))?,
+        if found.misfits() { ": make a new image (retrain)" } else { "" }
+    ))
 }
 
 /// The page as JSON: its lines by their titles, those of several lines as an array.

@@ -10,6 +10,7 @@ use crate::actuator::{Actuator, ActuatorParameters};
 use crate::error::ParameterError;
 use joint_firmware::friction::FrictionModel;
 use joint_firmware::joint::active::SLOW_RATE;
+use joint_firmware::joint::adaptation::{self, Adaptation, LOOK_RATE};
 use joint_firmware::joint::configuration::ConfigurationError;
 use joint_firmware::joint::state_machine::{Controlword, State};
 use joint_firmware::joint::{Active, Bridge, BridgeState, Demand, Joint, Measurements, Slow, Telemetry};
@@ -69,6 +70,8 @@ pub struct VirtualJoint {
     active: Active,
     winding: WindingTemperature,
     slow: Slow,
+    adaptation: Adaptation,
+    look_divider: u64,
     build: Build,
     period: f64,
     steps: u64,
@@ -99,7 +102,9 @@ impl VirtualJoint {
             joint: Joint::new(),
             active,
             winding,
-            slow: Slow { derating: 1.0, gear_temperature: temperature as f32 },
+            slow: Slow { gear_temperature: temperature as f32, ..Slow::default() },
+            adaptation: Adaptation::NOTHING,
+            look_divider: (rate / f64::from(LOOK_RATE)).round() as u64,
             build: Build::Whole,
             period: 1.0 / rate,
             steps: 0,
@@ -119,6 +124,7 @@ impl VirtualJoint {
 
     /// Changes the friction model between two control steps, as the firmware does after an upload.
     pub fn set_friction(&mut self, model: Option<FrictionModel>) {
+        self.adaptation = Adaptation::NOTHING;
         self.active.friction = model;
     }
 
@@ -149,9 +155,13 @@ impl VirtualJoint {
         self.steps += 1;
         if self.steps.is_multiple_of(self.slow_divider) {
             self.winding.step(self.joint.take_mean_square_current(), self.measured.winding_temperature);
-            self.slow = Slow { derating: self.winding.derating(), gear_temperature: self.winding.housing() };
+            (self.slow.derating, self.slow.gear_temperature) = (self.winding.derating(), self.winding.housing());
         }
-        self.joint.telemetry()
+        let telemetry = self.joint.telemetry();
+        if self.steps.is_multiple_of(self.look_divider) {
+            self.slow.factors = self.adaptation.look(&adaptation::Settings::of(&self.active), &telemetry);
+        }
+        telemetry
     }
 
     /// Starts the joint and enables operation, in torque mode without torque.
@@ -222,6 +232,23 @@ impl VirtualJoint {
     #[must_use]
     pub fn bridge(&self) -> &Bridge {
         &self.bridge
+    }
+
+    /// Goes on from what another joint of its kind has learned of friction in service, or the same one before.
+    pub fn set_adaptation(&mut self, adaptation: Adaptation) {
+        self.adaptation = adaptation;
+    }
+
+    /// All that it has learned.
+    #[must_use]
+    pub fn learned(&self) -> &Adaptation {
+        &self.adaptation
+    }
+
+    /// What of it acts.
+    #[must_use]
+    pub fn adaptation(&self) -> adaptation::Report {
+        self.adaptation.report(&adaptation::Settings::of(&self.active))
     }
 
     /// What the slow task knows.

@@ -5,8 +5,8 @@ use crate::actuator::ActuatorParameters;
 use joint_firmware::compensation::Request;
 use joint_firmware::joint::BoardLimits;
 use joint_firmware::joint::configuration::{
-    BridgeConfiguration, CompensationConfiguration, Configuration, FACTORY_TRIM, FRICTION_UNCERTAINTY, Gains,
-    GearConfiguration, Limits, MotorConfiguration, ThermalConfiguration, VelocitySource,
+    AdaptationRequest, BridgeConfiguration, CompensationConfiguration, Configuration, FACTORY_TRIM,
+    FRICTION_UNCERTAINTY, Gains, GearConfiguration, Limits, MotorConfiguration, ThermalConfiguration, VelocitySource,
 };
 use joint_firmware::motor::angle::{Direction, ElectricalAngle, EncoderAlignment};
 use std::f64::consts::TAU;
@@ -115,6 +115,7 @@ impl Setup {
                     velocity_source: VelocitySource::Reference,
                     standstill_velocity: 0.01,
                     uncertainty: FRICTION_UNCERTAINTY,
+                    adaptation: AdaptationRequest::Off,
                 },
                 thermal: ThermalConfiguration {
                     winding_capacity: joint.thermal.winding_capacity as f32,

@@ -1,0 +1,654 @@
+//! Adaptation: what friction is in service beside what the image says, from the motion that the joint makes anyway; task, host.
+//!
+//! A thousand times a second a task looks at a control step. Twenty looks make a row: the mean motor torque `y` of 20 ms is explained by
+//!
+//! ```text
+//! y = d f + c v + J dv/dt + s sin(q) + k cos(q) + o
+//! ```
+//!
+//! with the image's friction `f`, of which `d` is the factor, and an added viscous coefficient `c` (Nm s/rad). Inertia `J` (kg m²), gravity `s` and `k`
+//! (Nm) and an offset `o` (Nm), which is whatever pushes the link, are estimated only so that they are not taken for friction. The torque is a mean over
+//! time and not a sample: a controller on a bus moves it once a millisecond, and looks in step with that would see its saw teeth always at the same place. Mean
+//! values over a window need no measured acceleration, as in a momentum observer (003, section III-C).
+//!
+//! The estimate is that of least squares over the last [`MEMORY`] seconds of motion, with weights that fall exponentially, and with a ridge: each number is drawn
+//! towards the image (`d` = 1, the rest 0) as strongly as its prior deviation and the noise say. So a motion that does not tell two of them apart leaves them
+//! where they were, and nothing winds up. Rows lie far from independent, because ripple and what the image has no term for last longer than one: twenty
+//! of them count as one. A row that is far from what all six explain is a blow or a hand, and counts the less the farther it is (Huber's weights).
+//!
+//! Nothing is learned where the command does not move the joint ([`Learning`]): a joint that is led by hand needs only as much torque as compensation already
+//! gives, and would learn that friction is what it gives. What acts stays in its box whatever happens ([`FACTOR`], [`Adaptation::viscous_bound`]),
+//! and compensation within its clamp.
+
+use super::Telemetry;
+use super::active::Active;
+use super::configuration::AdaptationRequest;
+use super::state_machine::State;
+use crate::compensation::{Acting, Reason};
+use crate::motor::number::{exceeds, greater, lesser, limited, magnitude, or_zero, square_root, within};
+use crate::sine::cos_sin;
+
+/// Whether this program adapts. With the feature `little-room` a chip's program does not; on the host nothing changes.
+pub const ADAPTS: bool = !cfg!(all(feature = "little-room", target_os = "none"));
+/// Looks a second, Hz.
+pub const LOOK_RATE: f32 = 1_000.0;
+/// Looks in a row.
+const LOOKS: u16 = 20;
+/// Duration of a row, s.
+const ROW: f32 = LOOKS as f32 / LOOK_RATE;
+/// Place of a row's middle.
+const MIDDLE: f32 = 0.5 * (LOOKS as f32 - 1.0);
+/// From a slope's sum to the slope of the straight line through all looks, 1/s: they are n (n² - 1) / 12 in squares.
+const SLOPE: f32 = LOOK_RATE * 12.0 / (LOOKS as f32 * (LOOKS as f32 * LOOKS as f32 - 1.0));
+/// Time in which the weight of a row falls to a third (1 / e), s of motion.
+pub const MEMORY: f32 = 8.0;
+/// Weight of all rows before the newest, each time: exp(-ROW / MEMORY).
+const FORGETTING: f32 = 1.0 - ROW / MEMORY + 0.5 * (ROW / MEMORY) * (ROW / MEMORY);
+/// Lowest and highest factor of the image's friction that acts.
+pub const FACTOR: (f32, f32) = (0.25, 2.5);
+/// How far the factor may be from 1 with an image that still fits.
+pub const MISFIT: f32 = 0.2;
+/// Estimated numbers: factor, viscous coefficient, inertia, gravity along sine and cosine, offset.
+const N: usize = 6;
+/// Standard deviation of the factor before anything is seen; the image may be half too large.
+const PRIOR: f32 = 0.5;
+/// The same of gravity, as a part of the torque limit.
+const GRAVITY: f32 = 0.25;
+/// Rows that count as one.
+const ALIKE: f32 = 20.0;
+/// Deviation from what is explained, in standard deviations, from which a row counts less.
+const HUBER: f32 = 3.0;
+/// Rows after which a joint may know its friction, and the factor's deviation from which on it does.
+const KNOWN: (u32, f32) = (100, 0.2);
+/// Deviation from what is explained, in standard deviations, from which a joint that knows its friction is being touched.
+const TOUCHED: f32 = 4.0;
+/// Rows without that after which it learns again.
+const QUIET_ROWS: u32 = 25;
+/// Rows in which it has been touched without such a pause, after which it was friction that has changed: 10 s of motion.
+const PATIENCE_ROWS: u32 = 500;
+/// Part of what was learned that counts from then on.
+const FADED: f32 = 0.1;
+/// Rows over which the mean square of what is left unexplained is taken.
+const NOISE_ROWS: f32 = 50.0;
+/// Least of it, as a part of friction's mean square.
+const LEAST_NOISE: f32 = 4e-4;
+/// Least friction, as a part of the torque limit.
+const LEAST_FRICTION: f32 = 1e-3;
+
+/// What acts of the image in service.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Factors {
+    /// Factor of the image's friction, within [`FACTOR`].
+    pub factor: f32,
+    /// Added viscous friction, Nm s/rad.
+    pub viscous: f32,
+}
+
+impl Factors {
+    /// The image as it is.
+    pub const IMAGE: Self = Self { factor: 1.0, viscous: 0.0 };
+}
+
+impl Default for Factors {
+    fn default() -> Self {
+        Self::IMAGE
+    }
+}
+
+/// Why nothing is learned, or that something is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Learning {
+    /// The joint learns.
+    Learns = 0,
+    /// Adaptation is off.
+    #[default]
+    Off = 1,
+    /// No image acts, or compensation has no gain.
+    NothingActs = 2,
+    /// Operation is not enabled.
+    NotEnabled = 3,
+    /// A signal is outside the range that the image was trained in.
+    OutsideTrainedBox = 4,
+    /// The joint stands, or nearly.
+    Standstill = 5,
+    /// The command does not push the joint the way that it moves.
+    NotPushed = 6,
+    /// Torque or compensation are at a limit.
+    Limited = 7,
+    /// A torque acts on the link that motion and friction do not explain.
+    Touched = 8,
+}
+
+/// What is known of adaptation at one instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Report {
+    /// What acts, or in shadow would act.
+    pub factors: Factors,
+    /// Standard deviation of the factor.
+    pub deviation: f32,
+    /// Whether the joint learns.
+    pub learning: Learning,
+}
+
+impl Default for Report {
+    /// Of a joint that does not adapt.
+    fn default() -> Self {
+        Self { factors: Factors::IMAGE, deviation: PRIOR, learning: Learning::Off }
+    }
+}
+
+impl Report {
+    /// Whether friction is surely no more what the image says: [`MISFIT`] off, and two deviations. The image is to be made anew.
+    pub fn misfits(&self) -> bool {
+        ADAPTS && magnitude(self.factors.factor - 1.0) > MISFIT + 2.0 * self.deviation
+    }
+
+    /// Whether it may be what the image says, again or still.
+    pub fn fits(&self) -> bool {
+        magnitude(self.factors.factor - 1.0) < MISFIT
+    }
+}
+
+/// What adaptation needs of a configuration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// What it does.
+    pub request: AdaptationRequest,
+    /// The compensation's gain, 0 to 1.
+    pub gain: f32,
+    /// rad/s.
+    pub standstill: f32,
+    /// Nm.
+    pub torque_limit: f32,
+    /// rad/s.
+    pub velocity_limit: f32,
+    /// rad/s².
+    pub acceleration: f32,
+}
+
+impl Settings {
+    /// Of a joint that does not adapt.
+    pub const OFF: Self = Self {
+        request: AdaptationRequest::Off,
+        gain: 0.0,
+        standstill: 1.0,
+        torque_limit: 1.0,
+        velocity_limit: 1.0,
+        acceleration: 1.0,
+    };
+
+    /// Of a joint as it is prepared.
+    pub fn of(active: &Active) -> Self {
+        Self {
+            request: active.adaptation.request,
+            gain: active.adaptation.gain,
+            standstill: active.compensation.standstill,
+            torque_limit: active.limits.torque,
+            velocity_limit: active.limits.velocity,
+            acceleration: active.motion.acceleration,
+        }
+    }
+}
+
+/// Sums of a row, while it fills.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Window {
+    looks: u16,
+    torque: f32,
+    friction: f32,
+    velocity: f32,
+    sine: f32,
+    cosine: f32,
+    /// Sum of the velocity times its place before or behind the row's middle.
+    slope: f32,
+}
+
+/// The estimate of one joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Adaptation {
+    window: Window,
+    learning: Learning,
+    /// Weighted sums of the rows' products, below and on the diagonal. The offset's own is the sum of the weights.
+    products: [[f32; N]; N],
+    /// The same of rows and what the image leaves of the torque.
+    torques: [f32; N],
+    /// Mean square of what a row leaves unexplained, Nm².
+    noise: f32,
+    /// Rows since the beginning.
+    rows: u32,
+    /// Rows in which something touched the joint, and rows since the last one of them.
+    touched: u32,
+    /// The same.
+    quiet: u32,
+    /// Difference from the image; in the units of [`Adaptation::row`].
+    estimate: [f32; N],
+    /// Standard deviation of the factor.
+    deviation: f32,
+}
+
+impl Default for Adaptation {
+    fn default() -> Self {
+        Self::NOTHING
+    }
+}
+
+impl Adaptation {
+    /// Nothing seen yet.
+    pub const NOTHING: Self = Self {
+        window: Window { looks: 0, torque: 0.0, friction: 0.0, velocity: 0.0, sine: 0.0, cosine: 0.0, slope: 0.0 },
+        learning: Learning::Off,
+        products: [[0.0; N]; N],
+        torques: [0.0; N],
+        noise: 0.0,
+        rows: 0,
+        touched: 0,
+        quiet: 0,
+        estimate: [0.0; N],
+        deviation: PRIOR,
+    };
+
+    /// A look at a control step; [`LOOK_RATE`] times a second. What acts from here on.
+    pub fn look(&mut self, settings: &Settings, telemetry: &Telemetry) -> Factors {
+        if settings.request == AdaptationRequest::Off {
+            *self = Self::NOTHING;
+            return Factors::IMAGE;
+        }
+        self.learning = learning(settings, telemetry);
+        if self.learning == Learning::Learns {
+            self.note(settings, telemetry);
+            if self.touched > 0 {
+                self.learning = Learning::Touched;
+            }
+        } else {
+            self.window.looks = 0;
+        }
+        if settings.request == AdaptationRequest::On { self.factors(settings) } else { Factors::IMAGE }
+    }
+
+    /// What is known now.
+    pub fn report(&self, settings: &Settings) -> Report {
+        Report { factors: self.factors(settings), deviation: self.deviation, learning: self.learning }
+    }
+
+    /// What acts, or would act.
+    pub fn factors(&self, settings: &Settings) -> Factors {
+        if self.rows == 0 {
+            return Factors::IMAGE;
+        }
+        Factors {
+            factor: within(1.0 + self.estimate[0], FACTOR.0, FACTOR.1),
+            viscous: limited(self.estimate[1] / settings.velocity_limit, self.viscous_bound(settings)),
+        }
+    }
+
+    /// Largest added viscous friction, Nm s/rad: at the velocity limit three times the image's friction.
+    pub fn viscous_bound(&self, settings: &Settings) -> f32 {
+        3.0 * self.friction(settings) / settings.velocity_limit
+    }
+
+    /// Root of the mean square of the image's friction in what was seen, Nm.
+    fn friction(&self, settings: &Settings) -> f32 {
+        let weights = greater(self.products[N - 1][N - 1], 1.0);
+        greater(square_root(self.products[0][0] / weights), LEAST_FRICTION * settings.torque_limit)
+    }
+
+    fn note(&mut self, settings: &Settings, telemetry: &Telemetry) {
+        let motion = &telemetry.motion;
+        let turns = motion.position * (0.5 * core::f32::consts::FRAC_1_PI);
+        let (cosine, sine) = cos_sin(((turns - (turns as i32) as f32) * 4_294_967_296.0) as i64 as u32);
+        let window = &mut self.window;
+        if window.looks == 0 {
+            *window = Window::default();
+        }
+        window.slope += (f32::from(window.looks) - MIDDLE) * motion.velocity;
+        window.looks += 1;
+        window.torque += telemetry.mean_torque;
+        window.friction += torque(telemetry) / settings.gain;
+        window.velocity += motion.velocity;
+        window.sine += sine as f32 * (1.0 / 2_147_483_648.0);
+        window.cosine += cosine as f32 * (1.0 / 2_147_483_648.0);
+        if window.looks == LOOKS {
+            let (torque, row) = self.row(settings);
+            self.window.looks = 0;
+            self.learn(settings, torque, &row);
+        }
+    }
+
+    /// What the image leaves of a row's torque, Nm, and the row: friction, velocity as a part of the limit, acceleration as a part of the
+    /// ramp's, sine, cosine, one.
+    fn row(&self, settings: &Settings) -> (f32, [f32; N]) {
+        let Window { torque, friction, velocity, sine, cosine, slope, .. } = self.window;
+        let mean = 1.0 / f32::from(LOOKS);
+        let velocity = velocity * mean / settings.velocity_limit;
+        let row = [friction * mean, velocity, slope * SLOPE / settings.acceleration, sine * mean, cosine * mean, 1.0];
+        (or_zero((torque - friction) * mean), row.map(or_zero))
+    }
+
+    fn learn(&mut self, settings: &Settings, torque: f32, row: &[f32; N]) {
+        let explained: f32 = self.estimate.iter().zip(row).map(|(estimate, signal)| estimate * signal).sum();
+        let left = magnitude(torque - explained);
+        if self.is_touched(left) {
+            return;
+        }
+        let bound = HUBER * square_root(self.noise);
+        let weight = if self.rows == 0 || left <= bound { 1.0 } else { bound / left };
+        for (i, &signal) in row.iter().enumerate() {
+            self.torques[i] = FORGETTING * self.torques[i] + weight * signal * torque;
+            for (product, other) in self.products[i].iter_mut().zip(row).take(i + 1) {
+                *product = FORGETTING * *product + weight * signal * other;
+            }
+        }
+        self.rows = self.rows.saturating_add(1);
+        let square = left * left;
+        let news = greater(1.0 / NOISE_ROWS, 1.0 / self.rows as f32);
+        let square = if self.rows == 1 { square } else { lesser(square, 9.0 * self.noise) };
+        let friction = self.friction(settings);
+        self.noise = greater(self.noise + news * (square - self.noise), LEAST_NOISE * friction * friction);
+        let limit = settings.torque_limit;
+        self.solve(&[PRIOR, friction, limit, GRAVITY * limit, GRAVITY * limit, friction]);
+    }
+
+    /// Whether a row that leaves so much torque unexplained, Nm, is of a joint that is touched, or was a moment ago.
+    fn is_touched(&mut self, left: f32) -> bool {
+        let knows = self.rows >= KNOWN.0 && self.deviation < KNOWN.1;
+        if knows && left > TOUCHED * square_root(self.noise) {
+            (self.touched, self.quiet) = (self.touched + 1, 0);
+        } else if self.touched > 0 {
+            self.quiet += 1;
+        }
+        if self.touched > PATIENCE_ROWS {
+            // What was learned counts as a second's rows do.
+            self.torques = self.torques.map(|sum| FADED * sum);
+            self.products = self.products.map(|sums| sums.map(|sum| FADED * sum));
+            (self.rows, self.touched) = (0, 0);
+        } else if self.quiet >= QUIET_ROWS {
+            (self.touched, self.quiet) = (0, 0);
+        }
+        self.touched > 0
+    }
+
+    /// The estimate and the factor's deviation, by a Cholesky decomposition without roots (L D L') of the sums plus the ridge, in units of the prior
+    /// deviations: so the smallest pivot is one, however little a motion tells.
+    fn solve(&mut self, prior: &[f32; N]) {
+        let share = 1.0 / (ALIKE * self.noise);
+        let mut lower = [[0.0f32; N]; N];
+        let mut pivots = [1.0f32; N];
+        // Right-hand sides: what was seen, and the factor's unit vector.
+        let mut seen = [0.0f32; N];
+        let mut unit = [0.0f32; N];
+        for i in 0..N {
+            for j in 0..=i {
+                let mut value = self.products[i][j] * prior[i] * prior[j] * share;
+                for k in 0..j {
+                    value -= lower[i][k] * lower[j][k] * pivots[k];
+                }
+                if j < i {
+                    lower[i][j] = value / pivots[j];
+                } else {
+                    // Less than one by rounding alone.
+                    pivots[i] = greater(value + 1.0, 1.0);
+                }
+            }
+            seen[i] = self.torques[i] * prior[i] * share;
+            unit[i] = if i == 0 { 1.0 } else { 0.0 };
+            for j in 0..i {
+                seen[i] -= lower[i][j] * seen[j];
+                unit[i] -= lower[i][j] * unit[j];
+            }
+        }
+        for i in (0..N).rev() {
+            (seen[i], unit[i]) = (seen[i] / pivots[i], unit[i] / pivots[i]);
+            for j in i + 1..N {
+                seen[i] -= lower[j][i] * seen[j];
+                unit[i] -= lower[j][i] * unit[j];
+            }
+        }
+        for (estimate, (value, prior)) in self.estimate.iter_mut().zip(seen.iter().zip(prior)) {
+            *estimate = or_zero(value * prior);
+        }
+        self.deviation = PRIOR * square_root(unit[0]);
+    }
+}
+
+/// The image's torque with gain, Nm.
+fn torque(telemetry: &Telemetry) -> f32 {
+    telemetry.compensated.output.torque.to_bits() as f32 * (1.0 / 65_536.0)
+}
+
+/// Whether a control step tells something of friction.
+fn learning(settings: &Settings, telemetry: &Telemetry) -> Learning {
+    let output = &telemetry.compensated.output;
+    let velocity = telemetry.motion.velocity;
+    let fast = |velocity: f32| magnitude(velocity) > 2.0 * settings.standstill;
+    let pushed = match telemetry.wanted.velocity {
+        Some(reference) => reference * velocity > 0.0 && fast(reference),
+        None => telemetry.wanted.push * velocity > 0.0,
+    };
+    match output.reason {
+        _ if telemetry.state != State::OperationEnabled => Learning::NotEnabled,
+        _ if output.acting == Acting::Nothing || settings.gain <= 0.0 => Learning::NothingActs,
+        Reason::Off | Reason::NoModel => Learning::NothingActs,
+        Reason::OutsideTrainedBox(_) | Reason::FarOutsideTrainedBox(_) => Learning::OutsideTrainedBox,
+        _ if !fast(velocity) => Learning::Standstill,
+        _ if !pushed => Learning::NotPushed,
+        _ if output.limited || exceeds(telemetry.mean_torque, 0.95 * settings.torque_limit) => Learning::Limited,
+        _ => Learning::Learns,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::motion_law::Wanted;
+    use super::*;
+    use crate::compensation::Output;
+    use crate::quantity::Torque;
+
+    const SETTINGS: Settings = Settings {
+        request: AdaptationRequest::On,
+        gain: 0.8,
+        standstill: 0.01,
+        torque_limit: 20.0,
+        velocity_limit: 4.0,
+        acceleration: 30.0,
+    };
+
+    /// What a joint is that moves to and fro, once in 2 s and 1.5 rad/s at the fastest.
+    #[derive(Clone, Copy)]
+    struct Truth {
+        factor: f64,
+        viscous: f64,
+        /// Torque on the link beside gravity, Nm, at a time, s, and a velocity, rad/s.
+        external: fn(f64, f64) -> f64,
+    }
+
+    const IMAGE: Truth = Truth { factor: 1.0, viscous: 0.0, external: |_, _| 0.0 };
+
+    /// Image's friction, Nm.
+    fn friction(velocity: f64) -> f64 {
+        2.0 * (velocity / 0.05).tanh() + 0.3 * velocity
+    }
+
+    /// The look at a time, s.
+    fn look(truth: &Truth, time: f64) -> Telemetry {
+        let omega = core::f64::consts::PI;
+        let (sin, cos) = (omega * time).sin_cos();
+        let (position, velocity, acceleration) = (1.5 / omega * sin, 1.5 * cos, -1.5 * omega * sin);
+        let given = truth.factor * friction(velocity) + truth.viscous * velocity + (truth.external)(time, velocity);
+        let torque = given + 0.4 * acceleration + 3.0 * position.sin() + 0.2 * position.cos();
+        let mut telemetry = Telemetry::NOTHING;
+        telemetry.state = State::OperationEnabled;
+        telemetry.motion.position = position as f32;
+        telemetry.motion.velocity = velocity as f32;
+        telemetry.mean_torque = torque as f32;
+        telemetry.wanted = Wanted { velocity: Some(velocity as f32), ..Wanted::default() };
+        let image = f64::from(SETTINGS.gain) * friction(velocity);
+        telemetry.compensated.output = Output {
+            torque: Torque::from_bits((image * 65_536.0) as i32),
+            acting: Acting::Physical,
+            reason: Reason::NoNetwork,
+            ..Output::NOTHING
+        };
+        telemetry
+    }
+
+    /// Moves on from a time, s, for another, and returns what acts in the end.
+    fn moved(adaptation: &mut Adaptation, truth: &Truth, from: u32, seconds: u32) -> Factors {
+        let looks = from * 1_000..(from + seconds) * 1_000;
+        looks.fold(Factors::IMAGE, |_, n| adaptation.look(&SETTINGS, &look(truth, f64::from(n) * 1e-3)))
+    }
+
+    #[test]
+    fn friction_is_learned_and_gravity_inertia_and_a_steady_push_are_not_taken_for_it() {
+        let truths = [(1.0, 0.0), (0.7, 0.0), (1.3, 0.2), (0.4, 0.0), (2.0, -0.1)];
+        for (factor, viscous) in truths {
+            for external in [|_, _| 0.0, |_, _| 1.5] as [fn(f64, f64) -> f64; 2] {
+                let mut adaptation = Adaptation::NOTHING;
+                let found = moved(&mut adaptation, &Truth { factor, viscous, external }, 0, 20);
+                let off = [found.factor - factor as f32, found.viscous - viscous as f32].map(f32::abs);
+                assert!(off[0] < 0.03 && off[1] < 0.05, "{factor}, {viscous}: {found:?}");
+                assert!(adaptation.report(&SETTINGS).deviation < 0.1);
+            }
+        }
+    }
+
+    #[test]
+    fn what_acts_stays_in_its_box() {
+        for (factor, expected) in [(0.1, 0.25), (0.2, 0.25), (0.3, 0.3), (2.4, 2.4), (2.6, 2.5), (4.0, 2.5)] {
+            let found = moved(&mut Adaptation::default(), &Truth { factor, ..IMAGE }, 0, 30);
+            assert!((found.factor - expected).abs() < 0.03, "{factor}: {found:?}");
+        }
+        let mut adaptation = Adaptation::NOTHING;
+        let found = moved(&mut adaptation, &Truth { viscous: 6.0, ..IMAGE }, 0, 30);
+        assert_eq!(found.viscous, adaptation.viscous_bound(&SETTINGS));
+    }
+
+    #[test]
+    fn the_image_acts_until_something_is_learned_and_where_adaptation_is_off_or_in_shadow() {
+        let truth = Truth { factor: 0.5, ..IMAGE };
+        for request in [AdaptationRequest::Off, AdaptationRequest::Shadow] {
+            let settings = Settings { request, ..SETTINGS };
+            let mut adaptation = Adaptation::NOTHING;
+            for n in 0..20_000 {
+                let acts = adaptation.look(&settings, &look(&truth, f64::from(n) * 1e-3));
+                assert_eq!(acts, Factors::IMAGE);
+            }
+            let learned = adaptation.report(&settings).factors.factor;
+            let expected = if request == AdaptationRequest::Off { 1.0 } else { 0.5 };
+            assert!((learned - expected).abs() < 0.03, "{learned}");
+        }
+        let mut adaptation = Adaptation::NOTHING;
+        moved(&mut adaptation, &truth, 0, 20);
+        adaptation.look(&Settings { request: AdaptationRequest::Off, ..SETTINGS }, &look(&truth, 0.0));
+        assert_eq!(adaptation, Adaptation::NOTHING, "off forgets");
+    }
+
+    #[test]
+    fn nothing_is_learned_from_a_joint_that_its_command_does_not_move() {
+        let learning = |change: fn(&mut Telemetry)| {
+            let mut telemetry = look(&IMAGE, 0.0);
+            change(&mut telemetry);
+            let mut adaptation = Adaptation::NOTHING;
+            for _ in 0..100 {
+                adaptation.look(&SETTINGS, &telemetry);
+            }
+            assert_eq!(adaptation.rows > 0, adaptation.learning == Learning::Learns);
+            adaptation.learning
+        };
+        type Change = fn(&mut Telemetry);
+        let changes: [(Change, Learning); 16] = [
+            (|_| (), Learning::Learns),
+            (|t| t.wanted.velocity = None, Learning::NotPushed),
+            (|t| (t.wanted.velocity, t.wanted.push) = (None, 0.1), Learning::Learns),
+            (|t| (t.wanted.velocity, t.wanted.push) = (None, -0.1), Learning::NotPushed),
+            (|t| t.wanted.velocity = Some(0.0), Learning::NotPushed),
+            (|t| t.wanted.velocity = Some(-1.0), Learning::NotPushed),
+            (|t| t.wanted.velocity = Some(0.019), Learning::NotPushed),
+            (|t| t.wanted.velocity = Some(0.021), Learning::Learns),
+            (|t| t.motion.velocity = 0.019, Learning::Standstill),
+            (|t| t.motion.velocity = 0.021, Learning::Learns),
+            (|t| t.mean_torque = 18.9, Learning::Learns),
+            (|t| t.mean_torque = -19.1, Learning::Limited),
+            (|t| t.compensated.output.limited = true, Learning::Limited),
+            (|t| t.compensated.output.acting = Acting::Nothing, Learning::NothingActs),
+            (|t| t.state = State::QuickStopActive, Learning::NotEnabled),
+            (
+                |t| t.compensated.output.reason = Reason::OutsideTrainedBox(crate::friction::state::Signal::Velocity),
+                Learning::OutsideTrainedBox,
+            ),
+        ];
+        for (n, (change, expected)) in changes.into_iter().enumerate() {
+            assert_eq!(learning(change), expected, "change {n}");
+        }
+    }
+
+    #[test]
+    fn a_hand_on_a_joint_that_knows_its_friction_changes_nothing_and_a_lasting_change_is_learned() {
+        let mut adaptation = Adaptation::NOTHING;
+        let before = moved(&mut adaptation, &IMAGE, 0, 20);
+        // Against the motion, as friction is; for 4 s.
+        let hand = Truth { external: |_, velocity| 1.5 * velocity.signum(), ..IMAGE };
+        let during = moved(&mut adaptation, &hand, 20, 4);
+        assert_eq!(adaptation.learning, Learning::Touched);
+        assert_eq!(before, during);
+        let after = moved(&mut adaptation, &IMAGE, 24, 4);
+        assert_eq!(adaptation.learning, Learning::Learns);
+        assert!((after.factor - 1.0).abs() < 0.02, "{after:?}");
+        let changed = Truth { factor: 0.3, ..IMAGE };
+        let early = moved(&mut adaptation, &changed, 28, 8);
+        assert!((early.factor - 1.0).abs() < 0.02, "{early:?}");
+        let late = moved(&mut adaptation, &changed, 36, 20);
+        assert!((late.factor - 0.3).abs() < 0.05, "{late:?}");
+    }
+
+    #[test]
+    fn a_row_is_a_touched_joints_from_four_standard_deviations_on() {
+        let mut adaptation = Adaptation::NOTHING;
+        moved(&mut adaptation, &IMAGE, 0, 20);
+        let deviation = square_root(adaptation.noise);
+        for (left, touched) in [(3.9, false), (4.1, true)] {
+            assert_eq!(adaptation.clone().is_touched(left * deviation), touched, "{left}");
+        }
+        // Not before it knows its friction.
+        assert!(!Adaptation::default().is_touched(1e3));
+        let mut twice = adaptation;
+        twice.deviation = 1.01 * KNOWN.1;
+        assert!(!twice.is_touched(1e3));
+    }
+
+    #[test]
+    fn what_is_not_a_number_leaves_nothing_behind() {
+        for (value, n) in [f32::NAN, f32::INFINITY, 1e30].into_iter().flat_map(|value| (0..3).map(move |n| (value, n)))
+        {
+            let mut adaptation = Adaptation::NOTHING;
+            for row in 0..2_000 {
+                let mut telemetry = look(&IMAGE, f64::from(row) * 1e-3);
+                if row == 500 {
+                    match n {
+                        0 => telemetry.mean_torque = value,
+                        1 => telemetry.motion.position = value,
+                        _ => telemetry.motion.velocity = value,
+                    }
+                }
+                let acts = adaptation.look(&SETTINGS, &telemetry);
+                assert!(acts.factor >= FACTOR.0 && acts.factor <= FACTOR.1 && acts.viscous.is_finite());
+            }
+            let found = moved(&mut adaptation, &IMAGE, 2, 60);
+            assert!((found.factor - 1.0).abs() < 0.05, "{value} as signal {n}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn an_image_misfits_from_a_fifth_and_two_deviations_on() {
+        for (off, misfits) in [(0.299, false), (0.301, true), (-0.299, false), (-0.301, true)] {
+            let factors = Factors { factor: 1.0 + off, viscous: 0.0 };
+            assert_eq!(Report { factors, deviation: 0.05, learning: Learning::Learns }.misfits(), misfits, "{off}");
+        }
+        assert!(!Report::default().misfits());
+    }
+
+    #[test]
+    fn the_weights_fall_to_a_third_within_the_memory() {
+        assert!((f64::from(FORGETTING) - f64::from(-ROW / MEMORY).exp()).abs() < 1e-7);
+    }
+}
