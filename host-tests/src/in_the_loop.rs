@@ -163,8 +163,9 @@ impl RandomJoint {
         Ok(Moved { moves: errors(&self.moves)?, reversals: errors(&self.reversals)? })
     }
 
-    /// By how much a hand changes what adaptation adds, root of the mean square as a part of Coulomb friction, %: after 20 s the joint moves on,
-    /// and for 8 s a torque as large as Coulomb friction acts on the link, forward, or against the motion.
+    /// By how much a hand changes what adaptation adds, root of the mean square as a part of Coulomb friction, %: after
+    /// 20 s the joint moves on, and for 8 s a torque as large as Coulomb friction acts on the link, forward, or against
+    /// the motion.
     ///
     /// # Errors
     /// A fault on the way.

@@ -1,6 +1,7 @@
 //! Compensation in the loop, on random joints that are not our model: each is excited without compensation, recorded as a user would,
 //! fitted, and moved with the image that came out. The torque that friction would have taken arrives, slow reversals
-//! track, what is left in torque mode and in the cold is as published, and adaptation makes up for friction that has changed.
+//! track, what is left in torque mode and in the cold is as published, and adaptation makes up for friction that has
+//! changed.
 
 use host_tests::in_the_loop::{InTorqueMode, Moved, RandomJoint, for_seeds, median};
 use host_tests::variant::{ADAPTIVE, DEFAULT};
@@ -20,8 +21,9 @@ const COLD: (f64, f64) = (11.7, 32.9);
 /// not, median and worst, %: README's figures and a tenth of them.
 const TORQUE_MODE: [(f64, f64); 3] = [(69.6, 74.1), (10.3, 44.1), (68.9, 70.3)];
 
-/// Torque errors in service, moves and slow reversals, median and worst, %, with adaptation: docs/adaptation.md's figures and a tenth of them. As
-/// commissioned; all of friction's torques times 0.7, 1.3, 0.4 and 2; viscous friction times 4.
+/// Torque errors in service, moves and slow reversals, median and worst, %, with adaptation: docs/adaptation.md's
+/// figures and a tenth of them. As commissioned; all of friction's torques times 0.7, 1.3, 0.4 and 2; viscous friction
+/// times 4.
 const IN_SERVICE: [(f64, f64, f64, f64); 6] = [
     (5.6, 11.8, 13.0, 30.5),
     (5.0, 7.8, 14.1, 33.0),
@@ -31,7 +33,8 @@ const IN_SERVICE: [(f64, f64, f64, f64); 6] = [
     (6.7, 12.7, 13.0, 37.5),
 ];
 
-/// Change of what adaptation adds while a hand pushes the link, and while it resists, % of Coulomb friction, median and worst; likewise.
+/// Change of what adaptation adds while a hand pushes the link, and while it resists, % of Coulomb friction, median and
+/// worst; likewise.
 const TOUCHED: [(f64, f64); 2] = [(1.1, 9.0), (1.5, 34.9)];
 
 fn factors() -> [(&'static str, FrictionFactors); 6] {

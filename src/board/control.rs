@@ -221,7 +221,8 @@ pub fn set_thermal(derating: f32, gear_temperature: f32) {
     WORDS.gear_temperature.store(gear_temperature, Ordering::Relaxed);
 }
 
-/// What adaptation says, for the next control steps. One of them may see the factor and not yet the viscous friction: each is sound by itself.
+/// What adaptation says, for the next control steps. One of them may see the factor and not yet the viscous friction:
+/// each is sound by itself.
 pub fn set_factors(factors: &Factors) {
     WORDS.factor.store(factors.factor, Ordering::Relaxed);
     WORDS.viscous.store(factors.viscous, Ordering::Relaxed);

@@ -15,7 +15,8 @@ use crate::quantity::Torque;
 pub const MAX_CRITERIA: usize = 2;
 /// Most parameter sets that an image can hold: every combination of the criteria.
 pub const MOST_SETS: usize = 1 << MAX_CRITERIA;
-/// Most parameter sets that this program has room for. With the feature `little-room` a chip's program has no regimes; on the host nothing changes.
+/// Most parameter sets that this program has room for. With the feature `little-room` a chip's program has no regimes;
+/// on the host nothing changes.
 pub const MAX_SETS: usize = if cfg!(all(feature = "little-room", target_os = "none")) { 1 } else { MOST_SETS };
 
 /// What a criterion looks at.

@@ -218,7 +218,8 @@ pub struct AdaptationGains {
 
 /// Everything prepared that the control step reads. It is replaced as a whole between two steps.
 ///
-/// In this order, the friction model and what follows it last: the core's floating-point loads reach no further than 1020 bytes.
+/// In this order, the friction model and what follows it last: the core's floating-point loads reach no further than
+/// 1020 bytes.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub struct Active {

@@ -1,24 +1,29 @@
-//! Adaptation: what friction is in service beside what the image says, from the motion that the joint makes anyway; task, host.
+//! Adaptation: what friction is in service beside what the image says, from the motion that the joint makes anyway;
+//! task, host.
 //!
-//! A thousand times a second a task looks at a control step. Twenty looks make a row: the mean motor torque `y` of 20 ms is explained by
+//! A thousand times a second a task looks at a control step. Twenty looks make a row: the mean motor torque `y` of 20
+//! ms is explained by
 //!
 //! ```text
 //! y = d f + c v + J dv/dt + s sin(q) + k cos(q) + o
 //! ```
 //!
-//! with the image's friction `f`, of which `d` is the factor, and an added viscous coefficient `c` (Nm s/rad). Inertia `J` (kg m²), gravity `s` and `k`
-//! (Nm) and an offset `o` (Nm), which is whatever pushes the link, are estimated only so that they are not taken for friction. The torque is a mean over
-//! time and not a sample: a controller on a bus moves it once a millisecond, and looks in step with that would see its saw teeth always at the same place. Mean
+//! with the image's friction `f`, of which `d` is the factor, and an added viscous coefficient `c` (Nm s/rad). Inertia
+//! `J` (kg m²), gravity `s` and `k` (Nm) and an offset `o` (Nm), which is whatever pushes the link, are estimated only
+//! so that they are not taken for friction. The torque is a mean over time and not a sample: a controller on a bus
+//! moves it once a millisecond, and looks in step with that would see its saw teeth always at the same place. Mean
 //! values over a window need no measured acceleration, as in a momentum observer (003, section III-C).
 //!
-//! The estimate is that of least squares over the last [`MEMORY`] seconds of motion, with weights that fall exponentially, and with a ridge: each number is drawn
-//! towards the image (`d` = 1, the rest 0) as strongly as its prior deviation and the noise say. So a motion that does not tell two of them apart leaves them
-//! where they were, and nothing winds up. Rows lie far from independent, because ripple and what the image has no term for last longer than one: twenty
-//! of them count as one. A row that is far from what all six explain is a blow or a hand, and counts the less the farther it is (Huber's weights).
+//! The estimate is that of least squares over the last [`MEMORY`] seconds of motion, with weights that fall
+//! exponentially, and with a ridge: each number is drawn towards the image (`d` = 1, the rest 0) as strongly as its
+//! prior deviation and the noise say. So a motion that does not tell two of them apart leaves them where they were, and
+//! nothing winds up. Rows lie far from independent, because ripple and what the image has no term for last longer than
+//! one: twenty of them count as one. A row that is far from what all six explain is a blow or a hand, and counts the
+//! less the farther it is (Huber's weights).
 //!
-//! Nothing is learned where the command does not move the joint ([`Learning`]): a joint that is led by hand needs only as much torque as compensation already
-//! gives, and would learn that friction is what it gives. What acts stays in its box whatever happens ([`FACTOR`], [`Adaptation::viscous_bound`]),
-//! and compensation within its clamp.
+//! Nothing is learned where the command does not move the joint ([`Learning`]): a joint that is led by hand needs only
+//! as much torque as compensation already gives, and would learn that friction is what it gives. What acts stays in its
+//! box whatever happens ([`FACTOR`], [`Adaptation::viscous_bound`]), and compensation within its clamp.
 
 use super::Telemetry;
 use super::active::Active;
@@ -60,11 +65,13 @@ const ALIKE: f32 = 20.0;
 const HUBER: f32 = 3.0;
 /// Rows after which a joint may know its friction, and the factor's deviation from which on it does.
 const KNOWN: (u32, f32) = (100, 0.2);
-/// Deviation from what is explained, in standard deviations, from which a joint that knows its friction is being touched.
+/// Deviation from what is explained, in standard deviations, from which a joint that knows its friction is being
+/// touched.
 const TOUCHED: f32 = 4.0;
 /// Rows without that after which it learns again.
 const QUIET_ROWS: u32 = 25;
-/// Rows in which it has been touched without such a pause, after which it was friction that has changed: 10 s of motion.
+/// Rows in which it has been touched without such a pause, after which it was friction that has changed: 10 s of
+/// motion.
 const PATIENCE_ROWS: u32 = 500;
 /// Part of what was learned that counts from then on.
 const FADED: f32 = 0.1;
@@ -139,7 +146,8 @@ impl Default for Report {
 }
 
 impl Report {
-    /// Whether friction is surely no more what the image says: [`MISFIT`] off, and two deviations. The image is to be made anew.
+    /// Whether friction is surely no more what the image says: [`MISFIT`] off, and two deviations. The image is to be
+    /// made anew.
     pub fn misfits(&self) -> bool {
         ADAPTS && magnitude(self.factors.factor - 1.0) > MISFIT + 2.0 * self.deviation
     }
@@ -217,9 +225,9 @@ pub struct Adaptation {
     noise: f32,
     /// Rows since the beginning.
     rows: u32,
-    /// Rows in which something touched the joint, and rows since the last one of them.
+    /// Rows in which something touched the joint, without a pause of [`QUIET_ROWS`].
     touched: u32,
-    /// The same.
+    /// Rows since the last of them.
     quiet: u32,
     /// Difference from the image; in the units of [`Adaptation::row`].
     estimate: [f32; N],
@@ -315,8 +323,8 @@ impl Adaptation {
         }
     }
 
-    /// What the image leaves of a row's torque, Nm, and the row: friction, velocity as a part of the limit, acceleration as a part of the
-    /// ramp's, sine, cosine, one.
+    /// What the image leaves of a row's torque, Nm, and the row: friction, velocity as a part of the limit,
+    /// acceleration as a part of the ramp's, sine, cosine, one.
     fn row(&self, settings: &Settings) -> (f32, [f32; N]) {
         let Window { torque, friction, velocity, sine, cosine, slope, .. } = self.window;
         let mean = 1.0 / f32::from(LOOKS);
@@ -368,8 +376,8 @@ impl Adaptation {
         self.touched > 0
     }
 
-    /// The estimate and the factor's deviation, by a Cholesky decomposition without roots (L D L') of the sums plus the ridge, in units of the prior
-    /// deviations: so the smallest pivot is one, however little a motion tells.
+    /// The estimate and the factor's deviation, by a Cholesky decomposition without roots (L D L') of the sums plus the
+    /// ridge, in units of the prior deviations: so the smallest pivot is one, however little a motion tells.
     fn solve(&mut self, prior: &[f32; N]) {
         let share = 1.0 / (ALIKE * self.noise);
         let mut lower = [[0.0f32; N]; N];

@@ -131,7 +131,8 @@ impl FrictionFeedforward {
         self.compensation.begin(active.friction.as_ref(), &gains.settings, &state);
     }
 
-    /// Second stage: friction by the network; and what adaptation adds, by the torque of the round before, because this step has room for it.
+    /// Second stage: friction by the network; and what adaptation adds, by the torque of the round before, because this
+    /// step has room for it.
     #[inline(always)]
     pub fn network(
         &mut self,
@@ -182,7 +183,8 @@ impl FrictionFeedforward {
         Compensated { torque, output, permitted }
     }
 
-    /// What adaptation adds to the image's torque: within clamp and slew limit, and nothing of its own where the image fades.
+    /// What adaptation adds to the image's torque: within clamp and slew limit, and nothing of its own where the image
+    /// fades.
     #[inline(always)]
     fn adapt(&mut self, gains: &AdaptationGains, velocity: f32, output: &Output, factors: &Factors) {
         let image = output.torque.to_bits() as f32 * (1.0 / 65536.0);

@@ -148,7 +148,8 @@ impl Telemetry {
     }
 }
 
-/// A joint, from one control step to the next. In this order, the history and what follows it last, for the same reason as [`Active`].
+/// A joint, from one control step to the next. In this order, the history and what follows it last, for the same reason
+/// as [`Active`].
 #[derive(Clone, Debug, Default)]
 #[repr(C)]
 pub struct Joint {
@@ -190,8 +191,9 @@ struct Found {
     bus_voltage: f32,
 }
 
-/// The measured torque's mean over a millisecond. A controller on a bus moves the torque in saw teeth of about that length, and whoever samples them in step
-/// with the bus takes the place in a tooth for torque: with a stiffness of 1,000 Nm/rad half a newton metre for each rad/s.
+/// The measured torque's mean over a millisecond. A controller on a bus moves the torque in saw teeth of about that
+/// length, and whoever samples them in step with the bus takes the place in a tooth for torque: with a stiffness of
+/// 1,000 Nm/rad half a newton metre for each rad/s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct MeanTorque {
     sum: f32,

@@ -8,7 +8,8 @@ use crate::parameters::life_cycle::Refusal;
 
 /// The joint left the range that its friction was learned in. Information: [`reason`](super::table), number of departures (u16).
 pub const ENVELOPE: u16 = 0xFF01;
-/// Friction is no more what the image says, as adaptation has found. Information: friction factor and its deviation in thousandths (u16 each).
+/// Friction is no more what the image says, as adaptation has found. Information: friction factor and its deviation in
+/// thousandths (u16 each).
 pub const MISFIT: u16 = 0xFF03;
 /// An image with a wrong tag, or none, or for a joint whose key is damaged. Information: code of the refusal (u16).
 pub const AUTHENTICATION: u16 = 0xFF02;
@@ -67,7 +68,8 @@ pub(super) struct Reports {
 }
 
 impl Reports {
-    /// The next thing to report: a fault that is new, the end of all, a departure from the trained range, an image that no more fits. Information of a fault: its
+    /// The next thing to report: a fault that is new, the end of all, a departure from the trained range, an image that
+    /// no more fits. Information of a fault: its
     /// number, and the bits of object 2021h:4 (u16); of the gate driver's: its number, and both its status words (u16 each), for which it waits.
     pub(super) fn next(&mut self, observed: &Observed, driver: &GateDriver, now: u64) -> Option<Emergency> {
         let latched = observed.latched;

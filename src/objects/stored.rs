@@ -17,7 +17,8 @@ use super::table::OBJECTS;
 use crate::canopen::{CommunicationParameters, NO_NODE_ID};
 use crate::joint::configuration::Configuration;
 
-/// Longest record: what all objects take, 1,151 bytes, and one more. A page of flash would hold 2,016; the stack has to, too.
+/// Longest record: what all objects take, 1,151 bytes, and one more. A page of flash would hold 2,016; the stack has
+/// to, too.
 pub const RECORD: usize = 1_152;
 const _: () = assert!(RECORD <= crate::parameters::slots::PAGE - crate::parameters::slots::OVERHEAD);
 const FORMAT: u8 = 1;

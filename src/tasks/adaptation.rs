@@ -1,4 +1,5 @@
-//! Adaptation of the joint's friction, between the task of the bus, which knows the configuration, and the control step, which uses the factors.
+//! Adaptation of the joint's friction, between the task of the bus, which knows the configuration, and the control
+//! step, which uses the factors.
 
 use crate::board::control;
 use core::cell::Cell;
@@ -9,7 +10,8 @@ use joint_firmware::joint::{Active, Telemetry};
 /// What was prepared last, and how many friction models came before it.
 static SETTINGS: Mutex<Cell<(Settings, u32)>> = Mutex::new(Cell::new((Settings::OFF, 0)));
 
-/// What is prepared counts for adaptation from now on; with a model that nothing has been learned for, or with the one before.
+/// What is prepared counts for adaptation from now on; with a model that nothing has been learned for, or with the one
+/// before.
 pub fn prepared(active: &Active, new_model: bool) {
     if ADAPTS {
         let settings = Settings::of(active);

@@ -1,4 +1,5 @@
-//! 2200h and 2201h: friction compensation, and its adaptation. Its settings act at once, also while the joint moves; 1010h stores them with the configuration.
+//! 2200h and 2201h: friction compensation, and its adaptation. Its settings act at once, also while the joint moves;
+//! 1010h stores them with the configuration.
 
 use super::*;
 use crate::objects::field::{Actual, Field::Actual as A, Field::Compensation as S};

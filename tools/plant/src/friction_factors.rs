@@ -38,7 +38,8 @@ impl FrictionFactors {
         Self::from_fn(|| factor)
     }
 
-    /// `factor` for every torque; Stribeck velocity and the way in which temperature acts stay. So is a gear that is worn, or has run in.
+    /// `factor` for every torque; Stribeck velocity and the way in which temperature acts stay. So is a gear that is
+    /// worn, or has run in.
     #[must_use]
     pub fn torques(factor: f64) -> Self {
         Self { stribeck_velocity: 1.0, viscous_thinning: 1.0, coulomb_thinning: 1.0, ..Self::uniform(factor) }
