@@ -25,17 +25,17 @@ const TORQUE_MODE: [(f64, f64); 3] = [(69.6, 74.1), (10.3, 44.1), (68.9, 70.3)];
 /// figures and a tenth of them. As commissioned; all of friction's torques times 0.7, 1.3, 0.4 and 2; viscous friction
 /// times 4.
 const IN_SERVICE: [(f64, f64, f64, f64); 6] = [
-    (5.6, 11.8, 13.0, 30.5),
-    (5.0, 7.8, 14.1, 33.0),
-    (6.9, 17.8, 13.0, 29.9),
-    (2.9, 6.7, 12.7, 30.4),
-    (12.8, 27.5, 12.5, 35.1),
-    (6.7, 12.7, 13.0, 37.5),
+    (5.6, 12.9, 12.0, 31.0),
+    (5.1, 7.9, 13.8, 33.0),
+    (7.0, 17.8, 12.4, 30.0),
+    (3.2, 6.7, 12.9, 31.6),
+    (12.9, 27.3, 12.5, 34.8),
+    (6.7, 12.7, 12.2, 37.5),
 ];
 
 /// Change of what adaptation adds while a hand pushes the link, and while it resists, % of Coulomb friction, median and
 /// worst; likewise.
-const TOUCHED: [(f64, f64); 2] = [(1.1, 9.0), (1.5, 34.9)];
+const TOUCHED: [(f64, f64); 2] = [(1.1, 7.0), (0.9, 34.7)];
 
 fn factors() -> [(&'static str, FrictionFactors); 6] {
     let torques = FrictionFactors::torques;
