@@ -61,7 +61,7 @@ impl Alone {
     }
 }
 
-/// What a joint did before it was left alone.
+/// The past of a joint that is left alone.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Experience {
     /// Nothing.
@@ -70,7 +70,7 @@ pub enum Experience {
     Moved,
 }
 
-/// What a joint learns of its friction in moves over its travel.
+/// Learned friction of a joint that has moved over its travel.
 fn learned(
     parameters: &ActuatorParameters,
     setup: &Setup,

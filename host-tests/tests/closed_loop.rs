@@ -49,7 +49,7 @@ fn factors() -> [(&'static str, FrictionFactors); 6] {
     ]
 }
 
-/// What a joint does.
+/// Everything that is asserted of a joint.
 struct Found {
     /// Without compensation, and with it.
     moved: [Moved; 2],

@@ -215,13 +215,13 @@ pub fn set_temperatures(bridge: f32, winding: f32) {
     WORDS.winding_temperature.store(winding, Ordering::Relaxed);
 }
 
-/// What the thermal model says, for the next control steps: part of the current that is permitted, and °C of the gear.
+/// Thermal model's result for the next control steps: part of the current that is permitted, and °C of the gear.
 pub fn set_thermal(derating: f32, gear_temperature: f32) {
     WORDS.derating.store(derating, Ordering::Relaxed);
     WORDS.gear_temperature.store(gear_temperature, Ordering::Relaxed);
 }
 
-/// What adaptation says, for the next control steps. One of them may see the factor and not yet the viscous friction:
+/// Adaptation's result for the next control steps. One of them may see the factor and not yet the viscous friction:
 /// each is sound by itself.
 pub fn set_factors(factors: &Factors) {
     WORDS.factor.store(factors.factor, Ordering::Relaxed);
