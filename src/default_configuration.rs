@@ -8,6 +8,7 @@
 use crate::compensation::Request;
 use crate::friction::regime::MOST_SETS;
 use crate::joint::BoardLimits;
+use crate::joint::stopping::StopConfiguration;
 use crate::joint::configuration::{
     AdaptationRequest, BridgeConfiguration, CompensationConfiguration, Configuration, FACTORY_TRIM,
     FRICTION_UNCERTAINTY, Gains, GearConfiguration, Limits, MotorConfiguration, ThermalConfiguration, VelocitySource,
@@ -72,6 +73,7 @@ pub const B_G431B_ESC1: BoardConfiguration = BoardConfiguration {
             has_bridge_sensor: true,
             has_winding_sensor: false,
             counts_an_encoder: true,
+            has_chopper_output: false,
             limits: BoardLimits {
                 // 6S, 25 V (the maker's limit); its converter ends at 34 V.
                 supply: 25.0,
@@ -102,6 +104,7 @@ pub const MOTEUS_R4: BoardConfiguration = BoardConfiguration {
             has_bridge_sensor: true,
             has_winding_sensor: false,
             counts_an_encoder: false,
+            has_chopper_output: true,
             limits: BoardLimits {
                 // The vendor's range is 10 to 44 V (specifications in the README of mjbots/moteus); its converter ends at 73 V.
                 supply: 44.0,
@@ -175,6 +178,8 @@ const fn uncommissioned(bus_voltage: (f32, f32), regeneration_band: f32, encoder
             over_current: 10.0,
             bus_voltage,
             regeneration_band,
+            chopper_voltage: 0.0,
+            chopper_share: 0.1,
             bridge_temperature: 70.0,
             winding_temperature: 80.0,
             command_deadline: 0.1,
@@ -190,6 +195,7 @@ const fn uncommissioned(bus_voltage: (f32, f32), regeneration_band: f32, encoder
             quick_stop_deceleration: 20.0,
             braking_time: 0.5,
         },
+        stops: StopConfiguration::DEFAULT,
         compensation: CompensationConfiguration {
             request: Request::Off,
             gain: 0.0,

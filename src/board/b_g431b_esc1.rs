@@ -21,6 +21,7 @@
 //! | CAN shutdown | PC11, low runs (O contradicts: unconfirmed) | S N |
 //! | CAN termination | PC14, high is 120 Ohm on | S N O |
 //! | button | PC10, low when pressed | S O R |
+//! | holding brake | PB3 (on the programmer's part the receiver of its serial port); high opens it. For the input of a driver with a pull-down: it floats until the program starts | S N |
 //! | LED | PC6, lit when high (polarity unconfirmed) | S O R |
 //!
 //! The board has no usable over-current comparator (the comparators see 1.71 mV/A), so over-current is the joint's software
@@ -28,7 +29,7 @@
 
 use super::adc::{self, FULL_SCALE, Sequence};
 use super::pwm::{self, TIMER_HZ};
-use super::{Led, Parts, Peripherals, StartError};
+use super::{Led, Parts, Peripherals, StartError, level_of};
 use embassy_stm32::Config;
 use embassy_stm32::gpio::{Input, Level, Output, OutputType, Pull, Speed};
 use embassy_stm32::opamp::{OpAmp, OpAmpGain, OpAmpSpeed};
@@ -45,7 +46,7 @@ use embassy_stm32::timer::qei;
 use embassy_stm32::timer::simple_pwm::PwmPin;
 use joint_firmware::default_configuration::{self, BoardConfiguration};
 use joint_firmware::hardware::Hardware;
-use joint_firmware::joint::{Bridge, BridgeState, Measurements};
+use joint_firmware::joint::{Bridge, BridgeState, Measurements, Outputs};
 use joint_firmware::sensors::incremental::Incremental;
 use joint_firmware::sensors::thermistor::Thermistor;
 
@@ -171,6 +172,7 @@ pub fn start(p: Peripherals) -> Result<Parts, StartError> {
     // Termination stays as the person who wired the bus wants it: off until a configuration says otherwise.
     core::mem::forget(Output::new(p.PC14, Level::Low, Speed::Low));
     core::mem::forget(Output::new(p.PC11, Level::Low, Speed::Low));
+    core::mem::forget(Output::new(p.PB3, Level::Low, Speed::Low));
     Ok(Parts {
         sensors: Some(Sensors { encoder: ENCODER, counts_kept: true }),
         led: Led { pin: Some(Output::new(p.PC6, Level::Low, Speed::Low)), lit_when_low: false },
@@ -338,9 +340,10 @@ pub fn temperatures() -> (f32, f32) {
     (BRIDGE_NTC.temperature(f32::from(adc::code::<2>(pac::ADC1)) / FULL_SCALE), f32::NAN)
 }
 
-/// Sets the bridge: off at once, or switching with the duties held for the next period.
+/// Sets the bridge: off at once, or switching with the duties held for the next period; and the output.
 #[inline(always)]
-pub fn apply(bridge: &Bridge) {
+pub fn apply(bridge: &Bridge, outputs: Outputs) {
+    pac::GPIOB.bsrr().write(|w| w.0 = level_of(3, outputs.brake_open));
     pwm::hold(bridge.duties, TOP, LARGEST_DUTY);
     let tim = pac::TIM1;
     match bridge.state {

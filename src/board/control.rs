@@ -15,7 +15,7 @@ use joint_firmware::joint::adaptation::{ADAPTS, Factors};
 use joint_firmware::joint::fault::Faults;
 use joint_firmware::joint::history::History;
 use joint_firmware::joint::state_machine::Controlword;
-use joint_firmware::joint::{Active, Bridge, BridgeState, Command, Coupled, Demand, Joint, Slow, Telemetry};
+use joint_firmware::joint::{Active, Bridge, BridgeState, Command, Coupled, Demand, Joint, Outputs, Slow, Telemetry};
 use joint_firmware::motor::open_loop::Window;
 use joint_firmware::motor::phases::Phases;
 
@@ -316,13 +316,16 @@ extern "C" fn ADC1_2() {
     let demand = control.ends.demand.newest();
     let held_off = super::SINGLE_BANK && WORDS.held_off.load(Ordering::Acquire);
     let demand = if held_off { &control.off } else { demand };
-    let wanted = match control.ends.active.current() {
-        Some(active) if super::is_started() => control.joint.control_step(active, demand, &slow, &measurements),
-        _ => Bridge::OFF,
+    let (wanted, outputs) = match control.ends.active.current() {
+        Some(active) if super::is_started() => {
+            let wanted = control.joint.control_step(active, demand, &slow, &measurements);
+            (wanted, control.joint.outputs())
+        }
+        _ => (Bridge::OFF, Outputs::OFF),
     };
     super::ask_reset(control.joint.waits_for_driver());
-    let bridge = if stopped { Bridge::OFF } else { wanted };
-    super::apply(&bridge);
+    let (bridge, outputs) = if stopped { (Bridge::OFF, Outputs::OFF) } else { (wanted, outputs) };
+    super::apply(&bridge, outputs);
 
     control.ends.report.publish_in_place(|report| {
         control.joint.report(&mut report.telemetry);

@@ -40,3 +40,37 @@ unsafe extern "C" fn __aeabi_uldivmod() {
         "b 4b",
     )
 }
+
+/// The same of signed numbers: the quotient is rounded towards zero, what is left has the dividend's sign. The least number over -1 is itself.
+#[unsafe(no_mangle)]
+#[unsafe(naked)]
+unsafe extern "C" fn __aeabi_ldivmod() {
+    core::arch::naked_asm!(
+        "push {{r4, r5, r6, lr}}",
+        "mov r5, r1",
+        "eor r4, r1, r3",
+        "cmp r1, #0",
+        "bpl 2f",
+        "rsbs r0, r0, #0",
+        "sbc.w r1, r1, r1, lsl #1",
+        "2:",
+        "cmp r3, #0",
+        "bpl 3f",
+        "rsbs r2, r2, #0",
+        "sbc.w r3, r3, r3, lsl #1",
+        "3:",
+        "bl {unsigned}",
+        "cmp r4, #0",
+        "bpl 4f",
+        "rsbs r0, r0, #0",
+        "sbc.w r1, r1, r1, lsl #1",
+        "4:",
+        "cmp r5, #0",
+        "bpl 5f",
+        "rsbs r2, r2, #0",
+        "sbc.w r3, r3, r3, lsl #1",
+        "5:",
+        "pop {{r4, r5, r6, pc}}",
+        unsigned = sym __aeabi_uldivmod,
+    )
+}

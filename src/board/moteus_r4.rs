@@ -13,6 +13,7 @@
 //! | bridge NTC, motor NTC | PA9 ADC5_IN2, PA8 ADC5_IN1 |
 //! | AS5047P | SPI2: SCK PB13, MISO PB14, MOSI PB15, select PB11 |
 //! | CAN receive, transmit | PA11, PA12: FDCAN1 |
+//! | holding brake, brake chopper | PC15, PC14: the pads DBG2, DBG1; high opens the brake, high conducts. For the input of a driver with a pull-down: they float until the program starts, and give no current |
 //! | LEDs | PF0 debug, PF1 power (lit when low: unconfirmed) |
 //!
 //! The vendor drives the same pins with TIM5, which cannot trigger the converters; TIM2 can trigger all of them at once. Neither has
@@ -23,7 +24,7 @@ use super::drv8353::Drv8353;
 use super::gate::{self, Gate};
 pub use super::gate::{ask_reset, is_started};
 use super::pwm;
-use super::{Led, Parts, Peripherals, StartError};
+use super::{Led, Parts, Peripherals, StartError, level_of};
 use core::sync::atomic::{AtomicU8, Ordering};
 use cortex_m::peripheral::DWT;
 use embassy_stm32::Config;
@@ -41,7 +42,7 @@ use embassy_stm32::timer::simple_pwm::{PwmPin, SimplePwm};
 use joint_firmware::default_configuration::{self, BoardConfiguration};
 use joint_firmware::hardware::moteus_revision::{Pins, SUPPORTED};
 use joint_firmware::hardware::{Hardware, Setup};
-use joint_firmware::joint::{Bridge, BridgeState, Measurements};
+use joint_firmware::joint::{Bridge, BridgeState, Measurements, Outputs};
 use joint_firmware::sensors::as5047p;
 use joint_firmware::sensors::thermistor::Thermistor;
 
@@ -160,6 +161,8 @@ pub fn start(mut p: Peripherals) -> Result<Parts, StartError> {
     if !known || converts.is_err() {
         return Ok(parts);
     }
+    core::mem::forget(Output::new(p.PC14, Level::Low, Speed::Low));
+    core::mem::forget(Output::new(p.PC15, Level::Low, Speed::Low));
     core::mem::forget(Output::new(p.PB7, Level::Low, Speed::Medium));
     core::mem::forget(Input::new(p.PB6, Pull::Up));
     let mut bus = spi::Config::default();
@@ -341,9 +344,12 @@ pub fn temperatures() -> (f32, f32) {
     (bridge, WINDING_NTC.temperature(fraction(adc::code::<1>(pac::ADC5))))
 }
 
-/// Sets the bridge: off at once, or switching with the duties held for the next period.
+/// Sets the bridge: off at once, or switching with the duties held for the next period; and the outputs.
 #[inline(always)]
-pub fn apply(bridge: &Bridge) {
+pub fn apply(bridge: &Bridge, outputs: Outputs) {
+    pac::GPIOC.bsrr().write(|w| {
+        w.0 = level_of(14, outputs.chopper) | level_of(15, outputs.brake_open);
+    });
     pwm::hold(bridge.duties, TOP, LARGEST_DUTY);
     match bridge.state {
         BridgeState::Off => let_go(),

@@ -4,8 +4,10 @@ use super::configuration::{
     AdaptationRequest, BridgeConfiguration, Configuration, ConfigurationError, GearConfiguration, Limits, MOTION_STEPS,
     MotorConfiguration, VelocitySource,
 };
+use super::chopper::{CHOPS, ChopperGains};
 use super::limit_law::LimitGains;
 use super::monitor::OVER_SPEED;
+use super::stopping::{QUICK_STOP, StopGains};
 use crate::compensation::Settings;
 use crate::friction::FrictionModel;
 use crate::motor::angle::{Direction, EncoderAlignment, STEPS, TAU};
@@ -143,8 +145,12 @@ pub struct MotionGains {
     pub velocity_step: f32,
     /// rad/s².
     pub acceleration: f32,
-    /// Change of the quick stop's ramp in a round, rad/s.
+    /// Change of a quick stop's ramp in a round, rad/s.
     pub quick_stop_step: f32,
+    /// The same of a fault reaction.
+    pub fault_step: f32,
+    /// The same of a joint that is to hold.
+    pub hold_step: f32,
     /// Control steps that braking may take.
     pub braking_steps: u32,
 }
@@ -261,8 +267,12 @@ pub struct Active {
     pub jump_limit: f32,
     /// Silent steps of the encoder after which the rotor's turns are still known: in which it makes a quarter of a turn at the fastest.
     pub bridged_steps: u32,
-    /// Control steps without a new command.
+    /// Control steps without a new command after which the joint has a fault.
     pub deadline_steps: u32,
+    /// Control steps after which the coupled joint counts as standing.
+    pub coupled_steps: u32,
+    /// How it stops.
+    pub stops: StopGains,
     /// Open loop.
     pub open_loop: OpenLoopGains,
     /// Supply from which on braking current is withheld, V.
@@ -271,6 +281,8 @@ pub struct Active {
     pub withheld_per_volt: f32,
     /// Largest d current that flows instead, A.
     pub loss_current: f32,
+    /// Brake chopper.
+    pub chopper: ChopperGains,
     /// Motion.
     pub motion: MotionGains,
     /// Compensation.
@@ -423,12 +435,16 @@ impl Checked {
     /// Always inlined: what it gives is built where the caller wants it.
     #[inline(always)]
     fn active(self, configuration: &Configuration, bridge: &BridgeConfiguration) -> Active {
-        let Configuration { motor, gear, gains, compensation, .. } = configuration;
+        let Configuration { motor, gear, gains, stops, compensation, .. } = configuration;
         let limits = bridge.limits.hold(&configuration.limits);
         let current_limit = lesser(motor.current_limit, bridge.limits.current);
         let (rate, motion_rate) = (bridge.rate, bridge.motion_rate() as f32);
         let mean_steps = (MEAN * rate + 0.5) as u32;
         let period = 1.0 / motion_rate;
+        let deadline = (limits.command_deadline * rate) as u32;
+        let (quick, slow) = (gains.quick_stop_deceleration * period, gains.acceleration * period);
+        // Odd codes are those of the modes' ramp.
+        let ramp = |code: u8| if code & 1 == 1 { slow } else { quick };
         let pole_pairs = motor.alignment.pole_pairs as f32;
         let (_, highest_voltage) = limits.bus_voltage;
         let current_slope = CURRENT_NOISE * motor.current_limit * VOLTAGE_FILTER * motion_rate;
@@ -458,7 +474,15 @@ impl Checked {
             // Half an electrical radian: with it the torque would already be a tenth less than commanded.
             jump_limit: 0.5 / pole_pairs,
             bridged_steps: (0.25 * TAU / self.rotor_velocity * rate) as u32,
-            deadline_steps: (limits.command_deadline * rate) as u32,
+            deadline_steps: if stops.late_command == QUICK_STOP { u32::MAX } else { deadline },
+            coupled_steps: deadline,
+            stops: StopGains {
+                options: *stops,
+                late_steps: if stops.late_command == QUICK_STOP { deadline } else { u32::MAX },
+                release_rounds: (stops.brake_release * motion_rate) as u32,
+                apply_steps: (stops.brake_apply * rate) as u32,
+            },
+            chopper: if CHOPS { ChopperGains::new(&limits, rate) } else { ChopperGains::NONE },
             open_loop: OpenLoopGains::new(rate),
             onset: highest_voltage - limits.regeneration_band,
             withheld_per_volt: 1.0 / (FADE * limits.regeneration_band),
@@ -470,9 +494,11 @@ impl Checked {
                 damping: gains.damping,
                 velocity_integral: gains.integral * period,
                 position_integral: 0.1 * gains.integral * period,
-                velocity_step: gains.acceleration * period,
+                velocity_step: slow,
                 acceleration: gains.acceleration,
-                quick_stop_step: gains.quick_stop_deceleration * period,
+                quick_stop_step: ramp(stops.quick_stop),
+                fault_step: ramp(stops.fault_reaction),
+                hold_step: ramp(stops.halt),
                 braking_steps: (gains.braking_time * rate) as u32,
             },
             compensation: CompensationGains {

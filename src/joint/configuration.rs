@@ -4,8 +4,10 @@
 //! friction is learned anew.
 
 use super::board_limits::BoardLimits;
+use super::stopping::StopConfiguration;
 use crate::compensation::SettingsError;
 use crate::motor::angle::EncoderAlignment;
+use crate::motor::number::lesser;
 use crate::motor::setting::{Name, SettingError, in_range, within_range};
 
 /// Control steps of a round of the motion loop, each of which does a [stage](super::motion_loop::Stage) of it.
@@ -65,6 +67,11 @@ pub struct Limits {
     pub bus_voltage: (f32, f32),
     /// Span below the highest supply over which a braking current that feeds it fades to nothing, V; 0.1 to what lies between lowest and highest supply.
     pub regeneration_band: f32,
+    /// Supply at which a brake chopper conducts, V; 0 (none), or 1 V above the lowest supply to where the regeneration band begins. 0 on a board without
+    /// an output for one.
+    pub chopper_voltage: f32,
+    /// Largest part of the time in which it may conduct, over some 10 s; 0.001 to 1.
+    pub chopper_share: f32,
     /// Bridge temperature, °C; 40 to the board's highest. Current is derated over the last 20 K.
     pub bridge_temperature: f32,
     /// Winding temperature, °C; 40 to 200. Current is derated over the last 20 K.
@@ -175,6 +182,8 @@ pub struct BridgeConfiguration {
     pub has_winding_sensor: bool,
     /// The encoder is an incremental one with an index, which it has to meet after each start; otherwise it is absolute.
     pub counts_an_encoder: bool,
+    /// The board has an output for a brake chopper.
+    pub has_chopper_output: bool,
     /// What no configuration may exceed.
     pub limits: BoardLimits,
 }
@@ -221,6 +230,8 @@ pub struct Configuration {
     pub limits: Limits,
     /// Gains.
     pub gains: Gains,
+    /// Stops.
+    pub stops: StopConfiguration,
     /// Compensation.
     pub compensation: CompensationConfiguration,
     /// Heat.
@@ -240,6 +251,8 @@ pub enum ConfigurationError {
     PolePairs(u32),
     /// The encoder cannot have so many counts a turn.
     EncoderCounts(u32),
+    /// An option code of a stop that there is not.
+    StopOption,
 }
 
 impl From<SettingError> for ConfigurationError {
@@ -261,6 +274,10 @@ impl core::fmt::Display for ConfigurationError {
             Self::Compensation(error) => error.fmt(f),
             Self::NodeId(id) => write!(f, "node id is {id}, must be 1 to 127, or 255 for none"),
             Self::PolePairs(pairs) => write!(f, "motor has {pairs} pole pairs, must have 1 to 64"),
+            Self::StopOption => f.write_str(
+                "an option code of a stop is not possible: quick_stop must be 0, 1, 2, 5 or 6, shutdown and disable_operation 0 or 1, \
+                 halt 1 or 2, fault_reaction 0 to 2, late_command 1 or 3",
+            ),
             Self::EncoderCounts(counts) => write!(f, "encoder has {counts} counts a turn, must have 16 to 65535"),
         }
     }
@@ -269,7 +286,7 @@ impl core::fmt::Display for ConfigurationError {
 impl core::error::Error for ConfigurationError {}
 
 /// Name and range of each number whose range does not depend on another: as a table they take a third less flash than as calls.
-static RANGES: [(Name, f32, f32); 21] = [
+static RANGES: [(Name, f32, f32); 24] = [
     (Name::of("control rate", "Hz"), 1e3, 100e3),
     (Name::of("dead time", "s"), 0.0, 5e-6),
     (Name::of("torque constant", "Nm/A"), 1e-3, 5.0),
@@ -291,6 +308,9 @@ static RANGES: [(Name, f32, f32); 21] = [
     (Name::of("compensation slew limit", "Nm/s"), 0.5, 32e3),
     (Name::of("standstill velocity", "rad/s"), 1e-4, 10.0),
     (Name::of("friction uncertainty", ""), 0.0, 1.0),
+    (Name::of("brake chopper's share of the time", ""), 1e-3, 1.0),
+    (Name::of("holding brake's release time", "s"), 0.0, 5.0),
+    (Name::of("holding brake's apply time", "s"), 0.0, 5.0),
 ];
 
 impl Configuration {
@@ -305,7 +325,10 @@ impl Configuration {
         if !(16..=65_535).contains(&self.motor.encoder_counts) {
             return Err(ConfigurationError::EncoderCounts(self.motor.encoder_counts));
         }
-        let Self { motor, gear, limits, gains, compensation, .. } = self;
+        if !self.stops.is_possible() {
+            return Err(ConfigurationError::StopOption);
+        }
+        let Self { motor, gear, limits, gains, stops, compensation, .. } = self;
         let magnitude = if gear.ratio < 0.0 { -gear.ratio } else { gear.ratio };
         let ((lowest, highest), (lowest_supply, highest_supply)) = (limits.position, limits.bus_voltage);
         // In the order of the table.
@@ -331,6 +354,9 @@ impl Configuration {
             compensation.slew,
             compensation.standstill_velocity,
             compensation.uncertainty,
+            limits.chopper_share,
+            stops.brake_release,
+            stops.brake_apply,
         ];
         for ((name, low, high), value) in RANGES.iter().zip(values) {
             within_range(*name, value, *low, *high)?;
@@ -342,6 +368,11 @@ impl Configuration {
         in_range!("lowest supply voltage", "V", lowest_supply, 5.0, board.supply - 1.0)?;
         in_range!("highest supply voltage", "V", highest_supply, lowest_supply + 1.0, board.supply)?;
         in_range!("regeneration band", "V", limits.regeneration_band, 0.1, highest_supply - lowest_supply)?;
+        if limits.chopper_voltage != 0.0 {
+            let highest = if bridge.has_chopper_output { highest_supply - limits.regeneration_band } else { 0.0 };
+            let lowest = lesser(lowest_supply + 1.0, highest);
+            in_range!("brake chopper's voltage", "V", limits.chopper_voltage, lowest, highest)?;
+        }
         in_range!("loss current", "A", motor.loss_current, 0.0, motor.current_limit)?;
         in_range!("field-weakening current", "A", motor.field_weakening_current, 0.0, motor.current_limit)?;
         in_range!("bridge temperature limit", "°C", limits.bridge_temperature, 40.0, board.bridge_temperature)?;

@@ -9,7 +9,8 @@
 //!  - [`state_machine`]: whether the joint may move;
 //!  - [`motion_loop`], slower than the rest, a stage a step: [`command`] and [`motion_law`], from a set-point to a torque, [`limit_law`], how much of it
 //!    the limits permit, and [`friction_feedforward`], what friction will take of it;
-//!  - `regeneration`: how much of a braking current the supply bears;
+//!  - [`stopping`]: how the joint stops, and its holding brake;
+//!  - `regeneration`: how much of a braking current the supply bears, and [`chopper`]: what a resistor takes of it;
 //!  - [`history`]: the last steps before a fault.
 //!
 //! In place of the motion loop and the current loop, for commissioning: [`open_loop`](crate::motor::open_loop).
@@ -20,6 +21,7 @@
 pub mod active;
 pub mod adaptation;
 pub mod board_limits;
+pub mod chopper;
 pub mod command;
 pub mod configuration;
 pub mod fault;
@@ -36,12 +38,13 @@ mod rig;
 pub mod shadow;
 mod signals;
 pub mod state_machine;
+pub mod stopping;
 
 pub use active::{Active, JointMotion};
 pub use board_limits::BoardLimits;
 pub use command::{Command, Coupled, Demand, Mode};
 pub use offsets::OFFSET_STEPS;
-pub use signals::{Bridge, BridgeState, Measurements};
+pub use signals::{Bridge, BridgeState, Measurements, Outputs};
 
 use crate::motor::field_oriented::{FieldOriented, FieldOrientedInput};
 use crate::motor::number::{greater, lesser, limited, or_zero, within};
@@ -52,6 +55,7 @@ use crate::motor::thermal::MeanSquareCurrent;
 use crate::motor::transform::Dq;
 use active::DERATING;
 use adaptation::{ADAPTS, Factors};
+use chopper::{CHOPS, Chopper};
 use fault::{Fault, Faults, Reaction};
 use friction_feedforward::{Compensated, Surroundings};
 use history::{History, Snapshot};
@@ -60,7 +64,8 @@ use motion_law::Wanted;
 use motion_loop::{MotionLoop, Seen, Stage};
 use offsets::Offsets;
 use regeneration::Regeneration;
-use state_machine::{Events, State, StateMachine};
+use state_machine::{Controlword, Events, State, StateMachine};
+use stopping::Stopping;
 
 /// Speed below which a braking joint counts as standing, as a part of the velocity limit.
 pub(crate) const STANDING: f32 = 0.01;
@@ -109,6 +114,10 @@ pub struct Telemetry {
     pub current: Dq,
     /// Supply, V.
     pub bus_voltage: f32,
+    /// An enabled joint holds where it is instead of following its command: its brake opens, or it is to stop.
+    pub held: bool,
+    /// What the board's outputs do.
+    pub outputs: Outputs,
 }
 
 impl Default for Telemetry {
@@ -131,6 +140,8 @@ impl Telemetry {
         reference: Dq { d: 0.0, q: 0.0 },
         current: Dq { d: 0.0, q: 0.0 },
         bus_voltage: 0.0,
+        held: false,
+        outputs: Outputs::OFF,
     };
 
     /// Torque of the current, Nm: the mean over a millisecond, where the program takes it.
@@ -170,7 +181,8 @@ pub struct Joint {
     coupled_sequence: u32,
     /// Steps since the coupled joint was heard.
     coupled_steps: u32,
-    braking: Braking,
+    stopping: Stopping,
+    chopper: Chopper,
     /// Faults since the last acknowledgement.
     latched: Faults,
     mean_square: MeanSquareCurrent,
@@ -189,6 +201,7 @@ struct Found {
     reference: Dq,
     current: Dq,
     bus_voltage: f32,
+    outputs: Outputs,
 }
 
 /// The measured torque's mean over a millisecond. A controller on a bus moves the torque in saw teeth of about that
@@ -210,13 +223,6 @@ impl MeanTorque {
             *self = Self { sum: 0.0, steps: 0, mean: self.sum * active.adaptation.mean_share };
         }
     }
-}
-
-/// How long a joint has been braking and standing.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Braking {
-    steps: u32,
-    standing: u32,
 }
 
 impl Joint {
@@ -262,10 +268,15 @@ impl Joint {
         let winding = within(slow.derating, 0.0, 1.0);
         let faults = self.watch(active, demand, winding, measured, currents, &observation, &motion);
         let open_loop = demand.command.mode == Mode::OpenLoop;
-        let state = match self.machine.stays_enabled(demand.controlword, !faults.is_empty(), open_loop) {
+        let late = self.stale_steps > active.stops.late_steps;
+        let something = !faults.is_empty() | late | self.stopping.is_under_way();
+        let state = match self.machine.stays_enabled(demand.controlword, something, open_loop) {
             true => State::OperationEnabled,
-            false => self.decide(active, demand, faults, &motion),
+            false => self.decide(active, demand, faults, late, &motion),
         };
+        if CHOPS {
+            self.chopper.step(&active.chopper, measured.bus_voltage);
+        }
 
         // No sensor is no number, and derates nothing.
         let bridge = (active.limits.bridge_temperature - measured.bridge_temperature) * (1.0 / DERATING);
@@ -274,12 +285,14 @@ impl Joint {
         let coupled_velocity = self.coupled(active, demand);
         let surroundings = Surroundings { temperature: slow.gear_temperature, coupled_velocity };
         let seen = Seen { motion: &motion, derating, measured_torque, surroundings, factors: &slow.factors };
-        let torque = self.motion_loop.step::<COMPENSATION>(active, state, &demand.command, &seen);
+        let torque = self.motion_loop.step::<COMPENSATION>(active, state, demand, &seen);
 
+        let mut brake_open = false;
         let (bridge, reference, current) = if state.makes_torque() {
             // What is hot bears the current of braking for as long as braking may take; a joint that coasts into somebody is worse.
             let limit = match state {
                 State::OperationEnabled => active.current_limit * derating,
+                _ if self.stopping.stands() => active.current_limit * derating,
                 _ => active.current_limit,
             };
             let wanted = limited(torque * active.scales.current_per_torque, limit);
@@ -298,6 +311,7 @@ impl Joint {
             let output = self.field_oriented.step(gains, &input);
             self.monitor.current_loop(reference, &output, way);
             self.mean_square.add(output.current);
+            brake_open = !self.stopping.closes_brake();
             (Bridge { state: BridgeState::Switching, duties: output.duties }, reference, output.current)
         } else {
             match state {
@@ -325,6 +339,7 @@ impl Joint {
             reference,
             current,
             bus_voltage: measured.bus_voltage,
+            outputs: Outputs { brake_open, chopper: CHOPS && self.chopper.conducts() },
         };
         self.note(state);
         bridge
@@ -354,6 +369,14 @@ impl Joint {
         telemetry.reference = found.reference;
         telemetry.current = found.current;
         telemetry.bus_voltage = found.bus_voltage;
+        telemetry.held = self.motion_loop.is_held();
+        telemetry.outputs = found.outputs;
+    }
+
+    /// What the board's outputs are to do.
+    #[inline(always)]
+    pub fn outputs(&self) -> Outputs {
+        self.found.outputs
     }
 
     /// Faults since the last acknowledgement.
@@ -448,7 +471,7 @@ impl Joint {
         motion: &JointMotion,
     ) -> Faults {
         let state = self.machine.state();
-        self.count_stale_steps(demand, state);
+        self.count_stale_steps(active, demand, state);
         if !self.offsets.are_known() {
             let mut faults = Faults::NONE;
             faults.set(Fault::CurrentSensor, self.offsets.are_refused());
@@ -484,15 +507,17 @@ impl Joint {
         faults
     }
 
-    /// Counts the steps without a new set-point from "ready to switch on" on, but for a joint that holds: nothing that could be late is asked of it.
-    /// In "fault" a count that has led there stays until one comes.
+    /// Counts the steps without a new set-point from "ready to switch on" on, but for a joint that holds or is to stop: nothing that could be late is
+    /// asked of it. In "fault" a count that has led there stays until one comes.
     #[inline(always)]
-    fn count_stale_steps(&mut self, demand: &Demand, state: State) {
+    fn count_stale_steps(&mut self, active: &Active, demand: &Demand, state: State) {
         self.stale_steps = match state {
             _ if demand.sequence != self.sequence => 0,
             State::NotReadyToSwitchOn | State::SwitchOnDisabled => 0,
             State::Fault => self.stale_steps,
             _ if demand.command.mode == Mode::Hold => 0,
+            State::OperationEnabled if demand.controlword.ends_operation() => 0,
+            State::QuickStopActive if active.stops.options.holds() => 0,
             _ => self.stale_steps.saturating_add(1),
         };
         self.sequence = demand.sequence;
@@ -504,14 +529,15 @@ impl Joint {
         let heard = demand.coupled.sequence != self.coupled_sequence;
         self.coupled_sequence = demand.coupled.sequence;
         self.coupled_steps = if heard { 0 } else { self.coupled_steps.saturating_add(1) };
-        if self.coupled_steps <= active.deadline_steps { demand.coupled.velocity } else { 0.0 }
+        if self.coupled_steps <= active.coupled_steps { demand.coupled.velocity } else { 0.0 }
     }
 
     /// The state from now on, where it may be another one. A fault that must not be braked against goes straight
     /// through the reaction to "fault".
     #[inline(never)]
-    fn decide(&mut self, active: &Active, demand: &Demand, faults: Faults, motion: &JointMotion) -> State {
+    fn decide(&mut self, active: &Active, demand: &Demand, faults: Faults, late: bool, motion: &JointMotion) -> State {
         let before = self.machine.state();
+        let stops = &active.stops.options;
         let open_loop = demand.command.mode == Mode::OpenLoop;
         let events = Events {
             // The open loop looks for the encoder's zero.
@@ -519,13 +545,16 @@ impl Joint {
             open_loop,
             fault: !faults.is_empty(),
             driver_alone: faults.is_only(Fault::BridgeDriver),
-            stopped: self.has_stopped(active, before, motion),
+            stopped: self.has_stopped(active, demand.controlword, motion),
+            late,
+            stops,
         };
         let mut state = self.machine.step(demand.controlword, events);
         if state == State::OpenLoop && before != state {
             self.open_loop.begin();
         }
-        if state == State::FaultReactionActive && faults.union(self.latched).reaction() != Some(Reaction::Brake) {
+        let brakes = stops.fault_reaction != 0 && faults.union(self.latched).reaction() == Some(Reaction::Brake);
+        if state == State::FaultReactionActive && !brakes {
             state = self.machine.end_reaction();
         }
         if !faults.is_empty() {
@@ -537,18 +566,16 @@ impl Joint {
         state
     }
 
-    /// Whether braking is over: the joint stands, or it took too long.
+    /// Whether braking is over. One that operation is enabled after, in the middle of it, may have closed the brake.
     #[inline(always)]
-    fn has_stopped(&mut self, active: &Active, state: State, motion: &JointMotion) -> bool {
-        if !matches!(state, State::QuickStopActive | State::FaultReactionActive) {
-            self.braking = Braking::default();
-            return false;
+    fn has_stopped(&mut self, active: &Active, word: Controlword, motion: &JointMotion) -> bool {
+        let closed = self.stopping.closes_brake();
+        let over = self.motion_loop.ramp_is_over();
+        let stopped = self.stopping.step(active, self.machine.state(), word, motion, over);
+        if closed && !self.stopping.closes_brake() {
+            self.motion_loop.open_brake(active);
         }
-        let standing = STANDING * active.limits.velocity;
-        let stands = motion.velocity <= standing && motion.velocity >= -standing && self.motion_loop.ramp_is_over();
-        self.braking.standing = if stands { self.braking.standing.saturating_add(1) } else { 0 };
-        self.braking.steps = self.braking.steps.saturating_add(1);
-        self.braking.standing >= STANDING_STEPS || self.braking.steps > active.motion.braking_steps
+        stopped
     }
 
     #[inline(always)]

@@ -30,6 +30,8 @@ pub struct MotionLaw {
     integral: f32,
     /// Of the torque.
     bounds: Bounds,
+    /// The joint brakes: no mode.
+    brakes: bool,
 }
 
 impl MotionLaw {
@@ -83,14 +85,14 @@ impl MotionLaw {
         &self.bounds
     }
 
-    /// One round of braking: the velocity comes down along the quick stop's ramp, by the limit damping and an integral of its own, whatever the
+    /// One round of braking: the velocity comes down along a ramp by so much, rad/s, by the limit damping and an integral of its own, whatever the
     /// modes' gains are.
     #[inline(never)]
-    pub fn brake(&mut self, active: &Active, motion: &JointMotion) -> Wanted {
-        if self.mode.is_some() {
-            *self = Self { velocity: motion.velocity, ..Self::default() };
+    pub fn brake(&mut self, active: &Active, motion: &JointMotion, step: f32) -> Wanted {
+        if !self.brakes {
+            *self = Self { velocity: motion.velocity, brakes: true, ..Self::default() };
         }
-        self.ramp(0.0, active.motion.quick_stop_step);
+        self.ramp(0.0, step);
         let (gains, limit) = (&active.limit_gains, active.limits.torque);
         let error = self.velocity - motion.velocity;
         let damped = limited(active.limits.damping * error, limit);
@@ -106,22 +108,22 @@ impl MotionLaw {
     }
 
     /// Begins a mode where the joint is. What moves or holds it goes on without a step from one of these modes to another: velocity, position and hold
-    /// share ramp and integral, position and hold the reference too.
+    /// share ramp and integral, position and hold the reference too. Braking's ramp and integral they take over.
     #[inline(never)]
     fn enter(&mut self, mode: Mode, motion: &JointMotion) {
         let ramps = |mode| matches!(mode, Mode::Velocity | Mode::Position | Mode::Hold);
-        let goes_on = self.mode.is_some_and(ramps) && ramps(mode);
+        let goes_on = (self.brakes || self.mode.is_some_and(ramps)) && ramps(mode);
         // Field by field: the compiler would copy the whole record, byte by byte where it is optimised for size.
         if !goes_on {
             (self.integral, self.bounds) = (0.0, Bounds::default());
         }
-        if !goes_on || self.mode == Some(Mode::Velocity) {
+        if !goes_on || self.brakes || self.mode == Some(Mode::Velocity) {
             self.position = motion.position;
         }
         if !goes_on || mode == Mode::Velocity {
             self.velocity = motion.velocity;
         }
-        self.mode = Some(mode);
+        (self.mode, self.brakes) = (Some(mode), false);
     }
 
     fn ramp(&mut self, target: f32, step: f32) {
@@ -131,8 +133,11 @@ impl MotionLaw {
     /// One round of the reference: towards the command's position, or to a stop.
     #[inline(never)]
     fn follow(&mut self, command: &Command, active: &Active) {
-        let velocity = if command.mode == Mode::Hold { 0.0 } else { self.approach(command.position, active) };
-        self.ramp(velocity, active.motion.velocity_step);
+        let (velocity, step) = match command.mode {
+            Mode::Hold => (0.0, active.motion.hold_step),
+            _ => (self.approach(command.position, active), active.motion.velocity_step),
+        };
+        self.ramp(velocity, step);
         self.position += self.velocity * active.motion.period;
     }
 

@@ -6,7 +6,7 @@
 
 use super::active::{Active, JointMotion};
 use super::adaptation::Factors;
-use super::command::Command;
+use super::command::{Command, Demand, Mode};
 use super::friction_feedforward::{Compensated, FrictionFeedforward, Surroundings};
 use super::motion_law::{MotionLaw, Wanted};
 use super::state_machine::State;
@@ -36,6 +36,10 @@ pub struct MotionLoop {
     friction: FrictionFeedforward,
     wanted: Wanted,
     compensated: Compensated,
+    /// Rounds for which an enabled joint still holds where it is, because its brake opens.
+    release: u32,
+    /// It holds where it is instead of following the command.
+    held: bool,
 }
 
 /// What a round sees of the joint.
@@ -59,12 +63,12 @@ impl MotionLoop {
         &mut self,
         active: &Active,
         state: State,
-        command: &Command,
+        demand: &Demand,
         seen: &Seen,
     ) -> f32 {
         let begins = state != self.state;
         if begins {
-            self.begin(state);
+            self.begin(active, state);
         }
         if !state.makes_torque() {
             return 0.0;
@@ -72,7 +76,7 @@ impl MotionLoop {
         let enabled = state == State::OperationEnabled;
         // Nobody waits for the first torque of an enabled joint, and the step of a new state has enough to do; a brake's comes at once.
         if !(begins && enabled) {
-            self.stage::<COMPENSATION>(active, enabled, command, seen);
+            self.stage::<COMPENSATION>(active, demand, seen);
         }
         match self.compensated.torque {
             0.0 => self.wanted.torque,
@@ -82,8 +86,11 @@ impl MotionLoop {
 
     /// A round begins in a new state: compensation only while operation is enabled, torque only while the bridge switches.
     #[inline(never)]
-    fn begin(&mut self, state: State) {
-        (self.state, self.stage) = (state, Stage::default());
+    fn begin(&mut self, active: &Active, state: State) {
+        if !self.state.makes_torque() {
+            self.open_brake(active);
+        }
+        (self.state, self.stage, self.held) = (state, Stage::default(), self.release > 0);
         self.friction.reset();
         self.compensated = Compensated::NOTHING;
         if !state.makes_torque() {
@@ -92,16 +99,45 @@ impl MotionLoop {
         }
     }
 
+    /// The brake opens from here on: the joint holds where it is meanwhile.
+    pub fn open_brake(&mut self, active: &Active) {
+        self.release = active.stops.release_rounds;
+    }
+
+    /// Whether an enabled joint holds where it is, because its brake opens or because it is to stop.
+    #[inline(always)]
+    pub fn is_held(&self) -> bool {
+        self.held
+    }
+
+    /// The round's torque while operation is enabled.
+    #[inline(always)]
+    fn follow(&mut self, active: &Active, demand: &Demand, seen: &Seen) -> Wanted {
+        let mut command = &demand.command;
+        let hold;
+        self.held = self.release > 0 || demand.controlword.ends_operation();
+        if self.held {
+            self.release = self.release.saturating_sub(1);
+            // What of the torque pushes nowhere goes on bearing a load.
+            hold = Command { mode: Mode::Hold, torque: command.torque - command.push, ..Command::NOTHING };
+            command = &hold;
+        }
+        self.law.step(active, command, seen.motion, seen.derating)
+    }
+
     /// One stage, and which one is next.
     #[inline(always)]
-    fn stage<const COMPENSATION: bool>(&mut self, active: &Active, enabled: bool, command: &Command, seen: &Seen) {
-        let Seen { motion, derating, measured_torque, surroundings, factors } = seen;
+    fn stage<const COMPENSATION: bool>(&mut self, active: &Active, demand: &Demand, seen: &Seen) {
+        let enabled = self.state == State::OperationEnabled;
+        let Seen { motion, measured_torque, surroundings, factors, .. } = seen;
         let compensates = COMPENSATION && enabled;
         self.stage = match self.stage {
             Stage::Law => {
-                self.wanted = match enabled {
-                    true => self.law.step(active, command, motion, *derating),
-                    false => self.law.brake(active, motion),
+                let gains = &active.motion;
+                self.wanted = match self.state {
+                    State::OperationEnabled => self.follow(active, demand, seen),
+                    State::QuickStopActive => self.law.brake(active, motion, gains.quick_stop_step),
+                    _ => self.law.brake(active, motion, gains.fault_step),
                 };
                 Stage::Regime
             }
@@ -159,9 +195,13 @@ impl MotionLoop {
 
 #[cfg(test)]
 mod tests {
-    use super::super::command::Mode;
+    use super::super::state_machine::Controlword;
     use super::super::configuration::MOTION_STEPS;
     use super::*;
+
+    fn enabling(command: Command) -> Demand {
+        Demand { controlword: Controlword::ENABLE_OPERATION, command, ..Demand::default() }
+    }
 
     fn active() -> Active {
         let board = crate::default_configuration::B_G431B_ESC1;
@@ -173,7 +213,7 @@ mod tests {
         let motion = JointMotion::default();
         let seen =
             Seen { motion: &motion, derating: 1.0, measured_torque: 0.0, surroundings, factors: &Factors::IMAGE };
-        motion_loop.step::<false>(active, state, &Command { torque, ..Command::default() }, &seen)
+        motion_loop.step::<false>(active, state, &enabling(Command { torque, ..Command::default() }), &seen)
     }
 
     #[test]
@@ -200,7 +240,7 @@ mod tests {
         let motion = JointMotion { velocity: 0.3, ..JointMotion::default() };
         let seen =
             Seen { motion: &motion, derating: 1.0, measured_torque: 0.0, surroundings, factors: &Factors::IMAGE };
-        let command = Command { mode: Mode::Velocity, velocity: 0.31, ..Command::default() };
+        let command = enabling(Command { mode: Mode::Velocity, velocity: 0.31, ..Command::default() });
         let mut motion_loop = MotionLoop::default();
         let mut step = |state| (motion_loop.step::<false>(&active, state, &command, &seen), *motion_loop.wanted());
         assert_eq!(step(State::OperationEnabled).0, 0.0, "the step in which it is enabled");
@@ -239,7 +279,7 @@ mod tests {
                 Seen { motion: &motion, derating: 1.0, measured_torque: 0.0, surroundings, factors: &Factors::IMAGE };
             let mut motion_loop = MotionLoop::default();
             let mut torque = || {
-                let command = Command { torque: limits.torque, ..Command::default() };
+                let command = enabling(Command { torque: limits.torque, ..Command::default() });
                 let torque = motion_loop.step::<false>(&active, State::OperationEnabled, &command, &seen);
                 motion_loop.compensated.torque = 0.5 * limits.torque;
                 torque

@@ -52,3 +52,17 @@ impl Bridge {
     /// All transistors off.
     pub const OFF: Self = Self { state: BridgeState::Off, duties: Phases::uniform(0.5) };
 }
+
+/// What the board's outputs are to do; they are off where nobody asks anything of them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Outputs {
+    /// The holding brake is to open.
+    pub brake_open: bool,
+    /// The brake chopper conducts.
+    pub chopper: bool,
+}
+
+impl Outputs {
+    /// Nothing: the brake is closed.
+    pub const OFF: Self = Self { brake_open: false, chopper: false };
+}

@@ -6,6 +6,8 @@
 //! [`State::OpenLoop`] is not of the profile: it takes the place of "operation enabled" in [`Mode::OpenLoop`](super::Mode::OpenLoop), in which a voltage
 //! turns the motor and nothing can brake it. Whatever leaves it switches the bridge off in the same step.
 
+use super::stopping::StopConfiguration;
+
 /// Control steps for which a fault reset waits for the gate driver: a task clears it, and configures it anew where it has to. 100 ms at 40 kHz.
 pub const RESET_STEPS: u16 = 4_000;
 
@@ -24,7 +26,7 @@ pub enum State {
     SwitchedOn = 3,
     /// The joint follows its commands.
     OperationEnabled = 4,
-    /// The joint brakes to a stop, then nothing may move.
+    /// The joint brakes to a stop; then nothing may move, or it holds.
     QuickStopActive = 5,
     /// A fault happened; the joint brakes, if the fault permits that.
     FaultReactionActive = 6,
@@ -59,6 +61,12 @@ impl Controlword {
 
     const fn has(self, bits: u16) -> bool {
         self.0 & bits == bits
+    }
+
+    /// Asks a joint in operation to leave it, by "shutdown" or "disable operation".
+    #[inline(always)]
+    pub const fn ends_operation(self) -> bool {
+        self.has(0x06) && self.0 & 0x0f != 0x0f
     }
 
     /// "Enable operation".
@@ -109,8 +117,8 @@ enum Permits {
 }
 
 /// What the machine is told in a control step besides the controlword.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Events {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Events<'a> {
     /// The start is complete, and what the mode needs is known.
     pub started: bool,
     /// The mode is [`Mode::OpenLoop`](super::Mode::OpenLoop).
@@ -119,8 +127,12 @@ pub struct Events {
     pub fault: bool,
     /// The gate driver is at fault, and nothing else: a fault reset waits until it has been cleared.
     pub driver_alone: bool,
-    /// Braking, of a quick stop or of a fault reaction, is over or not permitted.
+    /// Braking is over or not permitted.
     pub stopped: bool,
+    /// No command came for longer than a joint permits that then makes a quick stop.
+    pub late: bool,
+    /// How the joint stops.
+    pub stops: &'a StopConfiguration,
 }
 
 /// The state machine, from one control step to the next.
@@ -131,6 +143,8 @@ pub struct StateMachine {
     reset: bool,
     /// Control steps for which a fault reset still waits for the gate driver.
     waits: u16,
+    /// Since the quick stop somebody has asked for something else than operation: a master that was silent must not go on as if it had not been.
+    heard: bool,
 }
 
 impl StateMachine {
@@ -182,6 +196,10 @@ impl StateMachine {
         let faulty = events.fault && !matches!(self.state, FaultReactionActive | Fault);
         let (permits, commands) = (word.permits(), word.commands());
         let enables = permits == Permits::Operation && commands;
+        let stops = events.stops;
+        let (stopped, quick) = (events.stopped, permits == Permits::QuickStop || events.open_loop || events.late);
+        let goes_on = stops.holds() && self.heard && enables && !events.open_loop;
+        self.heard = self.state == QuickStopActive && (self.heard || !enables);
         self.state = match self.state {
             // A joint that was not moving has nothing to react with.
             NotReadyToSwitchOn | SwitchOnDisabled | ReadyToSwitchOn | SwitchedOn | OpenLoop if faulty => Fault,
@@ -192,17 +210,20 @@ impl StateMachine {
             SwitchOnDisabled if permits == Permits::Ready && commands => ReadyToSwitchOn,
             ReadyToSwitchOn | SwitchedOn | OpenLoop if permits as u8 <= Permits::QuickStop as u8 => SwitchOnDisabled,
             OperationEnabled | QuickStopActive if permits == Permits::Nothing => SwitchOnDisabled,
-            OperationEnabled if permits == Permits::QuickStop || events.open_loop => QuickStopActive,
-            SwitchedOn | OperationEnabled | OpenLoop if permits == Permits::Ready => ReadyToSwitchOn,
+            OperationEnabled if quick && stops.quick_stop == 0 => SwitchOnDisabled,
+            OperationEnabled if quick => QuickStopActive,
+            SwitchedOn | OpenLoop if permits == Permits::Ready => ReadyToSwitchOn,
+            OperationEnabled if permits == Permits::Ready && (stopped || stops.shutdown == 0) => ReadyToSwitchOn,
             ReadyToSwitchOn if permits as u8 >= Permits::SwitchedOn as u8 && commands => SwitchedOn,
             // Not "switched on": the controlword that applied the voltage would enable the other mode.
             OpenLoop if !events.open_loop => SwitchOnDisabled,
             SwitchedOn if enables && events.open_loop => OpenLoop,
             SwitchedOn if enables => OperationEnabled,
             OpenLoop if !enables => SwitchedOn,
-            OperationEnabled if permits == Permits::SwitchedOn => SwitchedOn,
-            QuickStopActive if events.stopped => SwitchOnDisabled,
-            FaultReactionActive if events.stopped => Fault,
+            OperationEnabled if permits == Permits::SwitchedOn && (stopped || stops.disable_operation == 0) => SwitchedOn,
+            QuickStopActive if stopped => SwitchOnDisabled,
+            QuickStopActive if goes_on => OperationEnabled,
+            FaultReactionActive if stopped => Fault,
             Fault if asked && !events.fault => SwitchOnDisabled,
             state => state,
         };
@@ -254,7 +275,15 @@ mod tests {
     use State::*;
     use proptest::prelude::*;
 
-    const QUIET: Events = Events { started: true, open_loop: false, fault: false, driver_alone: false, stopped: false };
+    const QUIET: Events<'static> = Events {
+        started: true,
+        open_loop: false,
+        fault: false,
+        driver_alone: false,
+        stopped: false,
+        late: false,
+        stops: &StopConfiguration::DEFAULT,
+    };
 
     fn enabled() -> StateMachine {
         let mut machine = StateMachine::default();
@@ -270,7 +299,7 @@ mod tests {
     fn nothing_is_enabled_before_the_start_is_complete() {
         let mut machine = StateMachine::default();
         for _ in 0..10 {
-            assert_eq!(machine.step(Controlword::ENABLE_OPERATION, Events::default()), NotReadyToSwitchOn);
+            assert_eq!(machine.step(Controlword::ENABLE_OPERATION, Events { started: false, ..QUIET }), NotReadyToSwitchOn);
         }
     }
 
@@ -371,7 +400,7 @@ mod tests {
         }
     }
 
-    const OPEN_LOOP: Events = Events { open_loop: true, ..QUIET };
+    const OPEN_LOOP: Events<'static> = Events { open_loop: true, ..QUIET };
 
     fn in_open_loop() -> StateMachine {
         let mut machine = StateMachine::default();

@@ -2,7 +2,7 @@
 
 /// Names of settings and units of their numbers, in the order of their numbers on the bus (object 2100h:3), and index and sub-index of the object that sets it or
 /// what it is computed from; zeros where that is nobody's to set over the bus. New ones come last.
-const NAMES: [(&str, &str, u16, u8); 66] = [
+const NAMES: [(&str, &str, u16, u8); 70] = [
     ("", "", 0x0000, 0),
     ("control rate", "Hz", 0x0000, 0),
     ("dead time", "s", 0x0000, 0),
@@ -69,6 +69,10 @@ const NAMES: [(&str, &str, u16, u8); 66] = [
     ("voltage induced where over-speed is a fault", "V", 0x2103, 2),
     ("oscillator trim", "", 0x2105, 1),
     ("friction uncertainty", "", 0x2200, 11),
+    ("brake chopper's voltage", "V", 0x2103, 14),
+    ("brake chopper's share of the time", "", 0x2103, 15),
+    ("holding brake's release time", "s", 0x2109, 1),
+    ("holding brake's apply time", "s", 0x2109, 2),
 ];
 
 /// The name of a setting. A board has its number only: texts and units are linked where somebody formats them, on a host.
@@ -222,7 +226,7 @@ mod tests {
             assert_eq!(code, u32::from(index) << 16 | u32::from(sub_index) << 8 | number as u32, "{text}");
             assert_eq!((Name::from_code(code), Name::from_code(code).text()), (name, text));
             let object = crate::objects::table::find(index, sub_index);
-            let setting = object.is_some_and(|o| matches!(o.field, Field::Setting(_) | Field::Compensation(_)));
+            let setting = object.is_some_and(|o| matches!(o.field, Field::Setting(_) | Field::AtOnce(_)));
             assert!(index == 0 || setting, "{text}");
         }
         assert_eq!(Name::from_code(NAMES.len() as u32), Name::default());

@@ -217,7 +217,7 @@ impl<'a, P: Program> Objects<'a, P> {
     /// Whether what is staged differs in any object: a loop over the table is a tenth of the code of comparing the records.
     fn is_changed(&self) -> bool {
         table::OBJECTS.iter().any(|object| match object.field {
-            Field::Setting(setting) | Field::Compensation(setting) => {
+            Field::Setting(setting) | Field::AtOnce(setting) => {
                 setting.get(&self.staged) != setting.get(&self.configuration)
             }
             _ => false,
@@ -242,7 +242,7 @@ impl<'a, P: Program> Objects<'a, P> {
             Field::Range(range) => self.shared.range(range).to_bits().into(),
             Field::Actual(actual) => self.observed.actual(actual, self.shared),
             Field::Setting(setting) => setting.get(&self.staged).into(),
-            Field::Compensation(setting) => setting.get(&self.configuration).into(),
+            Field::AtOnce(setting) => setting.get(&self.configuration).into(),
             Field::Configuration(ConfigurationField::Changed) => self.is_changed().into(),
             Field::Configuration(part) => self.refused.get(part).into(),
             Field::OpenLoop(part) => {
@@ -320,13 +320,14 @@ impl<'a, P: Program> Objects<'a, P> {
     }
 
     #[inline(never)]
-    fn write_compensation(&mut self, setting: Setting, number: u32) -> Result<(), Abort> {
+    fn write_at_once(&mut self, setting: Setting, number: u32) -> Result<(), Abort> {
         let mut configuration = self.configuration;
         if !setting.set(&mut configuration, number) {
             return Err(Abort::VALUE);
         }
         self.configure(&configuration)?;
         self.staged.compensation = configuration.compensation;
+        self.staged.stops = configuration.stops;
         Ok(())
     }
 
@@ -441,7 +442,7 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
                     Err(Abort::VALUE)
                 }
             }
-            Field::Compensation(setting) => self.write_compensation(setting, word),
+            Field::AtOnce(setting) => self.write_at_once(setting, word),
             Field::Configuration(ConfigurationField::Command) => self.command_configuration(word),
             Field::Image(field) => self.write_image(field, word),
             Field::Hardware(HardwareField::SetOptions) => self.set_options(word),

@@ -19,8 +19,8 @@ pub enum Field {
     Actual(Actual),
     /// A setting of the configuration: staged, and taken with all others by a command.
     Setting(Setting),
-    /// A setting of the compensation: acts at once.
-    Compensation(Setting),
+    /// A setting that acts at once: of the compensation, and how the joint stops.
+    AtOnce(Setting),
     /// Taking the configuration, and why it was refused.
     Configuration(ConfigurationField),
     /// The open loop's last window.
@@ -61,12 +61,6 @@ pub enum HardwareField {
 /// A number that never changes. Without the number itself, which is wider than all other fields, an entry of the table takes six bytes less.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Constant {
-    /// Reaction to a lost connection: quick stop.
-    AbortConnectionOption,
-    /// A quick stop brakes and then disables.
-    QuickStopOption,
-    /// Halt brakes and then holds.
-    HaltOption,
     /// Modes of operation, a bit each.
     SupportedModes,
 }
@@ -75,9 +69,6 @@ impl Constant {
     /// The number.
     pub const fn number(self) -> i32 {
         match self {
-            Self::AbortConnectionOption => 3,
-            Self::QuickStopOption => 2,
-            Self::HaltOption => 1,
             Self::SupportedModes => 0x0003_0380,
         }
     }
@@ -219,6 +210,8 @@ pub enum Actual {
     ImageVersion,
     /// Where a staged image stands.
     ImageState,
+    /// What the board's outputs do.
+    Outputs,
 }
 
 /// Taking the staged configuration.

@@ -63,7 +63,7 @@ impl Observed {
         let tenths = |value: f32| signed(temperature(value).into());
         match actual {
             Actual::Statusword => {
-                let follows = t.state == State::OperationEnabled && shared.follows();
+                let follows = t.state == State::OperationEnabled && shared.follows() && !t.held;
                 (t.statusword() | u16::from(follows) << 12).into()
             }
             Actual::Mode => shared.set_point(SetPoint::Mode),
@@ -89,6 +89,7 @@ impl Observed {
             Actual::AdaptedFactor => self.adaptation.factors.factor.to_bits().into(),
             Actual::FactorDeviation => self.adaptation.deviation.to_bits().into(),
             Actual::AdaptedViscous => self.adaptation.factors.viscous.to_bits().into(),
+            Actual::Outputs => (u64::from(!t.outputs.brake_open)) | u64::from(t.outputs.chopper) << 16,
             Actual::ImageVersion => shared.image_version().into(),
             Actual::ImageState => shared.image_state().into(),
         }

@@ -46,6 +46,8 @@ impl Refused {
             }
             ConfigurationError::NodeId(id) => of(const { Name::of("node id", "") }, id.into(), 1.0, 127.0),
             ConfigurationError::PolePairs(pairs) => of(const { Name::of("pole pairs", "") }, pairs as f32, 1.0, 64.0),
+            // Refused where it is written, before it gets here.
+            ConfigurationError::StopOption => Self { result: 1, ..Self::default() },
             ConfigurationError::EncoderCounts(counts) => {
                 of(const { Name::of("encoder counts", "") }, counts as f32, 16.0, 65_535.0)
             }

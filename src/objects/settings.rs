@@ -4,6 +4,7 @@
 use crate::compensation::Request;
 use crate::joint::adaptation::ADAPTS;
 use crate::joint::configuration::{AdaptationRequest, Configuration, VelocitySource};
+use crate::joint::stopping::StopConfiguration;
 use crate::motor::angle::Direction;
 
 /// Declares the settings: their names, and the members that are real numbers.
@@ -53,6 +54,8 @@ settings! {
     WindingTemperature => limits.winding_temperature,
     CommandDeadline => limits.command_deadline,
     RegenerationBand => limits.regeneration_band,
+    ChopperVoltage => limits.chopper_voltage,
+    ChopperShare => limits.chopper_share,
     CurrentBandwidth => gains.current_bandwidth,
     ObserverBandwidth => gains.observer_bandwidth,
     VoltageFraction => gains.voltage_fraction,
@@ -62,6 +65,8 @@ settings! {
     Acceleration => gains.acceleration,
     QuickStopDeceleration => gains.quick_stop_deceleration,
     BrakingTime => gains.braking_time,
+    BrakeRelease => stops.brake_release,
+    BrakeApply => stops.brake_apply,
     CompensationGain => compensation.gain,
     Clamp => compensation.clamp,
     Slew => compensation.slew,
@@ -81,6 +86,12 @@ settings! {
     VelocitySource,
     OscillatorTrim,
     Adaptation,
+    QuickStop,
+    Shutdown,
+    DisableOperation,
+    Halt,
+    FaultReaction,
+    LateCommand,
 }
 
 impl Setting {
@@ -99,6 +110,12 @@ impl Setting {
             Self::Request => copy.compensation.request as u32,
             Self::OscillatorTrim => copy.oscillator_trim.into(),
             Self::Adaptation => copy.compensation.adaptation as u32,
+            Self::QuickStop => copy.stops.quick_stop.into(),
+            Self::Shutdown => copy.stops.shutdown.into(),
+            Self::DisableOperation => copy.stops.disable_operation.into(),
+            Self::Halt => copy.stops.halt.into(),
+            Self::FaultReaction => copy.stops.fault_reaction.into(),
+            Self::LateCommand => copy.stops.late_command.into(),
             _ => (copy.compensation.velocity_source == VelocitySource::Measured).into(),
         }
     }
@@ -127,8 +144,28 @@ impl Setting {
             (Self::Adaptation, 0) => configuration.compensation.adaptation = AdaptationRequest::Off,
             (Self::Adaptation, 1) if ADAPTS => configuration.compensation.adaptation = AdaptationRequest::Shadow,
             (Self::Adaptation, 2) if ADAPTS => configuration.compensation.adaptation = AdaptationRequest::On,
-            _ => return false,
+            _ => return self.set_option(&mut configuration.stops, number),
         }
         true
+    }
+
+    /// The same of an option code.
+    fn set_option(self, stops: &mut StopConfiguration, number: u32) -> bool {
+        let before = *stops;
+        let place = match self {
+            Self::QuickStop => &mut stops.quick_stop,
+            Self::Shutdown => &mut stops.shutdown,
+            Self::DisableOperation => &mut stops.disable_operation,
+            Self::Halt => &mut stops.halt,
+            Self::FaultReaction => &mut stops.fault_reaction,
+            Self::LateCommand => &mut stops.late_command,
+            _ => return false,
+        };
+        *place = if number < 256 { number as u8 } else { u8::MAX };
+        let possible = stops.is_possible();
+        if !possible {
+            *stops = before;
+        }
+        possible
     }
 }

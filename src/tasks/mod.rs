@@ -78,6 +78,7 @@ pub fn start(slow: Spawner, medium: impl FnOnce() -> SendSpawner, peripherals: P
                 ConfigurationError::NodeId(_) => 0,
                 ConfigurationError::PolePairs(_) => 0x2101_0600,
                 ConfigurationError::EncoderCounts(_) => 0x2101_0A00,
+                ConfigurationError::StopOption => 0x605A_0000,
             };
             defmt::error!("{} does not start: setting {:#010x} out of range in its configuration", board::NAME, what);
         }

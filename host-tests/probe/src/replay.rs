@@ -72,6 +72,7 @@ pub fn configuration(scenario: &Scenario) -> (Configuration, BridgeConfiguration
         has_bridge_sensor: true,
         has_winding_sensor: true,
         counts_an_encoder: false,
+        has_chopper_output: true,
         limits: BoardLimits {
             supply: 60.0,
             over_current: 60.0,

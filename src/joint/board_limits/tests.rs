@@ -50,7 +50,7 @@ fn highest(board: &BoardLimits, setting: Setting) -> Option<f32> {
 /// Every setting with the numbers that it is attacked with: both ends, the board's, just beyond each, and what is no number.
 fn attacks(board: &BoardLimits) -> Vec<(Setting, Vec<u32>)> {
     let of = |(object, text): (&crate::objects::table::Object, &crate::objects::table::Text)| {
-        let (Field::Setting(setting) | Field::Compensation(setting)) = object.field else { return None };
+        let (Field::Setting(setting) | Field::AtOnce(setting)) = object.field else { return None };
         if object.data_type != DataType::F32 {
             return Some((setting, vec![0, 1, 2, 63, 64, 65, u32::MAX]));
         }

@@ -85,6 +85,10 @@ room! {
             "With which torque fades towards velocity and position limits, and with which the joint brakes; at least 5 times the torque limit over the velocity limit"
         13, "regeneration band", F32, RW, UNMAPPED, S(Setting::RegenerationBand); "V", 1.0, within(0.1, 95.0);
             "Span below the highest bus voltage over which a braking current that feeds the supply fades to nothing"
+        14, "chopper voltage", F32, RW, UNMAPPED, S(Setting::ChopperVoltage); "V", 1.0, within(0.0, 100.0);
+            "Supply at which the brake chopper conducts, until it is 1 % less; 0: never; from 1 V above the lowest bus voltage to where the regeneration band begins, on a board that has an output for one"
+        15, "chopper share", F32, RW, UNMAPPED, S(Setting::ChopperShare); "", 1.0, within(0.001, 1.0);
+            "Largest part of the time in which the brake chopper may conduct, mean over 10 s: power of its resistor times resistance over the chopper voltage squared"
     }
     0x2104 "gains" {
         1, "current bandwidth", F32, RW, UNMAPPED, S(Setting::CurrentBandwidth); "Hz", 1.0, within(10.0, 100e3);
@@ -160,5 +164,11 @@ room! {
             "1 where the encoder's zero is known: always with an absolute one, from the index on with an incremental one"
         16, "control rate", U32, RO, UNMAPPED, W(Window::ControlRate); "Hz", 1.0, ANY;
             "Control steps a second"
+    }
+    0x2109 "holding brake" {
+        1, "brake release time", F32, RW, UNMAPPED, S(Setting::BrakeRelease); "s", 1.0, within(0.0, 5.0);
+            "For so long an enabled joint holds where it is before it follows a target"
+        2, "brake apply time", F32, RW, UNMAPPED, S(Setting::BrakeApply); "s", 1.0, within(0.0, 5.0);
+            "For so long a joint that has stopped goes on bearing its load before the bridge is off"
     }
 }

@@ -2,7 +2,7 @@
 //! 1010h stores them with the configuration.
 
 use super::*;
-use crate::objects::field::{Actual, Field::Actual as A, Field::Compensation as S};
+use crate::objects::field::{Actual, Field::Actual as A, Field::AtOnce as S};
 use crate::objects::settings::Setting;
 
 room! {

@@ -1,13 +1,16 @@
 //! 6000h to 67FFh: what CiA 402-2 has an object for.
 
 use super::*;
-use crate::objects::field::Constant::{AbortConnectionOption, HaltOption, QuickStopOption, SupportedModes};
-use crate::objects::field::{Actual, Field::Actual as A, Field::Constant, Field::SetPoint as Set, SetPoint};
+use crate::objects::field::Constant::SupportedModes;
+use crate::objects::field::{
+    Actual, Field::Actual as A, Field::AtOnce as S, Field::Constant, Field::SetPoint as Set, SetPoint,
+};
+use crate::objects::settings::Setting;
 
 room! {
     0x6007 "abort connection option code" {
-        0, "abort connection option code", I16, RO, UNMAPPED, Constant(AbortConnectionOption); "", 1.0, ANY;
-            "3: outside OPERATIONAL the joint makes a quick stop"
+        0, "abort connection option code", I16, RW, UNMAPPED, S(Setting::LateCommand); "", 1.0, within(1.0, 3.0);
+            "A command that is late (2103h:11) is 1 a fault (8130h), 3 a quick stop; 2 is not possible. Outside OPERATIONAL the joint makes a quick stop in any case. Acts at once, stored by 1010h, as 605Ah to 605Eh do"
     }
     0x603F "error code" {
         0, "error code", U16, RO, TRANSMIT, A(Actual::ErrorCode); "", 1.0, ANY;
@@ -22,12 +25,24 @@ room! {
             "State of the state machine, voltage present (bit 4), remote (bit 9), the joint follows the target of its mode (bit 12: not before one has come, nor in halt); operation enabled with bit 14 is the open loop"
     }
     0x605A "quick stop option code" {
-        0, "quick stop option code", I16, RO, UNMAPPED, Constant(QuickStopOption); "", 1.0, ANY;
-            "2: brake along the quick-stop ramp, then switch on disabled"
+        0, "quick stop option code", I16, RW, UNMAPPED, S(Setting::QuickStop); "", 1.0, within(0.0, 6.0);
+            "0: off at once; 1: along the ramp of 2104h:6, 2: of 2104h:7, then switch on disabled; 5, 6: the same, then it holds in quick stop active until the voltage is disabled or operation enabled anew, after another command. 3 and 4 are not possible"
+    }
+    0x605B "shutdown option code" {
+        0, "shutdown option code", I16, RW, UNMAPPED, S(Setting::Shutdown); "", 1.0, within(0.0, 1.0);
+            "0: off at once; 1: along the ramp of 2104h:6, then off; until then operation is enabled"
+    }
+    0x605C "disable operation option code" {
+        0, "disable operation option code", I16, RW, UNMAPPED, S(Setting::DisableOperation); "", 1.0, within(0.0, 1.0);
+            "0: off at once; 1: along the ramp of 2104h:6, then off; until then operation is enabled"
     }
     0x605D "halt option code" {
-        0, "halt option code", I16, RO, UNMAPPED, Constant(HaltOption); "", 1.0, ANY;
-            "1: brake along the ramp of 2104h:6, then hold, with operation enabled"
+        0, "halt option code", I16, RW, UNMAPPED, S(Setting::Halt); "", 1.0, within(1.0, 2.0);
+            "1: brake along the ramp of 2104h:6, 2: of 2104h:7; then hold, with operation enabled"
+    }
+    0x605E "fault reaction option code" {
+        0, "fault reaction option code", I16, RW, UNMAPPED, S(Setting::FaultReaction); "", 1.0, within(0.0, 2.0);
+            "Of a fault that permits braking. 0: off at once; 1: along the ramp of 2104h:6, 2: of 2104h:7, then fault"
     }
     0x6060 "modes of operation" {
         0, "modes of operation", I8, RW, RECEIVE, Set(SetPoint::Mode); "", 1.0, within(-2.0, 10.0);
@@ -69,6 +84,10 @@ room! {
     0x60B2 "torque offset" {
         0, "torque offset", I16, RW, RECEIVE, Set(SetPoint::TorqueOffset); "of 6076h", 1e-3, ANY;
             "Added in every mode but the open loop: what holds the joint, gravity above all. In torque mode the energy guard takes the sign of 6071h alone for a push"
+    }
+    0x60FE "digital outputs" {
+        1, "physical outputs", U32, RO, TRANSMIT, A(Actual::Outputs); "", 1.0, ANY;
+            "Bits: 0 the holding brake is to be closed, 16 the brake chopper conducts. Where a board has no such output it is what one would do"
     }
     0x60FF "target velocity" {
         0, "target velocity", I32, RW, RECEIVE, Set(SetPoint::TargetVelocity); "rad/s", 1e-3, ANY;

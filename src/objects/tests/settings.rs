@@ -43,8 +43,8 @@ fn a_refused_configuration_says_which_setting_and_why() {
 fn every_limit_in_the_table_is_one_that_the_joint_keeps() {
     for (object, text) in described() {
         let (setting, (low, high)) = match (object.field, text.limits) {
-            (Field::Setting(setting) | Field::Compensation(setting), Some(limits)) => (setting, limits),
-            (Field::Setting(_) | Field::Compensation(_), None) => continue,
+            (Field::Setting(setting) | Field::AtOnce(setting), Some(limits)) => (setting, limits),
+            (Field::Setting(_) | Field::AtOnce(_), None) => continue,
             _ => continue,
         };
         for outside in [low - 1e-3 * (1.0 + low.abs()), high + 1e-3 * (1.0 + high.abs())] {
@@ -66,7 +66,7 @@ fn every_limit_in_the_table_is_one_that_the_joint_keeps() {
 #[test]
 fn every_setting_keeps_the_number_it_was_given() {
     for (object, text) in described() {
-        let (Field::Setting(setting) | Field::Compensation(setting)) = object.field else { continue };
+        let (Field::Setting(setting) | Field::AtOnce(setting)) = object.field else { continue };
         let number = if object.data_type == DataType::F32 { 0.123f32.to_bits() } else { 1 };
         let mut configuration = BOARD.joint;
         assert!(setting.set(&mut configuration, number));
@@ -176,7 +176,7 @@ fn whole() -> Vec<u8> {
 #[test]
 fn the_whole_record_comes_back_and_fits() {
     let record = whole();
-    assert_eq!(record.len(), 1_151);
+    assert_eq!(record.len(), 1_221);
     let configuration = Configuration { node_id: 17, ..crate::default_configuration::MOTEUS_R4.joint };
     let stored = Stored::decode(&record, &BOARD.joint).unwrap();
     assert_eq!((stored.configuration(&BOARD.joint), stored.ranges()), (configuration, [1.0, 2.0, 3.0, 4.0, 5.0]));

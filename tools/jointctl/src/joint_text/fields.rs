@@ -42,7 +42,7 @@ const fn field(
 }
 
 /// All keys.
-pub const FIELDS: [Field; 49] = [
+pub const FIELDS: [Field; 59] = [
     field("", "node_id", "", None, "Node on the CAN bus, 1 to 127; 255 where none is assigned yet"),
     field("", "oscillator_trim", "", Some((54.0, 74.0)), "Trim of the board's oscillator, steps of some 0.3 %"),
     field("motor", "resistance", "Ohm", Some((1e-3, 100.0)), "Resistance of a phase at 25 °C"),
@@ -129,6 +129,20 @@ pub const FIELDS: [Field; 49] = [
     ),
     field(
         "limits",
+        "chopper_voltage",
+        "V",
+        None,
+        "Supply at which a brake chopper conducts; 0 (none), or 1 V above the lowest supply to where the regeneration band begins",
+    ),
+    field(
+        "limits",
+        "chopper_share",
+        "",
+        Some((1e-3, 1.0)),
+        "Largest part of the time in which it may conduct, over 10 s: power times resistance over chopper_voltage squared",
+    ),
+    field(
+        "limits",
         "bridge_temperature",
         "°C",
         Some((40.0, 150.0)),
@@ -187,6 +201,26 @@ pub const FIELDS: [Field; 49] = [
         "Deceleration of quick stop and fault reaction",
     ),
     field("gains", "braking_time", "s", Some((0.01, 10.0)), "Longest time of braking before the bridge switches off"),
+    field(
+        "stops",
+        "quick_stop",
+        "",
+        None,
+        "605Ah: 0 off at once, 1 along the ramp of the modes, 2 along its own; 5, 6 the same, then it holds",
+    ),
+    field("stops", "shutdown", "", Some((0.0, 1.0)), "605Bh: 0 off at once, 1 along the ramp of the modes"),
+    field("stops", "disable_operation", "", Some((0.0, 1.0)), "605Ch: 0 off at once, 1 along the ramp of the modes"),
+    field("stops", "halt", "", Some((1.0, 2.0)), "605Dh: 1 along the ramp of the modes, 2 of the quick stop; then it holds"),
+    field(
+        "stops",
+        "fault_reaction",
+        "",
+        Some((0.0, 2.0)),
+        "605Eh, where a fault permits braking: 0 off at once, 1 along the ramp of the modes, 2 of the quick stop",
+    ),
+    field("stops", "late_command", "", None, "6007h: a command that is late is 1 a fault, 3 a quick stop"),
+    field("stops", "brake_release", "s", Some((0.0, 5.0)), "Time in which the holding brake opens"),
+    field("stops", "brake_apply", "s", Some((0.0, 5.0)), "Time in which the holding brake closes"),
     field(
         "compensation",
         "request",

@@ -8,6 +8,7 @@ use joint_firmware::joint::configuration::{
     AdaptationRequest, CompensationConfiguration, Configuration, FACTORY_TRIM, FRICTION_UNCERTAINTY, Gains,
     GearConfiguration, Limits, MotorConfiguration, ThermalConfiguration, VelocitySource,
 };
+use joint_firmware::joint::stopping::StopConfiguration;
 use joint_firmware::motor::angle::{Direction, ElectricalAngle, EncoderAlignment};
 use serde::{Deserialize, Serialize};
 
@@ -30,6 +31,8 @@ struct ConfigurationText {
     limits: Limits,
     #[serde(with = "GainsText")]
     gains: Gains,
+    #[serde(default, with = "StopText")]
+    stops: StopConfiguration,
     #[serde(with = "CompensationText")]
     compensation: CompensationConfiguration,
     #[serde(with = "ThermalText")]
@@ -62,6 +65,11 @@ fn oscillator_trim() -> u8 {
 /// Of a file that says nothing of it.
 fn encoder_counts() -> u32 {
     4_000
+}
+
+/// Of a file that says nothing of it.
+fn chopper_share() -> f32 {
+    0.1
 }
 
 /// Of a file that says nothing of it.
@@ -104,6 +112,10 @@ struct LimitsText {
     over_current: f32,
     bus_voltage: (f32, f32),
     regeneration_band: f32,
+    #[serde(default)]
+    chopper_voltage: f32,
+    #[serde(default = "chopper_share")]
+    chopper_share: f32,
     bridge_temperature: f32,
     winding_temperature: f32,
     command_deadline: f32,
@@ -122,6 +134,20 @@ struct GainsText {
     acceleration: f32,
     quick_stop_deceleration: f32,
     braking_time: f32,
+}
+
+/// A file of an earlier program has none of this.
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "StopConfiguration", deny_unknown_fields)]
+struct StopText {
+    quick_stop: u8,
+    shutdown: u8,
+    disable_operation: u8,
+    halt: u8,
+    fault_reaction: u8,
+    late_command: u8,
+    brake_release: f32,
+    brake_apply: f32,
 }
 
 #[derive(Serialize, Deserialize)]

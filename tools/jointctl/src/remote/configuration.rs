@@ -47,7 +47,7 @@ pub fn set(joint: &RemoteJoint, wanted: &[(Entry, Value)]) -> Result<(), RemoteE
     }
     for (entry, value) in wanted.iter().filter(|(entry, _)| !is_setting(entry)) {
         joint.write(*entry, value).map_err(|error| match entry.object.field {
-            Field::Compensation(_) => explained(joint, error),
+            Field::AtOnce(_) => explained(joint, error),
             _ => error,
         })?;
     }

@@ -69,12 +69,12 @@ pub fn page(joint: &RemoteJoint) -> Result<String, RemoteError> {
     line("life cycle", life(state, left));
     line("authentication", authentication(joint)?);
     let setting = |setting| show(joint, Field::Setting(setting));
-    let compensation = |setting| show(joint, Field::Compensation(setting));
+    let compensation = |setting| show(joint, Field::AtOnce(setting));
     line(
         "compensation",
         format!(
             "requested {}, acting {}: {}",
-            match joint.raw(Field::Compensation(Setting::Request))? {
+            match joint.raw(Field::AtOnce(Setting::Request))? {
                 0 => "off",
                 request => model(request),
             },
@@ -142,7 +142,7 @@ const LEARNING: [&str; 9] = [
 
 /// Object 2201h in words.
 fn adaptation(joint: &RemoteJoint) -> Result<String, RemoteError> {
-    let request = match joint.raw(Field::Compensation(Setting::Adaptation))? {
+    let request = match joint.raw(Field::AtOnce(Setting::Adaptation))? {
         0 => return Ok("off".into()),
         1 => "in shadow",
         _ => "on",

@@ -187,7 +187,7 @@ struct Tidy<'a> {
 
 impl Tidy<'_> {
     fn request(&self, request: u64) -> Result<(), RemoteError> {
-        let entry = Entry::of(Field::Compensation(Setting::Request));
+        let entry = Entry::of(Field::AtOnce(Setting::Request));
         configuration::set(self.joint, &[(entry, Value::Integer(request.into()))])
     }
 }
@@ -223,7 +223,7 @@ impl Round {
         let excitation = vec![series(&bounds, self.excitation, seed)?, series(&slow, self.excitation, seed + 1)?];
         let validation = vec![series(&bounds, self.validation, seed + 2)?];
         let speed = 0.5 * bounds.velocity;
-        let request = joint.raw(Field::Compensation(Setting::Request))?;
+        let request = joint.raw(Field::AtOnce(Setting::Request))?;
         let mut tidy = Tidy { joint, request, staged: false };
         let travel = |route: &Route, signals: &[Actual], acknowledge| {
             let travelled = route.travel(joint, signals, self.rate, acknowledge, running)?;

@@ -26,7 +26,7 @@ fn round(out: &Path) -> Round {
 pub fn a_round_lowers_what_is_unexplained_and_commits_a_newer_version() {
     let served = Served::joints(&[NODE]);
     let joint = served.joint();
-    let request = || joint.raw(Field::Compensation(Setting::Request)).unwrap();
+    let request = || joint.raw(Field::AtOnce(Setting::Request)).unwrap();
     let folder = tempfile::tempdir().unwrap();
     // What a joint has before: a friction that is not its own.
     joint.upload_image(&image(6, 0.05, 0), Use::Commit, &Silent).unwrap();

@@ -4,6 +4,7 @@
 use crate::actuator::ActuatorParameters;
 use joint_firmware::compensation::Request;
 use joint_firmware::joint::BoardLimits;
+use joint_firmware::joint::stopping::StopConfiguration;
 use joint_firmware::joint::configuration::{
     AdaptationRequest, BridgeConfiguration, CompensationConfiguration, Configuration, FACTORY_TRIM,
     FRICTION_UNCERTAINTY, Gains, GearConfiguration, Limits, MotorConfiguration, ThermalConfiguration, VelocitySource,
@@ -66,6 +67,8 @@ impl Setup {
             bus_voltage: ((0.6 * parameters.bus.source_voltage) as f32, (1.3 * parameters.bus.source_voltage) as f32),
             // Two thirds of the way up from the supply's own voltage: the rest is for its rise before the current follows.
             regeneration_band: (0.2 * parameters.bus.source_voltage) as f32,
+            chopper_voltage: 0.0,
+            chopper_share: 0.1,
             bridge_temperature: 110.0,
             winding_temperature: 130.0,
             command_deadline: 0.1,
@@ -107,6 +110,7 @@ impl Setup {
                     quick_stop_deceleration: deceleration as f32,
                     braking_time: 1.0,
                 },
+                stops: StopConfiguration::DEFAULT,
                 compensation: CompensationConfiguration {
                     request: Request::Off,
                     gain: 0.98,
@@ -133,6 +137,7 @@ impl Setup {
                 has_bridge_sensor: parameters.sensors.bridge.fitted,
                 has_winding_sensor: parameters.sensors.winding.fitted,
                 counts_an_encoder: false,
+                has_chopper_output: true,
                 limits: board_limits(parameters),
             },
         }
