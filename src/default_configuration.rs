@@ -8,11 +8,11 @@
 use crate::compensation::Request;
 use crate::friction::regime::MOST_SETS;
 use crate::joint::BoardLimits;
-use crate::joint::stopping::StopConfiguration;
 use crate::joint::configuration::{
     AdaptationRequest, BridgeConfiguration, CompensationConfiguration, Configuration, FACTORY_TRIM,
     FRICTION_UNCERTAINTY, Gains, GearConfiguration, Limits, MotorConfiguration, ThermalConfiguration, VelocitySource,
 };
+use crate::joint::stopping::StopConfiguration;
 use crate::motor::angle::{Direction, ElectricalAngle, EncoderAlignment};
 use crate::sensors::analog::Analog;
 

@@ -29,7 +29,7 @@
 
 use super::adc::{self, FULL_SCALE, Sequence};
 use super::pwm::{self, TIMER_HZ};
-use super::{Led, Parts, Peripherals, StartError, level_of};
+use super::{Led, Parts, Peripherals, StartError};
 use embassy_stm32::Config;
 use embassy_stm32::gpio::{Input, Level, Output, OutputType, Pull, Speed};
 use embassy_stm32::opamp::{OpAmp, OpAmpGain, OpAmpSpeed};
@@ -340,10 +340,15 @@ pub fn temperatures() -> (f32, f32) {
     (BRIDGE_NTC.temperature(f32::from(adc::code::<2>(pac::ADC1)) / FULL_SCALE), f32::NAN)
 }
 
-/// Sets the bridge: off at once, or switching with the duties held for the next period; and the output.
+/// Sets the holding brake; there is no chopper.
 #[inline(always)]
-pub fn apply(bridge: &Bridge, outputs: Outputs) {
-    pac::GPIOB.bsrr().write(|w| w.0 = level_of(3, outputs.brake_open));
+pub fn set_outputs(outputs: Outputs) {
+    pac::GPIOB.bsrr().write(|w| w.0 = if outputs.brake_open() { 1 << 3 } else { 1 << (3 + 16) });
+}
+
+/// Sets the bridge: off at once, or switching with the duties held for the next period.
+#[inline(always)]
+pub fn apply(bridge: &Bridge) {
     pwm::hold(bridge.duties, TOP, LARGEST_DUTY);
     let tim = pac::TIM1;
     match bridge.state {

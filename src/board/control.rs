@@ -128,7 +128,7 @@ static WINDOW: Newest<Window> = Newest::new(Window::NOTHING);
 /// Tasks of both executors read it, one at a time.
 static READER: Mutex<RefCell<Option<Subscriber<Report>>>> = Mutex::new(RefCell::new(None));
 
-/// What the joint found and did in a control step.
+/// What the joint found and did in a control step: in one of each round of the motion loop, and in each in which the bridge is off.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Report {
     /// The step.
@@ -316,22 +316,25 @@ extern "C" fn ADC1_2() {
     let demand = control.ends.demand.newest();
     let held_off = super::SINGLE_BANK && WORDS.held_off.load(Ordering::Acquire);
     let demand = if held_off { &control.off } else { demand };
-    let (wanted, outputs) = match control.ends.active.current() {
-        Some(active) if super::is_started() => {
-            let wanted = control.joint.control_step(active, demand, &slow, &measurements);
-            (wanted, control.joint.outputs())
+    let wanted = match control.ends.active.current() {
+        Some(active) if super::is_started() => control.joint.control_step(active, demand, &slow, &measurements),
+        _ => {
+            control.joint.skip_step();
+            Bridge::OFF
         }
-        _ => (Bridge::OFF, Outputs::OFF),
     };
     super::ask_reset(control.joint.waits_for_driver());
-    let (bridge, outputs) = if stopped { (Bridge::OFF, Outputs::OFF) } else { (wanted, outputs) };
-    super::apply(&bridge, outputs);
+    let bridge = if stopped { Bridge::OFF } else { wanted };
+    super::apply(&bridge);
+    super::set_outputs(if stopped { Outputs::OFF } else { control.joint.outputs() });
 
-    control.ends.report.publish_in_place(|report| {
-        control.joint.report(&mut report.telemetry);
-        report.latched = control.joint.latched_faults();
-        report.phase_currents = measurements.phase_currents;
-    });
+    if control.joint.is_to_be_told() {
+        control.ends.report.publish_in_place(|report| {
+            control.joint.report(&mut report.telemetry);
+            report.latched = control.joint.latched_faults();
+            report.phase_currents = measurements.phase_currents;
+        });
+    }
     if WORDS.mean_square_wanted.load(Ordering::Acquire) {
         WORDS.mean_square_wanted.store(false, Ordering::Relaxed);
         WORDS.mean_square_current.store(control.joint.take_mean_square_current(), Ordering::Release);

@@ -67,12 +67,6 @@ pub struct Parts {
     pub watchdog: embassy_stm32::Peri<'static, IWDG>,
 }
 
-/// The bits of a port's BSRR that set a pin.
-#[inline(always)]
-const fn level_of(pin: u32, high: bool) -> u32 {
-    1 << (pin + if high { 0 } else { 16 })
-}
-
 /// A light with its polarity.
 pub struct Led {
     /// None on a board that the program is not for.

@@ -24,7 +24,7 @@ use super::drv8353::Drv8353;
 use super::gate::{self, Gate};
 pub use super::gate::{ask_reset, is_started};
 use super::pwm;
-use super::{Led, Parts, Peripherals, StartError, level_of};
+use super::{Led, Parts, Peripherals, StartError};
 use core::sync::atomic::{AtomicU8, Ordering};
 use cortex_m::peripheral::DWT;
 use embassy_stm32::Config;
@@ -344,12 +344,17 @@ pub fn temperatures() -> (f32, f32) {
     (bridge, WINDING_NTC.temperature(fraction(adc::code::<1>(pac::ADC5))))
 }
 
-/// Sets the bridge: off at once, or switching with the duties held for the next period; and the outputs.
+/// Sets holding brake and brake chopper.
 #[inline(always)]
-pub fn apply(bridge: &Bridge, outputs: Outputs) {
-    pac::GPIOC.bsrr().write(|w| {
-        w.0 = level_of(14, outputs.chopper) | level_of(15, outputs.brake_open);
-    });
+pub fn set_outputs(outputs: Outputs) {
+    // The chopper's pin is the lower one, as its bit is.
+    let bits = u32::from(outputs.bits());
+    pac::GPIOC.bsrr().write(|w| w.0 = bits << 14 | (bits ^ 0b11) << (14 + 16));
+}
+
+/// Sets the bridge: off at once, or switching with the duties held for the next period.
+#[inline(always)]
+pub fn apply(bridge: &Bridge) {
     pwm::hold(bridge.duties, TOP, LARGEST_DUTY);
     match bridge.state {
         BridgeState::Off => let_go(),

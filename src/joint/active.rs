@@ -1,13 +1,13 @@
 //! A configuration as the control step uses it: gains, limits and scales prepared, nothing left to divide; task, host.
 
+use super::chopper::{CHOPS, ChopperGains};
 use super::configuration::{
     AdaptationRequest, BridgeConfiguration, Configuration, ConfigurationError, GearConfiguration, Limits, MOTION_STEPS,
     MotorConfiguration, VelocitySource,
 };
-use super::chopper::{CHOPS, ChopperGains};
 use super::limit_law::LimitGains;
 use super::monitor::OVER_SPEED;
-use super::stopping::{QUICK_STOP, StopGains};
+use super::stopping::StopGains;
 use crate::compensation::Settings;
 use crate::friction::FrictionModel;
 use crate::motor::angle::{Direction, EncoderAlignment, STEPS, TAU};
@@ -267,12 +267,8 @@ pub struct Active {
     pub jump_limit: f32,
     /// Silent steps of the encoder after which the rotor's turns are still known: in which it makes a quarter of a turn at the fastest.
     pub bridged_steps: u32,
-    /// Control steps without a new command after which the joint has a fault.
+    /// Control steps without a new command.
     pub deadline_steps: u32,
-    /// Control steps after which the coupled joint counts as standing.
-    pub coupled_steps: u32,
-    /// How it stops.
-    pub stops: StopGains,
     /// Open loop.
     pub open_loop: OpenLoopGains,
     /// Supply from which on braking current is withheld, V.
@@ -281,8 +277,6 @@ pub struct Active {
     pub withheld_per_volt: f32,
     /// Largest d current that flows instead, A.
     pub loss_current: f32,
-    /// Brake chopper.
-    pub chopper: ChopperGains,
     /// Motion.
     pub motion: MotionGains,
     /// Compensation.
@@ -297,6 +291,10 @@ pub struct Active {
     pub thermal: ThermalSettings,
     /// The verified friction model; none: no compensation.
     pub friction: Option<FrictionModel>,
+    /// How it stops.
+    pub stops: StopGains,
+    /// Brake chopper.
+    pub chopper: ChopperGains,
     /// For adaptation, where a program has it.
     pub adaptation: AdaptationGains,
 }
@@ -441,7 +439,6 @@ impl Checked {
         let (rate, motion_rate) = (bridge.rate, bridge.motion_rate() as f32);
         let mean_steps = (MEAN * rate + 0.5) as u32;
         let period = 1.0 / motion_rate;
-        let deadline = (limits.command_deadline * rate) as u32;
         let (quick, slow) = (gains.quick_stop_deceleration * period, gains.acceleration * period);
         // Odd codes are those of the modes' ramp.
         let ramp = |code: u8| if code & 1 == 1 { slow } else { quick };
@@ -474,11 +471,9 @@ impl Checked {
             // Half an electrical radian: with it the torque would already be a tenth less than commanded.
             jump_limit: 0.5 / pole_pairs,
             bridged_steps: (0.25 * TAU / self.rotor_velocity * rate) as u32,
-            deadline_steps: if stops.late_command == QUICK_STOP { u32::MAX } else { deadline },
-            coupled_steps: deadline,
+            deadline_steps: (limits.command_deadline * rate) as u32,
             stops: StopGains {
                 options: *stops,
-                late_steps: if stops.late_command == QUICK_STOP { deadline } else { u32::MAX },
                 release_rounds: (stops.brake_release * motion_rate) as u32,
                 apply_steps: (stops.brake_apply * rate) as u32,
             },

@@ -4,10 +4,13 @@
 //! loses none of its torque as long as the resistor takes what comes. The board sees a supply of a control step ago; a step later the output acts.
 //!
 //! **So that the resistor bears it** the part of the time in which it conducted, over some 10 s, is held below a setting: for a resistor R of the power P that is
-//! P R / U^2. Where that is used up, the [fade of the braking torque](super::regeneration) does what is left. It is a first-order mean: from cold the resistor gets up to
-//! 10 s times the setting at once, as energy P 10 s. A threshold below what the supply has by itself uses it up, too, and burns no more.
+//! P R / U^2. It is a first-order mean: from cold the resistor gets up to 10 s times the setting at once, as energy P 10 s. Over the last fifth of it the
+//! voltage at which it conducts rises to the highest supply, through the band in which the [braking torque fades](super::regeneration): a resistor that
+//! is gone at once would leave a supply that rises faster than the current can follow. A voltage below what the supply has by itself uses its share up, too, and
+//! burns no more.
 
 use super::configuration::Limits;
+use crate::motor::number::greater;
 
 /// Whether this program has one.
 pub const CHOPS: bool = !cfg!(all(target_os = "none", feature = "little-room"));
@@ -15,6 +18,8 @@ pub const CHOPS: bool = !cfg!(all(target_os = "none", feature = "little-room"));
 const MEMORY: f32 = 10.0;
 /// Part of its voltage by which the supply has to fall below it.
 const HYSTERESIS: f32 = 0.01;
+/// Part of the share from which on the threshold rises.
+const USED: f32 = 0.8;
 /// A mean that counts as none.
 const FORGOTTEN: f32 = 1e-5;
 
@@ -27,18 +32,23 @@ pub struct ChopperGains {
     off: f32,
     /// Largest mean of the time.
     share: f32,
+    /// Mean from which on the thresholds rise, and by how much for each part of it, V.
+    used: f32,
+    rise: f32,
     /// Part of a control step in the mean.
     part: f32,
 }
 
 impl ChopperGains {
     /// Never.
-    pub const NONE: Self = Self { on: f32::INFINITY, off: f32::INFINITY, share: 0.0, part: 0.0 };
+    pub const NONE: Self = Self { on: f32::INFINITY, off: f32::INFINITY, share: 0.0, used: 0.0, rise: 0.0, part: 0.0 };
 
     /// For `rate` control steps a second, Hz.
     pub fn new(limits: &Limits, rate: f32) -> Self {
         let on = if limits.chopper_voltage > 0.0 { limits.chopper_voltage } else { f32::INFINITY };
-        Self { on, off: (1.0 - HYSTERESIS) * on, share: limits.chopper_share, part: 1.0 / (MEMORY * rate) }
+        let share = limits.chopper_share;
+        let rise = greater(limits.bus_voltage.1 - on, 0.0) / ((1.0 - USED) * share);
+        Self { on, off: (1.0 - HYSTERESIS) * on, share, used: USED * share, rise, part: 1.0 / (MEMORY * rate) }
     }
 }
 
@@ -53,7 +63,8 @@ impl Chopper {
     /// One control step at a supply, V; what is not a number is none.
     #[inline(always)]
     pub fn step(&mut self, gains: &ChopperGains, supply: f32) {
-        if supply > gains.off || self.mean > 0.0 {
+        // As integers, see `motor::number`: negative numbers and what is none come after all others, and are looked at more closely.
+        if supply.to_bits() > gains.off.to_bits() || self.mean.to_bits() != 0 {
             self.decide(gains, supply);
         }
     }
@@ -62,7 +73,8 @@ impl Chopper {
     #[inline(never)]
     fn decide(&mut self, gains: &ChopperGains, supply: f32) {
         let from = if self.conducts { gains.off } else { gains.on };
-        self.conducts = supply > from && self.mean < gains.share;
+        let rise = gains.rise * greater(self.mean - gains.used, 0.0);
+        self.conducts = supply > from + rise && self.mean < gains.share;
         let now = if self.conducts { 1.0 } else { 0.0 };
         self.mean += gains.part * (now - self.mean);
         if !self.conducts && self.mean < FORGOTTEN {
@@ -125,7 +137,7 @@ mod tests {
             let mut conducted = |seconds: f32| {
                 let steps = (seconds * RATE) as u32;
                 let on = (0..steps).filter(|_| {
-                    chopper.step(&gains, 30.0);
+                    chopper.step(&gains, 60.0);
                     chopper.conducts()
                 });
                 on.count() as f32 / steps as f32

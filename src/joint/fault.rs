@@ -184,6 +184,12 @@ impl Faults {
         Self(self.0 & other.0)
     }
 
+    /// The set without a fault.
+    #[inline(always)]
+    pub const fn without(self, fault: Fault) -> Self {
+        Self(self.0 & !fault.bit())
+    }
+
     /// Both sets.
     #[inline(always)]
     pub const fn union(self, other: Self) -> Self {

@@ -65,7 +65,7 @@ use motion_loop::{MotionLoop, Seen, Stage};
 use offsets::Offsets;
 use regeneration::Regeneration;
 use state_machine::{Controlword, Events, State, StateMachine};
-use stopping::Stopping;
+use stopping::{QUICK_STOP, Stopping};
 
 /// Speed below which a braking joint counts as standing, as a part of the velocity limit.
 pub(crate) const STANDING: f32 = 0.01;
@@ -181,13 +181,13 @@ pub struct Joint {
     coupled_sequence: u32,
     /// Steps since the coupled joint was heard.
     coupled_steps: u32,
-    stopping: Stopping,
-    chopper: Chopper,
     /// Faults since the last acknowledgement.
     latched: Faults,
     mean_square: MeanSquareCurrent,
     found: Found,
     history: History,
+    stopping: Stopping,
+    chopper: Chopper,
     mean_torque: MeanTorque,
 }
 
@@ -268,11 +268,10 @@ impl Joint {
         let winding = within(slow.derating, 0.0, 1.0);
         let faults = self.watch(active, demand, winding, measured, currents, &observation, &motion);
         let open_loop = demand.command.mode == Mode::OpenLoop;
-        let late = self.stale_steps > active.stops.late_steps;
-        let something = !faults.is_empty() | late | self.stopping.is_under_way();
-        let state = match self.machine.stays_enabled(demand.controlword, something, open_loop) {
-            true => State::OperationEnabled,
-            false => self.decide(active, demand, faults, late, &motion),
+        let something = !faults.is_empty() | self.stopping.is_under_way();
+        let (state, faults) = match self.machine.stays_enabled(demand.controlword, something, open_loop) {
+            true => (State::OperationEnabled, Faults::NONE),
+            false => self.decide(active, demand, faults, &motion),
         };
         if CHOPS {
             self.chopper.step(&active.chopper, measured.bus_voltage);
@@ -292,7 +291,7 @@ impl Joint {
             // What is hot bears the current of braking for as long as braking may take; a joint that coasts into somebody is worse.
             let limit = match state {
                 State::OperationEnabled => active.current_limit * derating,
-                _ if self.stopping.stands() => active.current_limit * derating,
+                _ if self.stopping.bears() => active.current_limit * derating,
                 _ => active.current_limit,
             };
             let wanted = limited(torque * active.scales.current_per_torque, limit);
@@ -339,7 +338,7 @@ impl Joint {
             reference,
             current,
             bus_voltage: measured.bus_voltage,
-            outputs: Outputs { brake_open, chopper: CHOPS && self.chopper.conducts() },
+            outputs: Outputs::new(brake_open, CHOPS && self.chopper.conducts()),
         };
         self.note(state);
         bridge
@@ -373,10 +372,23 @@ impl Joint {
         telemetry.outputs = found.outputs;
     }
 
+    /// A period without a control step, because the board is not ready: its outputs are off.
+    #[inline(always)]
+    pub fn skip_step(&mut self) {
+        self.found.outputs = Outputs::OFF;
+    }
+
     /// What the board's outputs are to do.
     #[inline(always)]
     pub fn outputs(&self) -> Outputs {
         self.found.outputs
+    }
+
+    /// Whether the last step is one that tasks are told of: the one of a round that has the least to do. To copy all that a joint tells takes 90 cycles, which the longest steps, those that begin
+    /// a round in a new state, do not have; nobody asks more often than once a round.
+    #[inline(always)]
+    pub fn is_to_be_told(&self) -> bool {
+        self.motion_loop.due() == Stage::PhysicalModel || !self.machine.state().makes_torque()
     }
 
     /// Faults since the last acknowledgement.
@@ -529,16 +541,26 @@ impl Joint {
         let heard = demand.coupled.sequence != self.coupled_sequence;
         self.coupled_sequence = demand.coupled.sequence;
         self.coupled_steps = if heard { 0 } else { self.coupled_steps.saturating_add(1) };
-        if self.coupled_steps <= active.coupled_steps { demand.coupled.velocity } else { 0.0 }
+        if self.coupled_steps <= active.deadline_steps { demand.coupled.velocity } else { 0.0 }
     }
 
-    /// The state from now on, where it may be another one. A fault that must not be braked against goes straight
+    /// The state from now on, where it may be another one, and the faults that count. A fault that must not be braked against goes straight
     /// through the reaction to "fault".
     #[inline(never)]
-    fn decide(&mut self, active: &Active, demand: &Demand, faults: Faults, late: bool, motion: &JointMotion) -> State {
+    fn decide(
+        &mut self,
+        active: &Active,
+        demand: &Demand,
+        mut faults: Faults,
+        motion: &JointMotion,
+    ) -> (State, Faults) {
         let before = self.machine.state();
         let stops = &active.stops.options;
         let open_loop = demand.command.mode == Mode::OpenLoop;
+        let late = faults.contains(Fault::StaleCommand) && stops.late_command == QUICK_STOP && !open_loop;
+        if late {
+            faults = faults.without(Fault::StaleCommand);
+        }
         let events = Events {
             // The open loop looks for the encoder's zero.
             started: self.offsets.are_known() && (self.referenced || open_loop),
@@ -563,7 +585,7 @@ impl Joint {
             self.latched = Faults::NONE;
             self.history.release();
         }
-        state
+        (state, faults)
     }
 
     /// Whether braking is over. One that operation is enabled after, in the middle of it, may have closed the brake.

@@ -195,8 +195,8 @@ impl MotionLoop {
 
 #[cfg(test)]
 mod tests {
-    use super::super::state_machine::Controlword;
     use super::super::configuration::MOTION_STEPS;
+    use super::super::state_machine::Controlword;
     use super::*;
 
     fn enabling(command: Command) -> Demand {

@@ -53,16 +53,35 @@ impl Bridge {
     pub const OFF: Self = Self { state: BridgeState::Off, duties: Phases::uniform(0.5) };
 }
 
-/// What the board's outputs are to do; they are off where nobody asks anything of them.
+/// What the board's outputs are to do, a bit each; they are off where nobody asks anything of them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Outputs {
-    /// The holding brake is to open.
-    pub brake_open: bool,
-    /// The brake chopper conducts.
-    pub chopper: bool,
-}
+pub struct Outputs(u8);
 
 impl Outputs {
     /// Nothing: the brake is closed.
-    pub const OFF: Self = Self { brake_open: false, chopper: false };
+    pub const OFF: Self = Self(0);
+
+    /// The holding brake is to open; the brake chopper conducts.
+    #[inline(always)]
+    pub const fn new(brake_open: bool, chopper: bool) -> Self {
+        Self(chopper as u8 | (brake_open as u8) << 1)
+    }
+
+    /// The brake chopper conducts.
+    #[inline(always)]
+    pub const fn chopper(self) -> bool {
+        self.0 & 1 != 0
+    }
+
+    /// The holding brake is to open.
+    #[inline(always)]
+    pub const fn brake_open(self) -> bool {
+        self.0 & 2 != 0
+    }
+
+    /// The chopper in bit 0, the brake in bit 1.
+    #[inline(always)]
+    pub const fn bits(self) -> u8 {
+        self.0
+    }
 }

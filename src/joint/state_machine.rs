@@ -220,7 +220,9 @@ impl StateMachine {
             SwitchedOn if enables && events.open_loop => OpenLoop,
             SwitchedOn if enables => OperationEnabled,
             OpenLoop if !enables => SwitchedOn,
-            OperationEnabled if permits == Permits::SwitchedOn && (stopped || stops.disable_operation == 0) => SwitchedOn,
+            OperationEnabled if permits == Permits::SwitchedOn && (stopped || stops.disable_operation == 0) => {
+                SwitchedOn
+            }
             QuickStopActive if stopped => SwitchOnDisabled,
             QuickStopActive if goes_on => OperationEnabled,
             FaultReactionActive if stopped => Fault,
@@ -299,7 +301,10 @@ mod tests {
     fn nothing_is_enabled_before_the_start_is_complete() {
         let mut machine = StateMachine::default();
         for _ in 0..10 {
-            assert_eq!(machine.step(Controlword::ENABLE_OPERATION, Events { started: false, ..QUIET }), NotReadyToSwitchOn);
+            assert_eq!(
+                machine.step(Controlword::ENABLE_OPERATION, Events { started: false, ..QUIET }),
+                NotReadyToSwitchOn
+            );
         }
     }
 
@@ -398,6 +403,63 @@ mod tests {
                 assert_eq!(in_state(from).step(word, QUIET), to, "{word:?} in {from:?}");
             }
         }
+    }
+
+    /// What the machine does in "operation enabled" with an option, before and after the joint has stopped.
+    fn with(change: fn(&mut StopConfiguration), word: Controlword, late: bool) -> [State; 2] {
+        let mut stops = StopConfiguration::DEFAULT;
+        change(&mut stops);
+        assert!(stops.is_possible());
+        let mut machine = enabled();
+        [false, true].map(|stopped| machine.step(word, Events { stops: &stops, stopped, late, ..QUIET }))
+    }
+
+    #[test]
+    fn operation_is_left_as_the_option_codes_say() {
+        use Controlword as C;
+        let ended = [
+            (C::QUICK_STOP, (|s| s.quick_stop = 0) as fn(&mut StopConfiguration), [SwitchOnDisabled, SwitchOnDisabled]),
+            (C::QUICK_STOP, |s| s.quick_stop = 1, [QuickStopActive, SwitchOnDisabled]),
+            (C::QUICK_STOP, |s| s.quick_stop = 2, [QuickStopActive, SwitchOnDisabled]),
+            (C::SHUTDOWN, |s| s.shutdown = 0, [ReadyToSwitchOn, ReadyToSwitchOn]),
+            (C::SHUTDOWN, |s| s.shutdown = 1, [OperationEnabled, ReadyToSwitchOn]),
+            (C::SWITCH_ON, |s| s.disable_operation = 0, [SwitchedOn, SwitchedOn]),
+            (C::SWITCH_ON, |s| s.disable_operation = 1, [OperationEnabled, SwitchedOn]),
+            // Each option is for its own command.
+            (C::SHUTDOWN, |s| s.disable_operation = 1, [ReadyToSwitchOn, ReadyToSwitchOn]),
+            (C::SWITCH_ON, |s| s.shutdown = 1, [SwitchedOn, SwitchedOn]),
+            (C::DISABLE_VOLTAGE, |s| (s.shutdown, s.disable_operation) = (1, 1), [SwitchOnDisabled, SwitchOnDisabled]),
+        ];
+        for (word, change, states) in ended {
+            assert_eq!(with(change, word, false), states, "{word:?}");
+        }
+        assert_eq!(with(|_| {}, C::ENABLE_OPERATION, true), [QuickStopActive, SwitchOnDisabled]);
+        assert_eq!(with(|s| s.quick_stop = 0, C::ENABLE_OPERATION, true)[0], SwitchOnDisabled);
+    }
+
+    /// Transition 16 of the profile.
+    #[test]
+    fn a_joint_that_holds_after_a_quick_stop_goes_on_when_operation_is_enabled_anew() {
+        let stops = StopConfiguration { quick_stop: 6, ..StopConfiguration::DEFAULT };
+        let events = Events { stops: &stops, ..QUIET };
+        for word in [Controlword::SHUTDOWN, Controlword::SWITCH_ON, Controlword::QUICK_STOP] {
+            let mut machine = enabled();
+            machine.step(Controlword::QUICK_STOP, events);
+            assert_eq!(machine.step(word, events), QuickStopActive, "{word:?}");
+            assert_eq!(machine.step(Controlword::ENABLE_OPERATION, events), OperationEnabled, "{word:?}");
+        }
+        let mut late = enabled();
+        assert_eq!(late.step(Controlword::ENABLE_OPERATION, Events { late: true, ..events }), QuickStopActive);
+        assert_eq!(late.step(Controlword::ENABLE_OPERATION, events), QuickStopActive, "nobody asked for anything else");
+        assert_eq!(late.step(Controlword(0x8F), events), QuickStopActive);
+        assert_eq!(late.step(Controlword::ENABLE_OPERATION, events), OperationEnabled);
+        let mut off = enabled();
+        off.step(Controlword::QUICK_STOP, events);
+        assert_eq!(off.step(Controlword::DISABLE_VOLTAGE, events), SwitchOnDisabled);
+        // Without the option nothing leads back.
+        let mut machine = enabled();
+        machine.step(Controlword::QUICK_STOP, QUIET);
+        assert_eq!(machine.step(Controlword::ENABLE_OPERATION, QUIET), QuickStopActive);
     }
 
     const OPEN_LOOP: Events<'static> = Events { open_loop: true, ..QUIET };

@@ -85,8 +85,6 @@ impl Default for StopConfiguration {
 pub struct StopGains {
     /// The options.
     pub options: StopConfiguration,
-    /// Control steps without a command after which the joint makes a quick stop; where that is a fault, never.
-    pub late_steps: u32,
     /// Rounds of the motion loop in which the brake opens.
     pub release_rounds: u32,
     /// Control steps in which it closes.
@@ -99,6 +97,8 @@ pub struct Stopping {
     /// Control steps that it took so far; those of a joint that stands and holds do not count.
     steps: u32,
     standing: u32,
+    /// It has stood.
+    stood: bool,
     /// Control steps since the ramp ended.
     applying: u32,
 }
@@ -112,8 +112,8 @@ impl Stopping {
 
     /// The joint has stood for long enough: from here on it bears a load, and is not braked any more.
     #[inline(always)]
-    pub const fn stands(&self) -> bool {
-        self.standing >= STANDING_STEPS
+    pub const fn bears(&self) -> bool {
+        self.stood
     }
 
     /// The brake is to close.
@@ -146,12 +146,39 @@ impl Stopping {
         let standing = STANDING * active.limits.velocity;
         let stands = motion.velocity <= standing && motion.velocity >= -standing && ramp_is_over;
         self.standing = if stands { self.standing.saturating_add(1) } else { 0 };
+        let stands = self.standing >= STANDING_STEPS;
+        self.stood |= stands;
         // Not to zero: it is under way.
-        self.steps = if holds && self.stands() { 1 } else { self.steps.saturating_add(1) };
-        let ended = !holds && self.stands() || self.steps > active.motion.braking_steps;
+        self.steps = if holds && stands { 1 } else { self.steps.saturating_add(1) };
+        let ended = !holds && stands || self.steps > active.motion.braking_steps;
         if ended || self.closes_brake() {
             self.applying = self.applying.saturating_add(1);
         }
         self.applying > stops.apply_steps
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_option_codes_of_the_profile_are_possible() {
+        type Member = fn(&mut StopConfiguration) -> &mut u8;
+        let members: [(Member, &[u8]); 6] = [
+            (|s| &mut s.quick_stop, &[0, 1, 2, 5, 6]),
+            (|s| &mut s.shutdown, &[0, 1]),
+            (|s| &mut s.disable_operation, &[0, 1]),
+            (|s| &mut s.halt, &[1, 2]),
+            (|s| &mut s.fault_reaction, &[0, 1, 2]),
+            (|s| &mut s.late_command, &[1, 3]),
+        ];
+        for (number, (member, codes)) in members.into_iter().enumerate() {
+            for code in 0..=u8::MAX {
+                let mut stops = StopConfiguration::DEFAULT;
+                *member(&mut stops) = code;
+                assert_eq!(stops.is_possible(), codes.contains(&code), "{number}: {code}");
+            }
+        }
     }
 }

@@ -89,7 +89,7 @@ impl Observed {
             Actual::AdaptedFactor => self.adaptation.factors.factor.to_bits().into(),
             Actual::FactorDeviation => self.adaptation.deviation.to_bits().into(),
             Actual::AdaptedViscous => self.adaptation.factors.viscous.to_bits().into(),
-            Actual::Outputs => (u64::from(!t.outputs.brake_open)) | u64::from(t.outputs.chopper) << 16,
+            Actual::Outputs => u64::from(!t.outputs.brake_open()) | u64::from(t.outputs.chopper()) << 16,
             Actual::ImageVersion => shared.image_version().into(),
             Actual::ImageState => shared.image_state().into(),
         }

@@ -10,6 +10,7 @@ mod full_bus;
 mod gate_driver;
 mod images;
 mod oscillator;
+mod outputs;
 mod power_cut;
 mod same_run;
 mod settling;
@@ -32,6 +33,7 @@ fn main() {
         boards::trials(),
         images::trials(),
         oscillator::trials(),
+        outputs::trials(),
         same_run::trials(),
         settling::trials(),
         workbench::trials(),

@@ -1,8 +1,9 @@
-//! What the boards' linked programs show without running: a file a promise.
+//! What the boards' linked programs show without running as a whole: a file a promise.
 //!
 //! Needs the target; where it is missing the tests are reported as ignored, by name; with `CI` set they run and fail.
 
 mod control_interrupt;
+mod division;
 mod stack;
 mod thumb;
 
@@ -12,7 +13,7 @@ use libtest_mimic::Arguments;
 fn main() {
     let arguments = Arguments::from_args();
     let ignored = std::env::var_os("CI").is_none() && !target_installed();
-    let trials = control_interrupt::trials().into_iter().chain(stack::trials());
+    let trials = control_interrupt::trials().into_iter().chain(stack::trials()).chain(division::trials());
     let trials = trials.map(|trial| trial.with_ignored_flag(ignored)).collect();
     libtest_mimic::run(&arguments, trials).exit();
 }

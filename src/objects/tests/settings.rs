@@ -279,3 +279,29 @@ fn a_flash_that_fails_is_reported_and_nothing_counts_as_stored() {
     assert_eq!(node.download(0x1010, 1, b"save"), Err(0x0606_0000));
     assert_eq!(node.number(0x1003, 1) as u16, emergency::FLASH);
 }
+
+#[test]
+fn an_option_code_acts_at_once_also_under_way_and_comes_back_after_a_reset() {
+    let codes: [(u16, &[u16], &[u16]); 6] = [
+        (0x6007, &[3, 1], &[0, 2, 4, 0xFFFF]),
+        (0x605A, &[0, 1, 5, 6], &[3, 4, 7, 0xFFFF, 0x0106]),
+        (0x605B, &[0, 1], &[2, 0xFFFF]),
+        (0x605C, &[0, 1], &[2]),
+        (0x605D, &[1, 2], &[0, 3]),
+        (0x605E, &[0, 1, 2], &[3, 0xFFFF]),
+    ];
+    let mut node = Node::operational();
+    node.observed.telemetry.state = State::OperationEnabled;
+    for (index, taken, refused) in codes {
+        for &code in taken {
+            node.download(index, 0, &code.to_le_bytes()).unwrap();
+            assert_eq!(node.number(index, 0) as u16, code, "{index:04X}h");
+        }
+        let before = *node.objects.program().configured.last().unwrap();
+        for &code in refused {
+            assert_eq!(node.download(index, 0, &code.to_le_bytes()), Err(0x0609_0030), "{index:04X}h = {code}");
+        }
+        assert_eq!(*node.objects.program().configured.last().unwrap(), before);
+    }
+    assert_eq!(node.objects.program().configured.last().unwrap().stops.quick_stop, 6);
+}

@@ -4,7 +4,7 @@ mod rig;
 
 use joint_firmware::joint::fault::Fault;
 use joint_firmware::joint::state_machine::Controlword;
-use plant::actuator::ActuatorParameters;
+use plant::actuator::{Accessories, ActuatorParameters};
 use plant::virtual_joint::Setup;
 use rig::{Rig, torque, velocity};
 use std::f64::consts::PI;
@@ -39,6 +39,8 @@ struct Braked {
     lost: f64,
     stored: f64,
     heat: f64,
+    /// By a chopper's resistor.
+    burnt: f64,
     speed_left: f64,
 }
 
@@ -53,9 +55,15 @@ enum Stop {
 
 /// Up to nine tenths of the speed limit, then a quick stop, which brakes as hard as it may, for `time` s or until it ends.
 fn braked(parameters: &ActuatorParameters, setup: &Setup, stop: Stop, time: f64) -> Braked {
+    braked_with(parameters, setup, stop, time, 0.0)
+}
+
+/// The same with a chopper's resistor, 1/ohm.
+fn braked_with(parameters: &ActuatorParameters, setup: &Setup, stop: Stop, time: f64, chopper: f64) -> Braked {
     let mut setup = *setup;
     setup.configuration.limits.position = (-1000.0, 1000.0);
     let mut rig = Rig::enabled(*parameters, &setup);
+    rig.joint.actuator_mut().fit(Accessories { chopper, ..Accessories::default() });
     let full = parameters.joint.motor.torque_limit() as f32;
     let speed = 0.9 * parameters.joint.limits.speed;
     rig.demand.command = velocity(speed as f32);
@@ -63,6 +71,7 @@ fn braked(parameters: &ActuatorParameters, setup: &Setup, stop: Stop, time: f64)
     let start = *rig.joint.actuator().state();
     let motion = |rig: &Rig| rig.joint.actuator().joint().stored_energy();
     let before = motion(&rig);
+    let before_burnt = rig.joint.actuator().fitted().burnt();
     match stop {
         Stop::Quick => rig.demand.controlword = Controlword::QUICK_STOP,
         Stop::Torque => rig.demand.command = torque(-full),
@@ -82,12 +91,14 @@ fn braked(parameters: &ActuatorParameters, setup: &Setup, stop: Stop, time: f64)
         highest = highest.max(state.bus_voltage);
     }
     let end = rig.joint.actuator().state();
+    let burnt = rig.joint.actuator().fitted().burnt() - before_burnt;
     Braked {
         faults: rig.latched(),
         highest,
         lost: before - motion(&rig) + start.magnetic_energy - end.magnetic_energy + supplied,
         stored: end.bus_energy - start.bus_energy,
         heat,
+        burnt,
         speed_left: (end.joint.velocity / speed).abs(),
     }
 }
@@ -165,4 +176,56 @@ fn a_d_current_burns_what_the_supply_does_not_take() {
         }
     }
     assert!(helped >= 5, "{helped}");
+}
+
+/// A resistor that takes the largest braking power at the chopper's voltage.
+#[test]
+fn a_chopper_takes_what_the_supply_does_not_and_braking_loses_none_of_its_torque() {
+    let (mut needed, mut helped) = (0, 0);
+    for seed in 0..130 {
+        let parameters = one_way(seed);
+        let mut setup = Setup::of(&parameters);
+        let without = braked(&parameters, &setup, Stop::Quick, 0.5);
+        let limits = &mut setup.configuration.limits;
+        let onset = limits.bus_voltage.1 - limits.regeneration_band;
+        // Half-way between the supply's own voltage and where the torque begins to fade.
+        limits.chopper_voltage = 0.5 * (parameters.bus.source_voltage as f32 + onset);
+        limits.chopper_share = 1.0;
+        let (onset, band) = (f64::from(onset), f64::from(limits.regeneration_band));
+        let motor = &parameters.joint.motor;
+        let power = motor.torque_limit() * parameters.joint.limits.speed;
+        let conductance = power / f64::from(limits.chopper_voltage).powi(2);
+        let with = braked_with(&parameters, &setup, Stop::Quick, 0.5, conductance);
+        assert!(!tripped(&with) && with.burnt >= 0.0, "seed {seed}: {:.1} V", with.highest);
+        // The fade has hardly begun.
+        let most = onset + 0.25 * band;
+        assert!(with.highest < most, "seed {seed}: {:.2} V of {onset:.2} V, {most:.2}", with.highest);
+        let found = with.stored + with.heat + with.burnt;
+        // The plant's supply is stepped once a period, and loses some where the resistor discharges it in a few.
+        assert!((found / with.lost - 1.0).abs() < 0.05, "seed {seed}: {} J lost, {found} J found", with.lost);
+        if without.speed_left > 0.1 {
+            needed += 1;
+            helped += u32::from(with.speed_left < 0.02);
+        }
+    }
+    assert!(needed >= 10 && helped == needed, "{helped} of {needed}");
+}
+
+/// A resistor that bears little: what it does not take, the fade of the torque does.
+#[test]
+fn a_chopper_whose_share_is_used_up_leaves_the_rest_to_the_fade() {
+    let charges = |seed: &u64| braked(&one_way(*seed), &Setup::of(&one_way(*seed)), Stop::Quick, 0.5).speed_left > 0.1;
+    for (seed, conductance) in (0..130).filter(charges).zip([0.03, 0.1, 0.3].into_iter().cycle()) {
+        let parameters = one_way(seed);
+        let mut setup = Setup::of(&parameters);
+        let limits = &mut setup.configuration.limits;
+        limits.chopper_voltage = 1.05 * parameters.bus.source_voltage as f32;
+        limits.chopper_share = 1e-3;
+        let braked = braked_with(&parameters, &setup, Stop::Quick, 2.0, conductance);
+        assert!(!tripped(&braked), "seed {seed}");
+        // 10 s ln of it at once, and its part of 2.6 s.
+        let longest = 10.0 * 1e-3 + 2.6 * 1e-3;
+        let most = conductance * braked.highest.powi(2) * longest;
+        assert!(braked.burnt > 0.05 * most && braked.burnt < 1.05 * most, "{} of {most} J", braked.burnt);
+    }
 }

@@ -33,6 +33,7 @@ const SUPPLY: Pin = Pin::new('A', 0);
 const BRIDGE: Pin = Pin::new('B', 14);
 const BUTTON: Pin = Pin::new('C', 10);
 const LED: Pin = Pin::new('C', 6);
+const BRAKE: Pin = Pin::new('B', 3);
 
 /// The board.
 #[derive(Clone, Debug)]
@@ -124,8 +125,10 @@ impl Wiring for BG431BEsc1 {
     }
 
     fn driven(&mut self, _: Instant, pin: Pin, level: Option<bool>) {
-        if pin == LED {
-            self.led = level == Some(true);
+        match pin {
+            LED => self.led = level == Some(true),
+            BRAKE => self.drivetrain.set_brake(level == Some(true)),
+            _ => {}
         }
     }
 

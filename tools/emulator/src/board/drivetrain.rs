@@ -44,6 +44,8 @@ pub struct Drivetrain {
     switched: bool,
     /// When it last ceased to switch.
     off_since: Option<Instant>,
+    /// Outputs of the holding brake and of the brake chopper.
+    outputs: (bool, bool),
     /// Torque on the link from outside, Nm.
     pub external_torque: f64,
 }
@@ -81,6 +83,7 @@ impl Drivetrain {
             dead_time: None,
             switched: false,
             off_since: None,
+            outputs: (false, false),
             external_torque: 0.0,
         })
     }
@@ -93,6 +96,23 @@ impl Drivetrain {
     /// The actuator, to change.
     pub const fn actuator_mut(&mut self) -> &mut Actuator {
         &mut self.actuator
+    }
+
+    /// The output of the holding brake, with a pull-down: whether it is to open.
+    pub fn set_brake(&mut self, open: bool) {
+        self.outputs.0 = open;
+        self.actuator.set_outputs(self.outputs.0, self.outputs.1);
+    }
+
+    /// The output of the brake chopper, with a pull-down: whether it conducts.
+    pub fn set_chopper(&mut self, conducts: bool) {
+        self.outputs.1 = conducts;
+        self.actuator.set_outputs(self.outputs.0, self.outputs.1);
+    }
+
+    /// Both outputs.
+    pub const fn outputs(&self) -> (bool, bool) {
+        self.outputs
     }
 
     /// Encoder of the actuator as its parameters describe it.

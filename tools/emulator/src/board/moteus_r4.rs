@@ -32,6 +32,8 @@ const FAULT: Pin = Pin::new('B', 6);
 const DRIVER_SELECT: Pin = Pin::new('C', 4);
 const ENCODER_SELECT: Pin = Pin::new('B', 11);
 const LED: Pin = Pin::new('F', 0);
+const BRAKE: Pin = Pin::new('C', 15);
+const CHOPPER: Pin = Pin::new('C', 14);
 /// They tell the family: floating on an r4.
 const FAMILY: [Pin; 2] = [Pin::new('B', 10), Pin::new('B', 11)];
 /// They tell the revision: those of its code's ones are pulled low.
@@ -189,6 +191,8 @@ impl Wiring for MoteusR4 {
             ENCODER_SELECT => self.encoder.select(level == Some(false)),
             // Between the supply and the pin.
             LED => self.led = level == Some(false),
+            BRAKE => return self.drivetrain.set_brake(level == Some(true)),
+            CHOPPER => return self.drivetrain.set_chopper(level == Some(true)),
             _ => return,
         }
         self.enable(at);

@@ -210,7 +210,13 @@ pub const FIELDS: [Field; 59] = [
     ),
     field("stops", "shutdown", "", Some((0.0, 1.0)), "605Bh: 0 off at once, 1 along the ramp of the modes"),
     field("stops", "disable_operation", "", Some((0.0, 1.0)), "605Ch: 0 off at once, 1 along the ramp of the modes"),
-    field("stops", "halt", "", Some((1.0, 2.0)), "605Dh: 1 along the ramp of the modes, 2 of the quick stop; then it holds"),
+    field(
+        "stops",
+        "halt",
+        "",
+        Some((1.0, 2.0)),
+        "605Dh: 1 along the ramp of the modes, 2 of the quick stop; then it holds",
+    ),
     field(
         "stops",
         "fault_reaction",

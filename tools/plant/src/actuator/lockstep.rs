@@ -4,6 +4,7 @@
 //! broken lead decide) at the speed that the rotor has at its beginning; then the joint moves on by the period with the
 //! windings' mean torque and losses. Cogging acts on the joint only.
 
+use super::accessories::{Accessories, Fitted};
 use super::bus::Bus;
 use super::faults::{ActiveFaults, Fault, Schedule};
 use super::frame::Frame;
@@ -80,6 +81,7 @@ pub struct Actuator {
     windings: Windings,
     inverter: Inverter,
     bus: Bus,
+    fitted: Fitted,
     sensors: DriveSensors,
     schedule: Schedule,
     faults: ActiveFaults,
@@ -121,6 +123,7 @@ impl Actuator {
             windings,
             inverter,
             bus,
+            fitted: Fitted::default(),
             sensors,
             schedule: Schedule::default(),
             faults: ActiveFaults::default(),
@@ -171,10 +174,32 @@ impl Actuator {
     pub fn set_contact(&mut self, contact: Option<Contact>) -> Result<(), ParameterError> {
         contact.map_or(Ok(()), |contact| contact.validate())?;
         self.contact = contact;
-        if !self.faults.blocked {
-            self.joint.hold(contact);
-        }
+        self.grip_again();
         Ok(())
+    }
+
+    /// Fits what hangs at the board's outputs, in place of what was there; a brake is closed where the link is.
+    pub fn fit(&mut self, accessories: Accessories) {
+        self.fitted = Fitted::new(accessories, self.state.joint.position, self.parameters.joint.inertia());
+        self.grip_again();
+    }
+
+    /// What the board's outputs say from now on: the brake is to open, the chopper conducts.
+    pub fn set_outputs(&mut self, brake_open: bool, chopper: bool) {
+        self.fitted.set(brake_open, chopper);
+    }
+
+    /// What is fitted, in operation.
+    #[must_use]
+    pub fn fitted(&self) -> &Fitted {
+        &self.fitted
+    }
+
+    /// What holds the link: a broken gear, a brake, or what is in its way.
+    fn grip_again(&mut self) {
+        if !self.faults.blocked {
+            self.joint.hold(self.fitted.grip().or(self.contact));
+        }
     }
 
     /// Lets `fault` happen now and stay.
@@ -230,7 +255,10 @@ impl Actuator {
 
         let idle = self.parameters.inverter.idle_power;
         let idle = if self.bus.voltage() > LOWEST_SUPPLY { idle / self.bus.voltage() } else { 0.0 };
-        self.bus.advance(rail_current + idle, self.shoot_through(bridge_switching, duties), period);
+        let across = self.shoot_through(bridge_switching, duties) + self.fitted.conductance();
+        self.bus.advance(rail_current + idle, across, period);
+        self.fitted.advance(self.bus.voltage(), self.state.joint.position, self.parameters.joint.inertia(), period);
+        self.grip_again();
 
         let ambient = self.parameters.joint.thermal.ambient;
         self.inverter.heat(powers.bridge_loss + idle * self.bus.voltage(), ambient, period);
@@ -347,8 +375,8 @@ impl Actuator {
         self.faults = faults;
         self.bus.set_source_voltage(faults.source_voltage);
         if faults.blocked != was_blocked {
-            let grip = Contact::blocking(self.state.joint.position, self.parameters.joint.inertia());
-            self.joint.hold(if faults.blocked { Some(grip) } else { self.contact });
+            self.joint.hold(Some(Contact::blocking(self.state.joint.position, self.parameters.joint.inertia())));
+            self.grip_again();
         }
     }
 }

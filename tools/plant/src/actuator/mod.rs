@@ -16,11 +16,13 @@
 //! - [`freewheel`]: currents that diodes decide
 //! - [`inverter`]: duties to leg voltages, dead time, the bridge's heat
 //! - [`bus`]: source and capacitor
+//! - [`accessories`]: holding brake and brake chopper
 //! - [`current_sensors`], [`rotor_encoder`], [`thermistor`], [`sensors`]: what is measured
 //! - [`faults`]: what can break
 //! - [`parameters`], [`effects`], [`randomised`]: everything that describes an actuator, effects one by one, random actuators
 //! - [`lockstep`]: all of it together
 
+pub mod accessories;
 pub mod bus;
 pub mod current_sensors;
 pub mod effects;
@@ -39,6 +41,7 @@ pub mod windings;
 
 mod delay;
 
+pub use accessories::Accessories;
 pub use delay::MAXIMUM_DELAY;
 pub use effects::Effect;
 pub use faults::{Channel, Failure, Fault};

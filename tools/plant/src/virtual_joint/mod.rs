@@ -148,6 +148,8 @@ impl VirtualJoint {
             Build::Whole => self.joint.control_step(active, demand, slow, measured),
             Build::WithoutCompensation => self.joint.control_step_without_compensation(active, demand, slow, measured),
         };
+        let outputs = self.joint.outputs();
+        self.actuator.set_outputs(outputs.brake_open(), outputs.chopper());
         let duties = self.bridge.duties;
         let duties = [duties.a, duties.b, duties.c].map(f64::from);
         let switching = self.bridge.state == BridgeState::Switching;

@@ -4,11 +4,11 @@
 use crate::actuator::ActuatorParameters;
 use joint_firmware::compensation::Request;
 use joint_firmware::joint::BoardLimits;
-use joint_firmware::joint::stopping::StopConfiguration;
 use joint_firmware::joint::configuration::{
     AdaptationRequest, BridgeConfiguration, CompensationConfiguration, Configuration, FACTORY_TRIM,
     FRICTION_UNCERTAINTY, Gains, GearConfiguration, Limits, MotorConfiguration, ThermalConfiguration, VelocitySource,
 };
+use joint_firmware::joint::stopping::StopConfiguration;
 use joint_firmware::motor::angle::{Direction, ElectricalAngle, EncoderAlignment};
 use std::f64::consts::TAU;
 
