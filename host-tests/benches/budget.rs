@@ -78,7 +78,7 @@ fn main() -> Outcome<()> {
     println!(
         "\n## The control step\n\nFive runs of 200 steps, recorded in closed loop with the virtual joint and replayed: off; the physical model; all of the \
          model; torque mode with energy\nguard; position mode. The model is a certified image with every term, a network in each of its sets, and where the board has room for them four sets and two criteria. \
-         Least, median and most of the\nsteps that a part runs in. What the compiler has inlined counts for where it was written. A round of the motion loop takes {MOTION_STEPS} steps:\na step has one stage of it, four of them friction. The board's part (converters, timer, report) is that of its program, as it\nis flashed, on the emulated board: {INTERRUPTS} control interrupts while the joint is off."
+         Least, median and most of the\nsteps that a part runs in. What the compiler has inlined counts for where it was written. A round of the motion loop takes {MOTION_STEPS} steps:\na step has one stage of it, four of them friction. The board's part (converters, timer, report) is that of its program, as it\nis flashed, on the emulated board: {INTERRUPTS} control interrupts while the joint is off, in each of which it tells the tasks what it does; with the bridge on\none step in five does, not the longest, so that the sum of both is more than any takes."
     );
     for (board, program) in BOARDS.iter().zip(&boards) {
         let steps = input(&image_bytes(board.parameter_sets), &record(board.parameter_sets)?);
