@@ -122,3 +122,17 @@ fn a_file_without_limit_damping_is_refused_by_name() {
     let message = refusal(&good.replacen(damping, "", 1));
     assert!(message.contains("[limits]") && message.contains("missing field `damping`"), "{message}");
 }
+
+#[test]
+fn an_option_code_of_a_stop_that_there_is_not_is_refused_with_those_that_there_are() {
+    let good = to_text(&setup(1).configuration).unwrap();
+    for (from, to) in
+        [("quick_stop = 2", "quick_stop = 3"), ("halt = 1", "halt = 0"), ("late_command = 1", "late_command = 2")]
+    {
+        assert!(good.contains(from), "{from}");
+        let shown = refusal(&good.replacen(from, to, 1));
+        assert!(shown.contains("quick_stop must be 0, 1, 2, 5 or 6") && shown.contains("elbow.toml"), "{shown}");
+    }
+    let held = good.replacen("quick_stop = 2", "quick_stop = 6", 1);
+    assert_eq!(from_text(&held, Path::new("elbow.toml"), &setup(1).bridge).unwrap().stops.quick_stop, 6);
+}
