@@ -5,7 +5,7 @@
 //!
 //! **So that the resistor bears it** the part of the time in which it conducted, over some 10 s, is held below a setting: for a resistor R of the power P that is
 //! P R / U^2. It is a first-order mean: from cold the resistor gets up to 10 s times the setting at once, as energy P 10 s. Over the last fifth of it the
-//! voltage at which it conducts rises to the highest supply, through the band in which the [braking torque fades](super::regeneration): a resistor that
+//! voltage at which it conducts rises to the highest supply, through the band in which the braking torque fades (`regeneration`): a resistor that
 //! is gone at once would leave a supply that rises faster than the current can follow. A voltage below what the supply has by itself uses its share up, too, and
 //! burns no more.
 
