@@ -128,7 +128,8 @@ static WINDOW: Newest<Window> = Newest::new(Window::NOTHING);
 /// Tasks of both executors read it, one at a time.
 static READER: Mutex<RefCell<Option<Subscriber<Report>>>> = Mutex::new(RefCell::new(None));
 
-/// What the joint found and did in a control step: in one of each round of the motion loop, and in each in which the bridge is off.
+/// What the joint found and did in a control step: in one of each round of the motion loop, and in each in which the
+/// bridge is off.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Report {
     /// The step.

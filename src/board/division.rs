@@ -41,7 +41,8 @@ unsafe extern "C" fn __aeabi_uldivmod() {
     )
 }
 
-/// The same of signed numbers: the quotient is rounded towards zero, what is left has the dividend's sign. The least number over -1 is itself.
+/// The same of signed numbers: the quotient is rounded towards zero, what is left has the dividend's sign. The least
+/// number over -1 is itself.
 #[unsafe(no_mangle)]
 #[unsafe(naked)]
 unsafe extern "C" fn __aeabi_ldivmod() {

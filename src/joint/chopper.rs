@@ -1,13 +1,15 @@
 //! A brake chopper: a resistor that an output of the board connects to the supply while it is too high; control step.
 //!
-//! It conducts from its voltage on until the supply is 1 % below it, whatever state the joint is in, and before the regeneration band begins, so that braking
-//! loses none of its torque as long as the resistor takes what comes. The board sees a supply of a control step ago; a step later the output acts.
+//! It conducts from its voltage on until the supply is 1 % below it, whatever state the joint is in, and before the
+//! regeneration band begins, so that braking loses none of its torque as long as the resistor takes what comes. The
+//! board sees a supply of a control step ago; a step later the output acts.
 //!
-//! **So that the resistor bears it** the part of the time in which it conducted, over some 10 s, is held below a setting: for a resistor R of the power P that is
-//! P R / U^2. It is a first-order mean: from cold the resistor gets up to 10 s times the setting at once, as energy P 10 s. Over the last fifth of it the
-//! voltage at which it conducts rises to the highest supply, through the band in which the braking torque fades (`regeneration`): a resistor that
-//! is gone at once would leave a supply that rises faster than the current can follow. A voltage below what the supply has by itself uses its share up, too, and
-//! burns no more.
+//! **So that the resistor bears it** the part of the time in which it conducted, over some 10 s, is held below a
+//! setting: for a resistor R of the power P that is P R / U^2. It is a first-order mean: from cold the resistor gets up
+//! to 10 s times the setting at once, as energy P 10 s. Over the last fifth of it the voltage at which it conducts
+//! rises to the highest supply, through the band in which the braking torque fades (`regeneration`): a resistor that is
+//! gone at once would leave a supply that rises faster than the current can follow. A voltage below what the supply has
+//! by itself uses its share up, too, and burns no more.
 
 use super::configuration::Limits;
 use crate::motor::number::greater;
@@ -63,7 +65,8 @@ impl Chopper {
     /// One control step at a supply, V; what is not a number is none.
     #[inline(always)]
     pub fn step(&mut self, gains: &ChopperGains, supply: f32) {
-        // As integers, see `motor::number`: negative numbers and what is none come after all others, and are looked at more closely.
+        // As integers, see `motor::number`: negative numbers and what is none come after all others, and are looked at
+        // more closely.
         if supply.to_bits() > gains.off.to_bits() || self.mean.to_bits() != 0 {
             self.decide(gains, supply);
         }

@@ -67,8 +67,8 @@ pub struct Limits {
     pub bus_voltage: (f32, f32),
     /// Span below the highest supply over which a braking current that feeds it fades to nothing, V; 0.1 to what lies between lowest and highest supply.
     pub regeneration_band: f32,
-    /// Supply at which a brake chopper conducts, V; 0 (none), or 1 V above the lowest supply to where the regeneration band begins. 0 on a board without
-    /// an output for one.
+    /// Supply at which a brake chopper conducts, V; 0 (none), or 1 V above the lowest supply to where the regeneration
+    /// band begins. 0 on a board without an output for one.
     pub chopper_voltage: f32,
     /// Largest part of the time in which it may conduct, over some 10 s; 0.001 to 1.
     pub chopper_share: f32,

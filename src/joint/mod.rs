@@ -28,6 +28,7 @@ pub mod fault;
 pub mod friction_feedforward;
 pub mod history;
 pub mod limit_law;
+mod mean_torque;
 pub mod monitor;
 pub mod motion_law;
 pub mod motion_loop;
@@ -59,6 +60,7 @@ use chopper::{CHOPS, Chopper};
 use fault::{Fault, Faults, Reaction};
 use friction_feedforward::{Compensated, Surroundings};
 use history::{History, Snapshot};
+use mean_torque::MeanTorque;
 use monitor::Monitor;
 use motion_law::Wanted;
 use motion_loop::{MotionLoop, Seen, Stage};
@@ -69,8 +71,6 @@ use stopping::{QUICK_STOP, Stopping};
 
 /// Speed below which a braking joint counts as standing, as a part of the velocity limit.
 pub(crate) const STANDING: f32 = 0.01;
-/// Control steps for which it must stand before the bridge switches off.
-pub(crate) const STANDING_STEPS: u32 = 400;
 
 /// What the slow task knows and the control step uses.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -202,27 +202,6 @@ struct Found {
     current: Dq,
     bus_voltage: f32,
     outputs: Outputs,
-}
-
-/// The measured torque's mean over a millisecond. A controller on a bus moves the torque in saw teeth of about that
-/// length, and whoever samples them in step with the bus takes the place in a tooth for torque: with a stiffness of
-/// 1,000 Nm/rad half a newton metre for each rad/s.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct MeanTorque {
-    sum: f32,
-    steps: u32,
-    mean: f32,
-}
-
-impl MeanTorque {
-    #[inline(always)]
-    fn add(&mut self, active: &Active, torque: f32) {
-        self.sum += torque;
-        self.steps += 1;
-        if self.steps >= active.adaptation.mean_steps {
-            *self = Self { sum: 0.0, steps: 0, mean: self.sum * active.adaptation.mean_share };
-        }
-    }
 }
 
 impl Joint {
@@ -362,7 +341,7 @@ impl Joint {
         telemetry.compensated = *self.motion_loop.compensated();
         telemetry.measured_torque = found.measured_torque;
         if ADAPTS {
-            telemetry.mean_torque = self.mean_torque.mean;
+            telemetry.mean_torque = self.mean_torque.mean();
         }
         telemetry.gear_temperature = found.gear_temperature;
         telemetry.reference = found.reference;
@@ -384,8 +363,8 @@ impl Joint {
         self.found.outputs
     }
 
-    /// Whether the last step is one that tasks are told of: the one of a round that has the least to do. To copy all that a joint tells takes 90 cycles, which the longest steps, those that begin
-    /// a round in a new state, do not have; nobody asks more often than once a round.
+    /// The last step is one that tasks are told of: behind the network's stage, where the longest control interrupt bears
+    /// it, and whenever the bridge is off. Nobody asks more often than once a round.
     #[inline(always)]
     pub fn is_to_be_told(&self) -> bool {
         self.motion_loop.due() == Stage::PhysicalModel || !self.machine.state().makes_torque()
@@ -519,8 +498,8 @@ impl Joint {
         faults
     }
 
-    /// Counts the steps without a new set-point from "ready to switch on" on, but for a joint that holds or is to stop: nothing that could be late is
-    /// asked of it. In "fault" a count that has led there stays until one comes.
+    /// Counts the steps without a new set-point from "ready to switch on" on, but for a joint that holds or is to stop:
+    /// nothing that could be late is asked of it. In "fault" a count that has led there stays until one comes.
     #[inline(always)]
     fn count_stale_steps(&mut self, active: &Active, demand: &Demand, state: State) {
         self.stale_steps = match state {
@@ -544,8 +523,8 @@ impl Joint {
         if self.coupled_steps <= active.deadline_steps { demand.coupled.velocity } else { 0.0 }
     }
 
-    /// The state from now on, where it may be another one, and the faults that count. A fault that must not be braked against goes straight
-    /// through the reaction to "fault".
+    /// The state from now on, where it may be another one, and the faults that count. A fault that must not be braked
+    /// against goes straight through the reaction to "fault".
     #[inline(never)]
     fn decide(
         &mut self,

@@ -85,8 +85,8 @@ impl MotionLaw {
         &self.bounds
     }
 
-    /// One round of braking: the velocity comes down along a ramp by so much, rad/s, by the limit damping and an integral of its own, whatever the
-    /// modes' gains are.
+    /// One round of braking: the velocity comes down along a ramp by so much, rad/s, by the limit damping and an
+    /// integral of its own, whatever the modes' gains are.
     #[inline(never)]
     pub fn brake(&mut self, active: &Active, motion: &JointMotion, step: f32) -> Wanted {
         if !self.brakes {

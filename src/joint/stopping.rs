@@ -1,4 +1,5 @@
-//! How the joint stops, and who bears its load then: the option codes of CiA 402-2 and a holding brake; task and control step.
+//! How the joint stops, and who bears its load then: the option codes of CiA 402-2 and a holding brake; task and
+//! control step.
 //!
 //! | object | what ends the operation | 0 | 1 | 2 | 5, 6 |
 //! |---|---|---|---|---|---|
@@ -8,17 +9,21 @@
 //! | 605Dh | halt, and a mode without a target | | ramp of the modes, holds | ramp of the quick stop, holds | |
 //! | 605Eh | a fault that permits braking | off at once | ramp of the modes, off | ramp of the quick stop, off | |
 //!
-//! "Disable voltage" and a fault of the bridge or the current loop have it off at once, whatever stands here. A ramp ends where the joint stands, or after
-//! the longest braking time. A joint that holds after a quick stop does so until the voltage is disabled or operation is enabled anew, with no more
-//! current than winding and bridge bear for long.
+//! "Disable voltage" and a fault of the bridge or the current loop have it off at once, whatever stands here. A ramp
+//! ends where the joint stands, or after the longest braking time. A joint that holds after a quick stop does so until
+//! the voltage is disabled or operation is enabled anew, with no more current than winding and bridge bear for long.
 //!
-//! **The holding brake** has its output on as long as the bridge makes a torque. When operation is enabled the joint holds where it is for the brake's
-//! release time; a set-point counts after it. When a ramp has ended the output goes off, and the bridge only after the brake's apply time. Where
-//! the bridge is off at once nobody bears the load for that time: neither any program nor this one can.
+//! **The holding brake** has its output on as long as the bridge makes a torque. When operation is enabled the joint
+//! holds where it is for the brake's release time; a set-point counts after it. When a ramp has ended the output goes
+//! off, and the bridge only after the brake's apply time. Where the bridge is off at once nobody bears the load for
+//! that time.
 
 use super::active::Active;
 use super::state_machine::{Controlword, State};
-use super::{JointMotion, STANDING, STANDING_STEPS};
+use super::{JointMotion, STANDING};
+
+/// Control steps for which a joint must stand before its bridge switches off.
+const STANDING_STEPS: u32 = 400;
 
 /// How the joint stops, in the numbers of the profile's option codes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -122,7 +127,8 @@ impl Stopping {
         self.applying > 0
     }
 
-    /// One control step; whether the bridge may go off: the joint stands, or has braked for too long, and the brake has closed.
+    /// One control step; whether the bridge may go off: the joint stands, or has braked for too long, and the brake has
+    /// closed.
     #[inline(always)]
     pub fn step(
         &mut self,

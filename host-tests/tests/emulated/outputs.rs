@@ -1,5 +1,5 @@
-//! The boards' outputs, by their programs on the emulated boards: a holding brake opens before the joint follows and closes before the bridge is off, and a chopper conducts
-//! while the supply is too high and its resistor bears it.
+//! The boards' outputs, by their programs on the emulated boards: a holding brake opens before the joint follows and
+//! closes before the bridge is off, and a chopper conducts while the supply is too high and its resistor bears it.
 
 use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired as _};
 use host_tests::emulated::bench::{SUPPLY, actuator, program};

@@ -70,7 +70,8 @@ fn is_open_loop(name: &str) -> bool {
 
 /// Whether a function runs only with the bridge on, in operation ([`Joint::control_step`] asks for the state before) or in braking: the friction model and
 /// what adds it, the approach of a position, the torque's bounds, the brake and what the supply bears of it; or only while the bridge is off, when a step that
-/// would wait for the flash has waited for its vector already: the offsets. What decides on a state and what begins it runs in both.
+/// would wait for the flash has waited for its vector already: the offsets. What decides on a state and what begins it
+/// runs in both.
 ///
 /// [`Joint::control_step`]: joint_firmware::joint::Joint::control_step
 fn seldom_or_operating(name: &str) -> bool {

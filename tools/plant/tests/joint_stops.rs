@@ -1,4 +1,5 @@
-//! Every way to stop, with every option code, in every mode, of a joint that bears a load: what the arm does, with a holding brake and without. The table is published in
+//! Every way to stop, with every option code, in every mode, of a joint that bears a load: what the arm does, with a
+//! holding brake and without. The table is published in
 //! `docs/stops.md`; `UPDATE_DOCS=1 cargo test -p plant --test joint_stops` writes it anew.
 
 mod rig;
