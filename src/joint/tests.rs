@@ -210,11 +210,11 @@ fn the_torque_that_is_reported_is_a_mean_over_a_millisecond_and_not_what_a_tooth
     assert_eq!(steps, 40);
     let mut mean = MeanTorque::default();
     for n in 0..10 * steps {
-        let before = mean.mean;
+        let before = mean.mean();
         // From 3 to 5 Nm in each millisecond.
         mean.add(&active, 3.0 + 2.0 * (n % steps) as f32 / (steps - 1) as f32);
         let done = (n + 1) % steps == 0;
-        assert!(done || mean.mean == before);
-        assert!(!done || (mean.mean - 4.0).abs() < 1e-5, "{}", mean.mean);
+        assert!(done || mean.mean() == before);
+        assert!(!done || (mean.mean() - 4.0).abs() < 1e-5, "{}", mean.mean());
     }
 }
