@@ -222,6 +222,9 @@ const fn longest_frame(bytes: u64) -> u64 {
     let stuffed = 34 + 8 * bytes;
     47 + 8 * bytes + (stuffed - 1) / 4
 }
+/// Looks at the bus until no frame is under way, s, and how many: two of the longest frames.
+const FRAME_LOOK: f64 = 2e-6;
+const FRAME_LOOKS: u32 = 135;
 /// The joint's dead man, and its button's debouncing, s.
 const DEAD_MAN: f64 = 0.1;
 const DEBOUNCE: f64 = 0.020;
@@ -278,6 +281,14 @@ fn stop<W: Wired>(mut bench: Bench<W>, cause: Cause, rate: f64) -> Result<String
         frame.extend([mode as u8, 0, 0, 0, 0]);
         frame
     };
+    // A frame that has begun ends first: what is sent behind it comes later, and nobody stops anything meanwhile.
+    for _ in 0..FRAME_LOOKS {
+        let now = bench.emulation.now();
+        if bench.emulation.cpu.bus.wiring_mut().line().is_idle(now) {
+            break;
+        }
+        bench.run(FRAME_LOOK).map_err(failed)?;
+    }
     // The earliest and the latest instant at which the program can know, from now on, s.
     let begun = bench.emulation.now();
     let rpdo = |bench: &mut Bench<W>, frame: &[u8], id: u16| {

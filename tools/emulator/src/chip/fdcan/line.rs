@@ -203,6 +203,11 @@ impl Line {
         self.begin(at);
     }
 
+    /// Nobody sends, and nothing waits to be sent by the host: a frame that is sent now begins now.
+    pub fn is_idle(&self, at: Instant) -> bool {
+        self.under_way.is_none() && self.waiting.is_empty() && self.idle <= at
+    }
+
     /// The oldest frame of the controller's that the host has not taken.
     pub fn receive(&mut self) -> Option<(Instant, CanFrame)> {
         self.sent.pop_front()
