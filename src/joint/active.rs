@@ -112,6 +112,12 @@ impl Scales {
         }
     }
 
+    /// Joint's position where the encoder's first sample reads zero, rad.
+    #[inline(always)]
+    pub(super) const fn zero(&self) -> f32 {
+        self.zero
+    }
+
     /// The joint's motion from the rotor's. Whole turns and fraction are converted by themselves: together they have more digits than
     /// a single-precision number.
     #[inline(always)]

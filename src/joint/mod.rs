@@ -11,7 +11,7 @@
 //!    the limits permit, and [`friction_feedforward`], what friction will take of it;
 //!  - [`stopping`]: how the joint stops, and its holding brake;
 //!  - `regeneration`: how much of a braking current the supply bears, and [`chopper`]: what a resistor takes of it;
-//!  - [`history`]: the last steps before a fault.
+//!  - [`history`]: the last steps before a fault; `telemetry`: what tasks are told of a step.
 //!
 //! In place of the motion loop and the current loop, for commissioning: [`open_loop`](crate::motor::open_loop).
 //!
@@ -40,12 +40,14 @@ pub mod shadow;
 mod signals;
 pub mod state_machine;
 pub mod stopping;
+mod telemetry;
 
 pub use active::{Active, JointMotion};
 pub use board_limits::BoardLimits;
-pub use command::{Command, Coupled, Demand, Mode};
+pub use command::{Command, CommandLimits, Coupled, Demand, Mode, PROFILES};
 pub use offsets::OFFSET_STEPS;
 pub use signals::{Bridge, BridgeState, Measurements, Outputs};
+pub use telemetry::Telemetry;
 
 use crate::motor::field_oriented::{FieldOriented, FieldOrientedInput};
 use crate::motor::number::{greater, lesser, limited, or_zero, within};
@@ -58,11 +60,10 @@ use active::DERATING;
 use adaptation::{ADAPTS, Factors};
 use chopper::{CHOPS, Chopper};
 use fault::{Fault, Faults, Reaction};
-use friction_feedforward::{Compensated, Surroundings};
+use friction_feedforward::Surroundings;
 use history::{History, Snapshot};
 use mean_torque::MeanTorque;
 use monitor::Monitor;
-use motion_law::Wanted;
 use motion_loop::{MotionLoop, Seen, Stage};
 use offsets::Offsets;
 use regeneration::Regeneration;
@@ -86,76 +87,6 @@ pub struct Slow {
 impl Default for Slow {
     fn default() -> Self {
         Self { derating: 1.0, gear_temperature: 25.0, factors: Factors::IMAGE }
-    }
-}
-
-/// What a control step found and did, for tasks that report it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Telemetry {
-    /// State after the step.
-    pub state: State,
-    /// Faults present in the step.
-    pub faults: Faults,
-    /// Motion of the joint.
-    pub motion: JointMotion,
-    /// What the command wanted.
-    pub wanted: Wanted,
-    /// What compensation added.
-    pub compensated: Compensated,
-    /// Torque of the measured current, Nm.
-    pub measured_torque: f32,
-    /// Its mean over the last whole millisecond, Nm; where a program does not adapt, nothing.
-    pub mean_torque: f32,
-    /// Temperature that friction was computed for, °C.
-    pub gear_temperature: f32,
-    /// Wanted current, A.
-    pub reference: Dq,
-    /// Measured current, A.
-    pub current: Dq,
-    /// Supply, V.
-    pub bus_voltage: f32,
-    /// An enabled joint holds where it is instead of following its command: its brake opens, or it is to stop.
-    pub held: bool,
-    /// What the board's outputs do.
-    pub outputs: Outputs,
-}
-
-impl Default for Telemetry {
-    fn default() -> Self {
-        Self::NOTHING
-    }
-}
-
-impl Telemetry {
-    /// Before the first step.
-    pub const NOTHING: Self = Self {
-        state: State::NotReadyToSwitchOn,
-        faults: Faults::NONE,
-        motion: JointMotion { position: 0.0, velocity: 0.0, acceleration: 0.0 },
-        wanted: Wanted { torque: 0.0, velocity: None, push: 0.0 },
-        compensated: Compensated::NOTHING,
-        measured_torque: 0.0,
-        mean_torque: 0.0,
-        gear_temperature: 0.0,
-        reference: Dq { d: 0.0, q: 0.0 },
-        current: Dq { d: 0.0, q: 0.0 },
-        bus_voltage: 0.0,
-        held: false,
-        outputs: Outputs::OFF,
-    };
-
-    /// Torque of the current, Nm: the mean over a millisecond, where the program takes it.
-    pub const fn torque(&self) -> f32 {
-        if ADAPTS { self.mean_torque } else { self.measured_torque }
-    }
-
-    /// The statusword, object 6041h: state, voltage present, and that the joint follows its commands.
-    pub fn statusword(&self) -> u16 {
-        // Before the start is complete nobody has looked at the supply.
-        let started = self.state != State::NotReadyToSwitchOn;
-        let voltage = (started && !self.faults.contains(Fault::UnderVoltage)) as u16;
-        let remote = 1 << 9;
-        self.state.statusword() | voltage << 4 | remote
     }
 }
 
@@ -338,6 +269,9 @@ impl Joint {
         telemetry.faults = found.faults;
         telemetry.motion = found.motion;
         telemetry.wanted = *self.motion_loop.wanted();
+        if PROFILES {
+            telemetry.position_demand = self.motion_loop.position();
+        }
         telemetry.compensated = *self.motion_loop.compensated();
         telemetry.measured_torque = found.measured_torque;
         if ADAPTS {
@@ -498,15 +432,16 @@ impl Joint {
         faults
     }
 
-    /// Counts the steps without a new set-point from "ready to switch on" on, but for a joint that holds or is to stop:
-    /// nothing that could be late is asked of it. In "fault" a count that has led there stays until one comes.
+    /// Counts the steps without a new set-point from "ready to switch on" on, but for a joint that holds, moves to an
+    /// end or is to stop: nothing that could be late is asked of it. In "fault" a count that has led there stays until
+    /// one comes.
     #[inline(always)]
     fn count_stale_steps(&mut self, active: &Active, demand: &Demand, state: State) {
         self.stale_steps = match state {
             _ if demand.sequence != self.sequence => 0,
             State::NotReadyToSwitchOn | State::SwitchOnDisabled => 0,
             State::Fault => self.stale_steps,
-            _ if demand.command.mode == Mode::Hold => 0,
+            _ if matches!(demand.command.mode, Mode::Hold | Mode::Profile) => 0,
             State::OperationEnabled if demand.controlword.ends_operation() => 0,
             State::QuickStopActive if active.stops.options.holds() => 0,
             _ => self.stale_steps.saturating_add(1),

@@ -3,7 +3,7 @@
 //! Whatever a mode and its gains want, the torque stays within the [bounds](super::limit_law) of the limits.
 
 use super::active::{Active, JointMotion};
-use super::command::{Command, Mode};
+use super::command::{Command, CommandLimits, Mode, PROFILES};
 use super::limit_law::Bounds;
 use crate::motor::number::{greater, lesser, limited, or_zero};
 
@@ -22,7 +22,7 @@ pub struct Wanted {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MotionLaw {
     mode: Option<Mode>,
-    /// Reference that ramps towards the command, rad.
+    /// Reference that ramps towards the command, rad; in modes without one the joint's own position.
     position: f32,
     /// rad/s.
     velocity: f32,
@@ -32,6 +32,8 @@ pub struct MotionLaw {
     bounds: Bounds,
     /// The joint brakes: no mode.
     brakes: bool,
+    /// Joint's zero that the reference counts from, rad.
+    zero: f32,
 }
 
 impl MotionLaw {
@@ -52,12 +54,12 @@ impl MotionLaw {
             // The open loop knows no torque.
             Mode::Torque | Mode::OpenLoop => (0.0, None),
             Mode::Velocity => {
-                self.ramp(limited(command.velocity, active.limits.velocity), gains.velocity_step);
+                self.approach_velocity(limited(command.velocity, active.limits.velocity), &command.limits, active);
                 let error = self.velocity - motion.velocity;
                 self.integral += gains.velocity_integral * error;
                 (gains.damping * error + self.integral, Some(self.velocity))
             }
-            Mode::Position | Mode::Hold => {
+            Mode::Position | Mode::Profile | Mode::Hold => {
                 self.follow(command, active);
                 let error = self.position - motion.position;
                 self.integral += gains.position_integral * error;
@@ -71,12 +73,25 @@ impl MotionLaw {
                 (spring + damping * (command.velocity - motion.velocity), Some(or_zero(command.velocity)))
             }
         };
-        let limit = active.limits.torque * derating;
+        let limit = lesser(command.limits.torque(), active.limits.torque) * derating;
         self.integral = limited(self.integral, limit);
         // Two opposite infinities add up to no number.
         let torque = or_zero(or_zero(torque) + or_zero(command.torque));
         self.bounds = Bounds::at(active, motion, limit);
+        if PROFILES && !matches!(command.mode, Mode::Position | Mode::Profile | Mode::Hold) {
+            self.position = motion.position;
+        }
         Wanted { torque: self.bounds.hold(torque), velocity, push: command.push }
+    }
+
+    /// Follows a zero that the joint's positions count from since the last round, and tells whether it is another one:
+    /// what was remembered of positions means nothing then.
+    #[inline(always)]
+    pub fn counts_anew(&mut self, active: &Active) -> bool {
+        let (before, zero) = (self.zero, active.scales.zero());
+        self.zero = zero;
+        self.position += zero - before;
+        zero != before
     }
 
     /// What the torque of this round must not exceed, compensation included.
@@ -99,7 +114,22 @@ impl MotionLaw {
         let torque = limited(damped + self.integral + gains.braking_integral * error, limit);
         // What the limit has cut off is not integrated: it would drive the joint back after its stop.
         self.integral = torque - damped;
+        if PROFILES {
+            self.position = motion.position;
+        }
         Wanted { torque, velocity: Some(self.velocity), push: 0.0 }
+    }
+
+    /// Position that is asked for at this instant, rad; in modes without one the joint's own. With [`PROFILES`] alone.
+    #[inline(always)]
+    pub fn position(&self) -> f32 {
+        self.position
+    }
+
+    /// The joint is asked to be where it is, until a round says something else.
+    #[inline(always)]
+    pub fn begin_at(&mut self, motion: &JointMotion) {
+        self.position = motion.position;
     }
 
     /// Whether braking's ramp has come to its end.
@@ -107,11 +137,12 @@ impl MotionLaw {
         self.velocity == 0.0
     }
 
-    /// Begins a mode where the joint is. What moves or holds it goes on without a step from one of these modes to another: velocity, position and hold
-    /// share ramp and integral, position and hold the reference too. Braking's ramp and integral they take over.
+    /// Begins a mode where the joint is. What moves or holds it goes on without a step from one of these modes to
+    /// another: velocity, position, profile and hold share ramp and integral, all but velocity the reference too.
+    /// Braking's ramp and integral they take over.
     #[inline(never)]
     fn enter(&mut self, mode: Mode, motion: &JointMotion) {
-        let ramps = |mode| matches!(mode, Mode::Velocity | Mode::Position | Mode::Hold);
+        let ramps = |mode| matches!(mode, Mode::Velocity | Mode::Position | Mode::Profile | Mode::Hold);
         let goes_on = (self.brakes || self.mode.is_some_and(ramps)) && ramps(mode);
         // Field by field: the compiler would copy the whole record, byte by byte where it is optimised for size.
         if !goes_on {
@@ -130,20 +161,38 @@ impl MotionLaw {
         self.velocity += limited(target - self.velocity, step);
     }
 
+    /// The ramp towards a velocity, with the command's accelerations within the joint's own.
+    #[inline(always)]
+    fn approach_velocity(&mut self, target: f32, limits: &CommandLimits, active: &Active) {
+        let step = if PROFILES { self.velocity_step(target, limits, active) } else { active.motion.velocity_step };
+        self.ramp(target, step);
+    }
+
+    /// rad/s a round.
+    #[inline(never)]
+    fn velocity_step(&self, target: f32, limits: &CommandLimits, active: &Active) -> f32 {
+        // Up to a standstill a velocity of the other sign is a lower one.
+        let rises = if self.velocity < 0.0 { target < self.velocity } else { target > self.velocity };
+        let acceleration = if rises || self.velocity == 0.0 { limits.acceleration() } else { limits.deceleration() };
+        lesser(acceleration * active.motion.period, active.motion.velocity_step)
+    }
+
     /// One round of the reference: towards the command's position, or to a stop.
     #[inline(never)]
     fn follow(&mut self, command: &Command, active: &Active) {
-        let (velocity, step) = match command.mode {
-            Mode::Hold => (0.0, active.motion.hold_step),
-            _ => (self.approach(command.position, active), active.motion.velocity_step),
-        };
-        self.ramp(velocity, step);
+        match command.mode {
+            Mode::Hold => self.ramp(0.0, active.motion.hold_step),
+            _ => {
+                let velocity = self.approach(command.position, &command.limits, active);
+                self.approach_velocity(velocity, &command.limits, active);
+            }
+        }
         self.position += self.velocity * active.motion.period;
     }
 
     /// Velocity of the fastest approach to `target` from which the ramp can still stop there (trapezoidal profile, in closed loop).
     #[inline(always)]
-    fn approach(&self, target: f32, active: &Active) -> f32 {
+    fn approach(&self, target: f32, limits: &CommandLimits, active: &Active) -> f32 {
         let gains = &active.motion;
         let (low, high) = active.limits.position;
         let target = if target < low {
@@ -155,10 +204,10 @@ impl MotionLaw {
         };
         let way = or_zero(target - self.position);
         let distance = if way < 0.0 { -way } else { way };
+        let deceleration = lesser(limits.deceleration(), gains.acceleration);
         // Of the way that the next round needs anyway, nothing is left to brake on.
-        let speed =
-            lesser(active.limit_gains.speed(2.0 * gains.acceleration * distance, active), distance * gains.rate);
-        let speed = lesser(speed, active.limits.velocity);
+        let speed = lesser(active.limit_gains.speed(2.0 * deceleration * distance, active), distance * gains.rate);
+        let speed = lesser(speed, lesser(limits.velocity(), active.limits.velocity));
         if way < 0.0 { -speed } else { speed }
     }
 }

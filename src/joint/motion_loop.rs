@@ -6,7 +6,7 @@
 
 use super::active::{Active, JointMotion};
 use super::adaptation::Factors;
-use super::command::{Command, Demand, Mode};
+use super::command::{Command, Demand, Mode, PROFILES};
 use super::friction_feedforward::{Compensated, FrictionFeedforward, Surroundings};
 use super::motion_law::{MotionLaw, Wanted};
 use super::state_machine::State;
@@ -69,6 +69,9 @@ impl MotionLoop {
         let begins = state != self.state;
         if begins {
             self.begin(active, state);
+            if PROFILES {
+                self.law.begin_at(seen.motion);
+            }
         }
         if !state.makes_torque() {
             return 0.0;
@@ -134,6 +137,9 @@ impl MotionLoop {
         self.stage = match self.stage {
             Stage::Law => {
                 let gains = &active.motion;
+                if PROFILES && self.law.counts_anew(active) {
+                    self.friction.reset();
+                }
                 self.wanted = match self.state {
                     State::OperationEnabled => self.follow(active, demand, seen),
                     State::QuickStopActive => self.law.brake(active, motion, gains.quick_stop_step),
@@ -178,6 +184,13 @@ impl MotionLoop {
     #[inline(always)]
     pub fn wanted(&self) -> &Wanted {
         &self.wanted
+    }
+
+    /// Position that the command asks for at this instant, rad; in modes without one the joint's own. With [`PROFILES`]
+    /// alone.
+    #[inline(always)]
+    pub fn position(&self) -> f32 {
+        self.law.position()
     }
 
     /// What compensation adds.

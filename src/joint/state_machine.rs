@@ -79,6 +79,21 @@ impl Controlword {
         self.has(Self::HALT.0)
     }
 
+    /// "New set-point" of profile position mode, and "homing operation start".
+    pub const fn is_new_set_point(self) -> bool {
+        self.has(1 << 4)
+    }
+
+    /// "Change set immediately" of profile position mode.
+    pub const fn changes_at_once(self) -> bool {
+        self.has(1 << 5)
+    }
+
+    /// The position of profile position mode counts from the one before.
+    pub const fn is_relative(self) -> bool {
+        self.has(1 << 6)
+    }
+
     /// Not a fault reset, with which nothing else counts: every command of the profile has bit 7 clear.
     const fn commands(self) -> bool {
         !self.has(1 << 7)

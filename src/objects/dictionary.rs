@@ -5,16 +5,19 @@ use super::field::{
     ConfigurationField, Field, HardwareField, ImageField, OpenLoopField, RANGES, Range, ResetField, SetPoint,
 };
 use super::images::{Circumstances, Failure, Images, StoredImages, abort};
+use super::number::to_i32;
 use super::observed::{Observed, signed};
+use super::operation::Operation;
+use super::profile_modes::{PROFILE_MODES, ProfileModes, Wish};
 use super::program::{NotConfigured, Program};
 use super::refused::Refused;
-use super::set_points::mode;
 use super::settings::Setting;
 use super::shared::Shared;
 use super::stored::{Part, RECORD, Update, communication_parameters, is_range};
 use super::{hardware, history, last_reset, open_loop, table};
 use crate::canopen::{Abort, Access, CommunicationParameters, Entry, Event, Group, Length, NmtState, ObjectDictionary};
 use crate::hardware::chip_options::COMMAND;
+use crate::joint::PROFILES;
 use crate::joint::configuration::Configuration;
 use crate::joint::state_machine::State;
 use crate::motor::number::exceeds;
@@ -64,6 +67,7 @@ pub struct Objects<'a, P> {
     /// As it was when communication began; what is stored holds for it.
     node_id: Cell<u8>,
     reports: Reports,
+    profile_modes: [ProfileModes; PROFILE_MODES],
     emergencies: Deque<Emergency, WAITING>,
 }
 
@@ -74,7 +78,7 @@ impl<'a, P: Program> Objects<'a, P> {
         for (range, value) in Range::ALL.into_iter().zip(ranges) {
             shared.set_range(range, value);
         }
-        shared.set_rated_torque(configuration.limits.torque);
+        shared.rate(&configuration);
         let objects = Self {
             shared,
             program,
@@ -91,6 +95,7 @@ impl<'a, P: Program> Objects<'a, P> {
             told_reset: false,
             node_id: Cell::new(0),
             reports: Reports::default(),
+            profile_modes: [ProfileModes::NOTHING; PROFILE_MODES],
             emergencies: Deque::new(),
         };
         objects.publish();
@@ -108,7 +113,7 @@ impl<'a, P: Program> Objects<'a, P> {
         for (range, value) in Range::ALL.into_iter().zip(ranges) {
             self.shared.set_range(range, value);
         }
-        self.shared.set_rated_torque(configuration.limits.torque);
+        self.shared.rate(&configuration);
         self.window.set(Window::NOTHING);
         self.reports = Reports::default();
         self.emergencies.clear();
@@ -135,7 +140,28 @@ impl<'a, P: Program> Objects<'a, P> {
         {
             self.report(emergency);
         }
+        self.follow_profile();
         self.publish();
+    }
+
+    /// Looks after the profile modes, where the program has them. What the joint calls its zero it may be told anew
+    /// while it is enabled: the control step moves its references with it.
+    #[inline(never)]
+    fn follow_profile(&mut self) {
+        let wishes = self
+            .profile_modes
+            .each_mut()
+            .map(|modes| modes.poll(self.now, &self.observed, &self.configuration, self.shared));
+        for wish in wishes {
+            let Wish::Zero(zero) = wish else { continue };
+            let mut configuration = self.configuration;
+            let possible = Setting::JointZero.set(&mut configuration, zero.to_bits());
+            let taken = if possible { self.configure(&configuration) } else { Err(Abort::VALUE) };
+            if taken.is_ok() {
+                self.staged.gear.zero = configuration.gear.zero;
+            }
+            self.profile_modes.iter_mut().for_each(|modes| modes.answer(taken));
+        }
     }
 
     /// What is to be sent as EMCY by [`Server::emergency`](crate::canopen::Server::emergency), one at a time.
@@ -240,6 +266,10 @@ impl<'a, P: Program> Objects<'a, P> {
             Field::Constant(constant) => signed(constant.number()),
             Field::SetPoint(set_point) => self.shared.set_point(set_point),
             Field::Range(range) => self.shared.range(range).to_bits().into(),
+            Field::Profile(_) | Field::Milli(_) | Field::Micro(_) if !PROFILES => 0,
+            Field::Profile(parameter) => self.shared.parameter(parameter).into(),
+            Field::Milli(setting) => signed(to_i32(1e3 * f32::from_bits(setting.get(&self.configuration)))),
+            Field::Micro(setting) => signed(to_i32(1e6 * f32::from_bits(setting.get(&self.configuration)))),
             Field::Actual(actual) => self.observed.actual(actual, self.shared),
             Field::Setting(setting) => setting.get(&self.staged).into(),
             Field::AtOnce(setting) => setting.get(&self.configuration).into(),
@@ -260,8 +290,12 @@ impl<'a, P: Program> Objects<'a, P> {
 
     fn write_set_point(&mut self, set_point: SetPoint, value: u64) -> Result<(), Abort> {
         match set_point {
-            SetPoint::Mode if mode(value as i8).is_none() => return Err(Abort::VALUE),
-            SetPoint::Mode => {}
+            SetPoint::Mode if Operation::of(value as i8).is_none() => return Err(Abort::VALUE),
+            // With none a joint that moves would never stop.
+            SetPoint::ProfileAcceleration | SetPoint::ProfileDeceleration if PROFILES && value == 0 => {
+                return Err(Abort::VALUE);
+            }
+            choice if choice.is_choice() => {}
             _ if self.state != NmtState::Operational => return Err(Abort::DEVICE_STATE),
             _ => {}
         }
@@ -288,7 +322,7 @@ impl<'a, P: Program> Objects<'a, P> {
             Ok(()) => {
                 self.refused = Refused::default();
                 self.configuration = *configuration;
-                self.shared.set_rated_torque(configuration.limits.torque);
+                self.shared.rate(configuration);
                 Ok(())
             }
             Err(NotConfigured::Refused(error)) => {
@@ -443,6 +477,13 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
                 }
             }
             Field::AtOnce(setting) => self.write_at_once(setting, word),
+            Field::Profile(parameter) if PROFILES => {
+                if !parameter.permits(word) {
+                    return Err(Abort::VALUE);
+                }
+                self.shared.set_parameter(parameter, word);
+                Ok(())
+            }
             Field::Configuration(ConfigurationField::Command) => self.command_configuration(word),
             Field::Image(field) => self.write_image(field, word),
             Field::Hardware(HardwareField::SetOptions) => self.set_options(word),

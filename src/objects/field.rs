@@ -1,6 +1,8 @@
 //! What an object of this joint is about; any context. The [table](super::table) says which index means which field, nothing else does.
 
+use super::operation::Operation;
 use super::settings::Setting;
+use crate::joint::PROFILES;
 
 /// What an object reads or writes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,12 +17,18 @@ pub enum Field {
     SetPoint(SetPoint),
     /// The range of a part of the impedance frame.
     Range(Range),
+    /// A number for the profile modes or the statusword.
+    Profile(ProfileParameter),
     /// What the joint measures and does.
     Actual(Actual),
     /// A setting of the configuration: staged, and taken with all others by a command.
     Setting(Setting),
     /// A setting that acts at once: of the compensation, and how the joint stops.
     AtOnce(Setting),
+    /// A setting in use as a whole number of thousandths, to be read.
+    Milli(Setting),
+    /// The same of millionths.
+    Micro(Setting),
     /// Taking the configuration, and why it was refused.
     Configuration(ConfigurationField),
     /// The open loop's last window.
@@ -69,7 +77,7 @@ impl Constant {
     /// The number.
     pub const fn number(self) -> i32 {
         match self {
-            Self::SupportedModes => 0x0003_0380,
+            Self::SupportedModes => Operation::SUPPORTED as i32,
         }
     }
 }
@@ -115,10 +123,84 @@ pub enum SetPoint {
     OpenLoop = 8,
     /// Added in every mode but the open loop: what holds the joint.
     TorqueOffset = 9,
+    /// Profile position mode: velocity on the way.
+    ProfileVelocity = 10,
+    /// Profile modes: acceleration.
+    ProfileAcceleration = 11,
+    /// Profile modes: deceleration.
+    ProfileDeceleration = 12,
+    /// Largest torque in every mode but the open loop.
+    MaxTorque = 13,
+    /// Added in cyclic synchronous position mode.
+    PositionOffset = 14,
+    /// Added in cyclic synchronous velocity mode.
+    VelocityOffset = 15,
+}
+
+impl SetPoint {
+    /// Mode, profile and largest torque: they stay whatever the NMT state is, and ask nothing of the joint by
+    /// themselves.
+    pub(super) const fn is_choice(self) -> bool {
+        let of_profiles = matches!(
+            self,
+            Self::ProfileVelocity | Self::ProfileAcceleration | Self::ProfileDeceleration | Self::MaxTorque
+        );
+        matches!(self, Self::Mode) || PROFILES && of_profiles
+    }
 }
 
 /// Number of [`SetPoint`]s.
-pub(super) const SET_POINTS: usize = 10;
+pub(super) const SET_POINTS: usize = FIRST_OF_PROFILES + PROFILE_SET_POINTS;
+/// The first one that only a program with [`PROFILES`] has.
+pub(super) const FIRST_OF_PROFILES: usize = 10;
+/// Number of these.
+pub(super) const PROFILE_SET_POINTS: usize = 6 * PROFILES as usize;
+
+/// A number that a master sets for the profile modes, or for what the statusword tells. It lasts until the program
+/// ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum ProfileParameter {
+    /// Following error from which on bit 13 is set, raw position.
+    FollowingErrorWindow = 0,
+    /// For how long it has to be beyond, ms.
+    FollowingErrorTime = 1,
+    /// How near the joint has to be to its target, raw position.
+    PositionWindow = 2,
+    /// For how long, ms.
+    PositionTime = 3,
+    /// How near the velocity has to be to its target, raw velocity.
+    VelocityWindow = 4,
+    /// Below it the joint stands, raw velocity.
+    VelocityThreshold = 5,
+    /// Position that the joint has where it is homed, raw.
+    HomeOffset = 6,
+    /// How the zero is found.
+    HomingMethod = 7,
+    /// Speed on the way to the index, raw velocity.
+    HomingSpeed = 8,
+    /// Acceleration of it, raw.
+    HomingAcceleration = 9,
+    /// Speed on the way to a switch, raw velocity: no method looks for one.
+    SwitchSpeed = 10,
+}
+
+/// Number of [`ProfileParameter`]s that a program has.
+pub(super) const PROFILE_PARAMETERS: usize = if PROFILES { 11 } else { 0 };
+
+impl ProfileParameter {
+    /// Whether it may have this value: not an acceleration of zero, nor a method that there is none of.
+    pub(super) const fn permits(self, value: u32) -> bool {
+        match self {
+            Self::HomingMethod => matches!(value, 0 | 33 | 34 | 35 | 37),
+            Self::HomingSpeed | Self::HomingAcceleration | Self::SwitchSpeed => value > 0,
+            _ => true,
+        }
+    }
+
+    /// At the start.
+    pub const DEFAULTS: [u32; 11] = [u32::MAX, 0, 10_000, 0, 50, 20, 0, 0, 100, u32::MAX, 100];
+}
 
 /// A part of the impedance frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -170,6 +252,14 @@ pub enum Actual {
     Torque,
     /// Torque that the command asks for within all limits, before compensation.
     TorqueDemand,
+    /// Position that the command asks for at this instant.
+    PositionDemand,
+    /// What is missing to it.
+    FollowingError,
+    /// Current that makes torque.
+    Current,
+    /// Supply, in the profile's unit.
+    DcLink,
     /// What permille of torque refer to.
     RatedTorque,
     /// Code of the first latched fault.

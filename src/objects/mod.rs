@@ -8,7 +8,8 @@
 //!
 //! [`table`] declares every object once; the server's entries, `docs/objects.md` and the texts that a host makes (EDS, DBC) come
 //! from it. [`field`] is what an object can be about. The rest has one idea a file: [`Observed`] and its scaling, [`settings`] of the
-//! configuration, [`Images`] for the life cycle, [`Stored`] for what 1010h keeps, [`emergency`] for codes.
+//! configuration, [`Operation`] for the modes, `profile_positions` and `profile_modes` for those in which positions have
+//! a hand-shake and an end, [`Images`] for the life cycle, [`Stored`] for what 1010h keeps, [`emergency`] for codes.
 //!
 //! ```text
 //!  receive interrupt   image.observe(&observed)
@@ -36,7 +37,10 @@ mod last_reset;
 mod number;
 mod observed;
 mod open_loop;
+mod operation;
 mod process_image;
+mod profile_modes;
+mod profile_positions;
 mod program;
 mod refused;
 mod set_points;
@@ -54,6 +58,7 @@ pub use friction_statistics::FrictionStatistics;
 pub use history::STEP;
 pub use images::{Images, StoredImages};
 pub use observed::Observed;
+pub use operation::Operation;
 pub use process_image::JointImage;
 pub use program::{NotConfigured, Program};
 pub use set_points::impedance_frame;

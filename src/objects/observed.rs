@@ -3,12 +3,13 @@
 use super::field::{Actual, SetPoint};
 use super::friction_statistics::FrictionStatistics;
 use super::number::{temperature, to_i16, to_i32, to_u16, to_u32};
+use super::operation::Operation;
 use super::shared::Shared;
 use crate::compensation::Reason;
-use crate::joint::Telemetry;
 use crate::joint::adaptation;
 use crate::joint::fault::Faults;
 use crate::joint::state_machine::State;
+use crate::joint::{PROFILES, Telemetry};
 
 /// A copy of what the control step and the slow task know.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,6 +52,12 @@ impl Observed {
         self.telemetry.torque() - self.feedforward_torque - self.telemetry.compensated.torque
     }
 
+    /// Where the joint should be at this instant, rad: where nothing says so, where it is.
+    pub(super) fn position_demand(&self) -> f32 {
+        let t = &self.telemetry;
+        if t.state.makes_torque() { t.position_demand } else { t.motion.position }
+    }
+
     /// The value as its object carries it, sign-extended.
     pub(super) fn actual(&self, actual: Actual, shared: &Shared) -> u64 {
         let t = &self.telemetry;
@@ -63,14 +70,25 @@ impl Observed {
         let tenths = |value: f32| signed(temperature(value).into());
         match actual {
             Actual::Statusword => {
-                let follows = t.state == State::OperationEnabled && shared.follows() && !t.held;
-                (t.statusword() | u16::from(follows) << 12).into()
+                // In profile velocity mode the bit tells of a standstill.
+                let told = PROFILES && shared.mode() == Some(Operation::ProfileVelocity);
+                let follows = t.state == State::OperationEnabled && shared.follows() && !t.held && !told;
+                (t.statusword() | u16::from(follows) << 12 | shared.status()).into()
             }
             Actual::Mode => shared.set_point(SetPoint::Mode),
             Actual::Position => signed(to_i32(1e6 * t.motion.position)),
             Actual::Velocity => signed(to_i32(1e3 * t.motion.velocity)),
             Actual::Torque => permille(t.torque()),
             Actual::TorqueDemand => permille(t.wanted.torque),
+            Actual::PositionDemand | Actual::FollowingError | Actual::Current | Actual::DcLink if !PROFILES => 0,
+            Actual::PositionDemand => signed(to_i32(1e6 * self.position_demand())),
+            Actual::FollowingError => signed(to_i32(1e6 * (self.position_demand() - t.motion.position))),
+            Actual::Current => {
+                let rated = shared.rated_current();
+                let part = if rated > 0.0 { t.current.q / rated } else { 0.0 };
+                signed(to_i16(1e3 * part).into())
+            }
+            Actual::DcLink => to_u32(1e3 * t.bus_voltage).into(),
             Actual::RatedTorque => to_u32(1e3 * shared.rated_torque()).into(),
             Actual::ErrorCode => self.latched.iter().next().map_or(0, |fault| fault.error_code().into()),
             Actual::CompensationTorque => milli(t.compensated.torque),

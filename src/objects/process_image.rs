@@ -14,7 +14,7 @@ use super::shared::Shared;
 use super::table;
 use crate::canopen::{MappedObject, NmtState, ProcessImage};
 use crate::joint::state_machine::Controlword;
-use crate::joint::{Command, Coupled, Demand, Mode};
+use crate::joint::{Command, Coupled, Demand, PROFILES};
 
 /// The interrupt's part of the objects.
 #[derive(Debug)]
@@ -46,7 +46,7 @@ struct Arrived {
 impl<'a> JointImage<'a> {
     /// One for each [`Shared`].
     pub fn new(shared: &'a Shared) -> Self {
-        let points = SetPoints::none(Mode::Torque);
+        let points = SetPoints::NONE;
         points.publish(shared);
         Self {
             shared,
@@ -72,8 +72,12 @@ impl<'a> JointImage<'a> {
         if state != self.state {
             self.state_changed(state);
         }
+        if PROFILES && self.points.go_on(self.shared) {
+            self.arriving = self.points;
+            self.points.publish(self.shared);
+        }
         let Some((set_point, value)) = self.shared.take_written() else { return };
-        if set_point == SetPoint::Mode || self.state == NmtState::Operational {
+        if set_point.is_choice() || self.state == NmtState::Operational {
             self.arriving = self.points;
             self.put(set_point, value);
             self.arriving.insist(set_point);
@@ -101,8 +105,8 @@ impl<'a> JointImage<'a> {
         match set_point {
             SetPoint::CoupledVelocity => self.arrived.coupled = true,
             SetPoint::Counter => self.arrived.counter = Some(value as u8),
-            // A choice, nothing that is asked of the joint.
-            SetPoint::Mode => {}
+            // Nothing that is asked of the joint.
+            choice if choice.is_choice() => {}
             SetPoint::TargetPosition => (self.arrived.asked, self.arrived.position) = (true, true),
             _ => self.arrived.asked = true,
         }
@@ -117,7 +121,8 @@ impl<'a> JointImage<'a> {
         if coupled {
             self.coupled_sequence = self.coupled_sequence.wrapping_add(1);
         }
-        self.arriving.succeed(&self.points, position);
+        let actual = if PROFILES { self.shared.position() } else { 0 };
+        self.arriving.succeed(&self.points, position, actual);
         self.points = self.arriving;
         self.points.publish(self.shared);
     }
@@ -145,7 +150,7 @@ impl ProcessImage for JointImage<'_> {
     }
 
     fn state_changed(&mut self, state: NmtState) {
-        let none = SetPoints::none(self.points.mode);
+        let none = self.points.forgotten();
         // A transition by the task comes here twice: after it, and with the next frame.
         if state == self.state && self.points == none {
             return;

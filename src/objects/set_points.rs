@@ -1,22 +1,27 @@
 //! From the numbers of the bus to a command; the receive interrupt.
 
-use super::field::{Range, SetPoint};
+use super::field::{FIRST_OF_PROFILES, PROFILE_SET_POINTS, Range, SetPoint};
+use super::operation::Operation;
+use super::profile_positions::Positions;
 use super::shared::Shared;
 use crate::joint::state_machine::Controlword;
-use crate::joint::{Command, Mode};
+use crate::joint::{Command, CommandLimits, Mode, PROFILES};
 use crate::motor::open_loop::Frame;
 
 /// Set-points as they came.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SetPoints {
     pub(super) controlword: u16,
-    pub(super) mode: Mode,
+    pub(super) mode: Operation,
     pub(super) counter: Option<u8>,
     torque: i16,
     torque_offset: i16,
     position: i32,
     velocity: i32,
     impedance: u64,
+    /// Those of the profile modes, where a program has them: [`SetPoint`]s from [`FIRST_OF_PROFILES`] on, raw.
+    more: [u32; PROFILE_SET_POINTS],
+    positions: [Positions; PROFILES as usize],
     /// Targets that count: those that came since operation was enabled in this mode.
     targets: Targets,
     /// mrad/s.
@@ -34,50 +39,81 @@ struct Targets {
     impedance: bool,
 }
 
+/// A raw limit that limits nothing: the joint's own counts.
+const UNLIMITED: u32 = u32::MAX;
+/// Those of the profile modes at first: no limits, no offsets.
+const MORE: [u32; 6] = [UNLIMITED, UNLIMITED, UNLIMITED, 1_000, 0, 0];
+/// How many of them are choices, which stay.
+const CHOICES: usize = 4;
+
+const fn more() -> [u32; PROFILE_SET_POINTS] {
+    let mut more = [0; PROFILE_SET_POINTS];
+    let mut next = 0;
+    while next != PROFILE_SET_POINTS {
+        more[next] = MORE[next];
+        next += 1;
+    }
+    more
+}
+
 impl SetPoints {
-    /// As if there had never been one: the joint stops, and asks for no torque. The mode is a choice, not a set-point, and stays.
-    pub(super) const fn none(mode: Mode) -> Self {
-        Self {
-            controlword: Controlword::QUICK_STOP.0,
-            mode,
-            counter: None,
-            torque: 0,
-            torque_offset: 0,
-            position: 0,
-            velocity: 0,
-            impedance: 0,
-            targets: Targets {
-                torque: false,
-                torque_offset: false,
-                position: false,
-                velocity: false,
-                impedance: false,
-            },
-            coupled: 0,
-            open_loop: Frame { voltage: 0, speed: 0, along: 0, across: 0 },
-        }
+    /// None yet: the joint stops, and asks for no torque.
+    pub(super) const NONE: Self = Self {
+        controlword: Controlword::QUICK_STOP.0,
+        mode: Operation::Torque,
+        counter: None,
+        torque: 0,
+        torque_offset: 0,
+        position: 0,
+        velocity: 0,
+        impedance: 0,
+        more: more(),
+        positions: [Positions::NONE; PROFILES as usize],
+        targets: Targets { torque: false, torque_offset: false, position: false, velocity: false, impedance: false },
+        coupled: 0,
+        open_loop: Frame { voltage: 0, speed: 0, along: 0, across: 0 },
+    };
+
+    /// As if there had never been one. Mode, profile and largest torque are choices, not set-points, and stay.
+    pub(super) fn forgotten(&self) -> Self {
+        let mut none = Self { mode: self.mode, ..Self::NONE };
+        none.more.iter_mut().zip(self.more).take(CHOICES).for_each(|(place, value)| *place = value);
+        none.positions.iter_mut().zip(self.positions).for_each(|(place, before)| *place = before.forgotten());
+        none
     }
 
-    /// What an RPDO, or a value by SDO, makes of the set-points `before` it. `position` tells whether it carries one.
+    /// What an RPDO, or a value by SDO, makes of the set-points `before` it. `position` tells whether it carries one,
+    /// `actual` where the joint is, raw.
     ///
-    /// Where it enables operation or enters another mode no target counts: the joint holds where it is until one comes. A position has to be another
-    /// one then, because a PDO carries all of its objects, also those that the master has left at zero or at an old value. The position that comes
-    /// with the release of halt counts whatever it is.
-    pub(super) fn succeed(&mut self, before: &Self, position: bool) {
+    /// Where it enables operation or enters another mode no target counts: the joint holds where it is until one comes.
+    /// A position has to be another one then, because a PDO carries all of its objects, also those that the master has
+    /// left at zero or at an old value. The position that comes with the release of halt counts whatever it is.
+    pub(super) fn succeed(&mut self, before: &Self, position: bool, actual: i32) {
         let (word, last) = (Controlword(self.controlword), Controlword(before.controlword));
         let goes_on = last.enables_operation() && self.mode == before.mode;
         if word.enables_operation() && !goes_on {
             self.targets = Targets::default();
+            self.positions.iter_mut().for_each(Positions::forget);
         } else if position && last.halts() && !word.halts() {
             self.targets.position = true;
         }
+        if self.mode == Operation::ProfilePosition && word.enables_operation() {
+            let rises = goes_on && !last.is_new_set_point();
+            self.positions.iter_mut().for_each(|positions| positions.hand_shake(word, rises, self.position, actual));
+        }
+    }
+
+    /// Goes on to the position that waits, where the joint is told to have reached the one before; whether there was
+    /// one.
+    pub(super) fn go_on(&mut self, shared: &Shared) -> bool {
+        self.positions.iter_mut().any(|positions| positions.go_on(shared.reached()))
     }
 
     /// Sets one from the low bits of `value`. A mode that does not exist changes nothing.
     pub(super) fn set(&mut self, set_point: SetPoint, value: u64) {
         match set_point {
             SetPoint::Controlword => self.controlword = value as u16,
-            SetPoint::Mode => self.mode = mode(value as i8).unwrap_or(self.mode),
+            SetPoint::Mode => self.mode = Operation::of(value as i8).unwrap_or(self.mode),
             SetPoint::Counter => self.counter = Some(value as u8),
             SetPoint::TargetTorque => (self.torque, self.targets.torque) = (value as i16, true),
             SetPoint::TorqueOffset => (self.torque_offset, self.targets.torque_offset) = (value as i16, true),
@@ -89,7 +125,23 @@ impl SetPoints {
             SetPoint::ImpedanceFrame => (self.impedance, self.targets.impedance) = (value, true),
             SetPoint::CoupledVelocity => self.coupled = value as i32,
             SetPoint::OpenLoop => self.open_loop = Frame::from_bits(value),
+            SetPoint::ProfileVelocity
+            | SetPoint::ProfileAcceleration
+            | SetPoint::ProfileDeceleration
+            | SetPoint::MaxTorque
+            | SetPoint::PositionOffset
+            | SetPoint::VelocityOffset => {
+                if let Some(place) = self.more.get_mut(set_point as usize - FIRST_OF_PROFILES) {
+                    *place = value as u32;
+                }
+            }
         }
+    }
+
+    /// One of the profile modes', raw.
+    fn more(&self, set_point: SetPoint) -> u32 {
+        let number = set_point as usize - FIRST_OF_PROFILES;
+        self.more.get(number).copied().unwrap_or(MORE[number])
     }
 
     /// A position by SDO is meant: it counts also where it is the one that was there.
@@ -100,11 +152,13 @@ impl SetPoints {
     /// Whether there is a target for the mode, and nothing halts the joint.
     fn follows(&self) -> bool {
         let target = match self.mode {
-            Mode::Torque => self.targets.torque,
-            Mode::Velocity => self.targets.velocity,
-            Mode::Position => self.targets.position,
-            Mode::Impedance => self.targets.impedance,
-            Mode::OpenLoop | Mode::Hold => false,
+            Operation::Torque => self.targets.torque,
+            Operation::ProfileVelocity if !PROFILES => false,
+            Operation::Velocity | Operation::ProfileVelocity => self.targets.velocity,
+            Operation::Position => self.targets.position,
+            Operation::ProfilePosition => self.positions.iter().any(|positions| positions.target().is_some()),
+            Operation::Impedance => self.targets.impedance,
+            Operation::OpenLoop | Operation::None | Operation::Homing => false,
         };
         target && !Controlword(self.controlword).halts()
     }
@@ -113,7 +167,7 @@ impl SetPoints {
     pub(super) fn publish(&self, shared: &Shared) {
         for (set_point, value) in [
             (SetPoint::Controlword, self.controlword.into()),
-            (SetPoint::Mode, mode_number(self.mode) as u8 as u64),
+            (SetPoint::Mode, u64::from(self.mode.number() as u8)),
             (SetPoint::Counter, self.counter.unwrap_or(0).into()),
             (SetPoint::TargetTorque, self.torque as u64),
             (SetPoint::TargetPosition, self.position as u64),
@@ -125,11 +179,45 @@ impl SetPoints {
         ] {
             shared.copy(set_point, value);
         }
-        shared.set_follows(self.follows());
+        for (number, value) in (FIRST_OF_PROFILES..).zip(self.more) {
+            shared.copy_number(number, value.into());
+        }
+        for positions in &self.positions {
+            shared.set_profile_target(positions.target());
+        }
+        shared.set_follows(match self.mode {
+            Operation::ProfilePosition => self.positions.iter().any(Positions::are_acknowledged),
+            _ => self.follows(),
+        });
     }
 
     /// The command in SI units: to hold, where the mode's target has not come or halt is set.
     pub(super) fn command(&self, shared: &Shared) -> Command {
+        if !PROFILES {
+            return self.unlimited_command(shared);
+        }
+        let command = self.unlimited_command(shared);
+        let homing = shared.homing().filter(|_| self.mode == Operation::Homing && command.mode != Mode::Hold);
+        let (velocity, acceleration, deceleration) = match (self.mode, homing) {
+            (Operation::Homing, Some((_, speed, acceleration))) => (speed, acceleration, acceleration),
+            (Operation::ProfilePosition | Operation::ProfileVelocity, _) => (
+                self.more(SetPoint::ProfileVelocity),
+                self.more(SetPoint::ProfileAcceleration),
+                self.more(SetPoint::ProfileDeceleration),
+            ),
+            _ => (UNLIMITED, UNLIMITED, UNLIMITED),
+        };
+        let milli = |raw: u32| if raw == UNLIMITED { f32::INFINITY } else { 1e-3 * raw as f32 };
+        let torque = match self.more(SetPoint::MaxTorque) {
+            permille @ ..1_000 => permille as f32 * (1e-3 * shared.rated_torque()),
+            _ => f32::INFINITY,
+        };
+        let limits = CommandLimits::new(milli(velocity), milli(acceleration), milli(deceleration), torque);
+        Command { limits, ..command }
+    }
+
+    /// The same without the limits that come with it.
+    fn unlimited_command(&self, shared: &Shared) -> Command {
         let torque = |counts: bool, value: i16| {
             if counts { f32::from(value) * (1e-3 * shared.rated_torque()) } else { 0.0 }
         };
@@ -137,51 +225,53 @@ impl SetPoints {
         let offset = torque(self.targets.torque_offset, self.torque_offset);
         // Who does not say what holds the joint may mean gravity by the target.
         let push = if self.targets.torque_offset { target } else { 0.0 };
-        let plain = Command { mode: self.mode, torque: target + offset, push, ..Command::NOTHING };
+        let plain = Command { mode: self.mode.of_the_joint(), torque: target + offset, push, ..Command::NOTHING };
+        let halts = Controlword(self.controlword).halts();
         match self.mode {
-            Mode::OpenLoop if Controlword(self.controlword).halts() => Command { mode: self.mode, ..Command::NOTHING },
-            Mode::OpenLoop => Command { mode: self.mode, open_loop: self.open_loop, ..Command::NOTHING },
+            Operation::Homing | Operation::ProfilePosition | Operation::ProfileVelocity if !PROFILES => {
+                Command::NOTHING
+            }
+            Operation::OpenLoop if halts => Command { mode: Mode::OpenLoop, ..Command::NOTHING },
+            Operation::OpenLoop => Command { mode: Mode::OpenLoop, open_loop: self.open_loop, ..Command::NOTHING },
+            Operation::Homing => match shared.homing() {
+                Some((position, ..)) if !halts => Command { mode: Mode::Profile, position, ..plain },
+                _ => plain,
+            },
             // What bears a load goes on bearing it.
-            Mode::Velocity | Mode::Position if !self.follows() => Command { mode: Mode::Hold, ..plain },
+            Operation::Velocity | Operation::Position | Operation::ProfileVelocity | Operation::ProfilePosition
+                if !self.follows() =>
+            {
+                Command { mode: Mode::Hold, ..plain }
+            }
             _ if !self.follows() => Command { mode: Mode::Hold, torque: offset, ..Command::NOTHING },
-            Mode::Torque | Mode::Hold => plain,
-            Mode::Velocity => Command { velocity: 1e-3 * self.velocity as f32, ..plain },
-            Mode::Position => Command { position: 1e-6 * self.position as f32, ..plain },
-            Mode::Impedance => {
+            Operation::Torque | Operation::None => plain,
+            Operation::Velocity | Operation::ProfileVelocity => {
+                let offset = self.offset(Operation::Velocity, SetPoint::VelocityOffset);
+                Command { velocity: 1e-3 * self.velocity.saturating_add(offset) as f32, ..plain }
+            }
+            Operation::Position => {
+                let offset = self.offset(Operation::Position, SetPoint::PositionOffset);
+                Command { position: 1e-6 * self.position.saturating_add(offset) as f32, ..plain }
+            }
+            Operation::ProfilePosition => {
+                let target = self.positions.iter().find_map(Positions::target).map_or(0, |(target, _)| target);
+                Command { position: 1e-6 * target as f32, ..plain }
+            }
+            Operation::Impedance => {
                 let framed = impedance(self.impedance, |range| shared.range(range));
                 Command { torque: framed.torque + offset, ..framed }
             }
         }
     }
 
+    /// What is added to the target of one mode, raw.
+    fn offset(&self, mode: Operation, set_point: SetPoint) -> i32 {
+        if PROFILES && self.mode == mode { self.more(set_point) as i32 } else { 0 }
+    }
+
     /// rad/s.
     pub(super) fn coupled_velocity(&self) -> f32 {
         1e-3 * self.coupled as f32
-    }
-}
-
-/// The mode of a number of object 6060h.
-pub(super) const fn mode(number: i8) -> Option<Mode> {
-    Some(match number {
-        8 => Mode::Position,
-        9 => Mode::Velocity,
-        10 => Mode::Torque,
-        -1 => Mode::Impedance,
-        -2 => Mode::OpenLoop,
-        0 => Mode::Hold,
-        _ => return None,
-    })
-}
-
-/// The number of a mode.
-pub(super) const fn mode_number(mode: Mode) -> i8 {
-    match mode {
-        Mode::Position => 8,
-        Mode::Velocity => 9,
-        Mode::Torque => 10,
-        Mode::Impedance => -1,
-        Mode::OpenLoop => -2,
-        Mode::Hold => 0,
     }
 }
 

@@ -121,6 +121,32 @@ const fn within(low: f64, high: f64) -> Option<(f64, f64)> {
     Some((low, high))
 }
 
+/// Whether an object is there for the profile modes, homing or the limits and offsets of a command: not every program
+/// has these ([`PROFILES`](crate::joint::PROFILES)).
+pub const fn is_of_profiles(object: &Object) -> bool {
+    use super::field::{Actual, SetPoint};
+    matches!(
+        object.field,
+        Field::Profile(_)
+            | Field::Milli(_)
+            | Field::Micro(_)
+            | Field::SetPoint(
+                SetPoint::ProfileVelocity
+                    | SetPoint::ProfileAcceleration
+                    | SetPoint::ProfileDeceleration
+                    | SetPoint::MaxTorque
+                    | SetPoint::PositionOffset
+                    | SetPoint::VelocityOffset
+            )
+            | Field::Actual(Actual::PositionDemand | Actual::FollowingError | Actual::Current | Actual::DcLink)
+    )
+}
+
+/// Whether this program has the row.
+const fn is_there(object: &Object) -> bool {
+    crate::joint::PROFILES || !is_of_profiles(object)
+}
+
 /// Rows of a room.
 #[derive(Clone, Copy)]
 struct Room {
@@ -185,7 +211,9 @@ const fn length(rooms: &[Room]) -> usize {
     while room < rooms.len() {
         let mut row = 0;
         while row < rooms[room].objects.len() {
-            length += 1 + begins_record(rooms[room].objects, row) as usize;
+            if is_there(&rooms[room].objects[row]) {
+                length += 1 + begins_record(rooms[room].objects, row) as usize;
+            }
             row += 1;
         }
         room += 1;
@@ -202,6 +230,10 @@ const fn join<const N: usize>(rooms: &[Room]) -> ([Object; N], [Text; N]) {
         let Room { objects: rows, texts: words } = rooms[room];
         let mut row = 0;
         while row < rows.len() {
+            if !is_there(&rows[row]) {
+                row += 1;
+                continue;
+            }
             if begins_record(rows, row) {
                 let mut last = row;
                 while last + 1 < rows.len() && rows[last + 1].index == rows[row].index {

@@ -267,7 +267,9 @@ fn set_points_by_sdo_need_operational_and_a_mode_does_not() {
         assert_eq!(node.download(index, 0, value), Err(0x0800_0022), "{index:04x}");
     }
     set_mode(&mut node, 9);
-    assert_eq!(node.download(0x6060, 0, &[3]), Err(0x0609_0030));
+    for mode in [-3, 2, 4, 5, 7, 11] {
+        assert_eq!(node.download(0x6060, 0, &[mode as u8]), Err(0x0609_0030), "{mode}");
+    }
     set_mode(&mut node, 0);
     set_mode(&mut node, 9);
     node.receive(0, &[1, NODE]);
@@ -319,7 +321,7 @@ fn a_counter_that_is_mapped_and_repeated_does_not_renew_the_deadline() {
 fn a_mode_that_does_not_exist_changes_nothing() {
     let mut node = Node::operational();
     node.receive(0x305, &rpdo2(0x0F, 9, 5));
-    node.receive(0x305, &rpdo2(0x0F, 3, 6));
+    node.receive(0x305, &rpdo2(0x0F, 4, 6));
     assert_eq!(node.image.demand().command, Command { mode: Mode::Velocity, velocity: 0.006, ..Command::default() });
 }
 

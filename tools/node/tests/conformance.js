@@ -8,7 +8,7 @@ const { Device, DataType } = require(require.resolve('canopen', { paths: [module
 const fs = require('fs');
 const { Slcan } = require('./slcan.js');
 
-const [TORQUE, VELOCITY, POSITION, IMPEDANCE] = [10, 9, 8, -1];
+const [TORQUE, VELOCITY, POSITION, IMPEDANCE, PROFILE_POSITION, HOMING] = [10, 9, 8, -1, 1, 6];
 const node = Number(id);
 
 function check(condition, text) {
@@ -162,6 +162,20 @@ async function modes() {
     const target = value('position') + 200000;
     const near = () => Math.abs(value('position') - target) < 10000;
     check(await until(near, 10, () => command(0x0f, 0, target)), 'a position is reached');
+    await enable(PROFILE_POSITION);
+    await write(500, DataType.UNSIGNED32, 0x6081);
+    const far = value('position') + 150000;
+    const taken = () => (value('statusword') & 0x1000) !== 0;
+    check(await until(taken, 10, () => command(0x1f, 0, far)), 'a set-point is taken');
+    check(await until(() => !taken(), 10, () => command(0x0f, 0, far)), 'and let go of');
+    check(await until(() => (value('statusword') & 0x400) !== 0, 10, cycle), 'its target is reached, which nobody renews');
+    check(Math.abs(value('position') - far) < 15000, 'where it should be');
+    await enable(HOMING);
+    await write(37, DataType.INTEGER8, 0x6098);
+    await write(100000, DataType.INTEGER32, 0x607c);
+    const homed = () => (value('statusword') & 0x3400) === 0x1400;
+    check(await until(homed, 10, () => command(0x1f)), 'the joint is homed where it is');
+    check(Math.abs(value('position') - 100000) < 5000, 'which has the home offset');
     await disable();
     const ranges = [12.5, 65, 500, 50, 18];
     await write(ranges[3], DataType.REAL32, 0x2012, 4);

@@ -35,6 +35,9 @@ def dictionary():
         (0x6071, "target torque", datatypes.INTEGER16),
         (0x6077, "torque", datatypes.INTEGER16),
         (0x607A, "target position", datatypes.INTEGER32),
+        (0x607C, "home offset", datatypes.INTEGER32),
+        (0x6081, "profile velocity", datatypes.UNSIGNED32),
+        (0x6098, "homing method", datatypes.INTEGER8),
         (0x60FF, "target velocity", datatypes.INTEGER32),
         (0x6502, "supported drive modes", datatypes.UNSIGNED32),
     ]:
@@ -134,6 +137,41 @@ for mode in ("CYCLIC SYNCHRONOUS POSITION", "CYCLIC SYNCHRONOUS VELOCITY", "CYCL
         node.rpdo[1].period = None
         node.rpdo[1]["target torque"].raw = 0
     node.state = "SWITCH ON DISABLED"
+
+node.sdo[0x6098].raw = 37
+node.sdo[0x607C].raw = 200_000
+check(node.homing(timeout=20), "the profile homes the joint where it is")
+check(abs(node.sdo[0x6064].raw - 200_000) < 20_000, "which has the home offset from then on")
+check(node.is_homed(), "and is homed")
+node.state = "SWITCH ON DISABLED"
+
+# A set-point, given once: nothing is sent while the joint moves there.
+node.op_mode = "PROFILED POSITION"
+node.state = "OPERATION ENABLED"
+node.sdo[0x6081].raw = 500
+begun = node.sdo[0x6064].raw
+for target in (begun + 300_000, begun):
+    node.rpdo[1]["target position"].raw = target
+    node.controlword = 0x1F
+    until(lambda: node.statusword & 0x1000, "a set-point is taken")
+    node.controlword = 0x0F
+    until(lambda: not node.statusword & 0x1000, "the next one may come")
+    until(lambda: node.statusword & 0x400, "its target is reached")
+    check(abs(node.sdo[0x6064].raw - target) < 20_000, "the joint is there")
+node.state = "SWITCH ON DISABLED"
+
+node.op_mode = "PROFILED VELOCITY"
+node.state = "OPERATION ENABLED"
+node.rpdo[2]["controlword"].raw = 0x0F
+for velocity in (400, 0):
+    node.rpdo[2]["target velocity"].raw = velocity
+    node.rpdo[2].start(0.01)
+    until(lambda: node.statusword & 0x400 and abs(node.sdo[0x606C].raw - velocity) < 100, f"{velocity} mrad/s is reached")
+    node.rpdo[2].stop()
+    node.rpdo[2].period = None
+check(node.statusword & 0x1000, "the joint stands")
+check(not emergencies, f"nothing was reported: {emergencies}")
+node.state = "SWITCH ON DISABLED"
 network.sync.stop()
 network.disconnect()
 print("done")

@@ -8,7 +8,7 @@ use joint_firmware::joint::configuration::MOTION_STEPS;
 use joint_firmware::joint::monitor::UNEXPLAINED_STEPS;
 use joint_firmware::joint::state_machine::{Controlword, State};
 use joint_firmware::joint::{
-    Active, Bridge, BridgeState, Command, Demand, Joint, Measurements, Mode, OFFSET_STEPS, Slow,
+    Active, Bridge, BridgeState, Command, CommandLimits, Demand, Joint, Measurements, Mode, OFFSET_STEPS, Slow,
 };
 use joint_firmware::motor::open_loop::Frame;
 use joint_firmware::motor::phases::Phases;
@@ -57,12 +57,20 @@ fn measurements() -> impl Strategy<Value = Measurements> {
 
 /// A mode with a torque.
 fn mode() -> impl Strategy<Value = Mode> {
-    prop_oneof![Just(Mode::Torque), Just(Mode::Velocity), Just(Mode::Position), Just(Mode::Impedance)]
+    prop_oneof![
+        Just(Mode::Torque),
+        Just(Mode::Velocity),
+        Just(Mode::Position),
+        Just(Mode::Profile),
+        Just(Mode::Hold),
+        Just(Mode::Impedance)
+    ]
 }
 
 fn command(mode: impl Strategy<Value = Mode>) -> impl Strategy<Value = Command> {
-    (mode, number(), number(), number(), number(), number(), number(), any::<u64>()).prop_map(
-        |(mode, position, velocity, torque, push, stiffness, damping, frame)| Command {
+    let limits = [number(), number(), number(), number()].prop_map(|[v, a, d, t]| CommandLimits::new(v, a, d, t));
+    (mode, number(), number(), number(), number(), number(), number(), limits, any::<u64>()).prop_map(
+        |(mode, position, velocity, torque, push, stiffness, damping, limits, frame)| Command {
             mode,
             position,
             velocity,
@@ -70,6 +78,7 @@ fn command(mode: impl Strategy<Value = Mode>) -> impl Strategy<Value = Command> 
             push,
             stiffness,
             damping,
+            limits,
             open_loop: Frame::from_bits(frame),
         },
     )

@@ -130,7 +130,7 @@ impl BusYml {
 
 /// An entry of the file; joints of one identity share an EDS.
 fn joint(node: u8, identity: Identity, serial: u32) -> Joint {
-    let Identity { vendor, product, revision } = identity;
+    let Identity { vendor, product, revision, .. } = identity;
     let eds = match identity == Identity::default() {
         true => "joint.eds".into(),
         false => format!("joint-{vendor:x}-{product:x}-{revision:x}.eds"),

@@ -42,7 +42,9 @@ impl Eds {
 /// Vendor, product and revision of a joint, as its object 1018h says.
 pub(super) fn identity(joint: &RemoteJoint) -> Result<eds::Identity, CommandError> {
     let number = |sub_index| joint.node().number(0x1018, sub_index).map(u32::from_le_bytes);
-    let read = || Ok(eds::Identity { vendor: number(1)?, product: number(2)?, revision: number(3)? });
+    let modes = || joint.node().number(0x6502, 0).map(u32::from_le_bytes);
+    let read =
+        || Ok(eds::Identity { vendor: number(1)?, product: number(2)?, revision: number(3)?, modes: Some(modes()?) });
     read().map_err(|error: ClientError| crate::remote::RemoteError::from(error).into())
 }
 

@@ -162,7 +162,7 @@ mod tests {
 
     #[test]
     fn a_joint_is_written_with_its_identity_its_scales_and_its_pdos() {
-        let identity = Identity { vendor: 0, product: 0x564A_6E74, revision: 1 };
+        let identity = Identity { vendor: 0, product: 0x564A_6E74, revision: 1, modes: None };
         let text = text(Master { node: 1, period: 10 }, &[joint(5, identity, 12), joint(7, Identity::default(), 0)]);
         let (master, rest) = text.split_once("\njoint_5:\n").unwrap();
         let (five, seven) = rest.split_once("\njoint_7:\n").unwrap();

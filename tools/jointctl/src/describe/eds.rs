@@ -7,9 +7,10 @@
 use super::plain;
 use crate::remote::Entry;
 use joint_firmware::canopen::{Access, CommunicationParameters, PDOS, PdoParameters};
+use joint_firmware::objects::Operation;
 use joint_firmware::objects::default_communication;
-use joint_firmware::objects::field::Field;
-use joint_firmware::objects::table::DataType;
+use joint_firmware::objects::field::{Constant, Field};
+use joint_firmware::objects::table::{DataType, is_of_profiles};
 use std::fmt::Write;
 use std::time::Duration;
 
@@ -27,6 +28,16 @@ pub struct Identity {
     pub product: u32,
     /// 1018h:3.
     pub revision: u32,
+    /// 6502h of a joint that is known.
+    pub modes: Option<u32>,
+}
+
+impl Identity {
+    /// Whether the joint has this object.
+    fn has(&self, entries: &[Entry], index: u16) -> bool {
+        let mut of_index = entries.iter().filter(|entry| entry.object.index == index);
+        self.modes.is_none_or(Operation::has_profiles) || !of_index.any(|entry| is_of_profiles(entry.object))
+    }
 }
 
 /// The file's content. `name` is that of the file, `now` the time since 1970-01-01 UTC for the file's dates; `identity` is
@@ -48,7 +59,7 @@ fn write(text: &mut String, name: &str, now: Duration, identity: Identity) -> st
     let program = concat!("jointctl ", env!("CARGO_PKG_VERSION"));
     writeln!(text, "CreatedBy={program}\nModifiedBy={program}\n")?;
 
-    let Identity { vendor, product, revision } = identity;
+    let Identity { vendor, product, revision, .. } = identity;
     writeln!(text, "[DeviceInfo]\nVendorName=\nVendorNumber=0x{vendor:X}\nProductName=joint")?;
     writeln!(text, "ProductNumber=0x{product:X}\nRevisionNumber=0x{revision:X}\nOrderCode=")?;
     for rate in [10, 20, 50, 125, 250, 500, 800, 1000] {
@@ -66,6 +77,7 @@ fn write(text: &mut String, name: &str, now: Duration, identity: Identity) -> st
     let entries = Entry::all().collect::<Vec<_>>();
     let mut indices = entries.iter().map(|entry| entry.object.index).collect::<Vec<_>>();
     indices.dedup();
+    indices.retain(|index| identity.has(&entries, *index));
     let is_mandatory = |index: &u16| matches!(*index, 0x1000 | 0x1001 | 0x1018);
     let is_manufacturers = |index: &u16| (0x2000..0x6000).contains(index);
     list(text, "MandatoryObjects", indices.iter().copied().filter(is_mandatory))?;
@@ -164,7 +176,9 @@ fn default(entry: &Entry, defaults: &CommunicationParameters, identity: Identity
     let by_node = |cob_id: u32| Some(format!("$NODEID+0x{cob_id:X}"));
     let number = |number: u32| Some(format!("0x{number:X}"));
     match (object.field, object.index, object.sub_index) {
-        (Field::Constant(constant), ..) => Some(constant.number().to_string()),
+        (Field::Constant(constant @ Constant::SupportedModes), ..) => {
+            Some(identity.modes.map_or(constant.number().to_string(), |modes| modes.to_string()))
+        }
         (Field::Highest(highest), ..) => number(highest.into()),
         (Field::Server, 0x1000, 0) => number(crate::remote::joint::DEVICE_TYPE),
         (Field::Server, 0x1005, 0) => number(defaults.sync_cob_id),
@@ -243,7 +257,7 @@ mod tests {
 
     #[test]
     fn the_file_is_ascii_and_has_a_section_for_every_entry() {
-        let identity = Identity { vendor: 0, product: 0x564A_6E74, revision: 1 };
+        let identity = Identity { vendor: 0, product: 0x564A_6E74, revision: 1, modes: None };
         let text = text("joint.eds", Duration::ZERO, identity);
         assert!(text.is_ascii());
         assert!(text.contains("\nVendorNumber=0x0\nProductName=joint\nProductNumber=0x564A6E74\nRevisionNumber=0x1\n"));
@@ -262,6 +276,25 @@ mod tests {
         assert!(of("2103subB").contains("\n;LowLimit=0.001\n;HighLimit=10\n"), "{}", of("2103subB"));
         assert!(!of("2210").contains("PDOMapping"), "{}", of("2210"));
         assert!(of("1018sub2").contains("DefaultValue=0x564A6E74"), "{}", of("1018sub2"));
+        assert!(of("6502").contains(&format!("DefaultValue={}\n", Operation::SUPPORTED)), "{}", of("6502"));
         assert!(of("6060").contains("AccessType=rww\nPDOMapping=1\nLowLimit=-2\nHighLimit=10"), "{}", of("6060"));
+    }
+    #[test]
+    fn a_joint_without_profile_modes_has_none_of_their_objects() {
+        let without = Identity { modes: Some(0x0003_0380), ..Identity::default() };
+        let [with, without] =
+            [Identity::default(), without].map(|identity| text("joint.eds", Duration::ZERO, identity));
+        let sections = |text: &str| text.lines().filter(|line| line.starts_with('[')).count();
+        let of_profiles = Entry::all().filter(|entry| is_of_profiles(entry.object)).count();
+        // And two records with their number of entries.
+        assert_eq!(sections(&with) - sections(&without), of_profiles + 4);
+        for index in ["6081", "607Dsub0", "6099sub2", "60F4", "6072"] {
+            assert!(
+                with.contains(&format!("\n[{index}]\n")) && !without.contains(&format!("\n[{index}]\n")),
+                "{index}"
+            );
+        }
+        assert!(!without.contains("=0x6081\n") && without.contains("=0x607A\n"));
+        assert!(without.contains("DefaultValue=197504\n"), "6502h");
     }
 }

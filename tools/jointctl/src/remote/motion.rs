@@ -81,7 +81,7 @@ impl Motion {
         both("a torque", torque, "Nm", Setting::TorqueLimit)?;
         match mode {
             Mode::Torque => return Ok(()),
-            Mode::OpenLoop | Mode::Hold => return Err(super::stream::no_set_points()),
+            Mode::OpenLoop | Mode::Hold | Mode::Profile => return Err(super::stream::no_set_points()),
             Mode::Velocity => return both("a velocity", velocity, "rad/s", Setting::VelocityLimit),
             Mode::Position | Mode::Impedance => {}
         }

@@ -16,7 +16,7 @@ use joint_firmware::joint::state_machine::{Controlword, State};
 use joint_firmware::joint::{Command, Mode};
 use joint_firmware::objects::field::{Actual, Field, RANGES, Range, SetPoint};
 use joint_firmware::objects::settings::Setting;
-use joint_firmware::objects::{default_communication, impedance_frame};
+use joint_firmware::objects::{Operation, default_communication, impedance_frame};
 use std::sync::atomic::{AtomicU16, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -32,15 +32,16 @@ const DRIVE: u8 = 0;
 const VELOCITY: u8 = 1;
 const IMPEDANCE: u8 = 2;
 
-/// The number of a mode in object 6060h.
-fn mode_number(mode: Mode) -> i8 {
+/// The mode of operation in which a master streams a mode's set-points.
+fn operation(mode: Mode) -> Operation {
     match mode {
-        Mode::Position => 8,
-        Mode::Velocity => 9,
-        Mode::Torque => 10,
-        Mode::Impedance => -1,
-        Mode::OpenLoop => -2,
-        Mode::Hold => 0,
+        Mode::Position => Operation::Position,
+        Mode::Profile => Operation::ProfilePosition,
+        Mode::Velocity => Operation::Velocity,
+        Mode::Torque => Operation::Torque,
+        Mode::Impedance => Operation::Impedance,
+        Mode::OpenLoop => Operation::OpenLoop,
+        Mode::Hold => Operation::None,
     }
 }
 
@@ -77,7 +78,7 @@ impl Encoder {
             let Some(entry) = Entry::at(object.index(), object.sub_index()) else { return 0 };
             match entry.object.field {
                 Field::SetPoint(SetPoint::Controlword) => controlword.0.into(),
-                Field::SetPoint(SetPoint::Mode) => mode_number(self.mode) as u8 as u64,
+                Field::SetPoint(SetPoint::Mode) => u64::from(operation(self.mode).number() as u8),
                 Field::SetPoint(SetPoint::Counter) => self.counter.into(),
                 Field::SetPoint(SetPoint::TargetTorque) => {
                     entry.saturate(f64::from(command.torque) / self.rated_torque)
@@ -158,14 +159,14 @@ impl Stream {
             Mode::Torque | Mode::Position => &[DRIVE],
             Mode::Velocity => &[VELOCITY],
             Mode::Impedance => &[DRIVE, IMPEDANCE],
-            Mode::OpenLoop | Mode::Hold => return Err(no_set_points()),
+            Mode::OpenLoop | Mode::Hold | Mode::Profile => return Err(no_set_points()),
         };
         for pdo in Pdo::all(Direction::Receive).into_iter().filter(|pdo| needed.contains(&pdo.number)) {
             if let Some(wanted) = defaults.get(usize::from(pdo.number)) {
                 stream.changes.push(pdo.ensure(joint, wanted)?);
             }
         }
-        joint.write_raw(Field::SetPoint(SetPoint::Mode), mode_number(mode) as u8 as u64)?;
+        joint.write_raw(Field::SetPoint(SetPoint::Mode), u64::from(operation(mode).number() as u8))?;
         stream.commanding = true;
         joint.nmt(Nmt::Start, NmtState::Operational)?;
         let encoder = encoder_of(&stream.changes)?;
