@@ -8,6 +8,7 @@ mod commission;
 mod configuration;
 mod images;
 mod motion;
+mod readme;
 mod refused;
 mod retrain;
 mod served;
@@ -58,6 +59,9 @@ fn main() {
             braking_may_take_longer_than_the_command_deadline,
             a_master_that_dies_leaves_a_fault_that_is_named_and_acknowledged_only_when_asked,
             disable_stops_a_joint_that_somebody_else_moves,
+        }
+        readme {
+            the_section_on_the_bus_runs_line_by_line,
         }
         refused {
             a_wrong_node_id_is_told_from_a_bus_where_nobody_is,
