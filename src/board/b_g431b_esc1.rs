@@ -389,6 +389,11 @@ pub const fn is_started() -> bool {
 #[inline(always)]
 pub const fn ask_reset(_waits: bool) {}
 
+/// Whether the button is pressed, which says that somebody is at the joint; it stops the bridge, too.
+pub fn button() -> Option<bool> {
+    Some(pac::GPIOC.idr().read().idr(10) == pac::gpio::vals::Idr::LOW)
+}
+
 /// What the board tells of its hardware.
 pub fn hardware() -> Hardware {
     Hardware { options: super::options::found(), ..Hardware::default() }

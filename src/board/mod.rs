@@ -24,6 +24,7 @@ pub mod memory;
 pub mod options;
 pub mod oscillator;
 pub mod pwm;
+pub mod random;
 pub mod shadow;
 mod shared;
 pub mod watchdog;

@@ -191,6 +191,11 @@ pub fn start(mut p: Peripherals) -> Result<Parts, StartError> {
     Ok(parts)
 }
 
+/// There is no button.
+pub const fn button() -> Option<bool> {
+    None
+}
+
 /// What the board tells of its hardware.
 pub fn hardware() -> Hardware {
     Hardware { driver: gate::report(), revision: REVISION.load(Ordering::Relaxed), options: super::options::found() }

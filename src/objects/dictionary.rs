@@ -1,13 +1,17 @@
 //! The joint's objects as [`canopen`](crate::canopen) asks for them; the task.
 
+mod guarded;
+
 use super::emergency::{Emergency, LOST, LOST_BIT, Reports, of_refusal};
 use super::field::{
-    ConfigurationField, Field, HardwareField, ImageField, OpenLoopField, RANGES, Range, ResetField, SetPoint,
+    ConfigurationField, Field, HardwareField, ImageField, OpenLoopField, OwnerField, ProfileParameter, RANGES, Range,
+    ResetField, SetPoint,
 };
 use super::images::{Circumstances, Failure, Images, StoredImages, abort};
 use super::number::to_i32;
 use super::observed::{Observed, signed};
 use super::operation::Operation;
+use super::ownership::{SESSIONS, UPLOAD};
 use super::profile_modes::{PROFILE_MODES, ProfileModes, Wish};
 use super::program::{NotConfigured, Program};
 use super::refused::Refused;
@@ -22,7 +26,7 @@ use crate::joint::configuration::Configuration;
 use crate::joint::state_machine::State;
 use crate::motor::number::exceeds;
 use crate::motor::open_loop::Window;
-use crate::parameters::authentication::{KEY, STAGING};
+use crate::parameters::authentication::{CHALLENGE, STAGING, TAG};
 use crate::parameters::life_cycle::{Action, LifeCycle, Refusal};
 use crate::parameters::slots::SlotError;
 use core::cell::Cell;
@@ -64,6 +68,8 @@ pub struct Objects<'a, P> {
     heartbeat_lost: bool,
     /// Whether the start has been reported.
     told_reset: bool,
+    /// Whether a master has started the node since the program began.
+    was_started: bool,
     /// As it was when communication began; what is stored holds for it.
     node_id: Cell<u8>,
     reports: Reports,
@@ -73,8 +79,9 @@ pub struct Objects<'a, P> {
 
 impl<'a, P: Program> Objects<'a, P> {
     /// One for each [`Shared`].
-    pub fn new(shared: &'a Shared, program: P, images: Images<'a>, start: &Start) -> Self {
+    pub fn new(shared: &'a Shared, program: P, mut images: Images<'a>, start: &Start) -> Self {
         let Start { configuration, ranges, single_bank } = *start;
+        images.owner.note(&configuration);
         for (range, value) in Range::ALL.into_iter().zip(ranges) {
             shared.set_range(range, value);
         }
@@ -93,6 +100,7 @@ impl<'a, P: Program> Objects<'a, P> {
             now: 0,
             heartbeat_lost: false,
             told_reset: false,
+            was_started: false,
             node_id: Cell::new(0),
             reports: Reports::default(),
             profile_modes: [ProfileModes::NOTHING; PROFILE_MODES],
@@ -107,6 +115,7 @@ impl<'a, P: Program> Objects<'a, P> {
     pub fn restart(&mut self, life: LifeCycle, stored_images: StoredImages, start: &Start) {
         let Start { configuration, ranges, single_bank } = *start;
         self.images.restart(life, stored_images);
+        self.images.owner.note(&configuration);
         (self.configuration, self.staged, self.refused) = (configuration, configuration, Refused::default());
         self.single_bank = single_bank;
         (self.heartbeat_lost, self.told_reset) = (false, false);
@@ -193,11 +202,6 @@ impl<'a, P: Program> Objects<'a, P> {
         self.publish();
     }
 
-    fn keep(&mut self) -> Result<(), SlotError> {
-        let life = self.images.life();
-        self.program.keep(life.floor(), life.failures())
-    }
-
     fn publish(&self) {
         self.shared.set_image(self.images.version(), self.images.state());
     }
@@ -254,6 +258,7 @@ impl<'a, P: Program> Objects<'a, P> {
         match field {
             Field::Image(ImageField::Active) => self.images.active_length(),
             Field::Image(ImageField::Staging) => self.images.life().length() as u32,
+            Field::Owner(OwnerField::Challenge) => CHALLENGE as u32,
             Field::History => self.program.history(history::length).unwrap_or(0),
             Field::Reset(_) => last_reset::place(&self.program.last_reset()).len() as u32,
             _ => 0,
@@ -282,6 +287,7 @@ impl<'a, P: Program> Objects<'a, P> {
                 open_loop::get(&self.window.get(), self.program.bridge(), part)
             }
             Field::Image(part) => self.images.get(part, self.now).into(),
+            Field::Owner(part) => self.images.owner.get(part, self.is_present(), self.now).into(),
             Field::Reset(part) => last_reset::get(&self.program.last_reset(), part).into(),
             Field::Hardware(part) => hardware::get(&self.program.hardware(), part).into(),
             Field::Server | Field::History => 0,
@@ -341,6 +347,7 @@ impl<'a, P: Program> Objects<'a, P> {
         match command {
             1 if self.armed() => Err(Abort::DEVICE_STATE),
             1 => {
+                self.authorise()?;
                 let staged = self.staged;
                 self.configure(&staged)
             }
@@ -355,39 +362,20 @@ impl<'a, P: Program> Objects<'a, P> {
 
     #[inline(never)]
     fn write_at_once(&mut self, setting: Setting, number: u32) -> Result<(), Abort> {
+        if !self.images.owner.is_lowered(setting, number) {
+            self.authorise()?;
+        }
         let mut configuration = self.configuration;
         if !setting.set(&mut configuration, number) {
             return Err(Abort::VALUE);
         }
         self.configure(&configuration)?;
+        if self.authorise().is_ok() {
+            self.images.owner.note(&configuration);
+        }
         self.staged.compensation = configuration.compensation;
         self.staged.stops = configuration.stops;
         Ok(())
-    }
-
-    #[inline(never)]
-    fn write_image(&mut self, field: ImageField, number: u32) -> Result<(), Abort> {
-        let (floor, failures) = (self.images.life().floor(), self.images.life().failures());
-        let result = match field {
-            ImageField::Command => self.images.command(number as u8, self.circumstances()),
-            ImageField::TrialTime => self.images.set_trial_time(number),
-            _ => return Err(Abort::READ_ONLY),
-        };
-        if matches!(field, ImageField::Command) {
-            self.heartbeat_lost = false;
-        }
-        let (risen, count) = (self.images.life().floor() != floor, self.images.life().failures());
-        // Whoever sends wrong tags on and on must not wear the flash out.
-        let counted = count != failures && count.is_power_of_two() && !(self.single_bank && self.needs_control());
-        let kept = if risen || counted { self.keep() } else { Ok(()) };
-        if let (true, Err(error)) = (risen, kept) {
-            // The image comes after its floor, or not at all.
-            let _ = self.images.take_action();
-            let _ = self.images.finished(Err(error), self.observed.latched);
-        }
-        self.publish();
-        result.map_err(|refusal| self.refuse(refusal))?;
-        kept.map_err(|error| self.refuse(error.into()))
     }
 
     /// Sets the chip's option bytes, where `command` is the one that does.
@@ -395,6 +383,7 @@ impl<'a, P: Program> Objects<'a, P> {
         if command != COMMAND {
             return Err(Abort::VALUE);
         }
+        self.authorise()?;
         if self.needs_control() || !self.program.set_options() {
             return Err(Abort::DEVICE_STATE);
         }
@@ -404,7 +393,7 @@ impl<'a, P: Program> Objects<'a, P> {
     /// A function of its own: the record is more than 1 KiB of stack.
     #[inline(never)]
     fn store_record(&mut self, update: &Update) -> Result<(), Abort> {
-        if self.single_bank && self.needs_control() {
+        if !self.is_writable() {
             return Err(Abort::DEVICE_STATE);
         }
         let mut record = [0; RECORD];
@@ -430,7 +419,8 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
                 readable: self.readable(object.field),
                 writable: match object.field {
                     Field::Image(ImageField::Staging) => STAGING as u32,
-                    Field::Image(ImageField::Key) => KEY as u32,
+                    Field::Owner(OwnerField::Key) => UPLOAD as u32,
+                    Field::Owner(OwnerField::Response) => TAG as u32,
                     _ => 0,
                 },
             },
@@ -448,6 +438,11 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
                 self.images.is_same_image(offset) && self.program.read_image(offset, out)
             }
             Field::Image(ImageField::Staging) => self.images.read_staged(offset, out),
+            Field::Owner(OwnerField::Challenge) => {
+                let draw = || if SESSIONS { self.program.random() } else { None };
+                let challenge = self.images.owner.challenge(draw);
+                challenge.is_some_and(|bytes| history::copy(&bytes, offset, out))
+            }
             Field::History => self.program.history(|steps| history::read(steps, offset, out)).unwrap_or(false),
             Field::Reset(ResetField::Place) => {
                 history::copy(last_reset::place(&self.program.last_reset()), offset, out)
@@ -470,22 +465,24 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
             Field::SetPoint(set_point) => self.write_set_point(set_point, number),
             Field::Range(range) => self.write_range(range, f32::from_bits(word)),
             Field::Setting(setting) => {
-                if setting.set(&mut self.staged, word) {
-                    Ok(())
-                } else {
-                    Err(Abort::VALUE)
-                }
+                self.authorise()?;
+                if setting.set(&mut self.staged, word) { Ok(()) } else { Err(Abort::VALUE) }
             }
             Field::AtOnce(setting) => self.write_at_once(setting, word),
             Field::Profile(parameter) if PROFILES => {
                 if !parameter.permits(word) {
                     return Err(Abort::VALUE);
                 }
+                // These move the joint's zero, and its limits with it.
+                if matches!(parameter, ProfileParameter::HomingMethod | ProfileParameter::HomeOffset) {
+                    self.authorise()?;
+                }
                 self.shared.set_parameter(parameter, word);
                 Ok(())
             }
             Field::Configuration(ConfigurationField::Command) => self.command_configuration(word),
             Field::Image(field) => self.write_image(field, word),
+            Field::Owner(field) => self.write_owner(field, word),
             Field::Hardware(HardwareField::SetOptions) => self.set_options(word),
             _ => Err(Abort::READ_ONLY),
         }
@@ -493,13 +490,25 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
 
     fn open(&mut self, index: u16, sub_index: u8, length: Option<u32>) -> Result<(), Abort> {
         let object = table::find(index, sub_index).ok_or(Abort::NO_OBJECT)?;
-        let Field::Image(field) = object.field else { return Err(Abort::READ_ONLY) };
-        let result = self.images.open(field, length);
+        let result = match object.field {
+            Field::Image(ImageField::Staging) => {
+                self.images.owner.abandon();
+                self.images.open(length).map_err(Failure::Refused)
+            }
+            Field::Owner(field) => {
+                self.images.end();
+                self.images.owner.open(field).map_err(Failure::Abort)
+            }
+            _ => Err(Failure::Abort(Abort::READ_ONLY)),
+        };
         self.publish();
         result.map_err(|failure| self.fail(failure))
     }
 
     fn append(&mut self, _offset: u32, bytes: &[u8]) -> Result<(), Abort> {
+        if self.images.owner.is_receiving() {
+            return self.images.owner.append(bytes);
+        }
         let result = self.images.append(bytes);
         self.publish();
         result.map_err(|failure| self.fail(failure))
@@ -507,22 +516,21 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
 
     #[inline(never)]
     fn finish(&mut self) -> Result<(), Abort> {
-        if let Some(key) = self.images.finish().map_err(|failure| self.fail(failure))? {
-            if self.single_bank && self.needs_control() {
-                return Err(Abort::DEVICE_STATE);
-            }
-            self.program.provision(&key).map_err(|error| self.refuse(error.into()))?;
-            self.images.set_key(key);
+        if self.images.owner.is_receiving() {
+            return self.finish_owner();
         }
+        self.images.end();
         Ok(())
     }
 
     fn abandon(&mut self) {
-        self.images.abandon();
+        self.images.owner.abandon();
+        self.images.end();
     }
 
     #[inline(never)]
     fn store(&mut self, group: Group, communication: &CommunicationParameters) -> Result<(), Abort> {
+        self.authorise()?;
         let configuration = self.configuration;
         let ranges = Range::ALL.map(|range| self.shared.range(range));
         self.store_record(&Update {
@@ -534,6 +542,7 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
 
     #[inline(never)]
     fn restore(&mut self, group: Group) -> Result<(), Abort> {
+        self.authorise()?;
         self.store_record(&Update {
             node_id: None,
             application: part(group, Group::Application, Part::Removed),
@@ -564,6 +573,7 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
         match event {
             Event::State(state) => {
                 self.state = state;
+                self.was_started |= state == NmtState::Operational;
                 // Behind the boot-up message, which forgets what waits to be sent.
                 if !self.told_reset && state == NmtState::PreOperational {
                     self.told_reset = true;

@@ -35,6 +35,8 @@ pub enum Field {
     OpenLoop(OpenLoopField),
     /// The life of a parameter image.
     Image(ImageField),
+    /// Who owns the joint.
+    Owner(OwnerField),
     /// The control steps before a fault.
     History,
     /// Why the program started.
@@ -385,16 +387,31 @@ pub enum ImageField {
     Ending,
     /// A stored image.
     Stored(Which, StoredField),
-    /// Whether the joint has a key.
+    /// Lowest version that is taken.
+    Floor,
+    /// Wrong tags and responses so far.
+    Failures,
+}
+
+/// A part of the joint's ownership.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OwnerField {
+    /// Whether the joint has an owner.
     KeyPresent,
     /// Number of the key.
     KeyNumber,
-    /// Lowest version that is taken.
-    Floor,
-    /// Wrong tags so far.
-    Failures,
-    /// The key itself, once.
+    /// The key itself, to be written.
     Key,
+    /// What the next response answers.
+    Challenge,
+    /// Opens a session, or takes the key back.
+    Response,
+    /// What is left of the session; 0 ends it.
+    Session,
+    /// Whether somebody is at the joint.
+    Presence,
+    /// Takes the key back where somebody is.
+    Forget,
 }
 
 /// One of the two stored images.

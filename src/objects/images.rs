@@ -1,14 +1,15 @@
-//! Objects 2210h to 2215h: the image life cycle as a client sees it; the task.
+//! Objects 2210h to 2214h: the image life cycle as a client sees it; the task.
 //!
 //! A command that is accepted is answered at once; flash and control step are for the program to do afterwards ([`Images::take_action`],
 //! [`Images::finished`]), and the client polls the state.
 
 use super::emergency::{Emergency, of_refusal};
 use super::field::{ImageField, StoredField, Which};
+use super::ownership::Ownership;
 use crate::canopen::Abort;
 use crate::joint::fault::Faults;
 use crate::parameters::Summary;
-use crate::parameters::authentication::{KEY, Key, STAGING};
+use crate::parameters::authentication::STAGING;
 use crate::parameters::life_cycle::{Action, Conditions, Ending, LifeCycle, Refusal, State};
 use crate::parameters::slots::{Slot, SlotError};
 
@@ -29,46 +30,31 @@ pub(super) struct Circumstances {
     pub(super) single_bank: bool,
 }
 
-/// Where an upload goes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Upload {
-    Image,
-    Key { length: usize },
-}
-
-/// Life cycle, staging buffer and key.
+/// Life cycle, staging buffer and owner.
 #[derive(Debug)]
 pub struct Images<'a> {
     staging: &'a mut [u8; STAGING],
     life: LifeCycle,
-    key: Option<Key>,
-    locked: bool,
+    /// Whose key tags are checked with.
+    pub(super) owner: Ownership,
     stored: StoredImages,
     action: Action,
-    upload: Option<Upload>,
-    key_bytes: [u8; KEY],
+    uploads: bool,
     /// Of the image that is being read.
     reading: Option<u32>,
 }
 
 impl<'a> Images<'a> {
     /// From what was found at start.
-    pub fn new(staging: &'a mut [u8; STAGING], life: LifeCycle, key: Option<Key>, stored: StoredImages) -> Self {
-        let key_bytes = [0; KEY];
-        let (locked, action) = (false, Action::Nothing);
-        Self { staging, life, key, locked, stored, action, upload: None, key_bytes, reading: None }
+    pub fn new(staging: &'a mut [u8; STAGING], life: LifeCycle, owner: Ownership, stored: StoredImages) -> Self {
+        Self { staging, life, owner, stored, action: Action::Nothing, uploads: false, reading: None }
     }
 
-    /// The same, where the stored key is damaged: no image and no other key is taken.
-    pub fn lock(&mut self) {
-        self.locked = true;
-    }
-
-    /// As [`Images::new`], with the key that there is.
+    /// As [`Images::new`], with the owner that there is.
     pub(super) fn restart(&mut self, life: LifeCycle, stored: StoredImages) {
         (self.life, self.stored) = (life, stored);
-        (self.action, self.upload, self.reading) = (Action::Nothing, None, None);
-        self.key_bytes = [0; KEY];
+        (self.action, self.uploads, self.reading) = (Action::Nothing, false, None);
+        self.owner.close();
     }
 
     pub(super) fn state(&self) -> u8 {
@@ -119,7 +105,7 @@ impl<'a> Images<'a> {
     /// The value of an object that has one.
     pub(super) fn get(&self, field: ImageField, now: u64) -> u32 {
         match field {
-            ImageField::Staging | ImageField::Active | ImageField::Command | ImageField::Key => 0,
+            ImageField::Staging | ImageField::Active | ImageField::Command => 0,
             ImageField::Result => self.life.result().map_or(0, |refusal| refusal.code().into()),
             ImageField::Length => self.life.length() as u32,
             ImageField::Checksum => self.checksum(),
@@ -131,9 +117,7 @@ impl<'a> Images<'a> {
                 Some(Ending::Heartbeat) => 2,
             },
             ImageField::Stored(which, part) => self.stored_part(which, part),
-            ImageField::KeyPresent => (self.locked || self.key.is_some()).into(),
-            ImageField::KeyNumber => self.key.as_ref().map_or(0, Key::id),
-            ImageField::Floor => self.life.lowest(self.key.is_some()),
+            ImageField::Floor => self.life.lowest(self.owner.key().is_some()),
             ImageField::Failures => self.life.failures().into(),
         }
     }
@@ -164,7 +148,7 @@ impl<'a> Images<'a> {
     /// Carries a command out as far as the life cycle does.
     pub(super) fn command(&mut self, number: u8, circumstances: Circumstances) -> Result<(), Refusal> {
         let Circumstances { now, armed, single_bank } = circumstances;
-        let conditions = Conditions { now, armed, single_bank, key: self.key.as_ref(), locked: self.locked };
+        let conditions = Conditions { now, armed, single_bank, key: self.owner.key(), locked: self.owner.is_locked() };
         let action = self.life.command_number(number, self.staging, &conditions)?;
         if action != Action::Nothing {
             self.action = action;
@@ -176,56 +160,29 @@ impl<'a> Images<'a> {
         self.life.set_trial_time(time)
     }
 
-    pub(super) fn open(&mut self, field: ImageField, length: Option<u32>) -> Result<(), Failure> {
-        let length = length.map(|length| length as usize);
-        match field {
-            ImageField::Staging => {
-                self.life.begin(length)?;
-                self.upload = Some(Upload::Image);
-            }
-            ImageField::Key if self.locked || self.key.is_some() => return Err(Failure::Abort(Abort::LOCAL_CONTROL)),
-            ImageField::Key => self.upload = Some(Upload::Key { length: 0 }),
-            _ => return Err(Failure::Abort(Abort::READ_ONLY)),
-        }
+    pub(super) fn open(&mut self, length: Option<u32>) -> Result<(), Refusal> {
+        self.life.begin(length.map(|length| length as usize))?;
+        self.uploads = true;
         Ok(())
     }
 
     pub(super) fn append(&mut self, bytes: &[u8]) -> Result<(), Failure> {
-        match &mut self.upload {
-            Some(Upload::Image) => Ok(self.life.receive(self.staging, bytes)?),
-            Some(Upload::Key { length }) => {
-                let end = length.saturating_add(bytes.len());
-                let place = self.key_bytes.get_mut(*length..end).ok_or(Failure::Abort(Abort::TOO_LONG))?;
-                place.iter_mut().zip(bytes).for_each(|(place, byte)| *place = *byte);
-                *length = end;
-                Ok(())
-            }
-            None => Err(Failure::Abort(Abort::GENERAL)),
-        }
+        if self.uploads { Ok(self.life.receive(self.staging, bytes)?) } else { Err(Failure::Abort(Abort::GENERAL)) }
     }
 
-    /// The upload is whole; a key that came with it is to be kept and then given to [`Images::set_key`].
-    pub(super) fn finish(&mut self) -> Result<Option<Key>, Failure> {
-        let upload = self.upload.take();
-        let bytes = core::mem::replace(&mut self.key_bytes, [0; KEY]);
-        match upload {
-            Some(Upload::Key { length: KEY }) => {
-                let key = Key::provision(self.key.as_ref(), bytes);
-                Ok(Some(key.map_err(|_| Failure::Abort(Abort::VALUE))?))
-            }
-            Some(Upload::Key { .. }) => Err(Failure::Abort(Abort::TOO_SHORT)),
-            _ => Ok(None),
-        }
+    /// The upload is over. What has arrived of an image stays where it is, also where it is not whole: its length tells that, and verification
+    /// would say so.
+    pub(super) fn end(&mut self) {
+        self.uploads = false;
     }
 
-    pub(super) fn set_key(&mut self, key: Key) {
-        self.key = Some(key);
+    /// The key has been taken back, and with it what it guarded.
+    pub(super) fn forget_owner(&mut self) {
+        self.life.forget_owner();
     }
 
-    /// What has arrived of an image stays where it is; its length tells that it is not whole, and verification would say so.
-    pub(super) fn abandon(&mut self) {
-        self.upload = None;
-        self.key_bytes = [0; KEY];
+    pub(super) fn count_failure(&mut self) {
+        self.life.count_failure();
     }
 
     /// Bytes of what is staged; false where less is staged than is asked for.

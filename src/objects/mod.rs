@@ -9,7 +9,7 @@
 //! [`table`] declares every object once; the server's entries, `docs/objects.md` and the texts that a host makes (EDS, DBC) come
 //! from it. [`field`] is what an object can be about. The rest has one idea a file: [`Observed`] and its scaling, [`settings`] of the
 //! configuration, [`Operation`] for the modes, `profile_positions` and `profile_modes` for those in which positions have
-//! a hand-shake and an end, [`Images`] for the life cycle, [`Stored`] for what 1010h keeps, [`emergency`] for codes.
+//! a hand-shake and an end, [`Images`] for the life cycle, [`Ownership`] for key and sessions, [`Stored`] for what 1010h keeps, [`emergency`] for codes.
 //!
 //! ```text
 //!  receive interrupt   image.observe(&observed)
@@ -38,6 +38,7 @@ mod number;
 mod observed;
 mod open_loop;
 mod operation;
+pub mod ownership;
 mod process_image;
 mod profile_modes;
 mod profile_positions;
@@ -59,6 +60,7 @@ pub use history::STEP;
 pub use images::{Images, StoredImages};
 pub use observed::Observed;
 pub use operation::Operation;
+pub use ownership::Ownership;
 pub use process_image::JointImage;
 pub use program::{NotConfigured, Program};
 pub use set_points::impedance_frame;

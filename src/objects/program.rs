@@ -5,7 +5,8 @@ use crate::hardware::Hardware;
 use crate::joint::configuration::{BridgeConfiguration, Configuration, ConfigurationError};
 use crate::joint::history::History;
 use crate::motor::open_loop::Window;
-use crate::parameters::authentication::Key;
+use crate::parameters::authentication::CHALLENGE;
+use crate::parameters::guard::Guard;
 use crate::parameters::slots::SlotError;
 use crate::reset_record::LastReset;
 
@@ -40,11 +41,16 @@ pub trait Program {
         0
     }
 
-    /// Keeps the lowest version that is taken and the number of wrong tags. The client is answered after that.
-    fn keep(&mut self, floor: u32, failures: u16) -> Result<(), SlotError>;
+    /// Keeps what guards the joint. The client is answered after that.
+    fn keep(&mut self, guard: &Guard) -> Result<(), SlotError>;
 
-    /// Keeps the key, for good.
-    fn provision(&mut self, key: &Key) -> Result<(), SlotError>;
+    /// Random bytes that nobody can tell in advance; none where there are none, and then no challenge.
+    fn random(&mut self) -> Option<[u8; CHALLENGE]>;
+
+    /// Whether the board's button is pressed; none where it has none.
+    fn button(&self) -> Option<bool> {
+        None
+    }
 
     /// Fills `out` with bytes of the stored image in use, from `offset` on; false where they cannot be read.
     fn read_image(&mut self, offset: u32, out: &mut [u8]) -> bool;

@@ -12,6 +12,15 @@
 //! so the tag binds both. The tag is not part of the image and is not stored with it: what lies in a slot was let in before.
 //! An upload with a tag is at most [`STAGING`] bytes. A joint without a key takes uploads with and without a tag.
 //!
+//! # Who may change what a joint can do
+//!
+//! An owned joint, which is one with a key, wants a session for whatever changes what it can do to its surroundings. The owner reads a
+//! challenge of 16 random bytes (2215h:5) and writes the response (2215h:7): HMAC-SHA256 with the key over 16 bytes for the purpose, product and serial
+//! number (4 bytes each, little-endian) and the challenge. A challenge is good for one right response. Purposes: `joint session  1` opens
+//! a session, `joint key back 1` has the joint forget its key. A new key (2215h:6, 64 bytes) comes as the key exclusive or HMAC(`joint key mask 1`, …), and
+//! behind it the response for `joint key next 1`, which covers these 32 bytes too. Security access of ISO 14229-1, service 27h, works alike, and
+//! like there a session that is open serves whoever sends on the bus: CAN does not say who sent a frame.
+//!
 //! The same key verifies and signs: whoever reads it out of a joint can sign for every joint that shares it. Commands in real time,
 //! setpoints among them, are not authenticated.
 //!
@@ -30,10 +39,47 @@ pub const KEY: usize = 32;
 pub const STAGING: usize = ROOM + TAG;
 const _: () = assert!(MAX_LENGTH + TAG == 2048);
 
+/// Bytes of a challenge: random, so that nobody meets the same one twice.
+pub const CHALLENGE: usize = 16;
+
 /// What is signed with a tag; another use of the key has another text.
 const IMAGE: &[u8; 16] = b"joint image tag1";
+/// What the mask of a new key is made from.
+const MASK: &[u8; 16] = b"joint key mask 1";
 /// What the key's number is made from.
 const KEY_ID: &[u8; 16] = b"joint key number";
+
+/// What a response to a challenge asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Purpose {
+    /// A session: protected objects can be written.
+    Session,
+    /// The joint is to forget its key.
+    TakeBack,
+    /// Another key.
+    Rotate,
+}
+
+impl Purpose {
+    const fn text(self) -> &'static [u8; 16] {
+        match self {
+            Self::Session => b"joint session  1",
+            Self::TakeBack => b"joint key back 1",
+            Self::Rotate => b"joint key next 1",
+        }
+    }
+}
+
+/// The joint that gave a challenge, and its challenge: what a response is bound to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Challenge {
+    /// Product of the joint (1018h:2).
+    pub product: u32,
+    /// Its serial number (1018h:4).
+    pub serial: u32,
+    /// What it drew.
+    pub random: [u8; CHALLENGE],
+}
 
 /// A joint's key. Its bytes are neither printed nor compared.
 #[derive(Clone)]
@@ -48,11 +94,6 @@ impl core::fmt::Debug for Key {
 /// Why a key is not taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum KeyRefusal {
-    /// The joint has a key already; a key is written once.
-    Present {
-        /// Number of the joint's key.
-        id: u32,
-    },
     /// All bytes are equal: erased flash, a cleared buffer.
     Trivial,
 }
@@ -60,7 +101,6 @@ pub enum KeyRefusal {
 impl core::fmt::Display for KeyRefusal {
     fn fmt(&self, f: &mut core::fmt::Formatter) -> core::fmt::Result {
         match self {
-            Self::Present { id } => write!(f, "the joint has key {id:08x} already, and a key is written once"),
             Self::Trivial => write!(f, "all {KEY} bytes of the key are equal"),
         }
     }
@@ -73,14 +113,6 @@ impl Key {
     pub fn new(bytes: [u8; KEY]) -> Result<Self, KeyRefusal> {
         let [first, ..] = bytes;
         if bytes.iter().all(|byte| *byte == first) { Err(KeyRefusal::Trivial) } else { Ok(Self(bytes)) }
-    }
-
-    /// The key that a joint with the key `present`, or none, gets when it is given `bytes`: once.
-    pub fn provision(present: Option<&Self>, bytes: [u8; KEY]) -> Result<Self, KeyRefusal> {
-        match present {
-            Some(key) => Err(KeyRefusal::Present { id: key.id() }),
-            None => Self::new(bytes),
-        }
     }
 
     /// The bytes, to be stored.
@@ -102,6 +134,32 @@ impl Key {
     /// True where `tag` is the image's. Takes the same time wherever the two differ.
     pub fn verify(&self, image: &[u8], tag: &[u8; TAG]) -> bool {
         self.mac(IMAGE).chain_update(image).verify(tag.into()).is_ok()
+    }
+
+    /// The response to a challenge. For [`Purpose::Rotate`] `masked` is the masked new key, otherwise empty.
+    pub fn respond(&self, purpose: Purpose, challenge: &Challenge, masked: &[u8]) -> [u8; TAG] {
+        self.response(purpose, challenge, masked).finalize().into_bytes().into()
+    }
+
+    /// True where `response` is the one to the challenge. Takes the same time wherever the two differ.
+    pub fn accepts(&self, purpose: Purpose, challenge: &Challenge, masked: &[u8], response: &[u8; TAG]) -> bool {
+        self.response(purpose, challenge, masked).verify(response.into()).is_ok()
+    }
+
+    /// Another key's bytes as they go over the bus, or back: each is the exclusive or of the other and of an HMAC over the challenge.
+    pub fn mask(&self, challenge: &Challenge, bytes: &[u8; KEY]) -> [u8; KEY] {
+        let mut masked: [u8; KEY] = self.bound(MASK, challenge).finalize().into_bytes().into();
+        masked.iter_mut().zip(bytes).for_each(|(place, byte)| *place ^= byte);
+        masked
+    }
+
+    fn response(&self, purpose: Purpose, challenge: &Challenge, masked: &[u8]) -> Hmac<Sha256> {
+        self.bound(purpose.text(), challenge).chain_update(masked)
+    }
+
+    fn bound(&self, purpose: &[u8; 16], challenge: &Challenge) -> Hmac<Sha256> {
+        let Challenge { product, serial, random } = challenge;
+        self.mac(purpose).chain_update(product.to_le_bytes()).chain_update(serial.to_le_bytes()).chain_update(random)
     }
 
     fn mac(&self, purpose: &[u8; 16]) -> Hmac<Sha256> {
@@ -212,17 +270,55 @@ mod tests {
     }
 
     #[test]
-    fn a_key_is_written_once_and_does_not_show() {
-        let first = Key::provision(None, key().to_bytes()).expect("the first key");
-        let id = first.id();
-        let refused = |present, bytes| Key::provision(present, bytes).expect_err("refused");
-        let mut another = first.to_bytes();
-        another[0] ^= 1;
-        assert_eq!(refused(Some(&first), another), KeyRefusal::Present { id });
-        assert_eq!(refused(Some(&first), first.to_bytes()), KeyRefusal::Present { id });
+    fn a_key_does_not_show_and_is_not_of_equal_bytes() {
         for byte in 0..=255 {
-            assert_eq!(refused(None, [byte; KEY]), KeyRefusal::Trivial);
+            assert_eq!(Key::new([byte; KEY]).expect_err("refused"), KeyRefusal::Trivial);
         }
-        assert_eq!(format!("{first:?}"), format!("Key({id:08x})"));
+        assert_eq!(format!("{:?}", key()), format!("Key({:08x})", key().id()));
+    }
+
+    fn challenge() -> Challenge {
+        Challenge { product: 2, serial: 4, random: core::array::from_fn(|i| 200 - i as u8) }
+    }
+
+    #[test]
+    fn a_response_is_that_of_the_documented_bytes() {
+        let Challenge { random, .. } = challenge();
+        let documented = [&b"joint session  1"[..], &[2, 0, 0, 0, 4, 0, 0, 0], &random].concat();
+        let documented = hmac(&key().to_bytes()).chain_update(documented).finalize().into_bytes();
+        assert_eq!(key().respond(Purpose::Session, &challenge(), &[])[..], documented[..]);
+    }
+
+    #[test]
+    fn a_response_is_bound_to_purpose_joint_challenge_and_new_key() {
+        let (first, masked) = (key(), [9; KEY]);
+        let response = first.respond(Purpose::Rotate, &challenge(), &masked);
+        let accepts =
+            |purpose, challenge: &Challenge, masked: &[u8]| first.accepts(purpose, challenge, masked, &response);
+        assert!(accepts(Purpose::Rotate, &challenge(), &masked));
+        for purpose in [Purpose::Session, Purpose::TakeBack] {
+            assert!(!accepts(purpose, &challenge(), &masked));
+        }
+        assert!(!accepts(Purpose::Rotate, &Challenge { serial: 5, ..challenge() }, &masked));
+        assert!(!accepts(Purpose::Rotate, &Challenge { product: 3, ..challenge() }, &masked));
+        for bit in 0..8 * CHALLENGE {
+            let mut other = challenge();
+            other.random[bit / 8] ^= 1 << (bit % 8);
+            assert!(!accepts(Purpose::Rotate, &other, &masked), "bit {bit} of the challenge");
+        }
+        for bit in 0..8 * KEY {
+            let mut other = masked;
+            other[bit / 8] ^= 1 << (bit % 8);
+            assert!(!accepts(Purpose::Rotate, &challenge(), &other), "bit {bit} of the masked key");
+        }
+    }
+
+    #[test]
+    fn a_masked_key_comes_back_and_says_nothing() {
+        let new: [u8; KEY] = core::array::from_fn(|i| 255 - i as u8);
+        let masked = key().mask(&challenge(), &new);
+        assert_eq!(key().mask(&challenge(), &masked), new);
+        let other = key().mask(&Challenge { random: [0; CHALLENGE], ..challenge() }, &new);
+        assert!(masked != new && masked != other);
     }
 }

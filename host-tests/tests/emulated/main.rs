@@ -11,6 +11,7 @@ mod gate_driver;
 mod images;
 mod oscillator;
 mod outputs;
+mod ownership;
 mod power_cut;
 mod same_run;
 mod settling;
@@ -34,6 +35,7 @@ fn main() {
         images::trials(),
         oscillator::trials(),
         outputs::trials(),
+        ownership::trials(),
         same_run::trials(),
         settling::trials(),
         workbench::trials(),

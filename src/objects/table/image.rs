@@ -1,7 +1,9 @@
-//! 2210h to 221Fh: the life of a parameter image, from upload to roll back, and its authentication.
+//! 2210h to 221Fh: the life of a parameter image, from upload to roll back, and who owns the joint.
 
 use super::*;
-use crate::objects::field::{Actual, Field::Actual as A, Field::Image as I, ImageField, StoredField as F, Which};
+use crate::objects::field::{
+    Actual, Field::Actual as A, Field::Image as I, Field::Owner as O, ImageField, OwnerField, StoredField as F, Which,
+};
 
 room! {
     0x2210 "image staging" {
@@ -54,16 +56,26 @@ room! {
         5, "created", U32, RO, UNMAPPED, I(ImageField::Stored(Which::Previous, F::Created)); "s", 1.0, ANY;
             "Since 1970-01-01 UTC; 0 where it is not stated"
     }
-    0x2215 "image authentication" {
-        1, "key present", Bool, RO, UNMAPPED, I(ImageField::KeyPresent); "", 1.0, ANY;
-            "1 once the joint has a key: images then need a tag. With key number 0 the stored key is damaged, and no image is taken"
-        2, "key number", U32, RO, UNMAPPED, I(ImageField::KeyNumber); "", 1.0, ANY;
+    0x2215 "ownership" {
+        1, "key present", Bool, RO, UNMAPPED, O(OwnerField::KeyPresent); "", 1.0, ANY;
+            "1 once the joint has a key: images then need a tag, settings a session. With key number 0 the stored key is damaged, and nothing that needs them is taken"
+        2, "key number", U32, RO, UNMAPPED, O(OwnerField::KeyNumber); "", 1.0, ANY;
             "Tells keys apart; 0 where there is none"
         3, "version floor", U32, RO, UNMAPPED, I(ImageField::Floor); "", 1.0, ANY;
             "Lowest image version that is taken: with a key the highest that its tag was right for, without one the highest that is stored"
         4, "wrong tags", U16, RO, UNMAPPED, I(ImageField::Failures); "", 1.0, ANY;
-            "Wrong tags so far; kept over a loss of power at 1, 2, 4, 8 and so on. They keep no right one out"
-        6, "key", Domain, WO, UNMAPPED, I(ImageField::Key); "", 1.0, ANY;
-            "The key, 32 bytes; once"
+            "Wrong tags and responses so far; kept over a loss of power at 1, 2, 4, 8 and so on. They keep no right one out"
+        5, "challenge", Domain, RO, UNMAPPED, O(OwnerField::Challenge); "", 1.0, ANY;
+            "16 random bytes that the next response answers; others once one was right"
+        6, "key", Domain, WO, UNMAPPED, O(OwnerField::Key); "", 1.0, ANY;
+            "32 bytes: the first key, where somebody is present. 64 bytes: another one, masked, and the response that goes with it"
+        7, "response", Domain, WO, UNMAPPED, O(OwnerField::Response); "", 1.0, ANY;
+            "32 bytes that the key makes of the challenge: opens a session, or has the joint forget its key"
+        8, "session time left", U32, RW, UNMAPPED, O(OwnerField::Session); "s", 1e-3, within(0.0, 60.0);
+            "60 s after what was last written in it; 0 where none is open. Writing 0 ends it, nothing else can be written"
+        9, "presence", Bool, RO, UNMAPPED, O(OwnerField::Presence); "", 1.0, ANY;
+            "1 while somebody is at the joint: the button is pressed, or where there is none, less than 60 s since its supply came and no master has started it"
+        10, "forget key", U32, WO, UNMAPPED, O(OwnerField::Forget); "", 1.0, ANY;
+            "Where somebody is present, 6B636162h takes the key back, also a damaged one: the joint then belongs to nobody, and its version floor is 0"
     }
 }

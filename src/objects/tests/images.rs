@@ -9,6 +9,7 @@ use crate::friction::state::{JointState, SIGNALS};
 use crate::friction::{FrictionModel, FrictionParameters, ParameterSet};
 use crate::joint::state_machine::State;
 use crate::parameters::Summary;
+use crate::parameters::authentication::Key;
 use crate::parameters::image::{GoldenVector, Image, MAX_LENGTH};
 use crate::parameters::life_cycle::{Action, Mode};
 use crate::parameters::slots::Slot;
@@ -142,7 +143,7 @@ fn a_commit_goes_through_flash_to_active_and_back() {
     assert_eq!(node.objects.take_action(), Action::Store { length: bytes.len() });
     node.objects.finished(Ok(()), stored(&bytes));
     // Without a key there is no floor to be kept.
-    assert_eq!(node.objects.program().kept, []);
+    assert!(node.objects.program().kept.is_empty());
     assert_eq!((node.number(0x2212, 2), node.objects.take_action()), (6, Action::Activate));
     node.objects.program().image = bytes.clone();
     node.objects.finished(Ok(()), stored(&bytes));
@@ -198,7 +199,8 @@ fn a_key_is_given_once_and_from_then_on_tags_count() {
     node.download(0x2215, 6, &bytes).unwrap();
     let key = Key::new(bytes).unwrap();
     assert_eq!((node.number(0x2215, 1), node.number(0x2215, 2)), (1, key.id().into()));
-    assert_eq!(node.objects.program().key, Some(bytes));
+    let kept = node.objects.program().kept.pop().and_then(|guard| guard.key);
+    assert_eq!(kept.map(|key| key.to_bytes()), Some(bytes));
     assert_eq!(node.download(0x2215, 6, &[1; 32]), Err(0x0800_0021));
     let image = image(1);
     let tagged = |tag: &[u8; 32]| [&image[..], tag].concat();
@@ -211,7 +213,8 @@ fn a_key_is_given_once_and_from_then_on_tags_count() {
         assert_eq!(node.number(0x2215, 4), u64::from(failures));
     }
     // Few of many reach the flash.
-    assert_eq!(node.objects.program().kept, [1, 2, 4, 8].map(|failures| (0, failures)));
+    let kept = node.objects.program().kept.iter().map(|guard| (guard.floor, guard.failures));
+    assert!(kept.eq([1, 2, 4, 8].map(|failures| (0, failures))));
     node.download(0x2210, 0, &tagged(&key.sign(&image))).unwrap();
     command(&mut node, VERIFY).unwrap();
     assert_eq!((node.number(0x2212, 2), node.number(0x2215, 4)), (2, 9));

@@ -7,6 +7,7 @@ mod hostile;
 mod images;
 mod masters;
 mod open_loop;
+mod ownership;
 mod process_data;
 mod settings;
 mod table;
@@ -18,8 +19,9 @@ use crate::hardware::Hardware;
 use crate::joint::configuration::{BridgeConfiguration, Configuration};
 use crate::joint::history::History;
 use crate::motor::open_loop::Window;
-use crate::parameters::authentication::{Key, STAGING};
+use crate::parameters::authentication::{CHALLENGE, STAGING};
 use crate::parameters::certificate::Limits;
+use crate::parameters::guard::Guard;
 use crate::parameters::image::{Effort, Target};
 use crate::parameters::life_cycle::{LifeCycle, Requirements};
 use crate::parameters::slots::SlotError;
@@ -44,8 +46,11 @@ pub struct Memory {
     pub configured: Vec<Configuration>,
     pub busy: bool,
     pub record: Option<Vec<u8>>,
-    pub kept: Vec<(u32, u16)>,
-    pub key: Option<[u8; 32]>,
+    pub kept: Vec<Guard>,
+    pub drawn: u8,
+    /// Whether there are random numbers.
+    pub draws: bool,
+    pub button: Option<bool>,
     pub image: Vec<u8>,
     pub history: Option<History>,
     pub window: Window,
@@ -64,7 +69,9 @@ impl Default for Memory {
             busy: false,
             record: None,
             kept: Vec::new(),
-            key: None,
+            drawn: 0,
+            draws: true,
+            button: None,
             image: Vec::new(),
             history: None,
             window: Window::NOTHING,
@@ -109,15 +116,19 @@ impl Program for Memory {
         self.damaged
     }
 
-    fn keep(&mut self, floor: u32, failures: u16) -> Result<(), SlotError> {
+    fn keep(&mut self, guard: &Guard) -> Result<(), SlotError> {
         self.fails.map_or(Ok(()), Err)?;
-        self.kept.push((floor, failures));
+        self.kept.push(guard.clone());
         Ok(())
     }
 
-    fn provision(&mut self, key: &Key) -> Result<(), SlotError> {
-        self.key = Some(key.to_bytes());
-        Ok(())
+    fn random(&mut self) -> Option<[u8; CHALLENGE]> {
+        self.drawn = self.drawn.wrapping_add(1);
+        self.draws.then_some([self.drawn; CHALLENGE])
+    }
+
+    fn button(&self) -> Option<bool> {
+        self.button
     }
 
     fn read_image(&mut self, offset: u32, out: &mut [u8]) -> bool {
@@ -169,6 +180,11 @@ impl Node {
     }
 
     pub fn started(record: Option<Vec<u8>>, single_bank: bool, reset: LastReset) -> Self {
+        Self::guarded(record, single_bank, reset, &Guard::default())
+    }
+
+    /// With what guards the joint.
+    pub fn guarded(record: Option<Vec<u8>>, single_bank: bool, reset: LastReset, guard: &Guard) -> Self {
         let bus: &canopen::Shared = Box::leak(Box::new(canopen::Shared::new()));
         let shared: &Shared = Box::leak(Box::new(Shared::new()));
         let requirements = Requirements {
@@ -177,7 +193,8 @@ impl Node {
             limits: Limits { output: u32::MAX, torque_gain: u32::MAX, velocity_slope: u32::MAX },
         };
         let staging = Box::leak(Box::new([0; STAGING]));
-        let images = Images::new(staging, LifeCycle::new(requirements, 0, 0, 0), None, StoredImages::default());
+        let life = LifeCycle::new(requirements, guard.floor, 0, guard.failures);
+        let images = Images::new(staging, life, Ownership::new(guard), StoredImages::default());
         let stored = record.as_deref().and_then(|record| Stored::decode(record, &BOARD.joint));
         let stored = stored.unwrap_or(Stored::NOTHING);
         let start = Start { configuration: stored.configuration(&BOARD.joint), ranges: stored.ranges(), single_bank };

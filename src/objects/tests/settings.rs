@@ -266,7 +266,7 @@ fn a_joint_of_one_bank_takes_a_key_only_with_its_motor_off() {
         let mut node = Node::with(None, single_bank);
         node.observed.telemetry.state = State::OperationEnabled;
         assert_eq!(node.download(0x2215, 6, &key), expected);
-        assert_eq!(node.objects.program().key.is_some(), expected.is_ok());
+        assert_eq!(node.objects.program().kept.pop().is_some(), expected.is_ok());
         node.observed.telemetry.state = State::SwitchOnDisabled;
         assert_eq!(node.download(0x2215, 6, &key).is_ok(), single_bank, "once");
     }

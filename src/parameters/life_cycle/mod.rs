@@ -23,6 +23,7 @@ mod tests;
 mod verification;
 
 use super::authentication::{Key, STAGING};
+use super::image::Target;
 use super::slots::SlotError;
 pub use refusal::Refusal;
 pub use verification::{Requirements, Verified};
@@ -216,6 +217,11 @@ impl LifeCycle {
         self.length
     }
 
+    /// Joint that images have to be for.
+    pub const fn target(&self) -> Target {
+        self.requirements.target
+    }
+
     /// Highest version with a right tag that was to be stored. To be kept when it has risen, before the image is stored.
     pub const fn floor(&self) -> u32 {
         self.floor
@@ -229,6 +235,16 @@ impl LifeCycle {
     /// Wrong tags so far.
     pub const fn failures(&self) -> u16 {
         self.failures
+    }
+
+    /// Counts what somebody without the key has tried.
+    pub const fn count_failure(&mut self) {
+        self.failures = self.failures.saturating_add(1);
+    }
+
+    /// Forgets floor and wrong tags, with the key that they belong to.
+    pub const fn forget_owner(&mut self) {
+        (self.floor, self.failures) = (0, 0);
     }
 
     /// What is left of a trial or shadow, ms; 0 outside.
@@ -429,7 +445,7 @@ impl LifeCycle {
         }
         let upload = staging.get(..length).ok_or(Refusal::UploadTooLong { length, room: STAGING })?;
         if !verification::authentic(upload, conditions.key)? {
-            self.failures = self.failures.saturating_add(1);
+            self.count_failure();
             return Err(Refusal::TagWrong { failures: self.failures });
         }
         let verified = verification::verify(upload, &self.requirements, self.lowest(conditions.key.is_some()))?;

@@ -6,7 +6,7 @@ use crate::board::{self, Publisher, can};
 use embassy_stm32::can::CanConfigurator;
 use joint_firmware::canopen::{self, Identity, SdoSettings, Server};
 use joint_firmware::joint::Demand;
-use joint_firmware::objects::{Images, JointImage, Objects, Shared, Start, StoredImages};
+use joint_firmware::objects::{Images, JointImage, Objects, Ownership, Shared, Start, StoredImages};
 use joint_firmware::parameters::authentication::STAGING;
 use joint_firmware::parameters::certificate::Limits;
 use joint_firmware::parameters::image::{Effort, Target};
@@ -72,12 +72,7 @@ fn images(program: &BoardProgram, stored: &StoredImages, identity: &Identity, st
         },
     };
     let life = LifeCycle::new(requirements, program.guard.floor, newest, program.guard.failures);
-    let key = program.guard.key.clone();
-    let mut images = Images::new(BUFFER.take(), life, key, *stored);
-    if program.guard.locked {
-        images.lock();
-    }
-    images
+    Images::new(BUFFER.take(), life, Ownership::new(&program.guard), *stored)
 }
 
 /// The task's part of the node.

@@ -1,7 +1,7 @@
 //! What the board does for the objects: configurations and friction models to the control step, records to flash. Thread mode.
 
 use super::super::adaptation;
-use super::store::{Guard, Store};
+use super::store::Store;
 use crate::board::{self, BoardConfiguration, Offering, Prepared, Subscriber, oscillator, shadow};
 use core::cell::RefCell;
 use joint_firmware::canopen::{Event, Reset};
@@ -13,7 +13,8 @@ use joint_firmware::joint::history::History;
 use joint_firmware::motor::open_loop::Window;
 use joint_firmware::motor::thermal::ThermalSettings;
 use joint_firmware::objects::{NotConfigured, Program, Start, Stored};
-use joint_firmware::parameters::authentication::Key;
+use joint_firmware::parameters::authentication::CHALLENGE;
+use joint_firmware::parameters::guard::Guard;
 use joint_firmware::parameters::image::Image;
 use joint_firmware::parameters::slots::SlotError;
 use joint_firmware::reset_record::LastReset;
@@ -151,18 +152,18 @@ impl Program for BoardProgram {
         self.store.damaged() | u8::from(self.guard.locked) << 2
     }
 
-    fn keep(&mut self, floor: u32, failures: u16) -> Result<(), SlotError> {
-        let guard = Guard { floor, failures, ..self.guard.clone() };
-        self.store.keep(&guard)?;
-        self.guard = guard;
+    fn keep(&mut self, guard: &Guard) -> Result<(), SlotError> {
+        self.store.keep(guard)?;
+        self.guard = guard.clone();
         Ok(())
     }
 
-    fn provision(&mut self, key: &Key) -> Result<(), SlotError> {
-        let guard = Guard { key: Some(key.clone()), ..self.guard.clone() };
-        self.store.keep(&guard)?;
-        self.guard = guard;
-        Ok(())
+    fn random(&mut self) -> Option<[u8; CHALLENGE]> {
+        board::random::bytes()
+    }
+
+    fn button(&self) -> Option<bool> {
+        board::button()
     }
 
     fn read_image(&mut self, offset: u32, out: &mut [u8]) -> bool {

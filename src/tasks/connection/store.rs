@@ -4,55 +4,15 @@
 //! |---|---|---|
 //! | 0, 1 | 1 | friction image |
 //! | 2, 3 | 2 | record of object 1010h ([`Stored`](joint_firmware::objects::Stored)) |
-//! | 4, 5 | 3 | guard: floor (4 bytes), wrong tags (2), key: 0 none, 1 present, 2 lost by damage (1), reserved (1), key (32), all little-endian |
+//! | 4, 5 | 3 | what guards the joint ([`Guard`]) |
 
 use crate::board::flash::Parameters;
 use joint_firmware::objects::StoredImages;
 use joint_firmware::parameters::Summary;
-use joint_firmware::parameters::authentication::{KEY, Key, STAGING};
+use joint_firmware::parameters::authentication::STAGING;
+use joint_firmware::parameters::guard::{GUARD, Guard};
 use joint_firmware::parameters::image::Image;
 use joint_firmware::parameters::slots::{Layout, Slot, SlotError, Slots, WriteError};
-
-/// What guards the images.
-#[derive(Clone, Debug, Default)]
-pub struct Guard {
-    /// Lowest version that is taken.
-    pub floor: u32,
-    /// Wrong tags so far.
-    pub failures: u16,
-    /// The key, once there is one.
-    pub key: Option<Key>,
-    /// What was kept is damaged, and whether there was a key is not known.
-    pub locked: bool,
-}
-
-/// There is a key; what was kept is damaged.
-const PRESENT: u8 = 1;
-const LOCKED: u8 = 2;
-const GUARD: usize = 8 + KEY;
-
-impl Guard {
-    fn encode(&self) -> [u8; GUARD] {
-        let mut bytes = [0; GUARD];
-        let [a, b, c, d] = self.floor.to_le_bytes();
-        let [low, high] = self.failures.to_le_bytes();
-        let head = [a, b, c, d, low, high, if self.locked { LOCKED } else { self.key.is_some().into() }, 0];
-        let key = self.key.as_ref().map_or([0; KEY], Key::to_bytes);
-        bytes.iter_mut().zip(head.into_iter().chain(key)).for_each(|(place, byte)| *place = byte);
-        bytes
-    }
-
-    fn decode(bytes: &[u8; GUARD]) -> Self {
-        let (&[a, b, c, d, low, high, present, _], key) = bytes.split_first_chunk().unwrap_or((&[0; 8], &[]));
-        let key = key.first_chunk().filter(|_| present == PRESENT).and_then(|key| Key::new(*key).ok());
-        Self {
-            floor: u32::from_le_bytes([a, b, c, d]),
-            failures: u16::from_le_bytes([low, high]),
-            key,
-            locked: present == LOCKED,
-        }
-    }
-}
 
 /// The pairs of slots.
 pub struct Store {
@@ -132,14 +92,15 @@ impl Store {
         self.records.store(&mut self.flash, record)
     }
 
-    /// What guards the images. Where it is damaged and no key is left the joint is locked, and that is kept: the slot that is damaged is given up.
+    /// What guards the joint. Where it is damaged the joint is locked, and that is kept with the key that is left: the slot that is damaged is given
+    /// up, and may have held a higher floor, or a key.
     pub fn guard(&mut self) -> Guard {
         let mut bytes = [0; GUARD];
         let mut guard = match self.guards.load(&mut self.flash, &mut bytes) {
-            Ok(Some(GUARD)) => Guard::decode(&bytes),
-            _ => Guard::default(),
+            Ok(length) => Guard::decode(length.and_then(|length| bytes.get(..length))),
+            Err(_) => Guard::decode(Some(&[])),
         };
-        if self.guards.is_damaged() && guard.key.is_none() && !guard.locked {
+        if self.guards.is_damaged() && !guard.locked {
             guard.locked = true;
             // Where it cannot be written it is found damaged again.
             let _ = self.keep(&guard);
@@ -152,7 +113,7 @@ impl Store {
         u8::from(self.images.is_damaged()) | u8::from(self.records.is_damaged()) << 1
     }
 
-    /// Keeps what guards the images.
+    /// Keeps what guards the joint.
     pub fn keep(&mut self, guard: &Guard) -> Result<(), SlotError> {
         self.guards.store(&mut self.flash, &guard.encode())
     }

@@ -7,7 +7,8 @@ use joint_firmware::joint::configuration::{BridgeConfiguration, Configuration};
 use joint_firmware::joint::history::History;
 use joint_firmware::motor::open_loop::Window;
 use joint_firmware::objects::{NotConfigured, Program, Stored};
-use joint_firmware::parameters::authentication::Key;
+use joint_firmware::parameters::authentication::CHALLENGE;
+use joint_firmware::parameters::guard::Guard;
 use joint_firmware::parameters::slots::SlotError;
 use joint_firmware::reset_record::LastReset;
 
@@ -83,12 +84,13 @@ impl Program for VirtualProgram {
         self.storage.damaged()
     }
 
-    fn keep(&mut self, floor: u32, failures: u16) -> Result<(), SlotError> {
-        self.storage.store_counts(floor, failures)
+    fn keep(&mut self, guard: &Guard) -> Result<(), SlotError> {
+        self.storage.store_guard(guard)
     }
 
-    fn provision(&mut self, key: &Key) -> Result<(), SlotError> {
-        self.storage.store_key(key)
+    fn random(&mut self) -> Option<[u8; CHALLENGE]> {
+        let mut bytes = [0; CHALLENGE];
+        getrandom::fill(&mut bytes).ok().map(|()| bytes)
     }
 
     fn read_image(&mut self, offset: u32, out: &mut [u8]) -> bool {

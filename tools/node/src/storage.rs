@@ -1,16 +1,15 @@
-//! Everything that outlasts a loss of power: images, the record of object 1010h, the version floor and wrong tags, the key. Each lies in two
-//! slots of its own, so that a loss of power in any store leaves the old content or the new one.
+//! Everything that outlasts a loss of power: images, the record of object 1010h, what guards the joint. Each lies in two
+//! slots of its own, as on a board, so that a loss of power in any store leaves the old content or the new one.
 
 use crate::flash::Flash;
 use crate::images::SlotImages;
-use joint_firmware::parameters::authentication::{KEY, Key};
+use joint_firmware::parameters::guard::Guard;
 use joint_firmware::parameters::slots::{Layout, PAGE, SlotError, Slots};
 use std::path::Path;
 
 /// Contents of slots, for their checksum; 1 are friction images.
 const CONFIGURATION: u32 = 2;
-const COUNTS: u32 = 3;
-const KEY_KIND: u32 = 4;
+const GUARD: u32 = 3;
 
 /// Why there is no storage.
 #[derive(Debug, thiserror::Error)]
@@ -69,8 +68,7 @@ impl Record {
 pub struct Storage {
     pub(crate) images: SlotImages,
     configuration: Record,
-    counts: Record,
-    key: Record,
+    guard: Record,
 }
 
 impl Storage {
@@ -87,8 +85,8 @@ impl Storage {
     /// # Errors
     /// None in practice: an erased flash can be written.
     pub fn with(images: SlotImages) -> Result<Self, SlotError> {
-        let [configuration, counts, key] = [CONFIGURATION, COUNTS, KEY_KIND].map(Record::empty);
-        Ok(Self { images, configuration: configuration?, counts: counts?, key: key? })
+        let [configuration, guard] = [CONFIGURATION, GUARD].map(Record::empty);
+        Ok(Self { images, configuration: configuration?, guard: guard? })
     }
 
     /// What a folder holds, one file for each content; all that is stored is in the files at once. The folder is made where there is none.
@@ -101,8 +99,7 @@ impl Storage {
         Ok(Self {
             images: SlotImages::open(flash("images.bin")?)?,
             configuration: Record::open(flash("configuration.bin")?, CONFIGURATION)?,
-            counts: Record::open(flash("counts.bin")?, COUNTS)?,
-            key: Record::open(flash("key.bin")?, KEY_KIND)?,
+            guard: Record::open(flash("guard.bin")?, GUARD)?,
         })
     }
 
@@ -123,87 +120,83 @@ impl Storage {
         self.configuration.store(record)
     }
 
-    /// Version floor and wrong tags, as far as they are kept.
-    pub(crate) fn counts(&mut self) -> (u32, u16) {
-        match self.counts.load().as_deref() {
-            Some(&[a, b, c, d, low, high]) => (u32::from_le_bytes([a, b, c, d]), u16::from_le_bytes([low, high])),
-            _ => (0, 0),
+    /// What guards the joint. Where it is damaged the joint is locked, and that is kept, as a board does.
+    pub(crate) fn guard(&mut self) -> Guard {
+        let damaged = self.guard.is_damaged();
+        let mut guard = Guard::decode(self.guard.load().as_deref());
+        if damaged && !guard.locked {
+            guard.locked = true;
+            let _ = self.store_guard(&guard);
         }
+        guard
     }
 
-    pub(crate) fn store_counts(&mut self, floor: u32, failures: u16) -> Result<(), SlotError> {
-        let [a, b, c, d] = floor.to_le_bytes();
-        let [low, high] = failures.to_le_bytes();
-        self.counts.store(&[a, b, c, d, low, high])
-    }
-
-    pub(crate) fn key(&mut self) -> Option<Key> {
-        let bytes: [u8; KEY] = self.key.load()?.try_into().ok()?;
-        Key::new(bytes).ok()
-    }
-
-    /// Whether there was a key that cannot be read any more: it is written once, so no other slot holds it.
-    pub(crate) fn key_is_damaged(&mut self) -> bool {
-        self.key.is_damaged() && self.key().is_none()
+    pub(crate) fn store_guard(&mut self, guard: &Guard) -> Result<(), SlotError> {
+        self.guard.store(&guard.encode())
     }
 
     /// What of it is damaged: bits as of EMCY 6310h.
     pub(crate) fn damaged(&self) -> u8 {
-        let parts = [self.images.is_damaged(), self.configuration.is_damaged(), self.key.is_damaged()];
+        let locked = Guard::decode(self.guard.clone().load().as_deref()).locked;
+        let parts = [self.images.is_damaged(), self.configuration.is_damaged(), self.guard.is_damaged() || locked];
         parts.into_iter().rev().fold(0, |bits, damaged| bits << 1 | u8::from(damaged))
-    }
-
-    pub(crate) fn store_key(&mut self, key: &Key) -> Result<(), SlotError> {
-        self.key.store(&key.to_bytes())
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use joint_firmware::parameters::authentication::Key;
+
+    fn guard(floor: u32) -> Guard {
+        let key = Key::new(std::array::from_fn(|i| i as u8)).unwrap();
+        Guard { floor, failures: 3, key: Some(key), locked: false }
+    }
 
     #[test]
     fn what_is_stored_in_a_folder_is_there_when_it_is_opened_again() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("joint 5");
         let mut storage = Storage::open(&path).unwrap();
-        assert!(storage.configuration().is_none() && storage.key().is_none() && storage.counts() == (0, 0));
-        let key = Key::new(std::array::from_fn(|i| i as u8)).unwrap();
+        assert!(storage.configuration().is_none() && storage.guard().encode() == Guard::default().encode());
         storage.store_configuration(&[1, 2, 3]).unwrap();
-        storage.store_counts(70_000, 3).unwrap();
-        storage.store_counts(70_001, 4).unwrap();
-        storage.store_key(&key).unwrap();
+        storage.store_guard(&guard(70_000)).unwrap();
+        storage.store_guard(&guard(70_001)).unwrap();
         let mut storage = Storage::open(&path).unwrap();
-        assert_eq!((storage.configuration(), storage.counts()), (Some(vec![1, 2, 3]), (70_001, 4)));
-        assert_eq!(storage.key().unwrap().to_bytes(), key.to_bytes());
+        assert_eq!((storage.configuration(), storage.damaged()), (Some(vec![1, 2, 3]), 0));
+        assert_eq!(storage.guard().encode(), guard(70_001).encode());
     }
 
     #[test]
-    fn a_bit_of_a_stored_key_that_flips_leaves_the_key_or_locks_and_never_opens() {
-        let folder = tempfile::tempdir().unwrap();
-        let key = Key::new(std::array::from_fn(|i| i as u8)).unwrap();
-        Storage::open(folder.path()).unwrap().store_key(&key).unwrap();
-        let path = folder.path().join("key.bin");
-        let whole = std::fs::read(&path).unwrap();
-        let mut locked = 0;
-        // The header, the key, and something of what is blank behind it.
-        for bit in 0..8 * 80 {
-            let mut damaged = whole.clone();
-            damaged[bit / 8] ^= 1 << (bit % 8);
-            std::fs::write(&path, &damaged).unwrap();
-            // It stays so from start to start.
-            for _ in 0..2 {
-                let mut storage = Storage::open(folder.path()).unwrap();
-                match storage.key() {
-                    Some(found) => assert_eq!(found.to_bytes(), key.to_bytes(), "bit {bit}"),
-                    None => assert!(storage.key_is_damaged() && storage.damaged() == 4, "bit {bit}"),
+    fn a_bit_of_what_guards_the_joint_that_flips_changes_nothing_or_locks_and_never_opens() {
+        for records in [1, 2] {
+            let folder = tempfile::tempdir().unwrap();
+            let mut storage = Storage::open(folder.path()).unwrap();
+            (0..records).for_each(|number| storage.store_guard(&guard(7 + number)).unwrap());
+            let path = folder.path().join("guard.bin");
+            let whole = std::fs::read(&path).unwrap();
+            let mut locked = 0;
+            // The header, the record, and something of what is blank behind it; in the page that holds the newest one.
+            let newest = (records as usize + 1) % 2 * PAGE;
+            for bit in 0..8 * 88 {
+                let mut damaged = whole.clone();
+                damaged[newest + bit / 8] ^= 1 << (bit % 8);
+                std::fs::write(&path, &damaged).unwrap();
+                // It stays so from start to start.
+                for _ in 0..2 {
+                    let mut storage = Storage::open(folder.path()).unwrap();
+                    let found = storage.guard();
+                    let same = found.encode() == guard(6 + records).encode();
+                    assert!(same || found.locked && storage.damaged() == 4, "{records} records, bit {bit}: {found:?}");
+                    // The key of the record before is the owner's, who can repair it.
+                    assert!(same || found.key.is_some() == (records == 2), "{records} records, bit {bit}");
+                    locked += u32::from(found.locked);
                 }
-                locked += u32::from(storage.key_is_damaged());
             }
+            assert!(locked >= 2 * 8 * 40, "{locked}");
+            std::fs::write(&path, &whole).unwrap();
+            assert!(!Storage::open(folder.path()).unwrap().guard().locked);
         }
-        assert!(locked >= 2 * 8 * 32, "{locked}");
-        std::fs::write(&path, &whole).unwrap();
-        assert!(Storage::open(folder.path()).unwrap().key().is_some());
     }
 
     #[test]

@@ -14,7 +14,9 @@ use joint_firmware::joint::configuration::Configuration;
 use joint_firmware::joint::shadow::Shadow;
 use joint_firmware::joint::state_machine::State;
 use joint_firmware::joint::{Joint, Telemetry};
-use joint_firmware::objects::{FrictionStatistics, Images, JointImage, Objects, Observed, Shared, Start, StoredImages};
+use joint_firmware::objects::{
+    FrictionStatistics, Images, JointImage, Objects, Observed, Ownership, Shared, Start, StoredImages,
+};
 use joint_firmware::parameters::authentication::STAGING;
 use joint_firmware::parameters::certificate::Limits;
 use joint_firmware::parameters::image::{Effort, Target};
@@ -157,11 +159,8 @@ impl VirtualNode {
             },
         };
         let (life, stored_images) = life(requirements, &mut program.storage);
-        let key = program.storage.key();
-        let mut images = Images::new(Box::leak(Box::new([0; STAGING])), life, key, stored_images);
-        if program.storage.key_is_damaged() {
-            images.lock();
-        }
+        let owner = Ownership::new(&program.storage.guard());
+        let images = Images::new(Box::leak(Box::new([0; STAGING])), life, owner, stored_images);
         let start = Start { configuration, ranges: stored.ranges(), single_bank: true };
         let node_id = if stored.node_id == NO_NODE_ID { options.node_id } else { stored.node_id };
         Ok(Self {
@@ -464,6 +463,6 @@ impl VirtualNode {
 fn life(requirements: Requirements, storage: &mut Storage) -> (LifeCycle, StoredImages) {
     let stored = storage.images.stored();
     let versions = [stored.active, stored.previous].into_iter().flatten().map(|(summary, _)| summary.version);
-    let (floor, failures) = storage.counts();
-    (LifeCycle::new(requirements, floor, versions.fold(0, u32::max), failures), stored)
+    let guard = storage.guard();
+    (LifeCycle::new(requirements, guard.floor, versions.fold(0, u32::max), guard.failures), stored)
 }

@@ -171,6 +171,7 @@ impl<W: Wiring> Chip<W> {
             Device::Rcc => self.rcc.read(offset, at),
             Device::Flash => self.flash.read(offset),
             Device::Crc => self.crc.read(offset),
+            Device::Rng => self.rng.read(offset, self.rcc.has_hsi48(at.instant())),
             Device::Gpio(port) => {
                 let Self { gpio, wiring, clock, .. } = self;
                 gpio.read(port, offset, |pin| wiring.level(clock.instant(now), pin))
@@ -274,6 +275,7 @@ impl<W: Wiring> Chip<W> {
                 self.check_speed()?;
             }
             Device::Crc => self.crc.write(offset, width, value)?,
+            Device::Rng => self.rng.write(offset, value)?,
             Device::Gpio(port) => {
                 self.gpio.write(port, offset, value)?;
                 self.tell_driven(port, now);
@@ -372,6 +374,8 @@ impl<W: Wiring> Chip<W> {
             self.pwr.reset();
         } else if gate == variant::CRC_GATE {
             self.crc.reset();
+        } else if gate == variant::RNG_GATE {
+            self.rng.reset();
         } else if gate == variant::FDCAN_GATE {
             self.fdcan.reset();
             self.tell_line(self.clock.instant(now));

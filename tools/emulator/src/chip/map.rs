@@ -1,7 +1,7 @@
 //! What lies where: RM0440, 2.2 "Memory organization".
 
 use super::variant::{
-    self, CONVERTER_GATES, CRC_GATE, ClockGate, FDCAN_GATE, FLASH_GATE, PWR_GATE, SYSCFG_GATE, Variant,
+    self, CONVERTER_GATES, CRC_GATE, ClockGate, FDCAN_GATE, FLASH_GATE, PWR_GATE, RNG_GATE, SYSCFG_GATE, Variant,
 };
 
 /// A modelled peripheral.
@@ -25,6 +25,8 @@ pub enum Device {
     Flash,
     /// The CRC unit.
     Crc,
+    /// The random number generator.
+    Rng,
     /// A port, from 0 for A.
     Gpio(u8),
     /// Index in the variant's list.
@@ -48,6 +50,7 @@ pub fn gate(device: Device, variant: &Variant) -> Option<ClockGate> {
         Device::Syscfg | Device::Amplifiers => Some(SYSCFG_GATE),
         Device::Flash => Some(FLASH_GATE),
         Device::Crc => Some(CRC_GATE),
+        Device::Rng => Some(RNG_GATE),
         Device::Gpio(port) => Some(variant::gpio_gate(port)),
         Device::Converter(index) => Some(CONVERTER_GATES[variant.converters[index].group]),
         Device::Common(group) => Some(CONVERTER_GATES[group]),
@@ -106,6 +109,7 @@ pub fn locate(address: u32, variant: &Variant) -> Option<(Device, u32)> {
         0x4002_1000 => Device::Rcc,
         0x4002_2000 => Device::Flash,
         0x4002_3000 => Device::Crc,
+        0x5006_0800 => Device::Rng,
         0x4800_0000..=0x4800_1800 => Device::Gpio(((page - 0x4800_0000) >> 10) as u8),
         0x5000_0000 | 0x5000_0400 => return converter(address, variant),
         0xe004_2000 => Device::Debug,
@@ -175,7 +179,6 @@ const UNMODELLED: &[(u32, &str, &str)] = &[
     (0x5000_1000, "DAC3", "22"),
     (0x5000_1400, "DAC4", "22"),
     (0x5006_0000, "AES", "34"),
-    (0x5006_0800, "RNG", "26"),
 ];
 
 /// Name and chapter of what the chip has at an address where nothing is modelled; none where it has nothing.

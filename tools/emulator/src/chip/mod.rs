@@ -18,6 +18,7 @@ pub mod opamp;
 pub mod pwr;
 pub mod rcc;
 mod register;
+pub mod rng;
 pub mod spi;
 pub mod syscfg;
 pub mod time;
@@ -44,6 +45,7 @@ use memory::Memory;
 use opamp::Amplifiers;
 use pwr::{Pwr, Range};
 use rcc::{Cause, Rcc};
+use rng::Rng;
 use spi::Spi;
 use syscfg::{Alarm, Syscfg};
 use time::{Clock, Instant, Moment};
@@ -100,6 +102,7 @@ pub struct Chip<W> {
     spis: Vec<Spi>,
     iwdg: Iwdg,
     crc: Crc,
+    rng: Rng,
     fdcan: Fdcan,
     deviations: Vec<Deviation>,
     places: Places,
@@ -139,6 +142,7 @@ impl<W: Wiring> Chip<W> {
             spis: variant.spis.iter().map(Spi::new).collect(),
             iwdg: Iwdg::new(),
             crc: Crc::new(),
+            rng: Rng::new(),
             fdcan: Fdcan::new(),
             deviations: Vec::new(),
             places: Places::new(),
@@ -313,6 +317,7 @@ impl<W: Wiring> Chip<W> {
         self.spis.iter_mut().for_each(Spi::reset);
         self.iwdg.reset();
         self.crc.reset();
+        self.rng.reset();
         self.fdcan.reset();
         self.tell_line(at);
         for port in 0..PORTS {

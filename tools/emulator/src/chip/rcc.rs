@@ -162,6 +162,11 @@ impl Rcc {
         }
     }
 
+    /// Whether the 48 MHz clock of the random number generator runs: HSI48, as CCIPR.CLK48SEL says (7.4.26).
+    pub fn has_hsi48(&self, at: Instant) -> bool {
+        self.block.get(CCIPR) >> 26 & 3 == 0 && at >= self.hsi48
+    }
+
     /// Clock that FDCAN is given, Hz: CCIPR.FDCANSEL (7.4.26).
     pub fn fdcan_clock(&self) -> Result<u64, Refusal> {
         match self.block.get(CCIPR) >> 24 & 3 {

@@ -293,5 +293,7 @@ pub const PWR_GATE: ClockGate = gate(APB1, 28);
 pub const FLASH_GATE: ClockGate = gate(AHB1, 8);
 /// Clock of the CRC unit.
 pub const CRC_GATE: ClockGate = gate(AHB1, 12);
+/// The random number generator.
+pub const RNG_GATE: ClockGate = gate(AHB2, 26);
 /// Clock of FDCAN.
 pub const FDCAN_GATE: ClockGate = gate(APB1, 25);

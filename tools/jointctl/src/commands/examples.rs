@@ -4,7 +4,7 @@ use clap::Command;
 
 /// What a command is called below `jointctl`, and lines as one types them. `JOINTCTL_BUS` and `JOINTCTL_NODE` stand for `--bus` and
 /// `--node`.
-const EXAMPLES: [(&str, &[&str]); 33] = [
+const EXAMPLES: [(&str, &[&str]); 35] = [
     ("demo", &["jointctl demo", "jointctl demo --seed 7 --out demo-7"]),
     ("fit", &["jointctl fit elbow.toml", "jointctl fit elbow.toml --all"]),
     ("evaluate", &["jointctl evaluate elbow/friction.img other.toml"]),
@@ -13,6 +13,14 @@ const EXAMPLES: [(&str, &[&str]); 33] = [
     ("image convert", &["jointctl image convert elbow/friction.img friction.toml"]),
     ("key new", &["jointctl key new joint.key"]),
     ("key give", &["jointctl key give joint.key --bus socketcan:can0 --node 5"]),
+    ("key rotate", &["jointctl key rotate next.key --key joint.key --bus socketcan:can0 --node 5"]),
+    (
+        "key forget",
+        &[
+            "jointctl key forget --key joint.key --bus socketcan:can0 --node 5",
+            "jointctl key forget --bus socketcan:can0 --node 5",
+        ],
+    ),
     ("key number", &["jointctl key number joint.key"]),
     ("sign", &["jointctl sign elbow/friction.img --key joint.key --version 2 --serial 12"]),
     (

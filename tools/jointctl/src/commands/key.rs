@@ -17,10 +17,26 @@ pub enum KeyCommand {
         /// File to write; an existing one is never overwritten
         file: PathBuf,
     },
-    /// Give a key to a joint that has none; it cannot be changed afterwards
+    /// Give a key to a joint that has none. Somebody has to be at it: press its button meanwhile, or where it has none do
+    /// it within a minute after its supply came, before a master starts it
     Give {
         /// The key
         file: PathBuf,
+        /// Which joint.
+        #[command(flatten)]
+        on: Where,
+    },
+    /// Replace a joint's key by another one; --key is the one that it has
+    Rotate {
+        /// The new key
+        file: PathBuf,
+        /// Which joint.
+        #[command(flatten)]
+        on: Where,
+    },
+    /// Take a joint's key back: by --key, or without it where somebody is at the joint, as for `give`. A key that was
+    /// damaged goes the same way. The joint belongs to nobody then
+    Forget {
         /// Which joint.
         #[command(flatten)]
         on: Where,
@@ -39,12 +55,25 @@ impl KeyCommand {
             Self::New { file } => {
                 let key = key_file::create(file)?;
                 println!("key {:08x} written: {}", key.id(), file.display());
-                println!("Whoever has this file can change the compensation of every joint that has the key.");
+                println!("Whoever has this file owns every joint that has the key.");
             }
             Self::Give { file, on } => {
                 let key = key_file::read(file)?;
                 on.joint()?.give_key(&key)?;
-                println!("node {}: takes images with a tag of key {:08x} only, from now on", on.node, key.id());
+                println!("node {}: belongs to who has key {:08x}, from now on", on.node, key.id());
+            }
+            Self::Rotate { file, on } => {
+                let new = key_file::read(file)?;
+                let Some(old) = on.key()? else {
+                    let problem = "the key that the joint has is missing: --key FILE, or JOINTCTL_KEY".to_owned();
+                    return Err(CommandError::Arguments(problem));
+                };
+                on.joint()?.rotate_key(&old, &new)?;
+                println!("node {}: key {:08x} in the place of {:08x}", on.node, new.id(), old.id());
+            }
+            Self::Forget { on } => {
+                on.joint()?.forget_key(on.key()?.as_ref())?;
+                println!("node {}: belongs to nobody", on.node);
             }
             Self::Number { file } => println!("{:08x}", key_file::read(file)?.id()),
         }

@@ -65,7 +65,7 @@ impl Get {
             return Ok(());
         };
         let named = self.objects.iter().map(|name| Entry::find(name)).collect::<Result<Vec<_>, _>>()?;
-        let joint = Where { bus: bus.clone(), node }.joint()?;
+        let joint = Where { bus: bus.clone(), node, key: None }.joint()?;
         if let Some(path) = &self.out {
             let [entry] = named.concat()[..] else {
                 return Err(CommandError::Arguments("--out takes the bytes of one object".into()));

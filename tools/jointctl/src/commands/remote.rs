@@ -1,8 +1,11 @@
 //! What the commands on a joint over a bus share: which joint, and when to stop.
 
 use super::CommandError;
+use crate::key_file;
 use crate::remote::RemoteJoint;
 use clap::Args;
+use joint_firmware::parameters::authentication::Key;
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Which joint.
@@ -14,12 +17,25 @@ pub struct Where {
     /// Node id of the joint, 1 to 127
     #[arg(long, value_name = "N", env = "JOINTCTL_NODE")]
     pub node: u8,
+    /// The joint's key, where it has one: opens a session for what only its owner may do
+    #[arg(long, value_name = "FILE", env = "JOINTCTL_KEY")]
+    pub key: Option<PathBuf>,
 }
 
 impl Where {
     /// Finds the joint.
     pub fn joint(&self) -> Result<RemoteJoint, CommandError> {
-        Ok(RemoteJoint::open(&self.bus, self.node)?)
+        let key = self.key()?;
+        let joint = RemoteJoint::open(&self.bus, self.node)?;
+        Ok(match key {
+            Some(key) => joint.owned_by(key),
+            None => joint,
+        })
+    }
+
+    /// The key in the file.
+    pub fn key(&self) -> Result<Option<Key>, CommandError> {
+        Ok(self.key.as_deref().map(key_file::read).transpose()?)
     }
 }
 

@@ -4,7 +4,6 @@ use super::CommandError;
 use super::fit::write;
 use super::remote::{Where, catch_interrupts, running};
 use crate::fit::Options;
-use crate::key_file;
 use crate::progress::Terminal;
 use crate::remote::retrain::{RetrainError, Round};
 use crate::report::verdict;
@@ -37,9 +36,6 @@ pub struct Retrain {
     /// Seed of everything random
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// The joint's key, where it has one
-    #[arg(long, value_name = "FILE")]
-    key: Option<PathBuf>,
     /// Acknowledge a fault whose cause is gone first
     #[arg(long)]
     reset: bool,
@@ -48,7 +44,7 @@ pub struct Retrain {
 impl Retrain {
     /// Runs the command.
     pub fn run(&self) -> Result<(), CommandError> {
-        let key = self.key.as_deref().map(key_file::read).transpose()?;
+        let key = self.on.key()?;
         let joint = self.on.joint()?;
         let out = self.out.clone().unwrap_or_else(|| PathBuf::from(format!("retrain-{}", joint.id())));
         let options = Options {

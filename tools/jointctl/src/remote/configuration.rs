@@ -10,7 +10,7 @@ use super::value::Value;
 use bus::client::{Abort, ClientError};
 use joint_firmware::canopen::{Access, Group};
 use joint_firmware::motor::setting::Name;
-use joint_firmware::objects::field::{ConfigurationField, Field, ImageField};
+use joint_firmware::objects::field::{ConfigurationField, Field, ImageField, OwnerField};
 
 /// Commands of object 2100h:1.
 const TAKE: u64 = 1;
@@ -24,7 +24,9 @@ pub fn set(joint: &RemoteJoint, wanted: &[(Entry, Value)]) -> Result<(), RemoteE
     for (entry, value) in wanted {
         match (entry.object.field, entry.object.access) {
             (Field::Image(ImageField::Staging), _) => return Err(refuse(entry, "`jointctl upload` writes it")),
-            (Field::Image(ImageField::Key), _) => return Err(refuse(entry, "`jointctl key give` writes it")),
+            (Field::Owner(OwnerField::Key | OwnerField::Response | OwnerField::Forget), _) => {
+                return Err(refuse(entry, "`jointctl key` writes it"));
+            }
             (_, Access::ReadOnly) => return Err(refuse(entry, "is read-only")),
             _ => {}
         }
@@ -99,11 +101,11 @@ fn sub_index(group: Group) -> u8 {
 /// Keeps what is in use over a loss of power (1010h). The motor has to be off.
 pub fn store(joint: &RemoteJoint, group: Group) -> Result<(), RemoteError> {
     joint.require_off("storing")?;
-    Ok(joint.node().download(0x1010, sub_index(group), b"save")?)
+    joint.download(0x1010, sub_index(group), b"save")
 }
 
 /// Forgets what was stored (1011h): the joint has its defaults after the next reset. The motor has to be off.
 pub fn restore(joint: &RemoteJoint, group: Group) -> Result<(), RemoteError> {
     joint.require_off("restoring")?;
-    Ok(joint.node().download(0x1011, sub_index(group), b"load")?)
+    joint.download(0x1011, sub_index(group), b"load")
 }

@@ -15,6 +15,16 @@ pub enum RemoteError {
     /// The node, or the way to it.
     #[error(transparent)]
     Client(#[from] ClientError),
+    /// Only its owner may do that.
+    #[error("node {node}: only the owner of key {number:08x} may do that; {problem}")]
+    Owned {
+        /// Node id.
+        node: u8,
+        /// Number of the joint's key.
+        number: u32,
+        /// What is missing.
+        problem: String,
+    },
     /// Nobody has this node id, or the node is silent. Many nodes send nothing unless they are asked.
     #[error("{0} `jointctl scan` asks every node id")]
     Silent(ClientError),

@@ -103,7 +103,13 @@ impl RemoteJoint {
 
     /// A command of the life cycle; a refusal with its reason.
     fn image_command(&self, command: Command, upload: &[u8]) -> Result<(), RemoteError> {
-        let sent = self.write_raw(Field::Image(ImageField::Command), command as u64);
+        let Entry { object, .. } = Entry::of(Field::Image(ImageField::Command));
+        let (index, sub_index, number) = (object.index, object.sub_index, [command as u8]);
+        // A roll back is the owner's; of the others what is refused is the image.
+        let sent = match command {
+            Command::RollBack => self.download(index, sub_index, &number),
+            _ => self.node().download(index, sub_index, &number).map_err(RemoteError::from),
+        };
         sent.map_err(|error| self.explain(error, Attempt { command: Some(command), upload }))
     }
 
@@ -246,15 +252,5 @@ impl RemoteJoint {
     pub fn discard_image(&self) -> Result<ImageStatus, RemoteError> {
         self.image_command(Command::Discard, &[])?;
         self.image_status()
-    }
-
-    /// Gives a joint that has none its key; it cannot be changed afterwards.
-    pub fn give_key(&self, key: &joint_firmware::parameters::authentication::Key) -> Result<(), RemoteError> {
-        if self.raw(Field::Image(ImageField::KeyPresent))? != 0 {
-            let number = self.raw(Field::Image(ImageField::KeyNumber))?;
-            let problem = format!("it has key {number:08x} already, and a key is written once");
-            return Err(RemoteError::Image { node: self.id(), problem });
-        }
-        self.write(Entry::of(Field::Image(ImageField::Key)), &Value::Bytes(key.to_bytes().to_vec()))
     }
 }

@@ -8,7 +8,7 @@ use super::joint::RemoteJoint;
 use super::motion;
 use super::value::Value;
 use joint_firmware::joint::adaptation::{Factors, Learning, Report};
-use joint_firmware::objects::field::{Actual, Field, ImageField, ResetField, SetPoint};
+use joint_firmware::objects::field::{Actual, Field, ImageField, OwnerField, ResetField, SetPoint};
 use joint_firmware::objects::settings::Setting;
 use joint_firmware::parameters::life_cycle::State;
 use std::fmt::Write;
@@ -260,14 +260,15 @@ pub fn life(state: State, left: f64) -> String {
 fn authentication(joint: &RemoteJoint) -> Result<String, RemoteError> {
     let raw = |field| joint.raw(Field::Image(field));
     let floor = raw(ImageField::Floor)?;
-    if raw(ImageField::KeyPresent)? == 0 {
-        return Ok(format!("no key: images need no tag; version {floor} or newer"));
+    let of_owner = |field| joint.raw(Field::Owner(field));
+    if of_owner(OwnerField::KeyPresent)? == 0 {
+        return Ok(format!("no key: belongs to nobody, images need no tag; version {floor} or newer"));
     }
-    let number = raw(ImageField::KeyNumber)?;
+    let number = of_owner(OwnerField::KeyNumber)?;
     if number == 0 {
-        return Ok("the stored key is damaged: no image is taken".into());
+        return Ok("the stored key is damaged: nothing that needs it is taken, `jointctl key forget` repairs it".into());
     }
-    let mut text = format!("key {number:08x}: images need its tag; version {floor} or newer");
+    let mut text = format!("key {number:08x}: images need its tag, settings a session; version {floor} or newer");
     let failures = raw(ImageField::Failures)?;
     if failures > 0 {
         let _ = write!(text, "; {failures} wrong tags so far");

@@ -2,9 +2,11 @@
 
 use super::entry::Entry;
 use super::error::RemoteError;
+use super::owner::Owner;
 use super::value::Value;
 use bus::client::{ClientError, Network, Node, Object};
 use joint_firmware::objects::field::Field;
+use std::sync::Arc;
 
 /// Device profile 402, a servo drive: object 1000h of every joint.
 pub const DEVICE_TYPE: u32 = 0x0002_0192;
@@ -13,6 +15,7 @@ pub const DEVICE_TYPE: u32 = 0x0002_0192;
 #[derive(Clone, Debug)]
 pub struct RemoteJoint {
     node: Node,
+    pub(super) owner: Option<Arc<Owner>>,
 }
 
 impl RemoteJoint {
@@ -23,7 +26,7 @@ impl RemoteJoint {
 
     /// Finds a joint on a bus that is open: several may share it.
     pub fn on(network: &Network, node: u8) -> Result<Self, RemoteError> {
-        let joint = Self { node: network.node(node)? };
+        let joint = Self { node: network.node(node)?, owner: None };
         let device_type = || joint.node.number(0x1000, 0).map(u32::from_le_bytes);
         let device_type = match device_type() {
             // A client that vanished within a block leaves the node waiting for the rest: it takes the first request for data, and
@@ -67,7 +70,7 @@ impl RemoteJoint {
     /// Writes an object. What the table says cannot be is refused before anything is sent.
     pub fn write(&self, entry: Entry, value: &Value) -> Result<(), RemoteError> {
         let bytes = entry.encode(value)?;
-        Ok(self.node.download(entry.object.index, entry.object.sub_index, &bytes)?)
+        self.download(entry.object.index, entry.object.sub_index, &bytes)
     }
 
     /// Reads the number of a field, in the table's unit.
@@ -87,6 +90,6 @@ impl RemoteJoint {
         let Entry { object, .. } = Entry::of(field);
         let bytes = raw.to_le_bytes();
         let length = usize::from(object.data_type.bytes().unwrap_or(0)).min(bytes.len());
-        Ok(self.node.download(object.index, object.sub_index, bytes.get(..length).unwrap_or(&bytes))?)
+        self.download(object.index, object.sub_index, bytes.get(..length).unwrap_or(&bytes))
     }
 }

@@ -25,6 +25,7 @@ pub mod image;
 pub mod info;
 pub mod joint;
 pub mod motion;
+mod owner;
 pub mod pdo;
 pub mod record;
 pub mod refusal;

@@ -28,7 +28,7 @@ use crate::fit::{FitError, Fitted, Options, fit};
 use crate::output::{OutputError, OutputFile, write_directory};
 use crate::progress::Progress;
 use crate::rigid::{RigidParameters, RigidRegressor};
-use joint_firmware::objects::field::{Actual, ConfigurationField, Field, ImageField, Range};
+use joint_firmware::objects::field::{Actual, ConfigurationField, Field, ImageField, OwnerField, Range};
 use joint_firmware::objects::settings::Setting;
 use joint_firmware::parameters::authentication::Key;
 use joint_firmware::parameters::image::MAX_LENGTH;
@@ -286,8 +286,8 @@ impl Round {
             return Err(RetrainError::Busy { node, state: status.state, left: status.left });
         }
         let refuse = |problem| Err(RetrainError::Key { node, problem });
-        let number = joint.raw(Field::Image(ImageField::KeyNumber))?;
-        match (joint.raw(Field::Image(ImageField::KeyPresent))? != 0, &self.key) {
+        let number = joint.raw(Field::Owner(OwnerField::KeyNumber))?;
+        match (joint.raw(Field::Owner(OwnerField::KeyPresent))? != 0, &self.key) {
             (true, _) if number == 0 => return refuse("its key is damaged: it takes no image".into()),
             (true, None) => return refuse(format!("it takes images with a tag of key {number:08x} only: --key FILE")),
             (true, Some(key)) if u64::from(key.id()) != number => {

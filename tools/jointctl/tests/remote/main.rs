@@ -8,6 +8,7 @@ mod commission;
 mod configuration;
 mod images;
 mod motion;
+mod owner;
 mod readme;
 mod refused;
 mod retrain;
@@ -59,6 +60,11 @@ fn main() {
             braking_may_take_longer_than_the_command_deadline,
             a_master_that_dies_leaves_a_fault_that_is_named_and_acknowledged_only_when_asked,
             disable_stops_a_joint_that_somebody_else_moves,
+        }
+        owner {
+            what_the_owner_may_do_takes_a_session_that_ends_with_his_work,
+            a_key_is_replaced_and_taken_back_by_who_has_it,
+            the_program_takes_the_key_as_an_option_or_from_the_environment,
         }
         readme {
             the_section_on_the_bus_runs_line_by_line,

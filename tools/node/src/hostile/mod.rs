@@ -23,12 +23,14 @@ use crate::storage::Storage;
 use bus::Frame;
 use joint_firmware::canopen::{self, Identity, NO_NODE_ID, NmtState, Receiver, Route, SdoSettings, Server};
 use joint_firmware::default_configuration::B_G431B_ESC1;
+use joint_firmware::joint::configuration::Configuration;
 use joint_firmware::joint::state_machine::{Controlword, State};
 use joint_firmware::joint::{Command, Demand};
-use joint_firmware::objects::{DEFAULT_RANGES, Images, JointImage, Objects, Observed, Shared, Start};
+use joint_firmware::objects::{DEFAULT_RANGES, Images, JointImage, Objects, Observed, Ownership, Shared, Start};
 use joint_firmware::parameters::Summary;
 use joint_firmware::parameters::authentication::{Key, STAGING, TAG};
 use joint_firmware::parameters::certificate::Limits;
+use joint_firmware::parameters::guard::Guard;
 use joint_firmware::parameters::image::{Effort, Image, Target};
 use joint_firmware::parameters::life_cycle::{Action, LifeCycle, Requirements};
 use joint_firmware::parameters::slots::SlotError;
@@ -157,14 +159,16 @@ impl<'a> HostileNode<'a> {
         };
         let Statics { bus, shared, staging } = statics;
         let (bus, shared) = (&*bus, &*shared);
-        let images = Images::new(staging, LifeCycle::new(requirements, 3, 0, 0), key.cloned(), stored_images);
+        let guard = Guard { floor: 3, key: key.cloned(), ..Guard::default() };
+        storage.store_guard(&guard)?;
+        let images = Images::new(staging, LifeCycle::new(requirements, 3, 0, 0), Ownership::new(&guard), stored_images);
         let start = Start { configuration: board.joint, ranges: DEFAULT_RANGES, single_bank: true };
         let mut node = Self {
             bus,
             receiver: Receiver::new(bus),
             server: Server::new(bus, &IDENTITY, SdoSettings::default(), NODE),
             image: JointImage::new(shared),
-            objects: Objects::new(shared, Watched::new(board.bridge, storage, key.is_some()), images, &start),
+            objects: Objects::new(shared, Watched::new(board.bridge, storage), images, &start),
             observed: Observed::default(),
             key: key.cloned(),
             queue: VecDeque::new(),
@@ -280,6 +284,16 @@ impl<'a> HostileNode<'a> {
             let bridge = B_G431B_ESC1.bridge;
             let configuration = self.objects.configuration();
             hold!(configuration.prepare(&bridge).is_ok(), "configured: {configuration:?}");
+            // Nobody here has a session: of an owned joint compensation alone can change, downwards.
+            let Configuration { compensation, .. } = *configuration;
+            let before = B_G431B_ESC1.joint;
+            let lowered = compensation.gain <= before.compensation.gain
+                && compensation.clamp <= before.compensation.clamp
+                && compensation.slew <= before.compensation.slew
+                && compensation.request as u8 <= before.compensation.request as u8;
+            let node_id = configuration.node_id;
+            let same = *configuration == Configuration { compensation, node_id, ..before };
+            hold!(self.key.is_none() || lowered && same, "configured without its owner: {configuration:?}");
         }
         Ok(())
     }
@@ -334,6 +348,7 @@ impl<'a> HostileNode<'a> {
                 }
                 Action::RollBack => {
                     hold!(!self.objects.program().armed, "a roll back under current");
+                    hold!(self.key.is_none(), "a roll back without its owner");
                     self.counts.rolled_back += 1;
                     let mut buffer = *self.objects.staging();
                     self.objects.program().storage.images.roll_back(&mut buffer)

@@ -175,7 +175,7 @@ impl Noise {
             }
             5 => {
                 let bytes: Vec<u8> = (0..self.below(80)).map(|_| self.next() as u8).collect();
-                let object = self.choose(&[(0x2210, 0), (0x2215, 6), (0x2211, 0)]);
+                let object = self.choose(&[(0x2210, 0), (0x2215, 6), (0x2215, 7), (0x2215, 5), (0x2211, 0)]);
                 script::download(way, object.0, object.1, &bytes)
             }
             6 => {

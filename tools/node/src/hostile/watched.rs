@@ -6,7 +6,8 @@ use joint_firmware::joint::configuration::{BridgeConfiguration, Configuration};
 use joint_firmware::joint::history::History;
 use joint_firmware::motor::open_loop::Window;
 use joint_firmware::objects::{NotConfigured, Program};
-use joint_firmware::parameters::authentication::Key;
+use joint_firmware::parameters::authentication::{CHALLENGE, Key};
+use joint_firmware::parameters::guard::Guard;
 use joint_firmware::parameters::slots::SlotError;
 use joint_firmware::reset_record::LastReset;
 
@@ -17,7 +18,6 @@ pub struct Watched {
     pub storage: Storage,
     /// The joint is under current.
     pub armed: bool,
-    has_key: bool,
     /// Configurations taken since somebody looked.
     pub configured: u32,
     /// Wrong tags since somebody looked.
@@ -27,8 +27,8 @@ pub struct Watched {
 }
 
 impl Watched {
-    pub fn new(bridge: BridgeConfiguration, storage: Storage, has_key: bool) -> Self {
-        Self { bridge, storage, armed: false, has_key, configured: 0, forged: 0, problem: None }
+    pub fn new(bridge: BridgeConfiguration, storage: Storage) -> Self {
+        Self { bridge, storage, armed: false, configured: 0, forged: 0, problem: None }
     }
 }
 
@@ -58,20 +58,21 @@ impl Program for Watched {
         self.storage.store_configuration(record)
     }
 
-    fn keep(&mut self, floor: u32, failures: u16) -> Result<(), SlotError> {
-        if floor < self.storage.counts().0 {
+    fn keep(&mut self, guard: &Guard) -> Result<(), SlotError> {
+        let kept = self.storage.guard();
+        if guard.floor < kept.floor {
             self.problem = Some("the version floor came down");
         }
-        self.forged += u32::from(failures > self.storage.counts().1);
-        self.storage.store_counts(floor, failures)
-    }
-
-    fn provision(&mut self, key: &Key) -> Result<(), SlotError> {
-        if self.has_key {
+        if kept.key.is_some() && guard.key.as_ref().map(Key::id) != kept.key.as_ref().map(Key::id) {
             self.problem = Some("the key is replaced");
         }
-        self.has_key = true;
-        self.storage.store_key(key)
+        self.forged += u32::from(guard.failures > kept.failures);
+        self.storage.store_guard(guard)
+    }
+
+    fn random(&mut self) -> Option<[u8; CHALLENGE]> {
+        // The attackers do not have the key, so any challenge will do.
+        Some([7; CHALLENGE])
     }
 
     fn read_image(&mut self, offset: u32, out: &mut [u8]) -> bool {
