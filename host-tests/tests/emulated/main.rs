@@ -4,6 +4,7 @@
 
 mod boards;
 mod commissioning;
+mod commissioning_stops;
 mod control_loop;
 mod faults;
 mod full_bus;
@@ -25,6 +26,7 @@ fn main() {
     let ignored = std::env::var_os("CI").is_none() && !target_installed();
     // The longest first.
     let rooms = [
+        commissioning_stops::trials(),
         commissioning::trials(),
         power_cut::trials(),
         control_loop::trials(),
