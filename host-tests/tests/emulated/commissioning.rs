@@ -5,8 +5,12 @@ use emulator::program::Program;
 use host_tests::emulated::Bench;
 use host_tests::emulated::bench::{SUPPLY, program};
 use host_tests::emulated::commissioned::OnBoard;
+use joint_firmware::joint::state_machine::State;
+use joint_firmware::objects::settings::Setting;
+use jointctl::commission::bench::Motion;
 use jointctl::commission::joint::Joint;
-use jointctl::commission::{Bench as _, Found, Plan, commission};
+use jointctl::commission::{Bench as _, Found, Plan, Stopped, commission, find_index};
+use jointctl::remote::drive;
 use libtest_mimic::{Failed, Trial};
 use plant::ActuatorParameters;
 use plant::actuator::windings::PhaseOrder;
@@ -17,6 +21,16 @@ use std::sync::OnceLock;
 
 /// Random motors on each board.
 const MOTORS: u64 = 20;
+/// Random motors that lose their power.
+const RESTARTED: u64 = 3;
+/// Velocity of a motor that turns again, turns of the rotor per second, for how long, s, and how far off its mean may be.
+const SPEED: f64 = 0.5;
+const TURNING: f64 = 0.5;
+const RIGHT: f64 = 0.3;
+/// Between two set-points, s.
+const PERIOD: f64 = 0.01;
+/// Position that may be off after the index was met again, turns of the rotor.
+const OFF: f64 = 0.01;
 /// The joint's node id.
 pub const NODE: u8 = 5;
 /// How well a winding has to be known, and the electrical zero, degrees.
@@ -31,6 +45,10 @@ pub const ESC1: &str = "b-g431b-esc1";
 /// The tests of this file, by name.
 pub fn trials() -> Vec<Trial> {
     let mut trials = Vec::new();
+    for motor in 0..RESTARTED {
+        let name = format!("b_g431b_esc1_turns_again_by_its_index_after_a_loss_of_power_{motor}");
+        trials.push(Trial::test(name, move || turns_again(1_100 + motor)));
+    }
     for motor in 0..MOTORS {
         let name = format!("moteus_r4_is_commissioned_with_random_motor_{motor:02}");
         trials.push(Trial::test(name, move || is_commissioned(MOTEUS, MoteusR4::new, motor)));
@@ -200,6 +218,79 @@ fn is_commissioned<W: Wired>(board: &'static str, wired: fn(Drivetrain) -> W, se
         if (kept - wanted).abs() > 1e-6 * wanted.abs() + 1e-9 {
             return Err(format!("{setting:?} is {kept} after a loss of power, {wanted} was taken").into());
         }
+    }
+    Ok(())
+}
+
+/// A joint of the B-G431B-ESC1 that is commissioned loses its power: it is not ready before its encoder's index has been
+/// met once more, as `jointctl commission --index-only` has it, and turns then by what is in its flash.
+fn turns_again(seed: u64) -> Result<(), Failed> {
+    let motor = Motor::random(seed, true);
+    let bench = motor.board(BG431BEsc1::new, built(ESC1)?)?;
+    let (on_board, mut telling) = OnBoard::new(bench, NODE);
+    let mut joint = Joint::new(on_board);
+    let stopped = |stopped: Stopped| stopped.to_string();
+    commission(&mut joint, &motor.plan, &mut telling)
+        .map_err(|failure| format!("{failure}\n{}", telling.told.join("\n")))?;
+    let gear = joint.setting(Setting::GearRatio).map_err(stopped)?;
+    // Where the link is, and where the joint says that it is: what is between both stays, but for whole turns of the rotor.
+    let between = |joint: &mut Joint<OnBoard<'_, BG431BEsc1>>| -> Result<f64, String> {
+        let [position, ..] = joint.motion().map_err(stopped)?;
+        let link = joint.objects().bench.board().drivetrain().actuator().state().joint.position;
+        Ok(gear * (position - motor.sign() * link) / TAU)
+    };
+    let before = between(&mut joint)?;
+
+    joint.objects().bench.restart(NODE)?;
+    joint.pass(0.5).map_err(stopped)?;
+    let lost = joint.condition().map_err(stopped)?;
+    if (lost.state.as_str(), lost.faults.as_str()) != (drive::name(State::NotReadyToSwitchOn), "") {
+        return Err(format!("after the loss of power it is {} ({})", lost.state, lost.faults).into());
+    }
+    if joint.begin_motion(Motion::Velocity).is_ok() {
+        return Err("it is enabled without its index".into());
+    }
+    let index = find_index(&mut joint, &motor.plan, &mut telling)
+        .map_err(|failure| format!("{failure}\n{}", telling.told.join("\n")))?;
+    if index.turns == 0.0 {
+        return Err("the index was known before".into());
+    }
+    joint.pass(0.1).map_err(stopped)?;
+    let found = joint.condition().map_err(stopped)?;
+    if (found.state.as_str(), found.faults.as_str()) != (drive::name(State::SwitchOnDisabled), "") {
+        return Err(format!("with its index it is {} ({})", found.state, found.faults).into());
+    }
+    let off = between(&mut joint)? - before;
+    if (off - off.round()).abs() > OFF {
+        return Err(format!("the joint's position is off by {off} turns of the rotor").into());
+    }
+
+    for way in [1.0, -1.0] {
+        let wanted = way * TAU * SPEED / gear;
+        joint.begin_motion(Motion::Velocity).map_err(stopped)?;
+        let mut follow = |seconds: f64| -> Result<f64, Failed> {
+            let link = |joint: &mut Joint<OnBoard<'_, BG431BEsc1>>| {
+                let bench = &mut joint.objects().bench;
+                let now = bench.emulation.now().seconds();
+                (now, motor.sign() * bench.board().drivetrain().actuator().state().joint.position)
+            };
+            let (from, begun) = link(&mut joint);
+            for _ in 0..(seconds / PERIOD) as u32 {
+                joint.move_to(wanted).map_err(stopped)?;
+                joint.pass(PERIOD).map_err(stopped)?;
+                // It is enabled still.
+                joint.motion().map_err(stopped)?;
+            }
+            let (to, ended) = link(&mut joint);
+            Ok((ended - begun) / (to - from))
+        };
+        follow(TURNING)?;
+        let velocity = follow(TURNING)?;
+        println!("| {ESC1} | {seed} | {:.3} turns | {velocity:+.4} rad/s, wanted {wanted:+.4} |", index.turns);
+        if (velocity / wanted - 1.0).abs() > RIGHT {
+            return Err(format!("it turns at {velocity} rad/s, {wanted} was wanted").into());
+        }
+        joint.off().map_err(stopped)?;
     }
     Ok(())
 }
