@@ -1,7 +1,8 @@
-//! The moteus r4's gate driver and chip, by its program on the emulated board: faults of the driver are named over CAN and gone after a fault reset, without a loss of
-//! power; a driver that does not answer, or a supply that comes late, is waited for; another board is left alone; option bytes are told, and set when asked.
+//! The moteus r4's gate driver, and either board's chip, by their programs on the emulated boards: faults of the driver are
+//! named over CAN and gone after a fault reset, without a loss of power; a driver that does not answer, or a supply that
+//! comes late, is waited for; another board is left alone; option bytes are told, and set when asked.
 
-use emulator::board::{Drivetrain, MoteusR4, Wired as _};
+use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired as _};
 use emulator::cpu::Origin;
 use emulator::parts::drv8353::{Drv8353, fault};
 use emulator::program::Program;
@@ -10,6 +11,7 @@ use host_tests::emulated::bench::{SUPPLY, actuator, program};
 use host_tests::emulated::kept::{Kept, configuration};
 use host_tests::emulated::master::send;
 use host_tests::emulated::motion::{Moving, NODE, SET_POINT};
+use host_tests::emulated::observed::Observed;
 use joint_firmware::compensation::Request;
 use joint_firmware::hardware::chip_options::{COMMAND, N_SWBOOT0, SRAM_PE};
 use joint_firmware::hardware::drv8353::MOTEUS_R4_11;
@@ -45,7 +47,8 @@ pub fn trials() -> Vec<Trial> {
         Trial::test("moteus_r4_waits_for_a_silent_driver", silent_at_start),
         Trial::test("moteus_r4_waits_for_its_supply", late_supply),
         Trial::test("moteus_r4_leaves_another_board_alone", other_boards),
-        Trial::test("moteus_r4_tells_its_option_bytes_and_sets_them_when_asked", options),
+        Trial::test("moteus_r4_tells_its_option_bytes_and_sets_them_when_asked", || options(MoteusR4::new)),
+        Trial::test("b_g431b_esc1_tells_its_option_bytes_and_sets_them_when_asked", || options(BG431BEsc1::new)),
     ]
 }
 
@@ -303,17 +306,16 @@ fn other_boards() -> Result<(), Failed> {
     expect("2302h:5 of the right one", bench.number(NODE, 0x2302, 5)?, u32::from(SUPPORTED))
 }
 
-fn options() -> Result<(), Failed> {
-    let program = built()?;
-    let mut moving = moving(&program)?;
+fn options<W: Observed>(board: fn(Drivetrain) -> W) -> Result<(), Failed> {
+    let program = program(W::NAME, env!("CARGO_TARGET_TMPDIR"))?;
+    let mut moving = Moving::start(board, &actuator(), &program, &SampleImage::constant(1, 0.1))?;
     let found = moving.bench.number(NODE, 0x2303, 1)?;
     let needed = moving.bench.number(NODE, 0x2303, 2)?;
     expect("2303h:2", needed, found & !(SRAM_PE | N_SWBOOT0))?;
     expect("2303h:3", moving.bench.number(NODE, 0x2303, 3)?, 0b011)?;
     moving.bench.expect("option bytes 0x")?;
     // Not while it moves, not by another command.
-    let refused =
-        |bench: &mut Bench<MoteusR4>, command: u32| bench.download(NODE, 0x2303, 4, &command.to_le_bytes()).is_err();
+    let refused = |bench: &mut Bench<W>, command: u32| bench.download(NODE, 0x2303, 4, &command.to_le_bytes()).is_err();
     expect("refused in motion", refused(&mut moving.bench, COMMAND), true)?;
     moving.controlword = Some(0);
     moving.run(SHORT)?;
