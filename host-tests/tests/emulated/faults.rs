@@ -4,13 +4,14 @@
 //! read stands in the table of docs/emulated-board.md, which the tests read. Each fault is brought in at several instants, anywhere in a
 //! control period, drawn by a fixed seed; the worst counts.
 
-use emulator::board::{BG431BEsc1, MoteusR4, Wired};
+use emulator::board::{BG431BEsc1, Drivetrain, Inputs, MoteusR4, Wired};
 use emulator::chip::time::Instant;
 use emulator::cpu::{End, Watch};
 use emulator::program::Program;
 use host_tests::emulated::Bench;
 use host_tests::emulated::bench::{SUPPLY, actuator, program};
 use host_tests::emulated::motion::{Moving, NODE, SET_POINT};
+use host_tests::emulated::observed::Observed;
 use joint_firmware::reset_record::LastReset;
 use libtest_mimic::{Failed, Trial};
 use node::SampleImage;
@@ -34,8 +35,8 @@ const LOST: f64 = 0.1;
 /// The tests of this file, by name.
 pub fn trials() -> Vec<Trial> {
     vec![
-        Trial::test("moteus_r4_switches_off_in_time_and_says_why", moteus),
-        Trial::test("b_g431b_esc1_keeps_its_bridge_off_and_says_why", esc1),
+        Trial::test("moteus_r4_switches_off_in_time_and_says_why", || switches_off(MoteusR4::new, &MOTEUS)),
+        Trial::test("b_g431b_esc1_switches_off_in_time_and_says_why", || switches_off(BG431BEsc1::new, &ESC1)),
     ]
 }
 
@@ -75,10 +76,13 @@ fn documented(board: &str, fault: &str) -> Result<Documented, Failed> {
     })
 }
 
+/// Brings a fault in; the instant from which on it is there.
+type Bring<W> = fn(&mut Moving<W>, &Program) -> Result<Instant, Failed>;
+
 /// A fault, and how it is brought in: the instant from which on it is there.
-struct Broken {
+struct Broken<W: Wired> {
     name: &'static str,
-    bring: fn(&mut Moving, &Program) -> Result<Instant, Failed>,
+    bring: Bring<W>,
     /// How often it is brought in.
     instants: usize,
     /// From the fault to the last of what the joint has to say of it, s.
@@ -86,23 +90,23 @@ struct Broken {
 }
 
 /// Brought in at every instant; what there is to say is said at once.
-const fn broken(name: &'static str, bring: fn(&mut Moving, &Program) -> Result<Instant, Failed>) -> Broken {
+const fn broken<W: Wired>(name: &'static str, bring: Bring<W>) -> Broken<W> {
     Broken { name, bring, instants: INSTANTS, afterwards: 0.05 }
 }
 
-fn inject(moving: &mut Moving, fault: Fault) -> Result<Instant, Failed> {
+fn inject<W: Observed>(moving: &mut Moving<W>, fault: Fault) -> Result<Instant, Failed> {
     moving.bench.board().drivetrain().actuator_mut().inject(fault)?;
     Ok(moving.now())
 }
 
 /// Something on the board: no sensor, no lead, no supply.
-fn on_the_board(moving: &mut Moving, breaks: fn(&mut MoteusR4)) -> Instant {
-    breaks(moving.bench.board());
-    moving.now()
+fn on_the_board<W: Observed>(moving: &mut Moving<W>, breaks: fn(&mut Inputs)) -> Result<Instant, Failed> {
+    breaks(moving.bench.board().inputs());
+    Ok(moving.now())
 }
 
 /// The source takes another voltage; from the instant on at which the supply is beyond the configuration's limits.
-fn supply(moving: &mut Moving, part: f64) -> Result<Instant, Failed> {
+fn supply<W: Observed>(moving: &mut Moving<W>, part: f64) -> Result<Instant, Failed> {
     inject(moving, Fault::SourceVoltage(part * SUPPLY))?;
     let (lowest, highest) = moving.configuration.limits.bus_voltage;
     for _ in 0..100_000 {
@@ -116,7 +120,7 @@ fn supply(moving: &mut Moving, part: f64) -> Result<Instant, Failed> {
 }
 
 /// The supply is gone, and with it the chip's, at once; it comes back later.
-fn lose_supply(moving: &mut Moving) -> Result<Instant, Failed> {
+fn lose_supply<W: Observed>(moving: &mut Moving<W>) -> Result<Instant, Failed> {
     let lost = inject(moving, Fault::SourceVoltage(LOST * SUPPLY))?;
     moving.bench.emulation.power_down();
     moving.bench.board().drivetrain().actuator_mut().clear_faults();
@@ -125,7 +129,7 @@ fn lose_supply(moving: &mut Moving) -> Result<Instant, Failed> {
 }
 
 /// Nobody's frame comes through.
-fn disturb(moving: &mut Moving) -> Instant {
+fn disturb<W: Observed>(moving: &mut Moving<W>) -> Instant {
     let now = moving.now();
     moving.bench.board().line().disturb(Instant(now.0 + (DISTURBED * 1e12) as u64));
     now
@@ -168,15 +172,15 @@ fn stall_main_loop<W: Wired>(bench: &mut Bench<W>, program: &Program) -> Result<
     Ok(bench.emulation.now())
 }
 
-const MOTEUS: [Broken; 15] = [
+const MOTEUS: [Broken<MoteusR4>; 15] = [
     broken("motor lead open", |m, _| inject(m, Fault::PhaseOpen(Phase::B))),
     broken("low side shorted", |m, _| inject(m, Fault::PhaseShorted(Phase::B))),
     broken("current sensor off by 10 A", |m, _| inject(m, Fault::Sensor(Channel::CurrentA, Failure::Offset(10.0)))),
-    broken("encoder's line stuck low", |m, _| Ok(on_the_board(m, |board| board.inputs().encoder_line = Some(false)))),
-    broken("encoder silent", |m, _| Ok(on_the_board(m, |board| board.inputs().encoder_line = Some(true)))),
+    broken("encoder's line stuck low", |m, _| on_the_board(m, |inputs| inputs.encoder_line = Some(false))),
+    broken("encoder silent", |m, _| on_the_board(m, |inputs| inputs.encoder_line = Some(true))),
     broken("encoder stuck", |m, _| inject(m, Fault::Sensor(Channel::Encoder, Failure::Stuck))),
-    broken("bridge's thermistor open", |m, _| Ok(on_the_board(m, |board| board.inputs().thermistor_open = true))),
-    broken("gate driver's fault line", |m, _| Ok(on_the_board(m, |board| board.inputs().driver_fault = true))),
+    broken("bridge's thermistor open", |m, _| on_the_board(m, |inputs| inputs.thermistor_open = true)),
+    broken("gate driver's fault line", |m, _| on_the_board(m, |inputs| inputs.driver_fault = true)),
     broken("supply too high", |m, _| supply(m, SURGE)),
     broken("supply sags", |m, _| supply(m, SAG)),
     broken("supply lost", |m, _| lose_supply(m)),
@@ -189,10 +193,42 @@ const MOTEUS: [Broken; 15] = [
     Broken { instants: 1, ..broken("main loop stands still", |m, program| stall_main_loop(&mut m.bench, program)) },
 ];
 
-fn moteus() -> Result<(), Failed> {
-    let program = program(MoteusR4::NAME, env!("CARGO_TARGET_TMPDIR"))?;
+/// A line of the log comes every second.
+const LOGGED: f64 = 1.3;
+
+const ESC1: [Broken<BG431BEsc1>; 12] = [
+    broken("motor lead open", |m, _| inject(m, Fault::PhaseOpen(Phase::B))),
+    broken("low side shorted", |m, _| inject(m, Fault::PhaseShorted(Phase::B))),
+    Broken {
+        afterwards: LOGGED,
+        ..broken("current sensor off by 10 A", |m, _| {
+            inject(m, Fault::Sensor(Channel::CurrentA, Failure::Offset(10.0)))
+        })
+    },
+    broken("encoder's lines stay as they are", |m, _| on_the_board(m, |inputs| inputs.encoder_line = Some(false))),
+    Broken {
+        afterwards: LOGGED,
+        ..broken("bridge's thermistor open", |m, _| on_the_board(m, |inputs| inputs.thermistor_open = true))
+    },
+    Broken { afterwards: LOGGED, ..broken("supply too high", |m, _| supply(m, SURGE)) },
+    Broken { afterwards: LOGGED, ..broken("supply sags", |m, _| supply(m, SAG)) },
+    Broken { afterwards: LOGGED, ..broken("supply lost", |m, _| lose_supply(m)) },
+    Broken { afterwards: DISTURBED + 0.25, instants: 2, ..broken("bus disturbed", |m, _| Ok(disturb(m))) },
+    broken("set-points end", |m, _| {
+        m.silent = true;
+        Ok(m.now())
+    }),
+    Broken {
+        afterwards: LOGGED,
+        ..broken("interrupt executor stands still", |m, program| stall_interrupt_executor(&mut m.bench, program))
+    },
+    Broken { instants: 1, ..broken("main loop stands still", |m, program| stall_main_loop(&mut m.bench, program)) },
+];
+
+fn switches_off<W: Observed + Clone>(board: fn(Drivetrain) -> W, faults: &[Broken<W>]) -> Result<(), Failed> {
+    let program = program(W::NAME, env!("CARGO_TARGET_TMPDIR"))?;
     let image = SampleImage::constant(1, 0.1);
-    let mut moving = Moving::start(MoteusR4::new, &actuator(), &program, &image)?;
+    let mut moving = Moving::start(board, &actuator(), &program, &image)?;
     let mut random = ChaCha8Rng::seed_from_u64(1);
     let mut moments = Vec::new();
     for _ in 0..20 * INSTANTS {
@@ -210,8 +246,8 @@ fn moteus() -> Result<(), Failed> {
         return Err(format!("the joint hardly moves:\n{}", moving.bench.log()).into());
     }
     let mut bad = Vec::new();
-    for broken in &MOTEUS {
-        let limits = documented(MoteusR4::NAME, broken.name)?;
+    for broken in faults {
+        let limits = documented(W::NAME, broken.name)?;
         let (mut times, mut reasons) = (Vec::new(), Vec::new());
         for moment in moments.iter().take(broken.instants) {
             match broken.happens(moment.clone(), &program, &limits) {
@@ -230,19 +266,14 @@ fn moteus() -> Result<(), Failed> {
         }
         let (least, most) = times.iter().fold((f64::MAX, 0.0f64), |(least, most), t| (least.min(*t), most.max(*t)));
         let within = 1e3 * limits.within;
-        println!(
-            "| {} | {} | {within:.2} | {least:.3} to {most:.3} | {} |",
-            MoteusR4::NAME,
-            broken.name,
-            reasons.join("; ")
-        );
+        println!("| {} | {} | {within:.2} | {least:.3} to {most:.3} | {} |", W::NAME, broken.name, reasons.join("; "));
     }
     if bad.is_empty() { Ok(()) } else { Err(bad.join("\n").into()) }
 }
 
-impl Broken {
+impl<W: Observed> Broken<W> {
     /// After how long the bridge was off, and what is to be read of it.
-    fn happens(&self, mut moving: Moving, program: &Program, limits: &Documented) -> Result<(f64, String), Failed> {
+    fn happens(&self, mut moving: Moving<W>, program: &Program, limits: &Documented) -> Result<(f64, String), Failed> {
         let said = moving.bench.log().len();
         let from = (self.bring)(&mut moving, program)?;
         let time = moving.until_off(from, limits.within + 0.1)?.ok_or("the bridge is still on")?;
@@ -286,64 +317,11 @@ impl Broken {
 }
 
 /// Codes in object 1003h, newest first.
-fn error_history(bench: &mut Bench<MoteusR4>) -> Result<Vec<u16>, Failed> {
+fn error_history<W: Observed>(bench: &mut Bench<W>) -> Result<Vec<u16>, Failed> {
     let length = bench.upload(NODE, 0x1003, 0)?.first().copied().unwrap_or(0);
     let code = |number| {
         let entry = bench.upload(NODE, 0x1003, number)?;
         Ok(u16::from_le_bytes(*entry.first_chunk().ok_or("an entry of 1003h is short")?))
     };
     (1..=length).map(code).collect()
-}
-
-/// What breaks on the other board, which has no bus: nobody enables its bridge.
-type OnEsc1 = (&'static str, fn(&mut Bench<BG431BEsc1>, &Program) -> Result<(), Failed>);
-
-fn inject_on_esc1(bench: &mut Bench<BG431BEsc1>, fault: Fault) -> Result<(), Failed> {
-    Ok(bench.board().drivetrain().actuator_mut().inject(fault)?)
-}
-
-const ESC1: [OnEsc1; 6] = [
-    ("current sensor off by 10 A", |b, _| inject_on_esc1(b, Fault::Sensor(Channel::CurrentA, Failure::Offset(10.0)))),
-    ("bridge's thermistor open", |bench, _| {
-        bench.board().inputs().thermistor_open = true;
-        Ok(())
-    }),
-    ("supply too high", |bench, _| inject_on_esc1(bench, Fault::SourceVoltage(SURGE * SUPPLY))),
-    ("supply sags", |bench, _| inject_on_esc1(bench, Fault::SourceVoltage(SAG * SUPPLY))),
-    ("supply lost", |bench, _| {
-        bench.emulation.power_down();
-        bench.emulation.power_up();
-        Ok(())
-    }),
-    ("interrupt executor stands still", |bench, program| stall_interrupt_executor(bench, program).map(drop)),
-];
-
-fn esc1() -> Result<(), Failed> {
-    let program = program(BG431BEsc1::NAME, env!("CARGO_TARGET_TMPDIR"))?;
-    let mut actuator = actuator();
-    // Without the index's noise around its zero.
-    actuator.sensors.encoder.zero = 0.5;
-    let mut started = Bench::with(BG431BEsc1::new, &actuator, &program)?;
-    started.run(0.3)?;
-    let mut bad = Vec::new();
-    for (name, breaks) in ESC1 {
-        let mut bench = started.clone();
-        let said = bench.log().len();
-        breaks(&mut bench, &program)?;
-        // A line of the log a second.
-        bench.run(1.3)?;
-        let log = bench.log().split_off(said);
-        let drivetrain = bench.board().drivetrain();
-        if drivetrain.is_switching() || drivetrain.off_since().is_some() {
-            bad.push(format!("{name}: the bridge was on"));
-        }
-        let documented = documented(BG431BEsc1::NAME, name)?;
-        for text in documented.log {
-            match log.contains(&text) {
-                true => println!("| {} | {name} | off | off | `{text}` |", BG431BEsc1::NAME),
-                false => bad.push(format!("{name}: the log does not say \"{text}\":\n{log}")),
-            }
-        }
-    }
-    if bad.is_empty() { Ok(()) } else { Err(bad.join("\n").into()) }
 }
