@@ -15,6 +15,7 @@ mod outputs;
 mod ownership;
 mod power_cut;
 mod same_run;
+mod settings;
 mod settling;
 mod workbench;
 
@@ -39,6 +40,7 @@ fn main() {
         outputs::trials(),
         ownership::trials(),
         same_run::trials(),
+        settings::trials(),
         settling::trials(),
         workbench::trials(),
     ];
