@@ -5,8 +5,8 @@ use crate::default_configuration::{B_G431B_ESC1, BoardConfiguration, MOTEUS_R4};
 use crate::joint::configuration::Configuration;
 use crate::joint::fault::Fault;
 use crate::joint::rig::{self, at_rest, enabled};
-use crate::joint::state_machine::State;
-use crate::joint::{Active, BridgeState, Demand, Joint, Measurements, OFFSET_STEPS, Slow};
+use crate::joint::state_machine::{Controlword, State};
+use crate::joint::{Active, BridgeState, Command, Demand, Joint, Measurements, OFFSET_STEPS, Slow};
 use crate::motor::phases::Phases;
 use crate::objects::field::Field;
 use crate::objects::settings::Setting;
@@ -16,7 +16,7 @@ use std::collections::BTreeSet;
 const BOARDS: [(&str, BoardConfiguration); 2] = [("b-g431b-esc1", B_G431B_ESC1), ("moteus-r4", MOTEUS_R4)];
 
 /// What may take part in harming a bridge; each is tried with each other.
-const ELECTRICAL: [Setting; 15] = [
+const ELECTRICAL: [Setting; 25] = [
     Setting::Resistance,
     Setting::InductanceD,
     Setting::InductanceQ,
@@ -32,7 +32,21 @@ const ELECTRICAL: [Setting; 15] = [
     Setting::WindingTemperature,
     Setting::CommandDeadline,
     Setting::CurrentBandwidth,
+    Setting::ObserverBandwidth,
+    Setting::FieldWeakeningCurrent,
+    Setting::VoltageFraction,
+    Setting::ChopperVoltage,
+    Setting::ChopperShare,
+    Setting::PolePairs,
+    Setting::EncoderCounts,
+    Setting::ElectricalZero,
+    Setting::VelocityLimit,
+    Setting::GearRatio,
 ];
+/// Control steps in which a joint is turned, and until when the loops ask for what they can.
+const TURNED: u32 = 24;
+/// 1 and a little: rounding of single-precision numbers.
+const ROUNDED: f32 = 1.000_01;
 
 /// The board's highest value of a setting; none where it has no say.
 fn highest(board: &BoardLimits, setting: Setting) -> Option<f32> {
@@ -47,16 +61,34 @@ fn highest(board: &BoardLimits, setting: Setting) -> Option<f32> {
     }
 }
 
+/// Ends of a setting that follow from the others as the board has them at first, or from its control rate.
+fn depending(board: &BoardConfiguration, setting: Setting) -> Vec<f32> {
+    let BoardConfiguration { bridge, joint: Configuration { limits, motor, .. }, .. } = board;
+    match setting {
+        Setting::LossCurrent | Setting::FieldWeakeningCurrent => vec![motor.current_limit],
+        Setting::ChopperVoltage => {
+            vec![limits.bus_voltage.0 + 1.0, limits.bus_voltage.1 - limits.regeneration_band]
+        }
+        Setting::RegenerationBand => vec![limits.bus_voltage.1 - limits.bus_voltage.0],
+        Setting::CurrentBandwidth => vec![bridge.rate / 18.0],
+        Setting::ObserverBandwidth => vec![bridge.rate / 10.0],
+        Setting::GearRatio => vec![1.0, -1.0, 100.0],
+        Setting::VelocityLimit => vec![100.0],
+        _ => Vec::new(),
+    }
+}
+
 /// Every setting with the numbers that it is attacked with: both ends, the board's, just beyond each, and what is no number.
-fn attacks(board: &BoardLimits) -> Vec<(Setting, Vec<u32>)> {
+fn attacks(board: &BoardConfiguration) -> Vec<(Setting, Vec<u32>)> {
     let of = |(object, text): (&crate::objects::table::Object, &crate::objects::table::Text)| {
         let (Field::Setting(setting) | Field::AtOnce(setting)) = object.field else { return None };
         if object.data_type != DataType::F32 {
-            return Some((setting, vec![0, 1, 2, 63, 64, 65, u32::MAX]));
+            return Some((setting, vec![0, 1, 2, 15, 16, 63, 64, 65, 65_535, 65_536, 1 << 31, u32::MAX]));
         }
         let mut values = vec![0.0, -1.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, f32::MIN_POSITIVE];
         let (low, high) = text.limits.map_or((1e-3, 1e3), |(low, high)| (low as f32, high as f32));
-        for end in [low, high].into_iter().chain(highest(board, setting)) {
+        let ends = [low, high].into_iter().chain(highest(&board.bridge.limits, setting));
+        for end in ends.chain(depending(board, setting)) {
             values.extend([end.next_down(), end, end.next_up(), 0.99 * end, 1.01 * end]);
         }
         Some((setting, values.into_iter().map(f32::to_bits).collect()))
@@ -69,10 +101,70 @@ fn started(board: &BoardConfiguration) -> Joint {
     rig::started(&board.joint.prepare(&board.bridge).unwrap())
 }
 
+/// What is accepted is within the facts of the board and of the bridge's timing that no measurement shows.
+fn is_borne(board: &BoardConfiguration, accepted: &Configuration) {
+    let (bears, rate) = (&board.bridge.limits, board.bridge.rate);
+    let Configuration { motor, gear, limits, gains, .. } = accepted;
+    let (lowest, highest) = limits.bus_voltage;
+    assert!(motor.loss_current <= motor.current_limit && motor.field_weakening_current <= motor.current_limit);
+    assert!(motor.current_limit <= bears.current && limits.over_current >= 1.049 * motor.current_limit);
+    assert!(gains.current_bandwidth <= ROUNDED * rate / 18.0 && gains.observer_bandwidth <= ROUNDED * rate / 10.0);
+    assert!((0.099..=1.1548).contains(&gains.voltage_fraction), "{}", gains.voltage_fraction);
+    assert!((1..=64).contains(&motor.alignment.pole_pairs) && (16..=65_535).contains(&motor.encoder_counts));
+    // Half a turn in a control step at twice the velocity limit: beyond it nobody could tell which way the rotor turned.
+    let rotor = limits.velocity * gear.ratio.abs();
+    assert!(gear.ratio.abs() >= 1.0 && 2.0 * rotor <= ROUNDED * core::f32::consts::PI * rate, "{rotor} rad/s");
+    // A rotor whose field is weakened does not charge the supply beyond its limit through the diodes.
+    if motor.field_weakening_current > 0.0 {
+        let induced = 3.0f32.sqrt() * motor.torque_constant / 1.5 * 1.2 * rotor;
+        assert!(induced <= ROUNDED * highest && highest <= bears.supply, "{induced} V induced on {highest} V");
+        let flux_linkage = motor.torque_constant / (1.5 * motor.alignment.pole_pairs as f32);
+        assert!(motor.field_weakening_current * motor.inductance_d <= ROUNDED * flux_linkage);
+    }
+    if limits.chopper_voltage != 0.0 {
+        assert!(board.bridge.has_chopper_output);
+        let (low, high) = (lowest + 1.0, highest - limits.regeneration_band);
+        assert!((low..=high).contains(&limits.chopper_voltage), "{} of {low} to {high}", limits.chopper_voltage);
+    }
+    assert!((0.000_999..=1.0).contains(&limits.chopper_share));
+}
+
+/// Turned at its velocity limit, with all the torque asked for, and stopped all of a sudden: duties leave the time in which the currents are
+/// sampled, and no more current is wanted than board and motor bear.
+fn turned(running: &Joint, board: &BoardConfiguration, active: &Active, accepted: &Configuration, calm: &Measurements) {
+    let (low, high) = board.bridge.duty;
+    let most = accepted.motor.current_limit.min(board.bridge.limits.current);
+    for sign in [1.0, -1.0] {
+        let (mut joint, mut encoder) = (running.clone(), calm.encoder);
+        let command = Command { torque: sign * 1e9, ..Command::default() };
+        let turns = accepted.limits.velocity * accepted.gear.ratio.abs() / (core::f32::consts::TAU * board.bridge.rate);
+        let way = (f64::from(sign * turns) * 4_294_967_296.0) as i64 as u32;
+        for step in 0..TURNED {
+            encoder = encoder.wrapping_add(if step < TURNED / 2 { way } else { 0 });
+            let demand = Demand {
+                command,
+                controlword: Controlword::ENABLE_OPERATION,
+                sequence: 1_000 + step,
+                ..Demand::default()
+            };
+            let measured = Measurements { encoder, ..*calm };
+            let bridge = joint.control_step(active, &demand, &Slow::default(), &measured);
+            for duty in [bridge.duties.a, bridge.duties.b, bridge.duties.c] {
+                assert!((low..=high).contains(&duty), "{step}: a duty of {duty} of {low} to {high}");
+            }
+            let reference = joint.telemetry().reference;
+            assert!(reference.norm() <= ROUNDED * most, "{step}: {reference:?} of {most} A");
+            let chops = joint.telemetry().outputs.chopper();
+            assert!(!chops || accepted.limits.chopper_voltage > 0.0);
+        }
+    }
+}
+
 /// A joint that is configured so protects the board; whether it ran, because its position is within its limits.
 fn protects(joint: &Joint, board: &BoardConfiguration, active: &Active, accepted: &Configuration) -> bool {
     let bears = &board.bridge.limits;
     let (limits, configured) = (&active.limits, &accepted.limits);
+    is_borne(board, accepted);
     let calm = at_rest(0.5 * (limits.bus_voltage.0 + limits.bus_voltage.1));
     let mut running = joint.clone();
     let demand = enabled(&mut running, active, 1e9, &calm);
@@ -81,6 +173,7 @@ fn protects(joint: &Joint, board: &BoardConfiguration, active: &Active, accepted
     running.control_step(active, &demand, &Slow::default(), &calm);
     assert!(running.telemetry().reference.norm() <= bears.current, "{:?}", running.telemetry().reference);
 
+    turned(&running, board, active, accepted, &calm);
     let faults = |measured: &Measurements| {
         let mut joint = running.clone();
         let bridge = joint.control_step(active, &demand, &Slow::default(), measured);
@@ -122,6 +215,15 @@ fn protects(joint: &Joint, board: &BoardConfiguration, active: &Active, accepted
         }
     }
     assert!(supplied(board.analog.supply(4_095)).0.contains(Fault::OverVoltage));
+    // Above its voltage a chopper conducts, and where there is none nothing does.
+    let mut joint = running.clone();
+    joint.control_step(
+        active,
+        &demand,
+        &Slow::default(),
+        &Measurements { bus_voltage: configured.bus_voltage.1, ..calm },
+    );
+    assert_eq!(joint.telemetry().outputs.chopper(), configured.chopper_voltage > 0.0);
     latched.is_empty()
 }
 
@@ -136,7 +238,7 @@ fn no_single_setting_at_its_ends_or_beyond_takes_a_protection_away() {
     for (_, board) in BOARDS {
         let joint = started(&board);
         let (mut tried, mut accepted) = (0, 0);
-        for (setting, values) in attacks(&board.bridge.limits) {
+        for (setting, values) in attacks(&board) {
             for bits in values {
                 let mut configuration = board.joint;
                 if setting.set(&mut configuration, bits) {
@@ -153,7 +255,7 @@ fn no_single_setting_at_its_ends_or_beyond_takes_a_protection_away() {
 fn no_pair_of_electrical_settings_takes_a_protection_away() {
     for (_, board) in BOARDS {
         let joint = started(&board);
-        let mut attacks = attacks(&board.bridge.limits);
+        let mut attacks = attacks(&board);
         attacks.retain(|(setting, _)| ELECTRICAL.contains(setting));
         assert_eq!(attacks.len(), ELECTRICAL.len());
         let (mut tried, mut accepted) = (0, 0);
@@ -176,7 +278,7 @@ fn a_value_above_the_boards_is_refused_with_its_name_and_the_boards_range() {
     for (_, board) in BOARDS {
         let bears = &board.bridge.limits;
         let mut names = BTreeSet::new();
-        for (setting, _) in attacks(bears) {
+        for (setting, _) in attacks(&board) {
             let Some(high) = highest(bears, setting) else { continue };
             // As far up as the others let it go.
             let mut configuration = board.joint;
