@@ -2,6 +2,7 @@
 
 mod rig;
 
+use joint_firmware::joint::configuration::Gains;
 use joint_firmware::joint::fault::Fault;
 use joint_firmware::joint::state_machine::{Controlword, State};
 use joint_firmware::joint::{Command, Mode};
@@ -76,6 +77,100 @@ fn a_load_is_held_at_each_position_limit_by_position_and_by_impedance() {
             assert!(rig.velocity().abs() < 0.01);
         }
     }
+}
+
+/// Stiffnesses and dampings of the modes, parts of the reference joint's.
+const GAINS: [f32; 3] = [0.0, 1.0, 4.0];
+
+/// Every mode with the parts of stiffness and damping that it has a use for.
+fn modes() -> impl Iterator<Item = (Mode, f32, f32)> {
+    let all = |mode| GAINS.into_iter().flat_map(move |k| GAINS.into_iter().map(move |d| (mode, k, d)));
+    let modes = [Mode::Position, Mode::Velocity, Mode::Impedance, Mode::Torque].into_iter().flat_map(all);
+    modes.filter(|(mode, k, d)| match mode {
+        Mode::Velocity => *k == 0.0,
+        Mode::Torque => (*k, *d) == (0.0, 0.0),
+        _ => true,
+    })
+}
+
+/// The reference joint at its upper or lower limit, without integral, with so many parts of stiffness and damping.
+fn at_limit(side: f32, stiffness: f32, damping: f32, usual: &Gains) -> Rig {
+    let mut rig = narrow(|setup| {
+        let gains = &mut setup.configuration.gains;
+        (gains.stiffness, gains.damping) = (stiffness * usual.stiffness, damping * usual.damping);
+        gains.integral = 0.0;
+    });
+    let Gains { stiffness, damping, .. } = *usual;
+    let lead = Command { mode: Mode::Impedance, stiffness, damping, ..Command::NOTHING };
+    for part in 1..=100 {
+        rig.follow(Command { position: 0.005 * part as f32 * side, ..lead }, 0.01);
+    }
+    rig.follow(Command { position: 0.5 * side, ..lead }, 0.5);
+    rig
+}
+
+/// 90 % of the torque limit at each position limit, in every mode, with any stiffness and damping, none included, and
+/// without integral.
+///
+/// Announced (60B2h) it is held where the joint is, whichever way it pulls: the limits act on the sum of torques alone.
+/// Unannounced a stiffness holds it as its spring gives (a tenth more where friction stops its swing), and without one
+/// the law does where the load pushes outwards: 95 % of the margin behind the limit, less what friction bears.
+///
+/// What pulls inwards, announced by nobody and held by no stiffness, the joint follows, as it is to: with a damping
+/// slowly, and the law holds it at the other limit; without one a fault ends it, because beyond the velocity limit its
+/// current is at the end of the supply's voltage (OverCurrent), or because a tenth of the torque is what is left to stop
+/// it at the other limit, less than the quick stop's deceleration takes (PositionLimit).
+#[test]
+fn a_load_of_nine_tenths_is_held_at_each_position_limit_with_any_gains_in_every_mode() {
+    let usual = Setup::of(&weightless(reference())).configuration.gains;
+    let (mut sag, mut farthest, mut faulty) = (0.0f64, [0.0f64; 2], 0);
+    for (mode, stiffness, damping) in modes() {
+        for side in [-1.0f32, 1.0] {
+            let there = at_limit(side, stiffness, damping, &usual);
+            for (outwards, known) in [(-1.0, 1.0), (1.0, 1.0), (-1.0, 0.0), (1.0, 0.0)] {
+                let (mut rig, begun) = (there.clone(), there.position());
+                let limits = rig.joint.active().limits;
+                let push = outwards * side * 0.9 * limits.torque;
+                break_down(&mut rig, Broken::ExternalTorque(f64::from(push)));
+                let (stiffness, damping) = (stiffness * usual.stiffness, damping * usual.damping);
+                let torque = -push * known;
+                let command = Command { mode, position: 0.5 * side, stiffness, damping, torque, ..Command::NOTHING };
+                let case = format!(
+                    "{mode:?}, {push} Nm at {side}, {known} of it known, {stiffness} Nm/rad, {damping} Nm s/rad"
+                );
+                rig.demand.command = command;
+                let follows = known == 0.0 && stiffness == 0.0 && outwards < 0.0;
+                rig.run(if follows { 5.0 } else { 2.0 });
+                if follows && damping == 0.0 {
+                    let faults = rig.latched();
+                    let ends = faults == [Fault::PositionLimit] || faults == [Fault::OverCurrent];
+                    assert!(ends, "{case}: {faults:?}");
+                    faulty += 1;
+                    continue;
+                }
+                assert!(rig.latched().is_empty(), "{case}: {:?}", rig.latched());
+                assert!(rig.velocity().abs() < 0.01, "{case}: {} rad/s", rig.velocity());
+                let held = if follows { -0.5 * side } else { 0.5 * side };
+                let off = (rig.position() - f64::from(held)).abs();
+                if known > 0.0 {
+                    let moved = (rig.position() - begun).abs();
+                    sag = sag.max(moved);
+                    assert!(moved < 4e-3, "{case}: {moved} rad from where it was");
+                } else if stiffness > 0.0 {
+                    let part = off * f64::from(stiffness / push.abs());
+                    farthest[0] = farthest[0].max(part);
+                    assert!(part < 1.1, "{case}: {off} rad, {part} of what its spring gives");
+                } else {
+                    let part = off / f64::from(limits.position_margin);
+                    farthest[1] = farthest[1].max(part);
+                    assert!((0.8..0.95).contains(&part), "{case}: {part} of the margin");
+                }
+            }
+        }
+    }
+    let [spring, margin] = farthest;
+    println!("{:.2} mrad announced; {spring:.3} of what a spring gives, {margin:.3} of the margin", 1e3 * sag);
+    assert_eq!(faulty, 2 * 4, "modes without stiffness and damping, at two limits");
 }
 
 #[test]
