@@ -1,9 +1,9 @@
-//! Stops of `jointctl commission` on the flashed programs: under a commanded voltage, whatever ends it has the bridge off
-//! in the same control step; where the joint follows set-points, so has what cuts the voltage, and the rest has it off
-//! once the joint stands.
+//! Stops of `jointctl commission` on the flashed programs: under a commanded voltage, whatever ends it has the bridge
+//! off in the same control step; where the joint follows set-points, so has what cuts the voltage, and the rest has it
+//! off once the joint stands.
 //!
-//! Every stage under current is stopped by every cause, all of the product on both boards: a stop takes milliseconds, and
-//! the commissioning that leads to it some seconds.
+//! Every stage under current is stopped by every cause, all of the product on both boards: a stop takes milliseconds,
+//! and the commissioning that leads to it some seconds.
 
 use super::commissioning::{ESC1, MOTEUS, Motor, NODE, built};
 use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired};
