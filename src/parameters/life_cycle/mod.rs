@@ -85,6 +85,36 @@ pub enum State {
     Active = 7,
 }
 
+impl Command {
+    /// The command in words.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Verify => "a verification",
+            Self::Trial => "a trial",
+            Self::Commit => "a commit",
+            Self::RollBack => "a roll back",
+            Self::Discard => "a discard",
+            Self::Shadow => "a shadow",
+        }
+    }
+}
+
+impl State {
+    /// The state in words, behind "while".
+    pub const fn phrase(self) -> &'static str {
+        match self {
+            Self::Empty => "nothing is staged",
+            Self::Staged => "the staged image is not verified",
+            Self::Verified => "a verified image waits",
+            Self::Shadow => "an image is in shadow",
+            Self::Trial => "an image is on trial",
+            Self::Storing => "flash is being written",
+            Self::Committed => "the stored image is not in use yet",
+            Self::Active => "nothing is staged beside the image in use",
+        }
+    }
+}
+
 /// How an image runs from RAM.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {

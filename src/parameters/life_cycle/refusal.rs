@@ -169,11 +169,13 @@ impl core::fmt::Display for Refusal {
             Self::Certificate(refusal) => write!(f, "certificate: {refusal}"),
             Self::Golden(mismatch) => mismatch.fmt(f),
             Self::UnknownCommand { value } => write!(f, "command {value} is not known, 1 to 6 are"),
-            Self::State { command: Some(command), state } => write!(f, "{command:?} is not possible while {state:?}"),
-            Self::State { command: None, state } => write!(f, "an upload is not possible while {state:?}"),
+            Self::State { command: Some(command), state } => {
+                write!(f, "{} is not possible while {}", command.name(), state.phrase())
+            }
+            Self::State { command: None, state } => write!(f, "an upload is not possible while {}", state.phrase()),
             Self::Busy => f.write_str("what was begun before has not come to its end"),
             Self::Armed { command } => {
-                write!(f, "{command:?} writes the only bank of flash: the motor must be off and nearly at rest")
+                write!(f, "{} writes the only bank of flash: the motor must be off and nearly at rest", command.name())
             }
             Self::TrialTime { time } => write!(f, "trial of {time} ms, must be 1 to {MAX_TRIAL_MS}"),
             Self::Changed => f.write_str("the staging buffer does not hold what was verified"),

@@ -1,8 +1,8 @@
 //! `jointctl sim --bus` and `jointctl scan`: virtual joints on a CAN bus, and who is there.
 
 use super::CommandError;
-use bus::Frame;
-use bus::client::{ClientError, Network, Node, cob_id};
+use crate::remote::present::{PATIENCE, present};
+use bus::client::{ClientError, Network, Node};
 use clap::Args;
 use joint_firmware::canopen::NO_NODE_ID;
 use joint_firmware::parameters::image::Image;
@@ -10,17 +10,12 @@ use node::{Options, Storage, VirtualNode, serve};
 use plant::ActuatorParameters;
 use plant::virtual_joint::Setup;
 use serde_json::json;
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// Serial number of the first joint that has no node id.
 const WITHOUT_ID: u32 = 1_000;
-/// How long `scan` listens for an answer, and for each further one.
-const PATIENCE: Duration = Duration::from_millis(500);
-/// Request of an SDO upload of object 1000h, which every node has (CiA 301, 7.2.4.3.5).
-const ASK: [u8; 8] = [0x40, 0x00, 0x10, 0, 0, 0, 0, 0];
 
 /// Arguments of `sim` that put the joint on a bus.
 #[derive(Debug, Args)]
@@ -180,6 +175,9 @@ pub struct Scan {
     /// Print a JSON array, an object for each node
     #[arg(long)]
     json: bool,
+    /// How long to listen for an answer, and for each further one, ms: longer for nodes on a busy machine
+    #[arg(long, value_name = "MS", default_value_t = PATIENCE.as_millis() as u64)]
+    wait: u64,
 }
 
 impl Scan {
@@ -188,7 +186,8 @@ impl Scan {
         let failed = |error: &dyn std::fmt::Display| CommandError::Bus(error.to_string());
         let transport = bus::open(&self.bus).map_err(|error| failed(&error))?;
         let network = Network::new(transport);
-        let present = present(&network).map_err(|error| failed(&error))?;
+        let wait = Duration::from_millis(self.wait.clamp(1, 60_000));
+        let present = present(&network, wait).map_err(|error| failed(&error))?;
         let mut list = Vec::new();
         for &id in &present {
             match network.node(id).and_then(|node| Described::of(&node)) {
@@ -207,23 +206,6 @@ impl Scan {
         }
         Ok(())
     }
-}
-
-/// Nodes that answer. All are asked at once: a node on a busy machine may take its time without the others having to wait for it.
-pub(super) fn present(network: &Network) -> Result<BTreeSet<u8>, ClientError> {
-    let answers = network.subscribe(|frame| matches!(frame.id(), 0x581..=0x5FF));
-    for id in 1..=127u16 {
-        if let Some(request) = Frame::new(cob_id::SDO_RECEIVE | id, &ASK) {
-            network.send(&request)?;
-        }
-    }
-    let mut present = BTreeSet::new();
-    // Others may be talking as well: not for ever.
-    let end = Instant::now() + 4 * PATIENCE;
-    while let Some(answer) = answers.next(PATIENCE.min(end.saturating_duration_since(Instant::now())))? {
-        present.insert((answer.frame.id() & 0x7F) as u8);
-    }
-    Ok(present)
 }
 
 /// What a node says of itself.

@@ -1,11 +1,11 @@
 //! `jointctl bus-yml`: the configuration of a ros2_canopen master for the joints on a bus.
 
 use super::CommandError;
-use super::bus::present;
 use super::describe::identity;
 use crate::describe::bus_yml::{Joint, Master, PERIODS, text};
 use crate::describe::eds::{self, Identity};
 use crate::output::{OutputFile, write_directory};
+use crate::remote::present::{PATIENCE, present};
 use crate::remote::{Entry, RemoteError, RemoteJoint};
 use bus::client::Network;
 use clap::Args;
@@ -67,7 +67,7 @@ impl BusYml {
     fn found(&self, bus: &str) -> Result<Vec<Joint>, CommandError> {
         let network = Network::new(bus::open(bus).map_err(RemoteError::from)?);
         let nodes = match self.node.is_empty() {
-            true => present(&network).map_err(RemoteError::from)?.into_iter().collect(),
+            true => present(&network, PATIENCE).map_err(RemoteError::from)?.into_iter().collect(),
             false => self.node.clone(),
         };
         let mut joints = Vec::new();

@@ -23,10 +23,12 @@ struct Held {
 }
 
 impl Held {
-    fn run(&self, command: Command, duration: f64) -> Result<(), CommandError> {
+    /// Whether the duration was over, and what is left of the joint's motion.
+    fn run(&self, command: Command, duration: f64) -> Result<(bool, String), CommandError> {
         let joint = self.on.joint()?;
         catch_interrupts()?;
         let motion = Motion { command, duration, rate: self.rate, acknowledge: self.reset };
+        motion.check(&joint)?;
         let progress = Terminal::new();
         progress.stage("enable");
         let outcome = motion.run(&joint, &running, &mut |observation| progress.detail(&observation.to_string()))?;
@@ -34,9 +36,7 @@ impl Held {
         if let Some(last) = outcome.last {
             println!("{last}");
         }
-        let ended = if outcome.complete { "" } else { "ended early; " };
-        println!("node {}: {ended}{}", joint.id(), left(&joint, outcome.state)?);
-        Ok(())
+        Ok((outcome.complete, left(&joint, outcome.state)?))
     }
 }
 
@@ -54,7 +54,10 @@ pub struct Enable {
 impl Enable {
     /// Runs the command.
     pub fn run(&self) -> Result<(), CommandError> {
-        self.held.run(Command::default(), self.duration)
+        let (complete, left) = self.held.run(Command::default(), self.duration)?;
+        // That somebody ends it is how it ends.
+        println!("node {}: {}{left}", self.held.on.node, if complete { "" } else { "ended early; " });
+        Ok(())
     }
 }
 
@@ -126,6 +129,12 @@ impl Move {
         if !matches!(self.mode, Kind::Impedance) && (self.stiffness.is_some() || self.damping.is_some()) {
             return Err(CommandError::Arguments("--stiffness and --damping belong to impedance mode".into()));
         }
-        self.held.run(Command { stiffness, damping, ..command }, self.duration)
+        let (complete, left) = self.held.run(Command { stiffness, damping, ..command }, self.duration)?;
+        let node = self.held.on.node;
+        if !complete {
+            return Err(CommandError::Interrupted(format!("node {node}: the motion was interrupted; {left}")));
+        }
+        println!("node {node}: {left}");
+        Ok(())
     }
 }

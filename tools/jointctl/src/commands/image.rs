@@ -51,12 +51,17 @@ impl ImageCommand {
         match self {
             Self::Inspect { image } => print!("{}", image_text::to_text(&read(image)?)),
             Self::Verify { image: path, key } => {
-                if let Some(key) = key {
-                    verify_tag(path, &key_file::read(key)?)?;
+                let key = key.as_deref().map(key_file::read).transpose()?;
+                if let Some(key) = &key {
+                    verify_tag(path, key)?;
                 }
+                let number = key.map(|key| key.id());
                 let image = read(path)?;
                 let certificate = verify(&image, path)?;
                 print!("{}", summary(&image, &certificate));
+                if let Some(number) = number {
+                    println!("tag: that of key {number:08x}");
+                }
             }
             Self::Convert(convert) => convert.run()?,
         }

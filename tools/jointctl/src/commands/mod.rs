@@ -190,6 +190,9 @@ pub enum CommandError {
     /// A round of learning on a joint.
     #[error(transparent)]
     Retrain(#[from] crate::remote::retrain::RetrainError),
+    /// Somebody ended what was under way.
+    #[error("{0}")]
+    Interrupted(String),
     /// Arguments that contradict each other.
     #[error("{0}")]
     Arguments(String),
@@ -202,6 +205,7 @@ impl CommandError {
         match self {
             Self::Retrain(crate::remote::retrain::RetrainError::NotBetter { .. }) => 3,
             Self::Arguments(_) => 2,
+            Self::Remote(error) if error.is_usage() => 2,
             _ => 1,
         }
     }
@@ -239,5 +243,27 @@ pub fn run(arguments: Arguments) -> Result<(), CommandError> {
         Command::BusYml(bus_yml) => bus_yml.run(),
         Command::Excite(excite) => excite.run(),
         Command::Completions(completions) => completions.run(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::CommandError;
+    use crate::remote::RemoteError;
+    use crate::remote::retrain::RetrainError;
+
+    #[test]
+    fn exit_codes_tell_failed_from_wrong_arguments_and_from_nothing_better() {
+        let not_better = RetrainError::NotBetter { node: 5, before: 1.0, after: 1.0 };
+        let unknown = RemoteError::UnknownName { name: "x".into(), near: Vec::new() };
+        let cases: [(CommandError, u8); 4] = [
+            (CommandError::Bus("gone".into()), 1),
+            (CommandError::Interrupted("stopped".into()), 1),
+            (unknown.into(), 2),
+            (not_better.into(), 3),
+        ];
+        for (error, expected) in cases {
+            assert_eq!(error.exit_code(), expected, "{error}");
+        }
     }
 }

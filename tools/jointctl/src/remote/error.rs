@@ -6,6 +6,31 @@ use joint_firmware::canopen::NmtState;
 use joint_firmware::joint::fault::Fault;
 use joint_firmware::joint::state_machine::State;
 
+/// A number with as many digits as it has: what was single precision on the joint is printed as that.
+struct Short(f64);
+
+impl std::fmt::Display for Short {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let single = self.0 as f32;
+        if f64::from(single) == self.0 { single.fmt(f) } else { self.0.fmt(f) }
+    }
+}
+
+impl RemoteError {
+    /// Whether what was asked for is wrong, whatever the joint is and does.
+    #[must_use]
+    pub const fn is_usage(&self) -> bool {
+        matches!(
+            self,
+            Self::UnknownName { .. }
+                | Self::AmbiguousName { .. }
+                | Self::Record { .. }
+                | Self::Value { .. }
+                | Self::Range { .. }
+        ) || matches!(self, Self::Client(ClientError::NodeId(_)) | Self::Bus(BusError::Malformed { .. }))
+    }
+}
+
 /// Why something did not happen.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum RemoteError {
@@ -73,7 +98,8 @@ pub enum RemoteError {
     },
     /// A setting that does not fit the others.
     #[error(
-        "node {node}: {setting} of {value} is outside {low} to {high}, with the other settings as they are; nothing was changed"
+        "node {node}: {setting} of {} is outside {} to {}, with the other settings as they are; nothing was changed",
+        Short(*value), Short(*low), Short(*high)
     )]
     Setting {
         /// Node id.
@@ -175,7 +201,10 @@ pub enum RemoteError {
         within_ms: u64,
     },
     /// Beyond a limit of the joint.
-    #[error("{what} of {value} {unit} is outside {low} to {high} {unit}, the limits of node {node} ({object})")]
+    #[error(
+        "{what} of {} {unit} is outside {} to {} {unit}, the limits of node {node} ({object})",
+        Short(*value), Short(*low), Short(*high)
+    )]
     Limit {
         /// Node id.
         node: u8,
@@ -223,7 +252,7 @@ pub enum RemoteError {
         bits: u32,
     },
     /// A time or rate that makes no sense.
-    #[error("{what} is {value} {unit}, must lie in {low} to {high} {unit}")]
+    #[error("{what} is {} {unit}, must lie in {} to {} {unit}", Short(*value), Short(*low), Short(*high))]
     Range {
         /// What.
         what: &'static str,

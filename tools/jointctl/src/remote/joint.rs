@@ -3,6 +3,7 @@
 use super::entry::Entry;
 use super::error::RemoteError;
 use super::owner::Owner;
+use super::present::{PATIENCE, present};
 use super::value::Value;
 use bus::client::{ClientError, Network, Node, Object};
 use joint_firmware::objects::field::Field;
@@ -21,7 +22,15 @@ pub struct RemoteJoint {
 impl RemoteJoint {
     /// Opens a bus ([`bus::open`]) and finds the joint on it.
     pub fn open(bus: &str, node: u8) -> Result<Self, RemoteError> {
-        Self::on(&Network::new(bus::open(bus)?), node)
+        let network = Network::new(bus::open(bus)?);
+        Self::on(&network, node).map_err(|error| match error {
+            // A bus that was opened just now has heard nobody yet.
+            RemoteError::Silent(ClientError::NoAnswer { object, timeout, .. }) => {
+                let heard = present(&network, PATIENCE).map_or(Vec::new(), |nodes| nodes.into_iter().collect());
+                RemoteError::Silent(ClientError::NoAnswer { object, timeout, heard })
+            }
+            error => error,
+        })
     }
 
     /// Finds a joint on a bus that is open: several may share it.

@@ -27,6 +27,7 @@ pub mod joint;
 pub mod motion;
 mod owner;
 pub mod pdo;
+pub mod present;
 pub mod record;
 pub mod refusal;
 pub mod retrain;

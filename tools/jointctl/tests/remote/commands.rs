@@ -113,12 +113,12 @@ pub fn what_goes_wrong_ends_in_one_line_and_an_exit_code_that_tells_why() {
     desk.write("joint.key", "00112233445566778899aabbccddeeff00112233445566778899aabbccddee11".as_bytes());
     desk.write("wrong.key", "11112233445566778899aabbccddeeff00112233445566778899aabbccddee11".as_bytes());
     let missing = desk.command(&["info"], "9").output().unwrap();
-    refused(&missing, 1, &["info"], &["1000h:0 of node 9: no answer within 1000 ms"]);
+    refused(&missing, 1, &["info"], &["1000h:0 of node 9: no answer within 1000 ms", "(5): is the node id right?"]);
     let no_id = desk.command(&["info"], "200").output().unwrap();
-    refused(&no_id, 1, &["info"], &["200 is no node id: they are 1 to 127"]);
-    desk.fails(&["get", "torque-limt"], &["'torque-limt' is no object of a joint; did you mean torque-limit"]);
+    refused(&no_id, 2, &["info"], &["200 is no node id: they are 1 to 127"]);
+    desk.misunderstands(&["get", "torque-limt"], &["'torque-limt' is no object of a joint; did you mean torque-limit"]);
     desk.fails(&["get", "2212:1"], &["2212h:1 of node 5 refused: 06010001h, Attempt to read a write only object"]);
-    desk.fails(&["set", "torque-limit", "5000"], &["5000 Nm is outside 0.01 to 2000 Nm"]);
+    desk.misunderstands(&["set", "torque-limit", "5000"], &["5000 Nm is outside 0.01 to 2000 Nm"]);
     desk.misunderstands(&["set", "gain", "0.5", "clamp"], &["'clamp' has no value"]);
     desk.fails(
         &["move", "velocity", "1e3", "--duration", "1"],
@@ -128,7 +128,7 @@ pub fn what_goes_wrong_ends_in_one_line_and_an_exit_code_that_tells_why() {
     desk.fails(&["upload", "damaged.img", "--commit"], &["node 5 does not accept the image", "0205h"]);
     desk.fails(&["upload", "other.img", "--commit"], &["image for serial number 99, this joint has 12"]);
     desk.fails(&["rollback"], &["node 5 does not roll back the image", "0905h"]);
-    desk.prints(&["key", "give", "joint.key"], &["node 5: takes images with a tag of key"]);
+    desk.prints(&["key", "give", "joint.key"], &["node 5: belongs to who has key"]);
     let signed = Command::new(env!("CARGO_BIN_EXE_jointctl"))
         .current_dir(&desk.folder)
         .args(["sign", "first.img", "--key", "wrong.key"])
@@ -142,7 +142,7 @@ pub fn what_goes_wrong_ends_in_one_line_and_an_exit_code_that_tells_why() {
     desk.prints(&["get", "2213:1"], &["active-images-identity.version (2213h:1) 0\n"]);
     let nonsense =
         Command::new(env!("CARGO_BIN_EXE_jointctl")).args(["info", "--bus", "can0", "--node", "5"]).output().unwrap();
-    refused(&nonsense, 1, &["--bus can0"], &["bus 'can0': a kind and a colon are missing"]);
+    refused(&nonsense, 2, &["--bus can0"], &["bus 'can0': a kind and a colon are missing"]);
 }
 
 /// Waits until the joint is enabled: only then has the program caught interrupts and begun.
@@ -159,6 +159,41 @@ fn finished(child: &mut Child) -> (Option<i32>, String) {
     child.stdout.take().unwrap().read_to_string(&mut text).unwrap();
     child.stderr.take().unwrap().read_to_string(&mut text).unwrap();
     (code, text)
+}
+
+pub fn tables_are_json_where_asked_for_and_bus_and_node_come_from_the_environment() {
+    let desk = Desk::new();
+    let run = |line: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_jointctl"));
+        command.current_dir(&desk.folder).args(line.split_whitespace());
+        let output = command.env("JOINTCTL_BUS", &desk.client).env("JOINTCTL_NODE", NODE.to_string()).output().unwrap();
+        assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
+        serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap_or_else(|error| panic!("{line}: {error}"))
+    };
+    let nodes = run("scan --json --wait 800");
+    assert_eq!((nodes[0]["node"].as_u64(), nodes[0]["serial"].as_u64()), (Some(5), Some(12)), "{nodes}");
+    let value = run("get 2103:1 --json");
+    assert!(value.to_string().contains("\"Nm\""), "{value}");
+    assert!(run("info --json").is_object());
+}
+
+#[cfg(unix)]
+pub fn a_motion_that_is_interrupted_is_not_done() {
+    // A bus for two clients.
+    let bus = format!("udp:239.74.163.2:{}", bus::free_port().unwrap());
+    let served = Served::on(&bus, &[NODE]);
+    let joint = served.joint();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_jointctl"));
+    command.args(["move", "position", "0", "--duration", "30", "--node", "5", "--bus", &bus]);
+    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let end = std::time::Instant::now() + Duration::from_secs(60);
+    while joint.state().unwrap() != joint_firmware::joint::state_machine::State::OperationEnabled {
+        assert!(std::time::Instant::now() < end, "never enabled");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let (code, text) = finished(&mut child);
+    assert!(code == Some(1) && text.contains("node 5: the motion was interrupted; disabled"), "{code:?} {text}");
 }
 
 #[cfg(unix)]

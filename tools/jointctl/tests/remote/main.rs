@@ -37,6 +37,8 @@ fn main() {
         commands {
             a_joint_is_looked_at_set_moved_and_fed_from_the_command_line,
             what_goes_wrong_ends_in_one_line_and_an_exit_code_that_tells_why,
+            tables_are_json_where_asked_for_and_bus_and_node_come_from_the_environment,
+            #[cfg(unix)] a_motion_that_is_interrupted_is_not_done,
             #[cfg(unix)] ctrl_c_and_termination_leave_the_joint_disabled,
             an_adapter_that_goes_away_while_the_joint_is_enabled_is_reported,
         }
