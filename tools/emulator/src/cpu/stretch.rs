@@ -67,6 +67,9 @@ pub(super) struct Stretches<B: Bus> {
     begins: Vec<Stretch>,
 }
 
+/// Runs of a stretch before it is asked again for its translation.
+const LATER: u32 = 64;
+
 const NONE: Stretch = Stretch { first: 0, end: 0, before_last: 0, bytes: 0, overlaps: 0, runs: 0 };
 
 impl<B: Bus> Stretches<B> {
@@ -89,6 +92,13 @@ impl<B: Bus> Stretches<B> {
             if self.begins.get(before).is_some_and(|stretch| before + usize::from(stretch.bytes / 2) == place) {
                 self.forget(before..before + 1);
             }
+        }
+    }
+
+    /// The stretch of a place runs some more times before it is asked again for its translation.
+    fn later(&mut self, place: usize, after: u32) {
+        if let Some(stretch) = self.begins.get_mut(place) {
+            stretch.runs = after.saturating_sub(LATER);
         }
     }
 
@@ -234,6 +244,9 @@ impl<B: Bus> Cpu<B> {
                 if !self.code.form(self.pc) {
                     self.elsewhere(self.pc);
                 }
+            }
+            Stopped::Often(place) if self.code.translations.rests() => {
+                self.code.stretches.later(place, self.code.translations.after());
             }
             Stopped::Often(place) => {
                 let number = self.translate(self.pc);

@@ -19,6 +19,9 @@ use std::sync::mpsc::{Receiver, channel};
 const SUPPLY: f64 = 18.0;
 /// Temperature of the surroundings, °C.
 const AMBIENT: f64 = 25.0;
+/// Rest behind a translation of the program for this machine, as a multiple of what it took: clients wait for an answer
+/// for a second.
+const REST: u32 = 3;
 
 /// Arguments of `sim` that put a board's program on the bus.
 #[derive(Debug, Args)]
@@ -139,6 +142,7 @@ impl Session<'_> {
         let mut emulation = Emulation::new(board, program).map_err(|error| error.to_string())?;
         let kept = storage.map(|folder| FlashFile::open(folder, &mut emulation, program)).transpose();
         let mut kept = kept.map_err(|error| error.to_string())?;
+        emulation.cpu.set_rest_between_translations(REST);
         let transport = bus::open(bus).map_err(|error| error.to_string())?;
         let messages = Messages::of(program)?;
         let mut decoder = messages.as_ref().map(Messages::decoder);

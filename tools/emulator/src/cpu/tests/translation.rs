@@ -189,6 +189,26 @@ fn code_that_has_changed_is_not_what_was_translated() {
 }
 
 #[test]
+fn a_translation_waits_for_the_rest_behind_the_one_before_and_changes_nothing() {
+    let mut counted = None;
+    for (rest, one) in [(None, false), (Some(0), false), (Some(u32::MAX), true)] {
+        // adds r0, #1, further behind the beginning than a stretch is long.
+        let mut code = [0xbf00; 101];
+        code[100] = 0x3001;
+        let mut cpu = endless(&code);
+        if let Some(times) = rest {
+            cpu.set_rest_between_translations(times);
+        }
+        run(&mut cpu, 20_000);
+        // subs r0, #1: what was translated is to be translated anew.
+        assert!(cpu.bus.set(START + 200, &0x3801u16.to_le_bytes()));
+        run(&mut cpu, 60_000);
+        assert_eq!(cpu.code.translations.functions.len() == 1, one, "{rest:?}");
+        assert_eq!(*counted.get_or_insert(cpu.register(0)), cpu.register(0), "{rest:?}");
+    }
+}
+
+#[test]
 fn a_word_of_code_that_has_changed_is_loaded_as_it_is() {
     // ldr r0, [pc, #508]; adds r1, r1, r0
     let mut cpu = endless(&[0x487f, 0x1809]);

@@ -28,6 +28,7 @@ use region::Region;
 use std::collections::HashSet;
 use std::ops::Range;
 use std::sync::Arc;
+use std::time::Instant;
 
 /// So often a stretch begins before what begins with it is translated.
 const OFTEN: u32 = 4096;
@@ -136,6 +137,10 @@ pub(super) struct Translations {
     changed_all: bool,
     /// So often a stretch begins before what begins with it is translated.
     after: u32,
+    /// Rest behind a translation, as a multiple of what it took; none where no clock has to be kept up with.
+    rest: Option<u32>,
+    /// End of the last rest.
+    rests: Option<Instant>,
 }
 
 /// A function, and the addresses that it was made of.
@@ -171,7 +176,15 @@ impl Translation {
 
 impl Default for Translations {
     fn default() -> Self {
-        Self { functions: Vec::new(), lines: HashSet::new(), changed: Vec::new(), changed_all: false, after: OFTEN }
+        Self {
+            functions: Vec::new(),
+            lines: HashSet::new(),
+            changed: Vec::new(),
+            changed_all: false,
+            after: OFTEN,
+            rest: None,
+            rests: None,
+        }
     }
 }
 
@@ -179,6 +192,12 @@ impl Translations {
     /// So often a stretch begins before what begins with it is translated.
     pub fn after(&self) -> u32 {
         self.after
+    }
+
+    /// The rest behind the last translation, in which what is often come across waits, is not over. Never where everything
+    /// is translated at once.
+    pub fn rests(&self) -> bool {
+        self.after > 0 && self.rests.is_some_and(|until| Instant::now() < until)
     }
 
     /// Nothing holds any more. It is forgotten by `settle`: functions may be in use.
@@ -261,15 +280,24 @@ impl<B: Bus> Cpu<B> {
         self.code.translations.after = after.unwrap_or(TRANSLATED);
     }
 
+    /// A rest behind each translation, so many times as long as it took, for who keeps up with a clock: code that is come
+    /// across equally often is translated one function behind the other otherwise, seconds at a stretch. No result depends
+    /// on it.
+    pub fn set_rest_between_translations(&mut self, times: u32) {
+        self.code.translations.rest = Some(times);
+    }
+
     /// Translates what begins at an address; the number of it.
     #[cold]
     pub(super) fn translate(&mut self, address: u32) -> u32 {
+        let begun = Instant::now();
         let memory = self.bus.memory().len() as u32;
         let source = Core { cpu: self, memory };
         let region = Region::explore(&source, address);
         let covers: Arc<[_]> = region.covers().collect();
         let function = Compiler::of_host().and_then(|compiler| compiler.compile(&Fields::of::<B>(), region));
-        let Translations { functions, lines, .. } = &mut self.code.translations;
+        let Translations { functions, lines, rest, rests, .. } = &mut self.code.translations;
+        *rests = rest.map(|times| Instant::now() + begun.elapsed() * times);
         lines.extend(covers.iter().flat_map(|range| [range.start / LINE, range.end / LINE]));
         functions.push(Translation { function, covers, holds: true });
         functions.len() as u32 - 1
