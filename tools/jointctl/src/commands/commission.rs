@@ -137,7 +137,8 @@ impl Terminal {
             if wanted.is_some() {
                 continue;
             }
-            let kept = joint.number(Field::Setting(setting))?;
+            // The joint's number has the digits of 32 bits.
+            let kept = joint.number(Field::Setting(setting))? as f32;
             let rest = if setting == Setting::TorqueConstant {
                 "; a new joint without one takes what it measures"
             } else {

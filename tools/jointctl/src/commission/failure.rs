@@ -333,7 +333,9 @@ impl std::fmt::Display for Failure {
             Self::DoesNotTurn { velocity, wanted } => write!(
                 f,
                 "the joint turned at {velocity:.3} rad/s instead of {wanted:.3} rad/s with the new configuration: it is disabled. \
-                 What was measured is kept; look at gains and limits (`jointctl get gains limits`)"
+                 What was measured is kept; look at gear ratio, gains and limits (`jointctl get gear gains limits`). A new joint's \
+                 gains follow --gear and --torque-constant: where those were wrong, `jointctl restore application`, switch it off and on, \
+                 and repeat with the right ones"
             ),
             Self::InertiaUnclear { inertia, error, limit } => write!(
                 f,
