@@ -72,11 +72,17 @@ fn root() -> PathBuf {
 
 /// Cargo as it compiles a program: with its own settings beside those of all, where it has any.
 fn cargo(program: &str) -> Command {
-    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    let mut command = plain();
     let own = root().join(format!(".cargo/{program}.toml"));
     if own.exists() {
         command.arg("--config").arg(own);
     }
+    command
+}
+
+/// Cargo as somebody calls it in a terminal.
+fn plain() -> Command {
+    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     // The cargo that runs the tests has set some of these as for the default program, and what is set cargo leaves; flags for the
     // host would take the place of the target's.
     for variable in ["DEFMT_LOG", "DEFMT_RTT_BUFFER_SIZE", "RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS"] {
@@ -121,5 +127,18 @@ pub fn build(board: &str, temporary: &str) -> Result<PathBuf, String> {
     command.args(["build", "--release", "-p", "joint-firmware", "--target", TARGET]);
     command.args(["--no-default-features", "--features", board]);
     command.current_dir(root());
+    built(command, "joint-firmware", temporary, folder.join(board))
+}
+
+/// Builds a board's program by a line that README shows, below a test's temporary folder; its path.
+///
+/// # Errors
+/// A line that does not call cargo, or what the compiler says.
+pub fn build_by(line: &str, board: &str, temporary: &str) -> Result<PathBuf, String> {
+    let arguments = line.strip_prefix("cargo ").ok_or_else(|| format!("{line}: it does not call cargo"))?;
+    let folder = Path::new(temporary).join("shown");
+    std::fs::create_dir_all(&folder).map_err(|error| error.to_string())?;
+    let mut command = plain();
+    command.args(arguments.split_whitespace()).current_dir(root());
     built(command, "joint-firmware", temporary, folder.join(board))
 }

@@ -13,6 +13,8 @@ mod readme;
 mod refused;
 mod retrain;
 mod served;
+#[path = "../shown/mod.rs"]
+mod shown;
 mod telemetry;
 
 use libtest_mimic::{Arguments, Trial};

@@ -1,41 +1,23 @@
 //! README's section on the bus, line by line as it stands.
 
 use crate::served::{Served, image};
+use crate::shown::{between, lines};
 use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
 
-const README: &str = include_str!("../../../../README.md");
 /// The bus of the section; here each run has a port of its own.
 const BUS: &str = "udp:239.74.163.2:43113";
 const PROGRAM: &str = "cargo run --release -p jointctl --";
 /// Beginnings of lines that others run: python-canopen's are those of `python_canopen.rs`, boards' programs those of
-/// `host-tests/tests/emulated`.
-const ELSEWHERE: [&str; 5] = [
+/// `unboxing.rs`.
+const ELSEWHERE: [&str; 6] = [
     "pip install canopen",
     "python3 tools/node/examples/drive.py",
-    "cargo --config .cargo/moteus-r4.toml build",
-    "cargo run --release -p jointctl -- sim --elf",
-    "cargo run --release -p jointctl -- address",
+    "BOARD=",
+    "cargo --config .cargo/$BOARD.toml build",
+    "jointctl sim --elf",
+    "jointctl address",
 ];
-
-/// The section's commands, without what explains them.
-fn lines() -> Vec<String> {
-    let (_, section) = README.split_once("\n## The joint on a bus\n").unwrap();
-    let (section, _) = section.split_once("\n## ").unwrap();
-    let mut lines = Vec::new();
-    let mut inside = false;
-    for line in section.lines() {
-        match line.trim() {
-            "```sh" => inside = true,
-            "```" => inside = false,
-            line if inside && !line.is_empty() => {
-                lines.push(line.split_once("  #").map_or(line, |(command, _)| command).trim().to_owned());
-            }
-            _ => {}
-        }
-    }
-    lines
-}
 
 pub fn the_section_on_the_bus_runs_line_by_line() {
     let port = bus::free_port().unwrap();
@@ -50,7 +32,7 @@ pub fn the_section_on_the_bus_runs_line_by_line() {
         command
     };
     let (mut served, mut run) = (None, Vec::new());
-    for line in lines() {
+    for line in lines(between("\n## The joint on a bus\n", "\n## ")) {
         let own = line.replace(BUS, &bus).replace("$B", &bus);
         if ELSEWHERE.iter().any(|beginning| line.starts_with(beginning)) {
             continue;
