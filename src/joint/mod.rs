@@ -396,7 +396,7 @@ impl Joint {
         motion: &JointMotion,
     ) -> Faults {
         let state = self.machine.state();
-        self.count_stale_steps(active, demand, state);
+        self.count_stale_steps(demand, state);
         if !self.offsets.are_known() {
             let mut faults = Faults::NONE;
             faults.set(Fault::CurrentSensor, self.offsets.are_refused());
@@ -436,14 +436,14 @@ impl Joint {
     /// end or is to stop: nothing that could be late is asked of it. In "fault" a count that has led there stays until
     /// one comes.
     #[inline(always)]
-    fn count_stale_steps(&mut self, active: &Active, demand: &Demand, state: State) {
+    fn count_stale_steps(&mut self, demand: &Demand, state: State) {
         self.stale_steps = match state {
             _ if demand.sequence != self.sequence => 0,
             State::NotReadyToSwitchOn | State::SwitchOnDisabled => 0,
             State::Fault => self.stale_steps,
             _ if matches!(demand.command.mode, Mode::Hold | Mode::Profile) => 0,
             State::OperationEnabled if demand.controlword.ends_operation() => 0,
-            State::QuickStopActive if active.stops.options.holds() => 0,
+            State::QuickStopActive => 0,
             _ => self.stale_steps.saturating_add(1),
         };
         self.sequence = demand.sequence;

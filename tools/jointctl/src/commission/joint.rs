@@ -254,18 +254,12 @@ impl<O: Objects> Bench for Joint<O> {
     }
 
     fn off(&mut self) -> Result<(), Stopped> {
-        let moved = matches!(self.told, Told::Move(_));
         self.told = Told::Nothing;
         // One frame without an answer: outside of OPERATIONAL no set-point counts, and the open loop ends in the same control step.
         self.objects.network(Command::EnterPreOperational)?;
         let mut waited = 0.0;
         loop {
             let state = self.state()?;
-            // With a coarse encoder a joint may not see that it stands: it brakes until its deadline makes a fault of a
-            // silence that was meant.
-            if state == State::Fault && moved && self.faults()? == [Fault::StaleCommand] {
-                return self.acknowledge();
-            }
             if matches!(state, State::NotReadyToSwitchOn | State::SwitchOnDisabled | State::Fault) {
                 return Ok(());
             }
