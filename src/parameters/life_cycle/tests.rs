@@ -521,5 +521,5 @@ fn every_refusal_has_a_number_and_a_text_of_its_own() {
     let text = Refusal::Version { version: 1, floor: 2 }.to_string();
     assert_eq!(text, "image version 1, must be at least 2");
     let text = Refusal::Armed { command: Command::Commit }.to_string();
-    assert_eq!(text, "Commit writes the only bank of flash: the motor must be off and nearly at rest");
+    assert_eq!(text, "a commit writes the only bank of flash: the motor must be off and nearly at rest");
 }

@@ -51,7 +51,7 @@ pub fn an_image_is_verified_shadowed_tried_committed_and_rolled_back() {
     assert!(message.contains("with the motor off only") && message.contains("operation enabled"), "{message}");
     let message = joint.upload_image(&image(3, 0.1, 0), Use::Verify, &Silent).unwrap_err().to_string();
     assert!(
-        message.contains("an upload is not possible while Trial") && message.contains("Version 1 stays"),
+        message.contains("an upload is not possible while an image is on trial") && message.contains("Version 1 stays"),
         "{message}"
     );
     assert_eq!(joint.state().unwrap(), Drive::OperationEnabled);
