@@ -66,6 +66,8 @@ impl Desk {
         let arguments = line.strip_prefix("jointctl ").ok_or_else(|| format!("{line}: nobody runs it"))?;
         let mut command = Command::new(env!("CARGO_BIN_EXE_jointctl"));
         command.current_dir(&self.folder).args(arguments.split_whitespace()).stdin(Stdio::null());
+        // The board runs in real time, and the machine may have much else to do.
+        command.env("JOINTCTL_TIMEOUT", "60000");
         Ok(command)
     }
 

@@ -7,8 +7,6 @@ use super::network::{Network, Subscription, frame};
 use super::sdo::Message;
 use std::time::{Duration, Instant};
 
-/// What nodes get to answer a configuration in; storing writes flash.
-const CONFIGURATION: Duration = Duration::from_secs(1);
 /// Scans until an answer neither comes late nor is lost.
 const ATTEMPTS: u32 = 3;
 
@@ -51,7 +49,7 @@ impl Network {
         for message in request::switch_selective(address) {
             self.lss(&message)?;
         }
-        let timeout = CONFIGURATION;
+        let timeout = self.patience();
         let what = || format!("an LSS answer of the node with {address}");
         wait_for(&answers, 0x44, timeout)?.map(drop).ok_or_else(|| ClientError::Silence { what: what(), timeout })
     }
@@ -68,22 +66,37 @@ impl Network {
         }
         let heartbeats = self.heartbeats();
         self.lss(&request::switch_global(false))?;
-        let deadline = Instant::now() + CONFIGURATION;
+        let timeout = self.patience();
+        let deadline = Instant::now() + timeout;
         while let Some(received) = heartbeats.next(deadline.saturating_duration_since(Instant::now()))? {
             if received.frame.id() == cob_id::HEARTBEAT | u16::from(node) {
                 return Ok(());
             }
         }
         // A node that had an id keeps it until its communication is reset.
-        Err(ClientError::Silence { what: format!("the boot-up message of node {node}"), timeout: CONFIGURATION })
+        Err(ClientError::Silence { what: format!("the boot-up message of node {node}"), timeout })
+    }
+
+    /// Has the node with this address keep its id over a loss of power.
+    pub fn store_node_id(&self, address: &Address) -> Result<(), ClientError> {
+        self.select(address)?;
+        let stored = self.configure("to store the node id", &request::store());
+        self.lss(&request::switch_global(false))?;
+        stored
+    }
+
+    /// Ends every configuration: a node that was given an id, and has not begun to use it, begins, and sends its boot-up message.
+    pub fn end_configuration(&self) -> Result<(), ClientError> {
+        self.lss(&request::switch_global(false))
     }
 
     fn configure(&self, what: &'static str, message: &Message) -> Result<(), ClientError> {
         let answers = self.subscribe(|frame| frame.id() == cob_id::LSS_SLAVE);
         self.lss(message)?;
         let &[command, ..] = message;
-        match wait_for(&answers, command, CONFIGURATION)? {
-            None => Err(ClientError::Silence { what: format!("the answer to LSS: {what}"), timeout: CONFIGURATION }),
+        let timeout = self.patience();
+        match wait_for(&answers, command, timeout)? {
+            None => Err(ClientError::Silence { what: format!("the answer to LSS: {what}"), timeout }),
             Some([_, 0, ..]) => Ok(()),
             Some([_, code, specific_code, ..]) => Err(ClientError::Lss { what, code, specific_code }),
         }

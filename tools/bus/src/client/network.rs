@@ -4,7 +4,7 @@ use super::cob_id;
 use super::error::{ClientError, Object};
 use super::nmt::{Command, Target};
 use super::node::Node;
-use super::sdo::{Failure, Transfer};
+use super::sdo::{Failure, Settings, Transfer};
 use super::{Emergency, NmtState};
 use crate::{BusError, Frame, Transport};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -53,6 +53,7 @@ struct Shared {
 #[derive(Clone)]
 pub struct Network {
     reader: Arc<Reader>,
+    patience: Duration,
 }
 
 struct Reader {
@@ -118,6 +119,11 @@ impl Shared {
         });
     }
 
+    #[cfg(test)]
+    fn subscribed(&self) -> usize {
+        lock(&self.subscribers).len()
+    }
+
     fn failure(&self) -> Option<BusError> {
         lock(&self.failure).clone()
     }
@@ -144,7 +150,18 @@ impl Network {
         });
         let reader = Arc::clone(&shared);
         let thread = std::thread::spawn(move || reader.read());
-        Self { reader: Arc::new(Reader { shared, thread: Mutex::new(Some(thread)) }) }
+        let reader = Arc::new(Reader { shared, thread: Mutex::new(Some(thread)) });
+        Self { reader, patience: Settings::default().timeout }
+    }
+
+    /// The same network for a master that waits longer, or less long, for a node's answer: behind a gateway, or on a busy machine.
+    pub fn with_patience(self, patience: Duration) -> Self {
+        Self { patience, ..self }
+    }
+
+    /// How long a node may take to answer before it counts as silent; 1 s unless told otherwise.
+    pub fn patience(&self) -> Duration {
+        self.patience
     }
 
     fn shared(&self) -> &Shared {
@@ -171,6 +188,8 @@ impl Network {
         let dropped = Arc::<AtomicU64>::default();
         let subscriber = Subscriber { filter: Box::new(filter), frames: sender, dropped: Arc::clone(&dropped) };
         let mut subscribers = lock(&self.shared().subscribers);
+        // Those that ended are noticed by the next frame of their interest, which may never come.
+        subscribers.retain(|subscriber| Arc::strong_count(&subscriber.dropped) > 1);
         // After a failure the channel is closed from the beginning.
         if self.shared().failure().is_none() {
             subscribers.push(subscriber);
@@ -313,5 +332,21 @@ impl Subscription {
     /// Frames that were dropped because too many waited to be read.
     pub fn dropped(&self) -> u64 {
         self.dropped.load(Ordering::Relaxed)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn subscriptions_that_ended_are_forgotten_though_nothing_of_their_interest_comes() {
+        let network = Network::new(crate::open("virtual:forgotten").unwrap());
+        for _ in 0..100 {
+            drop(network.heartbeats());
+        }
+        let kept = network.heartbeats();
+        assert_eq!(network.shared().subscribed(), 1);
+        drop((network.emergencies(), kept));
     }
 }

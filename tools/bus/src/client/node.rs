@@ -14,7 +14,8 @@ pub struct Node {
 
 impl Node {
     pub(super) fn new(network: Network, id: u8) -> Self {
-        Self { network, id, settings: Settings::default() }
+        let settings = Settings { timeout: network.patience(), ..Settings::default() };
+        Self { network, id, settings }
     }
 
     /// With other patience, say for storing into flash.

@@ -1,8 +1,9 @@
 //! `jointctl sim --bus` and `jointctl scan`: virtual joints on a CAN bus, and who is there.
 
 use super::CommandError;
+use super::remote::Patience;
 use crate::remote::present::{PATIENCE, present};
-use bus::client::{ClientError, Network, Node};
+use bus::client::{ClientError, Node};
 use clap::Args;
 use joint_firmware::canopen::NO_NODE_ID;
 use joint_firmware::parameters::image::Image;
@@ -178,14 +179,16 @@ pub struct Scan {
     /// How long to listen for an answer, and for each further one, ms: longer for nodes on a busy machine
     #[arg(long, value_name = "MS", default_value_t = PATIENCE.as_millis() as u64)]
     wait: u64,
+    /// How long each that is there may take.
+    #[command(flatten)]
+    patience: Patience,
 }
 
 impl Scan {
     /// Runs the command.
     pub fn run(&self) -> Result<(), CommandError> {
         let failed = |error: &dyn std::fmt::Display| CommandError::Bus(error.to_string());
-        let transport = bus::open(&self.bus).map_err(|error| failed(&error))?;
-        let network = Network::new(transport);
+        let network = self.patience.network(&self.bus)?;
         let wait = Duration::from_millis(self.wait.clamp(1, 60_000));
         let present = present(&network, wait).map_err(|error| failed(&error))?;
         let mut list = Vec::new();

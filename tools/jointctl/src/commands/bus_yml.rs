@@ -2,12 +2,12 @@
 
 use super::CommandError;
 use super::describe::identity;
+use super::remote::Patience;
 use crate::describe::bus_yml::{Joint, Master, PERIODS, text};
 use crate::describe::eds::{self, Identity};
 use crate::output::{OutputFile, write_directory};
 use crate::remote::present::{PATIENCE, present};
 use crate::remote::{Entry, RemoteError, RemoteJoint};
-use bus::client::Network;
 use clap::Args;
 use std::path::PathBuf;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -35,6 +35,9 @@ pub struct BusYml {
     /// Replace files that exist
     #[arg(long)]
     replace: bool,
+    /// How long joints may take.
+    #[command(flatten)]
+    patience: Patience,
 }
 
 impl BusYml {
@@ -65,7 +68,7 @@ impl BusYml {
 
     /// The joints on a bus.
     fn found(&self, bus: &str) -> Result<Vec<Joint>, CommandError> {
-        let network = Network::new(bus::open(bus).map_err(RemoteError::from)?);
+        let network = self.patience.network(bus)?;
         let nodes = match self.node.is_empty() {
             true => present(&network, PATIENCE).map_err(RemoteError::from)?.into_iter().collect(),
             false => self.node.clone(),

@@ -6,9 +6,10 @@ use crate::dataset::prepare;
 use crate::fit::fit;
 use crate::output::{OutputFile, write_directory};
 use crate::progress::{Progress, Terminal};
+use crate::report::{ReportError, numbers};
 use crate::simulation::page::{Shown, page};
 use crate::simulation::recording::{DESCRIPTION, record};
-use crate::simulation::table::{Line, table};
+use crate::simulation::table::{Line, json, table};
 use crate::simulation::{self, Choices as RunChoices, Run, Scenario, SimulationError, judge};
 use clap::Args;
 use joint_firmware::compensation::Request;
@@ -33,6 +34,9 @@ pub struct Demo {
     /// Choices of the fit.
     #[command(flatten)]
     choices: Choices,
+    /// Print the content of report.json, and the rows of the loop, as a JSON object
+    #[arg(long)]
+    json: bool,
 }
 
 impl Demo {
@@ -61,6 +65,12 @@ impl Demo {
         let page = page("The virtual joint without and with compensation", &lines, "", &shown)?;
         write_directory(&self.out, &[OutputFile::new("loop.html", page)])?;
         progress.finish();
+        if self.json {
+            let report: serde_json::Value =
+                serde_json::from_str(&numbers(&fitted.report)?).map_err(ReportError::from)?;
+            println!("{:#}", serde_json::json!({ "report": report, "in_the_loop": json(&lines) }));
+            return Ok(());
+        }
         print_summary(&prepared, &fitted, &self.out);
         println!("\nIn the loop, without and with the image:");
         print!("{}", table(&lines));

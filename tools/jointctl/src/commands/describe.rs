@@ -1,6 +1,7 @@
 //! `jointctl eds`, `jointctl dbc`: the joint's objects and frames for other people's tools.
 
 use super::CommandError;
+use super::remote::Patience;
 use crate::describe::{dbc, eds};
 use crate::output::write_file;
 use crate::remote::RemoteJoint;
@@ -21,6 +22,9 @@ pub struct Eds {
     /// Node id of that joint, 1 to 127
     #[arg(long, value_name = "N", requires = "bus")]
     node: Option<u8>,
+    /// How long it may take.
+    #[command(flatten)]
+    patience: Patience,
 }
 
 impl Eds {
@@ -30,7 +34,7 @@ impl Eds {
         // A clock before 1970 dates the file 1970.
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let identity = match (&self.bus, self.node) {
-            (Some(bus), Some(node)) => identity(&RemoteJoint::open(bus, node)?)?,
+            (Some(bus), Some(node)) => identity(&RemoteJoint::open_within(bus, node, self.patience.duration())?)?,
             _ => eds::Identity::default(),
         };
         write_file(&self.file, eds::text(&name, now, identity).as_bytes())?;

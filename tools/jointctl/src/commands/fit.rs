@@ -8,7 +8,7 @@ use crate::image_text;
 use crate::output::{OutputFile, write_directory};
 use crate::presets::Preset;
 use crate::progress::{Progress, Terminal};
-use crate::report::{NetworkOutcome, console, render, verdict};
+use crate::report::{NetworkOutcome, console, numbers, render, verdict};
 use crate::sample_table::write_sample_table;
 use clap::{Args, ValueEnum};
 use joint_firmware::friction::regime::Measure;
@@ -30,6 +30,9 @@ pub struct Fit {
     /// Choices of the fit.
     #[command(flatten)]
     choices: Choices,
+    /// Print the content of report.json instead of tables
+    #[arg(long)]
+    json: bool,
 }
 
 /// How a network is trained.
@@ -207,6 +210,11 @@ impl Fit {
             write_sample_table(&prepared, &fitted.predictions, path)?;
         }
         progress.finish();
+        if self.json {
+            print_warnings(&fitted.report.warnings);
+            print!("{}", numbers(&fitted.report)?);
+            return Ok(());
+        }
         print_summary(&prepared, &fitted, &out);
         Ok(())
     }

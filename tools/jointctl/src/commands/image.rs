@@ -20,6 +20,9 @@ pub enum ImageCommand {
     Inspect {
         /// Image, binary or TOML
         image: PathBuf,
+        /// Print JSON instead, with the same keys
+        #[arg(long)]
+        json: bool,
     },
     /// Check an image as a joint does before it uses one: checksum, fields, certificate, golden vectors; with a key, the tag
     Verify {
@@ -49,7 +52,13 @@ impl ImageCommand {
     /// Runs the command.
     pub fn run(&self) -> Result<(), CommandError> {
         match self {
-            Self::Inspect { image } => print!("{}", image_text::to_text(&read(image)?)),
+            Self::Inspect { image, json } => {
+                let text = image_text::to_text(&read(image)?);
+                match toml::from_str::<toml::Value>(&text) {
+                    Ok(value) if *json => println!("{:#}", serde_json::json!(value)),
+                    _ => print!("{text}"),
+                }
+            }
             Self::Verify { image: path, key } => {
                 let key = key.as_deref().map(key_file::read).transpose()?;
                 if let Some(key) = &key {

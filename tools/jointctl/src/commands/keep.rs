@@ -1,9 +1,8 @@
 //! `jointctl store`, `restore`, `address`: what a joint keeps over a loss of power.
 
 use super::CommandError;
-use super::remote::Where;
-use crate::remote::{RemoteError, address, configuration};
-use bus::client::Network;
+use super::remote::{Patience, Where};
+use crate::remote::{address, configuration};
 use clap::{Args, ValueEnum};
 use joint_firmware::canopen::Group;
 use std::time::Duration;
@@ -74,16 +73,28 @@ pub struct Address {
     /// How long a joint may take to answer each of a scan's 133 questions, ms
     #[arg(long, value_name = "MS", default_value_t = 20)]
     wait: u64,
+    /// Print a JSON array, an object for each joint that got a node id
+    #[arg(long)]
+    json: bool,
+    /// How long what has an id may take.
+    #[command(flatten)]
+    patience: Patience,
 }
 
 impl Address {
     /// Runs the command.
     pub fn run(&self) -> Result<(), CommandError> {
-        let network = Network::new(bus::open(&self.bus).map_err(RemoteError::from)?);
+        let network = self.patience.network(&self.bus)?;
         let wait = Duration::from_millis(self.wait.clamp(1, 10_000));
-        let mut tell = |done: &address::Addressed| println!("node {}: {}", done.node, done.address);
+        let mut list = Vec::new();
+        let mut tell = |done: &address::Addressed| match self.json {
+            true => list.push(serde_json::json!({ "node": done.node, "serial": done.address.serial })),
+            false => println!("node {}: {}", done.node, done.address),
+        };
         let count = address::assign(&network, self.first, !self.forget, wait, &mut tell)?;
-        if count == 0 {
+        if self.json {
+            println!("{:#}", serde_json::Value::Array(list));
+        } else if count == 0 {
             println!("{}: no joint without a node id", self.bus);
         }
         Ok(())

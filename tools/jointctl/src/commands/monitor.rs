@@ -5,6 +5,7 @@ mod screen;
 use super::CommandError;
 use super::remote::{Where, catch_interrupts, running};
 use crate::remote::drive::{self, faults_of, state_of};
+use crate::remote::info;
 use crate::remote::record::{Pace, Recorder};
 use clap::Args;
 use joint_firmware::objects::field::Actual;
@@ -46,6 +47,9 @@ pub struct Monitor {
     /// Print one page and end: needs no terminal
     #[arg(long)]
     once: bool,
+    /// Print that page as a JSON object, a text for each line
+    #[arg(long, requires = "once")]
+    json: bool,
 }
 
 /// What has been seen of a joint, newest last.
@@ -90,7 +94,7 @@ impl History {
         };
         let mut line = |title: &str, text: String| {
             // Writing to a string does not fail.
-            let _ = writeln!(page, "{title:<14}{text}");
+            let _ = writeln!(page, "{title:<width$}{text}", width = info::TITLE);
         };
         let faults = faults_of(self.now(Actual::LatchedFaults) as u16);
         line("node", self.node.to_string());
@@ -142,7 +146,10 @@ impl Monitor {
         shown?;
         ended?;
         if self.once {
-            print!("{}", history.page());
+            match self.json {
+                true => println!("{:#}", info::json(&history.page())),
+                false => print!("{}", history.page()),
+            }
         }
         Ok(())
     }

@@ -1,7 +1,7 @@
 //! `jointctl info`, `get`, `set`: a joint's objects, by the names of docs/objects.md or by index.
 
 use super::CommandError;
-use super::remote::Where;
+use super::remote::{Patience, Where};
 use crate::output::write_file;
 use crate::remote::entry::Entry;
 use crate::remote::{Value, configuration, info};
@@ -50,22 +50,29 @@ pub struct Get {
     /// Name all objects, with index, type, access, unit and limits; needs no bus
     #[arg(long, conflicts_with_all = ["objects", "out"])]
     list: bool,
-    /// Print a JSON object: for each object its value and unit
-    #[arg(long, conflicts_with_all = ["list", "out"])]
+    /// Print JSON: an object with each value and unit; with --list an array
+    #[arg(long, conflicts_with = "out")]
     json: bool,
+    /// How long it may take.
+    #[command(flatten)]
+    patience: Patience,
 }
 
 impl Get {
     /// Runs the command.
     pub fn run(&self) -> Result<(), CommandError> {
         let (Some(bus), Some(node), false) = (&self.bus, self.node, self.list) else {
-            let lines = Entry::all().filter(Entry::is_content).map(|entry| format!("{}\n", entry.listed()));
+            let content = Entry::all().filter(Entry::is_content);
+            let text = match self.json {
+                true => format!("{:#}\n", content.map(|entry| entry.json()).collect::<serde_json::Value>()),
+                false => content.map(|entry| format!("{}\n", entry.listed())).collect(),
+            };
             // Whoever closes the pipe, as `head` does, has seen enough.
-            let _ = std::io::stdout().write_all(lines.collect::<String>().as_bytes());
+            let _ = std::io::stdout().write_all(text.as_bytes());
             return Ok(());
         };
         let named = self.objects.iter().map(|name| Entry::find(name)).collect::<Result<Vec<_>, _>>()?;
-        let joint = Where { bus: bus.clone(), node, key: None }.joint()?;
+        let joint = Where { bus: bus.clone(), node, key: None, patience: self.patience }.joint()?;
         if let Some(path) = &self.out {
             let [entry] = named.concat()[..] else {
                 return Err(CommandError::Arguments("--out takes the bytes of one object".into()));

@@ -1,12 +1,36 @@
-//! What the commands on a joint over a bus share: which joint, and when to stop.
+//! What the commands on a joint over a bus share: which joint, how long it may take, and when to stop.
 
 use super::CommandError;
 use crate::key_file;
-use crate::remote::RemoteJoint;
+use crate::remote::{RemoteError, RemoteJoint};
+use bus::client::Network;
 use clap::Args;
 use joint_firmware::parameters::authentication::Key;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// How long nodes may take.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct Patience {
+    /// How long a node may take for each answer, ms: longer behind gateways and on busy machines
+    #[arg(long, value_name = "MS", default_value_t = 1_000, env = "JOINTCTL_TIMEOUT",
+        value_parser = clap::value_parser!(u64).range(10..=600_000))]
+    timeout: u64,
+}
+
+impl Patience {
+    /// For each answer.
+    pub fn duration(self) -> Duration {
+        Duration::from_millis(self.timeout)
+    }
+
+    /// Opens a bus.
+    pub fn network(self, bus: &str) -> Result<Network, CommandError> {
+        let transport = bus::open(bus).map_err(RemoteError::from)?;
+        Ok(Network::new(transport).with_patience(self.duration()))
+    }
+}
 
 /// Which joint.
 #[derive(Debug, Args)]
@@ -20,13 +44,16 @@ pub struct Where {
     /// The joint's key, where it has one: opens a session for what only its owner may do
     #[arg(long, value_name = "FILE", env = "JOINTCTL_KEY")]
     pub key: Option<PathBuf>,
+    /// How long it may take.
+    #[command(flatten)]
+    pub patience: Patience,
 }
 
 impl Where {
     /// Finds the joint.
     pub fn joint(&self) -> Result<RemoteJoint, CommandError> {
         let key = self.key()?;
-        let joint = RemoteJoint::open(&self.bus, self.node)?;
+        let joint = RemoteJoint::open_within(&self.bus, self.node, self.patience.duration())?;
         Ok(match key {
             Some(key) => joint.owned_by(key),
             None => joint,

@@ -5,7 +5,7 @@ use super::fit::write;
 use super::remote::{Where, catch_interrupts, running};
 use crate::fit::Options;
 use crate::progress::Terminal;
-use crate::remote::retrain::{RetrainError, Round};
+use crate::remote::retrain::{RetrainError, Round, Shown};
 use crate::report::verdict;
 use clap::Args;
 use std::path::PathBuf;
@@ -39,6 +39,9 @@ pub struct Retrain {
     /// Acknowledge a fault whose cause is gone first
     #[arg(long)]
     reset: bool,
+    /// Print the figures as a JSON object, in Nm and rad
+    #[arg(long)]
+    json: bool,
 }
 
 impl Retrain {
@@ -71,6 +74,20 @@ impl Retrain {
         let outcome = round.run(&joint, &running, &written, &progress);
         progress.finish();
         let outcome = outcome?;
+        let version = outcome.status.active.map_or(0, |image| image.version);
+        if self.json {
+            let judged = |on: &Shown| serde_json::json!({ "residual": on.residual, "tracking": on.tracking });
+            let value = serde_json::json!({
+                "node": joint.id(),
+                "version": version,
+                "before": judged(&outcome.before),
+                "after": judged(&outcome.after),
+                "shadow": outcome.before.shadow,
+                "report": out.join("report.json"),
+            });
+            println!("{value:#}");
+            return Ok(());
+        }
         println!("{} samples recorded, {} SYNCs without one", outcome.samples.0, outcome.samples.1);
         println!("{}", verdict(&outcome.fitted.report).sentence);
         println!("\n{:<34}{:>10}{:>10}", "on the joint, RMS", "before", "now");
@@ -82,7 +99,6 @@ impl Retrain {
             println!("{name:<34}{before:>10.4}{after:>10.4}");
         }
         println!("In shadow the new image was {:.4} Nm (RMS) from what acted.\n", before.shadow);
-        let version = outcome.status.active.map_or(0, |image| image.version);
         println!("node {}: version {version} is stored and in use where compensation is requested", joint.id());
         println!("Written: {}", out.join("report.html").display());
         Ok(())

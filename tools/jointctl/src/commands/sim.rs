@@ -11,7 +11,7 @@ use crate::output::{OutputFile, write_directory};
 use crate::progress::{Progress, Terminal};
 use crate::simulation::page::{Shown, page};
 use crate::simulation::run::USUAL_SAMPLE_PERIOD;
-use crate::simulation::table::{Line, table};
+use crate::simulation::table::{Line, json, table};
 use crate::simulation::{Choices, Log, Part, Run, Scenario, SimulationError, judge, log, run};
 use clap::Args;
 use joint_firmware::compensation::Request;
@@ -51,6 +51,9 @@ pub struct Sim {
     /// Folder for logs, page, and the files that describe joint and actuator
     #[arg(long, value_name = "DIR", default_value = "sim")]
     out: PathBuf,
+    /// Print the table as a JSON array, an object for each row
+    #[arg(long, conflicts_with = "bus")]
+    json: bool,
 }
 
 /// A part of a scenario that is run once.
@@ -157,6 +160,10 @@ impl Sim {
         files.push(OutputFile::new("sim.html", page));
         write_directory(&self.out, &files)?;
         progress.finish();
+        if self.json {
+            println!("{:#}", json(&lines));
+            return Ok(());
+        }
         print!("{}", table(&lines));
         if friction.is_none() {
             println!("Without --image there is no friction model: compensation stays off.");

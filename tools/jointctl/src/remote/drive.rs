@@ -8,8 +8,6 @@ use joint_firmware::joint::state_machine::State;
 use joint_firmware::objects::field::{Actual, Field};
 use std::time::{Duration, Instant};
 
-/// How long an NMT command may take to be seen.
-const NMT: Duration = Duration::from_secs(1);
 /// How long a joint may take to brake: the longest braking time of a configuration.
 pub(super) const BRAKING: Duration = Duration::from_secs(11);
 /// Between two looks at a node.
@@ -113,7 +111,7 @@ impl RemoteJoint {
         if period == 0 {
             return Ok(());
         }
-        let deadline = Instant::now() + NMT + Duration::from_millis(period.into());
+        let deadline = Instant::now() + self.network().patience() + Duration::from_millis(period.into());
         let mut last = None;
         while let Some(received) = heartbeats.next(deadline.saturating_duration_since(Instant::now()))? {
             match bus::client::heartbeat::parse(&received.frame) {
@@ -123,7 +121,12 @@ impl RemoteJoint {
             }
         }
         let state = last.unwrap_or(NmtState::Initialising);
-        Err(RemoteError::Nmt { node, state, wanted, within_ms: NMT.as_millis() as u64 + u64::from(period) })
+        Err(RemoteError::Nmt {
+            node,
+            state,
+            wanted,
+            within_ms: self.network().patience().as_millis() as u64 + u64::from(period),
+        })
     }
 
     /// Brakes and switches off, whoever commands the joint: outside OPERATIONAL no set-point counts. The state that it ends in:

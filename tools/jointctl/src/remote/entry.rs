@@ -112,13 +112,30 @@ impl Entry {
         format!("{:04X}h:{}", self.object.index, self.object.sub_index)
     }
 
-    /// A line of a list: name, place, type, access, unit, limits.
-    pub fn listed(&self) -> String {
-        let access = match self.object.access {
+    fn access(&self) -> &'static str {
+        match self.object.access {
             Access::ReadOnly => "ro",
             Access::WriteOnly => "wo",
             Access::ReadWrite => "rw",
-        };
+        }
+    }
+
+    /// What [`Self::listed`] tells, as a JSON object.
+    pub fn json(&self) -> serde_json::Value {
+        let limits = self.text.limits.map(|(low, high)| [low, high]);
+        serde_json::json!({
+            "name": self.name(),
+            "object": self.place(),
+            "type": self.object.data_type.name(),
+            "access": self.access(),
+            "limits": limits,
+            "unit": self.text.unit,
+        })
+    }
+
+    /// A line of a list: name, place, type, access, unit, limits.
+    pub fn listed(&self) -> String {
+        let access = self.access();
         let limits = self.text.limits.map_or(String::new(), |(low, high)| format!("{low} to {high} "));
         let (name, place, kind) = (self.name(), self.place(), self.object.data_type.name());
         let line = format!("{name:<52} {place:<9} {kind:<14} {access}  {limits}{}", self.text.unit);

@@ -18,7 +18,7 @@ const SIGNALS: [&str; 6] =
     ["position", "velocity", "theoretical torque", "measured torque", "temperature", "acceleration"];
 
 /// Columns of a line's title.
-const TITLE: usize = 16;
+pub const TITLE: usize = 16;
 
 /// The page; reads some fifty objects.
 pub fn page(joint: &RemoteJoint) -> Result<String, RemoteError> {

@@ -5,9 +5,11 @@ use super::error::RemoteError;
 use super::owner::Owner;
 use super::present::{PATIENCE, present};
 use super::value::Value;
+use bus::client::sdo::Settings;
 use bus::client::{ClientError, Network, Node, Object};
 use joint_firmware::objects::field::Field;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// Device profile 402, a servo drive: object 1000h of every joint.
 pub const DEVICE_TYPE: u32 = 0x0002_0192;
@@ -22,7 +24,12 @@ pub struct RemoteJoint {
 impl RemoteJoint {
     /// Opens a bus ([`bus::open`]) and finds the joint on it.
     pub fn open(bus: &str, node: u8) -> Result<Self, RemoteError> {
-        let network = Network::new(bus::open(bus)?);
+        Self::open_within(bus, node, Settings::default().timeout)
+    }
+
+    /// The same with `patience`: how long the node may take for each answer.
+    pub fn open_within(bus: &str, node: u8, patience: Duration) -> Result<Self, RemoteError> {
+        let network = Network::new(bus::open(bus)?).with_patience(patience);
         Self::on(&network, node).map_err(|error| match error {
             // A bus that was opened just now has heard nobody yet.
             RemoteError::Silent(ClientError::NoAnswer { object, timeout, .. }) => {

@@ -22,8 +22,6 @@ const SHORTEST_LEAD: f64 = 0.5;
 const STEEPEST: f64 = 1.875;
 /// Between two looks at the joint's state.
 const LOOK: Duration = Duration::from_millis(100);
-/// Longest time without a sample.
-const SILENCE: Duration = Duration::from_secs(1);
 
 /// What a joint follows.
 #[derive(Clone, Debug)]
@@ -128,8 +126,9 @@ impl Route {
                 stream.end()?;
                 return Ok(None);
             }
-            if recorder.next(SILENCE)?.is_none() {
-                return Err(RemoteError::NoSamples { node: joint.id(), within_ms: SILENCE.as_millis() as u64 });
+            let patience = joint.network().patience();
+            if recorder.next(patience)?.is_none() {
+                return Err(RemoteError::NoSamples { node: joint.id(), within_ms: patience.as_millis() as u64 });
             }
             if looked.elapsed() > LOOK {
                 stream.check()?;

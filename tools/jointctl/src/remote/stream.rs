@@ -25,8 +25,6 @@ use std::time::{Duration, Instant};
 
 /// Set-points a second: least and most.
 pub const RATES: [f64; 2] = [1.0, 1_000.0];
-/// How long each step to "operation enabled" may take.
-const STEP: Duration = Duration::from_secs(1);
 /// RPDOs of the joint: drive and torque and position; velocity; impedance frame.
 const DRIVE: u8 = 0;
 const VELOCITY: u8 = 1;
@@ -223,7 +221,9 @@ impl Stream {
 
     fn command_state(&self, controlword: Controlword, wanted: State) -> Result<(), RemoteError> {
         self.shared.controlword.store(controlword.0, Ordering::Relaxed);
-        let deadline = Instant::now() + STEP;
+        // Each step to "operation enabled" may take as long as an answer.
+        let patience = self.joint.network().patience();
+        let deadline = Instant::now() + patience;
         loop {
             self.failure()?;
             let state = self.joint.state()?;
@@ -234,7 +234,7 @@ impl Stream {
                 let node = self.joint.id();
                 return Err(match state {
                     State::Fault => RemoteError::Fault { node, faults: self.joint.faults()? },
-                    _ => RemoteError::State { node, state, wanted, within_ms: STEP.as_millis() as u64 },
+                    _ => RemoteError::State { node, state, wanted, within_ms: patience.as_millis() as u64 },
                 });
             }
             std::thread::sleep(LOOK);

@@ -397,7 +397,10 @@ pub fn render(report: &Report) -> Result<Vec<OutputFile>, ReportError> {
 }
 
 /// The content of `report.json`: the report without its samples, and the verdict.
-fn numbers(report: &Report) -> Result<String, ReportError> {
+///
+/// # Errors
+/// A number that has no place in JSON.
+pub fn numbers(report: &Report) -> Result<String, ReportError> {
     #[derive(Serialize)]
     struct Numbers<'a> {
         verdict: Verdict,

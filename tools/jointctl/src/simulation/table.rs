@@ -84,6 +84,26 @@ pub const HEADING: [&str; 7] = [
     "001 eq. 11 [%]",
 ];
 
+/// The same as a JSON array: an object for each row, in rad and per cent; what was not measured is null.
+#[must_use]
+pub fn json(lines: &[Line]) -> serde_json::Value {
+    let object = |line: &Line| {
+        let judged = &line.judgement;
+        serde_json::json!({
+            "scenario": line.scenario,
+            "part": line.part,
+            "compensated": line.compensated,
+            "position_rms": judged.position_rms,
+            "position_max": judged.position_max,
+            "torque_error": judged.torque_error,
+            "torque_error_in_motion": judged.torque_error_in_motion,
+            "faded": judged.faded,
+            "ending": line.ending.to_string(),
+        })
+    };
+    lines.iter().map(object).collect()
+}
+
 /// The table, ending in a line feed; below it, what stopped on the way.
 #[must_use]
 pub fn table(lines: &[Line]) -> String {

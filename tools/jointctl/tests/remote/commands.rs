@@ -1,6 +1,10 @@
 //! The program itself, with a joint behind slcan over TCP: what it prints, and the exit codes.
 
-use crate::served::{NODE, Served, image};
+use crate::served::{NODE, Served, image, program};
+use bus::client::Network;
+use joint_firmware::canopen::NO_NODE_ID;
+use joint_firmware::joint::state_machine::State;
+use jointctl::remote::drive::state_of;
 use std::io::Read;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
@@ -20,7 +24,7 @@ impl Desk {
     }
 
     fn command(&self, arguments: &[&str], node: &str) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_jointctl"));
+        let mut command = program();
         command.current_dir(&self.folder).args(arguments).args(["--bus", &self.client, "--node", node]);
         command
     }
@@ -89,7 +93,7 @@ pub fn a_joint_is_looked_at_set_moved_and_fed_from_the_command_line() {
     desk.prints(&["set", "command-deadline", "0.1"], &["command-deadline (2103h:"]);
     desk.prints(&["store"], &["node 5: stored"]);
     desk.prints(&["move", "velocity", "-0.4", "--duration", "1"], &["rad/s", "node 5: disabled"]);
-    desk.prints(&["monitor", "--once"], &["state         disabled", "position      ", "gear "]);
+    desk.prints(&["monitor", "--once"], &["state           disabled", "position      ", "gear "]);
     desk.prints(&["record", "--out", "log.csv", "--duration", "1"], &[" samples in ", "Written: log.csv"]);
     desk.misunderstands(&["record", "--out", "log.csv", "--duration", "1"], &["log.csv exists; --replace replaces"]);
     desk.prints(&["upload", "first.img", "--commit"], &["version 1 is stored; in use"]);
@@ -112,8 +116,8 @@ pub fn what_goes_wrong_ends_in_one_line_and_an_exit_code_that_tells_why() {
     desk.write("damaged.img", &damaged);
     desk.write("joint.key", "00112233445566778899aabbccddeeff00112233445566778899aabbccddee11".as_bytes());
     desk.write("wrong.key", "11112233445566778899aabbccddeeff00112233445566778899aabbccddee11".as_bytes());
-    let missing = desk.command(&["info"], "9").output().unwrap();
-    refused(&missing, 1, &["info"], &["1000h:0 of node 9: no answer within 1000 ms", "(5): is the node id right?"]);
+    let missing = desk.command(&["info", "--timeout", "500"], "9").output().unwrap();
+    refused(&missing, 1, &["info"], &["1000h:0 of node 9: no answer within 500 ms", "(5): is the node id right?"]);
     let no_id = desk.command(&["info"], "200").output().unwrap();
     refused(&no_id, 2, &["info"], &["200 is no node id: they are 1 to 127"]);
     desk.misunderstands(&["get", "torque-limt"], &["'torque-limt' is no object of a joint; did you mean torque-limit"]);
@@ -129,19 +133,15 @@ pub fn what_goes_wrong_ends_in_one_line_and_an_exit_code_that_tells_why() {
     desk.fails(&["upload", "other.img", "--commit"], &["image for serial number 99, this joint has 12"]);
     desk.fails(&["rollback"], &["node 5 does not roll back the image", "0905h"]);
     desk.prints(&["key", "give", "joint.key"], &["node 5: belongs to who has key"]);
-    let signed = Command::new(env!("CARGO_BIN_EXE_jointctl"))
-        .current_dir(&desk.folder)
-        .args(["sign", "first.img", "--key", "wrong.key"])
-        .output()
-        .unwrap();
+    let signed =
+        program().current_dir(&desk.folder).args(["sign", "first.img", "--key", "wrong.key"]).output().unwrap();
     assert!(signed.status.success(), "{}", String::from_utf8_lossy(&signed.stderr));
     desk.fails(
         &["upload", "first.signed", "--commit"],
         &["the tag is not that of this image and key (1 wrong ones so far)", "0302h"],
     );
     desk.prints(&["get", "2213:1"], &["active-images-identity.version (2213h:1) 0\n"]);
-    let nonsense =
-        Command::new(env!("CARGO_BIN_EXE_jointctl")).args(["info", "--bus", "can0", "--node", "5"]).output().unwrap();
+    let nonsense = program().args(["info", "--bus", "can0", "--node", "5"]).output().unwrap();
     refused(&nonsense, 2, &["--bus can0"], &["bus 'can0': a kind and a colon are missing"]);
 }
 
@@ -161,10 +161,48 @@ fn finished(child: &mut Child) -> (Option<i32>, String) {
     (code, text)
 }
 
+pub fn every_table_is_json_where_that_is_asked_for() {
+    let desk = Desk::new();
+    // Joints without node ids, which `address` finds.
+    let port = bus::free_port().unwrap();
+    let _others = Served::on(&format!("slcan:listen://127.0.0.1:{port}"), &[NO_NODE_ID]);
+    let on_bus = |line: &str| format!("{line} --bus {} --node {NODE}", desk.client);
+    let lines = [
+        "demo --samples 2000 --restarts 1 --patience 5 --json".into(),
+        "fit demo/dataset.toml --trainer none --json".into(),
+        "evaluate demo/friction.img demo/dataset.toml --json".into(),
+        "image inspect demo/friction.img --json".into(),
+        "sim --scenario slow-reversal --json".into(),
+        "get --list --json".into(),
+        on_bus("get limits --json"),
+        on_bus("info --json"),
+        on_bus("monitor --once --json"),
+        on_bus("retrain --duration 5 --validation 4 --restarts 0 --json"),
+        format!("scan --json --bus {}", desk.client),
+        format!("address --json --first 9 --wait 100 --bus slcan:tcp://127.0.0.1:{port}"),
+    ];
+    for line in &lines {
+        let output = program().current_dir(&desk.folder).args(line.split(' ')).output().unwrap();
+        assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
+        let value = serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap_or_else(|error| {
+            panic!("{line}: {error} in {}", String::from_utf8_lossy(&output.stdout));
+        });
+        assert!(value.as_object().is_none_or(|object| !object.is_empty()), "{line}: {value}");
+        assert!(value.as_array().is_none_or(|array| !array.is_empty()), "{line}: {value}");
+    }
+    // None that has the option is missing.
+    let has = |command: &clap::Command| command.get_arguments().any(|argument| argument.get_long() == Some("json"));
+    let all = jointctl::commands::arguments();
+    for command in all.get_subcommands().flat_map(|command| [command].into_iter().chain(command.get_subcommands())) {
+        let tried = lines.iter().any(|line| line.split(' ').any(|word| word == command.get_name()));
+        assert!(tried || !has(command), "{} is not tried", command.get_name());
+    }
+}
+
 pub fn tables_are_json_where_asked_for_and_bus_and_node_come_from_the_environment() {
     let desk = Desk::new();
     let run = |line: &str| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_jointctl"));
+        let mut command = program();
         command.current_dir(&desk.folder).args(line.split_whitespace());
         let output = command.env("JOINTCTL_BUS", &desk.client).env("JOINTCTL_NODE", NODE.to_string()).output().unwrap();
         assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
@@ -179,17 +217,25 @@ pub fn tables_are_json_where_asked_for_and_bus_and_node_come_from_the_environmen
 
 #[cfg(unix)]
 pub fn a_motion_that_is_interrupted_is_not_done() {
-    // A bus for two clients.
+    // A bus for two clients. This one asks nothing by SDO, which a node has for one client at a time: it reads TPDO 1.
     let bus = format!("udp:239.74.163.2:{}", bus::free_port().unwrap());
-    let served = Served::on(&bus, &[NODE]);
-    let joint = served.joint();
-    let mut command = Command::new(env!("CARGO_BIN_EXE_jointctl"));
+    let _served = Served::on(&bus, &[NODE]);
+    let network = Network::new(bus::open(&bus).unwrap());
+    let statuswords = network.subscribe(|frame| frame.id() == 0x180 + u16::from(NODE));
+    let mut command = program();
     command.args(["move", "position", "0", "--duration", "30", "--node", "5", "--bus", &bus]);
     let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    let end = std::time::Instant::now() + Duration::from_secs(60);
-    while joint.state().unwrap() != joint_firmware::joint::state_machine::State::OperationEnabled {
-        assert!(std::time::Instant::now() < end, "never enabled");
-        std::thread::sleep(Duration::from_millis(20));
+    loop {
+        network.sync().unwrap();
+        if let Some(received) = statuswords.next(Duration::from_millis(20)).unwrap()
+            && let [low, high, ..] = received.frame.data()
+            && state_of(u16::from_le_bytes([*low, *high])) == State::OperationEnabled
+        {
+            break;
+        }
+        if child.try_wait().unwrap().is_some() {
+            panic!("ended before it moved: {:?}", finished(&mut child));
+        }
     }
     assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
     let (code, text) = finished(&mut child);

@@ -39,6 +39,7 @@ fn main() {
         commands {
             a_joint_is_looked_at_set_moved_and_fed_from_the_command_line,
             what_goes_wrong_ends_in_one_line_and_an_exit_code_that_tells_why,
+            every_table_is_json_where_that_is_asked_for,
             tables_are_json_where_asked_for_and_bus_and_node_come_from_the_environment,
             #[cfg(unix)] a_motion_that_is_interrupted_is_not_done,
             #[cfg(unix)] ctrl_c_and_termination_leave_the_joint_disabled,
@@ -51,6 +52,7 @@ fn main() {
             settings_are_taken_together_or_not_at_all,
             what_is_stored_outlasts_a_reset_and_what_is_restored_does_not,
             new_joints_get_the_node_ids_that_are_free,
+            a_joint_that_was_left_with_an_id_that_it_does_not_use_yet_is_found_again,
             the_page_says_what_an_engineer_looks_for_first,
         }
         images {

@@ -1,6 +1,6 @@
 //! A joint that belongs to somebody, through the library and the program: what only its owner may do, and how he says that he is.
 
-use crate::served::{NODE, Served, image};
+use crate::served::{NODE, Served, image, program};
 use bus::client::{Abort, ClientError, Command as Nmt, Target};
 use joint_firmware::canopen::Group;
 use joint_firmware::objects::field::{Field, OwnerField, SetPoint};
@@ -11,7 +11,7 @@ use jointctl::remote::entry::Entry;
 use jointctl::remote::image::Use;
 use jointctl::remote::value::Value;
 use jointctl::remote::{RemoteError, RemoteJoint, configuration};
-use std::process::{Command, Output};
+use std::process::Output;
 
 fn key(first: u8) -> Key {
     Key::new(std::array::from_fn(|i| first + i as u8)).unwrap()
@@ -95,7 +95,7 @@ pub fn the_program_takes_the_key_as_an_option_or_from_the_environment() {
     let bus = format!("slcan:tcp://127.0.0.1:{port}");
     let folder = tempfile::tempdir().unwrap();
     let run = |line: &str, environment: Option<&str>| -> Output {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_jointctl"));
+        let mut command = program();
         command.current_dir(&folder).args(line.split_whitespace());
         if !line.starts_with("key new") {
             command.args(["--bus", &bus, "--node", "5"]);

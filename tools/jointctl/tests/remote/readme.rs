@@ -1,9 +1,9 @@
 //! README's section on the bus, line by line as it stands.
 
-use crate::served::{Served, image};
+use crate::served::{Served, image, program};
 use crate::shown::{between, lines};
 use std::io::{BufRead, BufReader};
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 
 /// The bus of the section; here each run has a port of its own.
 const BUS: &str = "udp:239.74.163.2:43113";
@@ -27,7 +27,7 @@ pub fn the_section_on_the_bus_runs_line_by_line() {
     std::fs::create_dir(folder.path().join("demo")).unwrap();
     std::fs::write(folder.path().join("demo/friction.img"), image(1, 0.25, 0)).unwrap();
     let command = |line: &str| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_jointctl"));
+        let mut command = program();
         command.current_dir(&folder).args(line.split_whitespace()).stdin(Stdio::null());
         command
     };

@@ -70,7 +70,7 @@ pub fn no_answer_says_for_how_long_and_what_to_look_at() {
     let began = Instant::now();
     let message = RemoteJoint::open("virtual:nobody-is-here", NODE).unwrap_err().to_string();
     assert!(message.contains("1000h:0 of node 5: no answer within 1000 ms. Nothing at all was heard"), "{message}");
-    assert!(began.elapsed() < Duration::from_secs(3));
+    assert!(began.elapsed() >= Duration::from_secs(1));
 }
 
 pub fn a_node_that_is_no_joint_is_left_alone() {

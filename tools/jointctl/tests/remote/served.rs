@@ -12,9 +12,21 @@ use jointctl::remote::RemoteJoint;
 use node::{Options, SlotImages, VirtualNode, serve};
 use plant::ActuatorParameters;
 use plant::virtual_joint::Setup;
+use std::process::Command;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::JoinHandle;
+use std::time::Duration;
+
+/// How long a joint may take for an answer: these joints run in real time, and the machine may have much else to do.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// The program, with that patience.
+pub fn program() -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_jointctl"));
+    command.env("JOINTCTL_TIMEOUT", PATIENCE.as_millis().to_string());
+    command
+}
 
 /// Node id of the first joint.
 pub const NODE: u8 = 5;
@@ -60,10 +72,9 @@ impl Served {
         &self.bus
     }
 
-    /// A client of its own for the first joint, which on a machine with much else to do may be late.
+    /// A client of its own for the first joint.
     pub fn joint(&self) -> RemoteJoint {
-        let attempt = || RemoteJoint::open(&self.bus, NODE);
-        attempt().or_else(|_| attempt()).or_else(|_| attempt()).unwrap()
+        RemoteJoint::open_within(&self.bus, NODE, PATIENCE).unwrap()
     }
 }
 
