@@ -185,6 +185,25 @@ mod tests {
     }
 
     #[test]
+    fn the_documentation_has_the_settings_that_are_written() {
+        let text = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/boards.md")).unwrap();
+        let Settings { high_side, low_side, drive_time, dead_time, vds_level, deglitch, gain, sense_level } =
+            MOTEUS_R4_11;
+        for row in [
+            format!("| high-side gates, source and sink current | {} and {} mA |", high_side.0, high_side.1),
+            format!("| low-side gates, source and sink current | {} and {} mA |", low_side.0, low_side.1),
+            format!("| time for which a gate is driven with these | {drive_time} ns |"),
+            format!("| dead time | {dead_time} ns |"),
+            format!("| over-current of a transistor, by its voltage (VDS) | {vds_level} mV |"),
+            format!("| for at least | {deglitch} µs |"),
+            format!("| gain of the current amplifiers | {gain} |"),
+            format!("| over-current of a shunt | {sense_level} mV |"),
+        ] {
+            assert_eq!(text.matches(&row).count(), 1, "docs/boards.md: {row}");
+        }
+    }
+
+    #[test]
     fn every_kind_of_fault_has_a_name() {
         assert_eq!(name([FAULT | VDS_OVER_CURRENT | 1 << 4, 0]), "over-current of a transistor");
         assert_eq!(name([FAULT, 1 << 9]), "over-current of a shunt");
