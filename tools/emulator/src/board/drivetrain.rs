@@ -16,9 +16,24 @@ use plant::actuator::{Actuator, ActuatorParameters, DriveSample};
 /// Period while no PWM runs, ps.
 const IDLE: u64 = 50_000_000;
 /// Before the top by less than this part of the way up, the period is over for whoever samples.
-const EARLY: f64 = 0.03;
+const EARLY: f64 = 0.05;
 /// Shortest period that the plant is given, ps; what is less goes with the next one.
 const SHORTEST: u64 = 1_000_000;
+
+/// How far an amplifier had followed its phase's current when a sample of it was held.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settling {
+    /// Time for which the low side had conducted, s.
+    conducting: f64,
+    amplifier: Amplifier,
+}
+
+impl Settling {
+    /// Part of the current that the output showed so long (s) before the sample was held, 0 to 1.
+    pub fn followed(&self, before: f64) -> f64 {
+        self.amplifier.followed(self.conducting - before)
+    }
+}
 
 /// The plant, and how far it has moved.
 #[derive(Clone, Debug)]
@@ -32,8 +47,8 @@ pub struct Drivetrain {
     pwm: Option<(Instant, Pwm)>,
     /// Since when the timer has asked for each low side; none where it asks for the high side.
     low_since: [Option<Instant>; 3],
-    /// The least part of a phase's current that a sample showed while the bridge switched.
-    least_followed: f64,
+    /// The sample whose low side had conducted for the shortest time while the bridge switched.
+    least_settled: Option<Settling>,
     /// Time for which each high side was on since `moved`, ps.
     on: [f64; 3],
     /// The bridge follows its inputs.
@@ -77,7 +92,7 @@ impl Drivetrain {
             sample,
             pwm: None,
             low_since: [Some(Instant(0)); 3],
-            least_followed: 1.0,
+            least_settled: None,
             on: [0.0; 3],
             enabled: false,
             dead_time: None,
@@ -185,9 +200,11 @@ impl Drivetrain {
         if !self.is_switching() {
             return current;
         }
-        let followed = amplifier.followed(self.conducting(at, phase));
-        self.least_followed = self.least_followed.min(followed);
-        current * followed
+        let settling = Settling { conducting: self.conducting(at, phase), amplifier: *amplifier };
+        if self.least_settled.is_none_or(|least| settling.conducting < least.conducting) {
+            self.least_settled = Some(settling);
+        }
+        current * settling.followed(0.0)
     }
 
     /// For how long a phase's low side has conducted, s; 0 where it does not, or both switches of the leg are off.
@@ -203,9 +220,9 @@ impl Drivetrain {
         if is_high { 0.0 } else { (low - self.dead_time.unwrap_or(0.0)).max(0.0) }
     }
 
-    /// The least part of a phase's current that a sample has shown while the bridge switched since the last call, 0 to 1.
-    pub fn take_least_followed(&mut self) -> f64 {
-        std::mem::replace(&mut self.least_followed, 1.0)
+    /// The sample, while the bridge switched since the last call, whose low side had conducted for the shortest time; none where it did not switch.
+    pub fn take_least_settled(&mut self) -> Option<Settling> {
+        self.least_settled.take()
     }
 
     /// Which low sides the timer asks for at an instant, to which it has counted; where one was asked for since `from`, from when on.
@@ -333,7 +350,7 @@ mod tests {
         assert!(conducting(254.0, 2) > 0.0 && conducting(256.0, 2) == 0.0);
     }
 
-    /// The currents are held 13 cycles and 12.5 clocks of four cycles after the trigger, a count before the top.
+    /// The currents are sampled from 13 cycles after the trigger, a count before the top, for 12.5 clocks of four cycles.
     #[test]
     fn at_the_duties_that_were_permitted_once_the_amplifiers_had_not_settled_and_at_those_of_now_they_have() {
         let [_, _, moteus, _] = super::super::moteus_r4::STEP_RESPONSE;
@@ -344,12 +361,11 @@ mod tests {
             (esc1, 20e3, 800e-9, 0.95, 0.8958),
         ] {
             let followed = |duty: f64| {
-                let held = (1.0 - duty) / 2.0 / rate + (13.0 + 50.0 - 1.0) / 170e6;
-                amplifier.followed(held - dead_time)
+                let begun = (1.0 - duty) / 2.0 / rate + (13.0 - 1.0) / 170e6;
+                amplifier.followed(begun - dead_time)
             };
             assert!(followed(now) > 0.99, "{} at {now}", followed(now));
-            // With the shorter dead time the old limit just did.
-            assert!(followed(then) < if dead_time < 100e-9 { 0.995 } else { 0.99 }, "{} at {then}", followed(then));
+            assert!(followed(then) < 0.98, "{} at {then}", followed(then));
         }
     }
 
@@ -360,13 +376,17 @@ mod tests {
         let held = Instant(top.0 + (60.0 * CYCLE) as u64);
         let sampled = drivetrain.sample(held).phase_currents;
         assert_eq!(drivetrain.phase_current(held, 0, &amplifier), sampled[0]);
-        assert_eq!(drivetrain.take_least_followed(), 1.0);
+        assert_eq!(drivetrain.take_least_settled().unwrap().followed(0.0), 1.0);
         let expected = amplifier.followed((255.0 + 60.0) * CYCLE * 1e-12 - DEAD_TIME);
         let shown = drivetrain.phase_current(held, 2, &amplifier);
         assert!((shown / sampled[2] - expected).abs() < 1e-4 && (0.9..0.999).contains(&expected), "{expected}");
-        assert!((drivetrain.take_least_followed() - expected).abs() < 1e-4);
+        assert_eq!(drivetrain.phase_current(held, 0, &amplifier), sampled[0]);
+        let least = drivetrain.take_least_settled().unwrap();
+        assert!((least.followed(0.0) - expected).abs() < 1e-4);
+        let before = amplifier.followed((255.0 + 60.0 - 50.0) * CYCLE * 1e-12 - DEAD_TIME);
+        assert!((least.followed(50.0 * CYCLE * 1e-12) - before).abs() < 1e-4 && before < expected - 0.01);
         drivetrain.enable(held, false);
         assert_eq!(drivetrain.phase_current(held, 2, &amplifier), sampled[2]);
-        assert_eq!(drivetrain.take_least_followed(), 1.0);
+        assert_eq!(drivetrain.take_least_settled(), None);
     }
 }
