@@ -22,17 +22,18 @@ use node::SampleImage;
 use plant::actuator::Fault;
 
 /// Error code of a fault of the gate driver.
-const DRIVER: u16 = 0x5410;
+pub const DRIVER: u16 = 0x5410;
 /// Fault status 1: any fault.
 const ANY: u16 = 1 << 10;
 /// Numbers of object 2302h:4.
-const COMPLETE: u32 = 0;
-const NO_ANSWER: u32 = 2;
-const FAULT: u32 = 4;
+pub const COMPLETE: u32 = 0;
+pub const NO_ANSWER: u32 = 2;
+pub const NOT_CONFIGURED: u32 = 3;
+pub const FAULT: u32 = 4;
 const WRONG_BOARD: u32 = 5;
 /// Controlwords.
 const SHUTDOWN: u16 = 0x06;
-const RESET: u16 = 0x80;
+pub const RESET: u16 = 0x80;
 /// Set-points in 50 ms, in 150 ms.
 const SHORT: f64 = 10.0 * SET_POINT;
 const LONG: f64 = 30.0 * SET_POINT;
@@ -79,7 +80,7 @@ fn started(
 }
 
 /// State by the statusword.
-fn is(bench: &mut Bench<MoteusR4>, state: State) -> Result<(), Failed> {
+pub fn is(bench: &mut Bench<MoteusR4>, state: State) -> Result<(), Failed> {
     let mask =
         if matches!(state, State::NotReadyToSwitchOn | State::SwitchOnDisabled | State::Fault) { 0x4f } else { 0x6f };
     let word = bench.number(NODE, 0x6041, 0)? as u16;
@@ -87,13 +88,13 @@ fn is(bench: &mut Bench<MoteusR4>, state: State) -> Result<(), Failed> {
 }
 
 /// Objects 2302h:1 to 4.
-fn told(bench: &mut Bench<MoteusR4>) -> Result<([u16; 2], u32, u32), Failed> {
+pub fn told(bench: &mut Bench<MoteusR4>) -> Result<([u16; 2], u32, u32), Failed> {
     let mut number = |sub_index| bench.number(NODE, 0x2302, sub_index);
     Ok(([number(1)? as u16, number(2)? as u16], number(3)?, number(4)?))
 }
 
 /// The status words that a fault is told with.
-fn words(status: [u16; 2]) -> [u16; 2] {
+pub fn words(status: [u16; 2]) -> [u16; 2] {
     [status[0] | ANY, status[1]]
 }
 
@@ -203,7 +204,7 @@ fn forgotten() -> Result<(), Failed> {
     moving.bench.board().driver().forget();
     moving.run(LONG)?;
     is(&mut moving.bench, State::Fault)?;
-    expect("2302h:4", moving.bench.number(NODE, 0x2302, 4)?, 3)?;
+    expect("2302h:4", moving.bench.number(NODE, 0x2302, 4)?, NOT_CONFIGURED)?;
     reset(&mut moving)?;
     expect("configured", is_configured(moving.bench.board().driver()), true)?;
     enable(&mut moving)

@@ -1,11 +1,14 @@
 //! The emulated board as a bench: commands do their thing, in the board's own time, and what the program stores outlasts the emulator.
 
+use super::gate_driver::{COMPLETE, DRIVER, FAULT, NO_ANSWER, NOT_CONFIGURED, RESET, is, told, words};
 use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired};
 use emulator::chip::time::Instant;
+use emulator::parts::drv8353::fault;
 use emulator::program::Program;
 use host_tests::emulated::Bench;
 use host_tests::emulated::bench::program;
-use host_tests::emulated::master::send;
+use host_tests::emulated::master::{heard, send};
+use joint_firmware::joint::state_machine::State;
 use libtest_mimic::{Failed, Trial};
 use node::{FlashFile, Workbench};
 
@@ -18,7 +21,14 @@ pub fn trials() -> Vec<Trial> {
     vec![
         Trial::test("each_command_does_its_thing_on_the_moteus_r4", on_the_moteus),
         Trial::test("each_command_does_its_thing_on_the_b_g431b_esc1", on_the_esc1),
-        Trial::test("what_is_stored_survives_a_restart_and_a_kill_of_the_emulator", storage),
+        Trial::test("each_fault_of_the_moteus_r4s_gate_driver_is_named_and_gone_after_a_fault_reset", driver_faults),
+        Trial::test("the_moteus_r4_waits_for_a_supply_that_comes_late", late_supply),
+        Trial::test("what_is_stored_survives_a_restart_and_a_kill_of_the_emulator_on_the_moteus_r4", || {
+            storage(MoteusR4::new)
+        }),
+        Trial::test("what_is_stored_survives_a_restart_and_a_kill_of_the_emulator_on_the_b_g431b_esc1", || {
+            storage(BG431BEsc1::new)
+        }),
     ]
 }
 
@@ -80,7 +90,7 @@ fn on_the_moteus() -> Result<(), Failed> {
 
     equal(at.say(&["supply 12"], 0.05)?, vec!["supply 12 V".into()])?;
     near(at.bench.board().drivetrain().actuator().state().bus_voltage, 12.0, 0.1)?;
-    at.say(&["thermistor-open", "driver-fault"], 1.1)?;
+    at.say(&["thermistor-open", "driver-fault line"], 1.1)?;
     equal(at.bench.board().inputs().thermistor_open && at.bench.board().inputs().driver_fault, true)?;
     at.bench.run(0.0)?;
     at.bench.expect("fault: temperature sensor open or shorted")?;
@@ -105,7 +115,10 @@ fn on_the_moteus() -> Result<(), Failed> {
 
 fn on_the_esc1() -> Result<(), Failed> {
     let mut at = Attended::new(BG431BEsc1::new)?;
-    equal(at.say(&["driver-fault"], 0.2)?, vec!["error: the b-g431b-esc1 has no fault line".into()])?;
+    equal(
+        at.say(&["driver-fault over-current", "driver-fault off"], 0.2)?,
+        vec!["error: the b-g431b-esc1 has no gate driver that tells of its faults".to_owned(); 2],
+    )?;
     at.say(&["encoder-open", "turn 0.2"], 1.0)?;
     let count = |at: &mut Attended<BG431BEsc1>| -> Result<u32, Failed> {
         let now = at.bench.emulation.cpu.now();
@@ -126,22 +139,107 @@ fn on_the_esc1() -> Result<(), Failed> {
     at.bench.expect("button: the bridge stays off until the next reset")
 }
 
+/// What the bench's driver fault is told by: a line of the log, 2302h:1 and 2, 2302h:4.
+type Told = (&'static str, [u16; 2], u32);
+
+fn driver_faults() -> Result<(), Failed> {
+    let mut at = Attended::new(MoteusR4::new)?;
+    at.bench.run(0.2)?;
+    at.bench.give_node_id(NODE)?;
+    send(&mut at.bench.emulation, 0x000, &[0x01, NODE])?;
+    at.bench.run(0.1)?;
+    is(&mut at.bench, State::SwitchOnDisabled)?;
+    let faults: [(&str, Told); 7] = [
+        ("over-current", ("over-current of a transistor", words(fault::OVER_CURRENT), FAULT)),
+        ("under-voltage", ("under-voltage lock-out", words(fault::UNDER_VOLTAGE), FAULT)),
+        ("over-temperature", ("thermal shutdown", words(fault::OVER_TEMPERATURE), FAULT)),
+        ("gate-drive", ("gate drive", words(fault::GATE_DRIVE), FAULT)),
+        ("line", ("", [0; 2], FAULT)),
+        ("silent", ("does not answer", [0x7ff; 2], NO_ANSWER)),
+        ("forgot", ("", [0; 2], NOT_CONFIGURED)),
+    ];
+    for (count, (word, (logged, status, setup))) in (1..).zip(faults) {
+        println!("{word}");
+        equal(told(&mut at.bench)?, ([0; 2], count - 1, COMPLETE))?;
+        heard(&mut at.bench.emulation);
+        let command = format!("driver-fault {word}");
+        equal(at.say(&[&command], 0.3)?, vec![command.clone()])?;
+        let frames = heard(&mut at.bench.emulation);
+        let [[a, b], [c, d]] = status.map(u16::to_le_bytes);
+        let [low, high] = DRIVER.to_le_bytes();
+        let emergency = (0x80 + u16::from(NODE), vec![low, high, 0x81, 16, a, b, c, d]);
+        if !frames.contains(&emergency) {
+            return Err(format!("no EMCY {emergency:x?}: {frames:x?}").into());
+        }
+        equal(told(&mut at.bench)?, (status, count, setup))?;
+        equal(at.bench.number(NODE, 0x603F, 0)? as u16, DRIVER)?;
+        is(&mut at.bench, State::Fault)?;
+        at.bench.run(0.0)?;
+        let [first, second] = status;
+        at.bench.expect(&format!("gate driver: {logged}, status {first:#05x} {second:#05x}"))?;
+        // It lasts until the bench ends it; a driver that has forgotten is configured anew by the reset.
+        reset(&mut at)?;
+        is(&mut at.bench, if word == "forgot" { State::SwitchOnDisabled } else { State::Fault })?;
+        equal(at.say(&["driver-fault off"], 0.1)?, vec!["driver-fault off".into()])?;
+        reset(&mut at)?;
+        is(&mut at.bench, State::SwitchOnDisabled)?;
+        equal(told(&mut at.bench)?, ([0; 2], count, COMPLETE))?;
+        equal(at.bench.number(NODE, 0x603F, 0)?, 0)?;
+    }
+    // Each ends the one before.
+    at.say(&["driver-fault silent", "driver-fault line", "driver-fault over-current", "driver-fault off"], 0.3)?;
+    reset(&mut at)?;
+    is(&mut at.bench, State::SwitchOnDisabled)?;
+    equal((at.bench.emulation.resets().len(), at.bench.emulation.is_powered()), (0, true))
+}
+
+/// A fault reset by the controlword, and the time that it may take.
+fn reset(at: &mut Attended<MoteusR4>) -> Result<(), Failed> {
+    for word in [RESET, 0] {
+        at.bench.download(NODE, 0x6040, 0, &word.to_le_bytes())?;
+        at.bench.run(0.15)?;
+    }
+    Ok(())
+}
+
+fn late_supply() -> Result<(), Failed> {
+    let mut at = Attended::new(MoteusR4::new)?;
+    at.bench.run(0.2)?;
+    at.bench.give_node_id(NODE)?;
+    at.say(&["supply 0", "power off", "power on"], 0.5)?;
+    is(&mut at.bench, State::NotReadyToSwitchOn)?;
+    equal(told(&mut at.bench)?, ([0; 2], 0, NO_ANSWER))?;
+    // Below the driver's lock-out, then above.
+    at.say(&["supply 7"], 0.1)?;
+    is(&mut at.bench, State::NotReadyToSwitchOn)?;
+    equal(told(&mut at.bench)?, (words(fault::UNDER_VOLTAGE), 0, FAULT))?;
+    at.say(&["supply 18"], 0.1)?;
+    is(&mut at.bench, State::SwitchOnDisabled)?;
+    equal(told(&mut at.bench)?, ([0; 2], 0, COMPLETE))?;
+    equal(at.bench.number(NODE, 0x603F, 0)?, 0)
+}
+
 /// A board with what a folder keeps.
-fn powered_up(program: &Program, folder: &std::path::Path) -> Result<(Bench<MoteusR4>, FlashFile), Failed> {
-    let mut bench = Bench::new(MoteusR4::new, program)?;
+fn powered_up<W: Wired>(
+    board: fn(Drivetrain) -> W,
+    program: &Program,
+    folder: &std::path::Path,
+) -> Result<(Bench<W>, FlashFile), Failed> {
+    let mut bench = Bench::new(board, program)?;
     let kept = FlashFile::open(folder, &mut bench.emulation, program)?;
     Ok((bench, kept))
 }
 
-fn deadline(bench: &mut Bench<MoteusR4>) -> Result<Vec<u8>, Failed> {
+fn deadline<W: Wired>(bench: &mut Bench<W>) -> Result<Vec<u8>, Failed> {
     bench.upload(NODE, DEADLINE.0, DEADLINE.1)
 }
 
-fn storage() -> Result<(), Failed> {
-    let program = program(MoteusR4::NAME, env!("CARGO_TARGET_TMPDIR"))?;
+fn storage<W: Wired>(board: fn(Drivetrain) -> W) -> Result<(), Failed> {
+    let file = format!("{}.flash", W::NAME);
+    let program = program(W::NAME, env!("CARGO_TARGET_TMPDIR"))?;
     let folder = tempfile::tempdir()?;
     let folder = folder.path();
-    let (mut bench, mut kept) = powered_up(&program, folder)?;
+    let (mut bench, mut kept) = powered_up(board, &program, folder)?;
     bench.run(0.2)?;
     bench.give_node_id(NODE)?;
     let old = deadline(&mut bench)?;
@@ -165,8 +263,8 @@ fn storage() -> Result<(), Failed> {
         // Every eighth operation is enough.
         seen.2 = operations - begun + 8;
         let killed = tempfile::tempdir()?;
-        std::fs::copy(folder.join("moteus-r4.flash"), killed.path().join("moteus-r4.flash"))?;
-        let (mut again, _) = powered_up(&program, killed.path())?;
+        std::fs::copy(folder.join(&file), killed.path().join(&file))?;
+        let (mut again, _) = powered_up(board, &program, killed.path())?;
         equal(again.emulation.cpu.bus.flash().array.torn().is_empty(), false)?;
         again.booted(NODE)?;
         match deadline(&mut again)? {
@@ -180,14 +278,14 @@ fn storage() -> Result<(), Failed> {
     bench.written()?;
     kept.keep(&bench.emulation)?;
     drop(bench);
-    let (mut again, _) = powered_up(&program, folder)?;
+    let (mut again, _) = powered_up(board, &program, folder)?;
     again.booted(NODE)?;
     equal(deadline(&mut again)?, new.to_vec())?;
 
     // Something else in the file is refused, and stays.
-    std::fs::write(folder.join("moteus-r4.flash"), b"a letter")?;
-    let refused = powered_up(&program, folder).err().ok_or("a letter was taken for a flash")?;
+    std::fs::write(folder.join(&file), b"a letter")?;
+    let refused = powered_up(board, &program, folder).err().ok_or("a letter was taken for a flash")?;
     let text = refused.message().unwrap_or_default().to_owned();
-    equal(text.contains("moteus-r4.flash: it does not begin as the flash of an emulated board"), true)?;
-    equal(std::fs::read(folder.join("moteus-r4.flash"))?, b"a letter".to_vec())
+    equal(text.contains(&format!("{file}: it does not begin as the flash of an emulated board")), true)?;
+    equal(std::fs::read(folder.join(&file))?, b"a letter".to_vec())
 }

@@ -32,7 +32,7 @@ mod serve;
 mod storage;
 mod virtual_node;
 
-pub use emulated::{Command, EmulatedNode, FlashFile, FlashFileError, Workbench};
+pub use emulated::{Command, DriverFault, EmulatedNode, FlashFile, FlashFileError, Workbench};
 pub use images::SlotImages;
 pub use paced::{PacedEvent, PacedNodes, REACTION, TASK};
 pub use sample_image::SampleImage;

@@ -13,6 +13,7 @@ use crate::chip::variant::{STM32G431CB, Variant};
 use crate::chip::wiring::{Pin, Pwm, Quadrature, SpiFrame, TimerName, Wiring};
 use crate::chip::{Chip, Deviation};
 use crate::cpu::Cpu;
+use crate::parts::drv8353::Drv8353;
 use plant::ParameterError;
 use std::cmp::Ordering;
 
@@ -62,7 +63,6 @@ impl Wired for BG431BEsc1 {
     const VARIANT: &'static Variant = &STM32G431CB;
     const NAME: &'static str = "b-g431b-esc1";
     const BUTTON: bool = true;
-    const FAULT_LINE: bool = false;
     // The bridge is switched off first of all, before TIM1 has a clock: without one it drives nothing.
     const DEVIATIONS: &'static [Deviation] = &[Deviation::WithoutClock { register: 0x4001_2c44 }];
 
@@ -89,6 +89,10 @@ impl Wired for BG431BEsc1 {
 
     fn led(&self) -> bool {
         self.led
+    }
+
+    fn gate_driver(&mut self) -> Option<&mut Drv8353> {
+        None
     }
 }
 

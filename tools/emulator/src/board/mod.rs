@@ -21,6 +21,7 @@ use crate::chip::variant::Variant;
 use crate::chip::wiring::Wiring;
 use crate::chip::{Chip, Deviation};
 use crate::cpu::Cpu;
+use crate::parts::drv8353::Drv8353;
 use plant::ParameterError;
 
 /// What a person or a broken part does to a board.
@@ -46,8 +47,6 @@ pub trait Wired: Wiring {
 
     /// Whether it has a button.
     const BUTTON: bool;
-    /// Whether it has a gate driver with a fault line.
-    const FAULT_LINE: bool;
 
     /// What the program does against the manual, knowingly.
     const DEVIATIONS: &'static [Deviation];
@@ -74,4 +73,6 @@ pub trait Wired: Wiring {
     fn line(&mut self) -> &mut Line;
     /// Whether the LED is lit.
     fn led(&self) -> bool;
+    /// The gate driver, where it has registers and a fault line.
+    fn gate_driver(&mut self) -> Option<&mut Drv8353>;
 }

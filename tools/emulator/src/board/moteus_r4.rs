@@ -43,7 +43,7 @@ const R4_11: u8 = 4;
 /// Amplifier control of the gate driver: gain 5, 10, 20, 40 by its bits 7 and 6.
 const AMPLIFIERS: usize = 6;
 /// Step response at each gain: the settling time to 1 % of the driver's data sheet (SLVSDY6, "Electrical characteristics") begins 500 ns after the
-/// edge. Together they are what the board's vendor has measured to be needed at gain 5, 10 and 20; at gain 40 it is derived.
+/// edge. Together they are what the board's vendor has measured to be needed at gain 20, and assumes at the others (docs/boards.md).
 pub(super) const STEP_RESPONSE: [Amplifier; 4] = [
     Amplifier::settling(500e-9, 250e-9),
     Amplifier::settling(500e-9, 500e-9),
@@ -112,7 +112,6 @@ impl Wired for MoteusR4 {
     const VARIANT: &'static Variant = &STM32G474CE;
     const NAME: &'static str = "moteus-r4";
     const BUTTON: bool = false;
-    const FAULT_LINE: bool = true;
     // The bridge is switched off first of all, before the ports have clocks: without them the pins are no outputs.
     const DEVIATIONS: &'static [Deviation] =
         &[Deviation::WithoutClock { register: 0x4800_0418 }, Deviation::WithoutClock { register: 0x4800_0018 }];
@@ -141,6 +140,10 @@ impl Wired for MoteusR4 {
 
     fn led(&self) -> bool {
         self.led
+    }
+
+    fn gate_driver(&mut self) -> Option<&mut Drv8353> {
+        Some(&mut self.driver)
     }
 }
 

@@ -11,6 +11,7 @@ use crate::chip::wiring::{Pin, Pwm, Quadrature, SpiFrame, TimerName, Wiring};
 use crate::chip::{Chip, Deviation};
 use crate::cpu::Cpu;
 use crate::emulation::Emulation;
+use crate::parts::drv8353::Drv8353;
 use plant::ParameterError;
 use std::hash::{Hash, Hasher};
 
@@ -90,7 +91,6 @@ impl<W: Wired> Wired for Witnessed<W> {
     const VARIANT: &'static Variant = W::VARIANT;
     const NAME: &'static str = W::NAME;
     const BUTTON: bool = W::BUTTON;
-    const FAULT_LINE: bool = W::FAULT_LINE;
     const DEVIATIONS: &'static [Deviation] = W::DEVIATIONS;
 
     fn core(chip: Chip<Self>) -> Cpu<Chip<Self>> {
@@ -115,6 +115,10 @@ impl<W: Wired> Wired for Witnessed<W> {
 
     fn led(&self) -> bool {
         self.board.led()
+    }
+
+    fn gate_driver(&mut self) -> Option<&mut Drv8353> {
+        self.board.gate_driver()
     }
 }
 

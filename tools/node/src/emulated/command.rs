@@ -23,10 +23,48 @@ pub enum Command {
     EncoderOpen(bool),
     /// The bridge's thermistor is disconnected, or connected again.
     ThermistorOpen(bool),
-    /// The gate driver's fault line is pulled low, or let go. Faults inside of the gate driver's model are commands of their own beside this one.
-    DriverFault(bool),
+    /// The gate driver has this fault and no other, or none any more.
+    DriverFault(Option<DriverFault>),
     /// The power comes or goes.
     Power(bool),
+}
+
+/// Faults of a gate driver with registers and a fault line. All but [`Forgot`](Self::Forgot) last until another command ends them; what the driver latches
+/// stays until it is cleared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DriverFault {
+    /// Over-current of a transistor, by its voltage.
+    OverCurrent,
+    /// Its supply is below its lock-out.
+    UnderVoltage,
+    /// It is too hot.
+    OverTemperature,
+    /// A gate does not follow.
+    GateDrive,
+    /// The fault line is pulled low from outside, and the driver knows of no fault.
+    Line,
+    /// Its data line is broken.
+    Silent,
+    /// It has lost its settings, once, and has no fault.
+    Forgot,
+}
+
+impl DriverFault {
+    /// Each with its word.
+    const ALL: [(&str, Self); 7] = [
+        ("over-current", Self::OverCurrent),
+        ("under-voltage", Self::UnderVoltage),
+        ("over-temperature", Self::OverTemperature),
+        ("gate-drive", Self::GateDrive),
+        ("line", Self::Line),
+        ("silent", Self::Silent),
+        ("forgot", Self::Forgot),
+    ];
+
+    /// Its word in a command.
+    pub fn word(self) -> &'static str {
+        Self::ALL.iter().find(|(_, fault)| *fault == self).map_or("", |(word, _)| word)
+    }
 }
 
 /// Lines of `help`, one for each command: the command, what follows it, what it does.
@@ -40,7 +78,11 @@ pub const HELP: [(&str, &str, &str); 11] = [
     ("button", "", "presses the button for 0.1 s"),
     ("encoder-open", "[on|off]", "disconnects the encoder"),
     ("thermistor-open", "[on|off]", "disconnects the bridge's thermistor"),
-    ("driver-fault", "[on|off]", "pulls the gate driver's fault line low"),
+    (
+        "driver-fault",
+        "over-current|under-voltage|over-temperature|gate-drive|line|silent|forgot|off",
+        "the gate driver has this fault and no other until the next, line pulls its fault line low, silent breaks its data line, forgot loses its settings once",
+    ),
     ("power", "on|off", "the power comes or goes"),
 ];
 
@@ -107,7 +149,13 @@ impl FromStr for Command {
             "button" => Self::Button,
             "encoder-open" => Self::EncoderOpen(switch(Some(true))?),
             "thermistor-open" => Self::ThermistorOpen(switch(Some(true))?),
-            "driver-fault" => Self::DriverFault(switch(Some(true))?),
+            "driver-fault" => Self::DriverFault(match given {
+                Some("off") => None,
+                given => {
+                    let known = DriverFault::ALL.into_iter().find(|(word, _)| Some(*word) == given);
+                    Some(known.ok_or(wrong)?.1)
+                }
+            }),
             _ => Self::Power(switch(None)?),
         })
     }
@@ -123,6 +171,7 @@ mod tests {
             let argument = match takes {
                 "" => "",
                 "[on|off]" | "on|off" => "on",
+                of if of.contains('|') => "line",
                 _ => "1.5",
             };
             format!("{name} {argument}").parse::<Command>().unwrap()
@@ -131,7 +180,19 @@ mod tests {
         assert_eq!(known[10], Command::Power(true));
         assert!((0..known.len()).all(|one| (0..one).all(|other| known[one] != known[other])));
         assert_eq!("encoder-open".parse(), Ok(Command::EncoderOpen(true)));
-        assert_eq!(" driver-fault  off ".parse(), Ok(Command::DriverFault(false)));
+        assert_eq!(" driver-fault  off ".parse(), Ok(Command::DriverFault(None)));
+    }
+
+    #[test]
+    fn the_help_names_every_fault_of_the_gate_driver() {
+        let (_, takes, _) = HELP.into_iter().find(|(name, ..)| *name == "driver-fault").unwrap();
+        let words: Vec<&str> = takes.split('|').collect();
+        let faults = DriverFault::ALL.map(|(word, fault)| {
+            assert_eq!(fault.word(), word);
+            assert_eq!(format!("driver-fault {word}").parse(), Ok(Command::DriverFault(Some(fault))));
+            word
+        });
+        assert_eq!(words, [&faults[..], &["off"]].concat());
     }
 
     #[test]
@@ -145,6 +206,10 @@ mod tests {
         assert_eq!(said("button 3"), "button takes nothing");
         assert_eq!(said("power"), "power takes on|off");
         assert_eq!(said("encoder-open maybe"), "encoder-open takes [on|off]");
+        for line in ["driver-fault", "driver-fault on", "driver-fault silent off"] {
+            let faults = "over-current|under-voltage|over-temperature|gate-drive|line|silent|forgot|off";
+            assert_eq!(said(line), format!("driver-fault takes {faults}"));
+        }
     }
 
     #[test]

@@ -4,7 +4,7 @@ mod command;
 mod flash_file;
 mod workbench;
 
-pub use command::Command;
+pub use command::{Command, DriverFault};
 pub use flash_file::{FlashFile, FlashFileError};
 pub use workbench::Workbench;
 

@@ -1,10 +1,11 @@
 //! Somebody at the bench of an emulated board: obeys [commands](Command) in the board's own time, and answers each in one line.
 
-use super::command::{Command, HELP};
+use super::command::{Command, DriverFault, HELP};
 use emulator::board::Wired;
 use emulator::chip::time::Instant;
 use emulator::cpu::End;
 use emulator::emulation::Emulation;
+use emulator::parts::drv8353::fault as status;
 use plant::actuator::Fault;
 use std::collections::VecDeque;
 
@@ -169,10 +170,22 @@ impl Workbench {
                 board.inputs().thermistor_open = open;
                 Ok(switched("thermistor-open", open))
             }
-            Command::DriverFault(_) if !W::FAULT_LINE => Err(format!("the {} has no fault line", W::NAME)),
             Command::DriverFault(fault) => {
-                board.inputs().driver_fault = fault;
-                Ok(switched("driver-fault", fault))
+                let missing = || format!("the {} has no gate driver that tells of its faults", W::NAME);
+                let driver = board.gate_driver().ok_or_else(missing)?;
+                driver.set_present(match fault {
+                    Some(DriverFault::OverCurrent) => status::OVER_CURRENT,
+                    Some(DriverFault::UnderVoltage) => status::UNDER_VOLTAGE,
+                    Some(DriverFault::OverTemperature) => status::OVER_TEMPERATURE,
+                    Some(DriverFault::GateDrive) => status::GATE_DRIVE,
+                    _ => [0; 2],
+                });
+                driver.set_silent(fault == Some(DriverFault::Silent));
+                if fault == Some(DriverFault::Forgot) {
+                    driver.forget();
+                }
+                board.inputs().driver_fault = fault == Some(DriverFault::Line);
+                Ok(format!("driver-fault {}", fault.map_or("off", DriverFault::word)))
             }
             Command::Power(on) => {
                 match (powered, on) {
