@@ -6,6 +6,8 @@
 //! The voltage lies along a field that turns at the commanded speed from phase A on. On top of it a voltage may alternate with an eighth of the
 //! control rate, along the field and across it. All voltages slew at [`SLEW`], and fall where the current exceeds its limit, so that
 //! a winding of any resistance is reached slowly.
+//!
+//! Nothing controls the current: it swings about its limit and passes it, by how much is in docs/commissioning.md.
 
 use super::angle::{ElectricalAngle, STEPS};
 use super::modulation::Modulator;
