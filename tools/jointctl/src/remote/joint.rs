@@ -9,10 +9,13 @@ use bus::client::sdo::Settings;
 use bus::client::{ClientError, Network, Node, Object};
 use joint_firmware::objects::field::Field;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Device profile 402, a servo drive: object 1000h of every joint.
 pub const DEVICE_TYPE: u32 = 0x0002_0192;
+
+/// A question that nobody answered is asked again after this time, as long as there is patience.
+const QUESTION: Duration = Duration::from_secs(1);
 
 /// A node that has been found to be a joint.
 #[derive(Clone, Debug)]
@@ -43,17 +46,22 @@ impl RemoteJoint {
     /// Finds a joint on a bus that is open: several may share it.
     pub fn on(network: &Network, node: u8) -> Result<Self, RemoteError> {
         let joint = Self { node: network.node(node)?, owner: None };
-        let device_type = || joint.node.number(0x1000, 0).map(u32::from_le_bytes);
-        let device_type = match device_type() {
-            // A client that vanished within a block leaves the node waiting for the rest: it takes the first request for data, and
-            // says so by an abort once its own time-out is over.
-            Err(ClientError::NoAnswer { heard, .. }) if heard.contains(&node) => device_type(),
-            answer => answer,
+        let patience = network.patience();
+        let timeout = patience.min(QUESTION);
+        let asked = joint.node.clone().with_settings(Settings { timeout, ..Settings::default() });
+        let (began, mut again) = (Instant::now(), 1);
+        let device_type = loop {
+            match asked.number(0x1000, 0) {
+                // A client that vanished within a block leaves the node waiting for the rest: it takes the first request for data, and
+                // says so by an abort once its own time-out is over.
+                Err(ClientError::NoAnswer { heard, .. }) if heard.contains(&node) && again > 0 => again -= 1,
+                Err(ClientError::NoAnswer { .. }) if began.elapsed() < patience => {}
+                Err(ClientError::NoAnswer { object, heard, .. }) => {
+                    return Err(RemoteError::Silent(ClientError::NoAnswer { object, timeout: patience, heard }));
+                }
+                answer => break u32::from_le_bytes(answer?),
+            }
         };
-        let device_type = device_type.map_err(|error| match error {
-            ClientError::NoAnswer { .. } => RemoteError::Silent(error),
-            error => error.into(),
-        })?;
         if device_type == DEVICE_TYPE { Ok(joint) } else { Err(RemoteError::NoJoint { node, device_type }) }
     }
 
