@@ -7,7 +7,8 @@ mod rig;
 use joint_firmware::joint::active::DERATING;
 use joint_firmware::joint::state_machine::{Controlword, State};
 use joint_firmware::joint::stopping::StopConfiguration;
-use joint_firmware::joint::{Command, Mode};
+use joint_firmware::joint::{Command, CommandLimits, Mode};
+use joint_firmware::objects::Operation;
 use plant::actuator::{Accessories, Fault as Broken};
 use plant::virtual_joint::Setup;
 use rig::{Rig, break_down, position, reference, torque, velocity};
@@ -20,7 +21,23 @@ const LEVEL: f32 = 1.3;
 const SPEED: f32 = 0.5;
 /// An arm that moves less, rad, holds.
 const HOLDS: f64 = 0.02;
-const MODES: [Mode; 4] = [Mode::Position, Mode::Velocity, Mode::Torque, Mode::Impedance];
+const MODES: [Operation; 7] = [
+    Operation::ProfilePosition,
+    Operation::ProfileVelocity,
+    Operation::Homing,
+    Operation::Position,
+    Operation::Velocity,
+    Operation::Torque,
+    Operation::Impedance,
+];
+/// Of the master that commands torques, Nm s/rad.
+const TORQUE_GAIN: f32 = 60.0;
+/// Of profiles, rad/s².
+const ACCELERATION: f32 = 8.0;
+/// From where a profile begins to where it ends, rad.
+const FAR: f32 = 0.6;
+/// The same of homing: the next index is less than a turn of the rotor away.
+const INDEX: f32 = 0.12;
 
 /// A way to stop.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -99,8 +116,21 @@ const WAYS: [Way; 9] = [
     Way::BridgeFault,
 ];
 
+/// Limits of a mode's command: a profile's speed, and accelerations of its own.
+fn limits(mode: Operation) -> CommandLimits {
+    match mode {
+        Operation::ProfilePosition | Operation::Homing | Operation::ProfileVelocity => {
+            CommandLimits::new(SPEED, ACCELERATION, ACCELERATION, f32::INFINITY)
+        }
+        _ => CommandLimits::NONE,
+    }
+}
+
 /// A loaded arm, nearly level, that rises in a mode.
-fn rising(mode: Mode, stops: StopConfiguration, brake: bool) -> Rig {
+///
+/// Commands are those of `objects::set_points`. Homing moves as a profile does, and the zero that follows changes nothing
+/// of the motion.
+fn rising(mode: Operation, stops: StopConfiguration, brake: bool) -> Rig {
     let parameters = reference().with_payload(3.0, 0.3);
     let mut setup = Setup::of(&parameters);
     setup.configuration.stops = stops;
@@ -119,10 +149,15 @@ fn rising(mode: Mode, stops: StopConfiguration, brake: bool) -> Rig {
     while time < 0.2 {
         let goal = at + SPEED * time;
         let command = match mode {
-            Mode::Velocity => velocity(SPEED),
-            Mode::Torque => torque(bears + 3.0),
-            Mode::Impedance => Command {
-                mode,
+            Operation::ProfilePosition | Operation::Homing => {
+                let far = if mode == Operation::Homing { INDEX } else { FAR };
+                Command { mode: Mode::Profile, position: at + far, limits: limits(mode), ..Command::NOTHING }
+            }
+            Operation::ProfileVelocity | Operation::Velocity => Command { limits: limits(mode), ..velocity(SPEED) },
+            // Its master controls the speed.
+            Operation::Torque => torque(bears + TORQUE_GAIN * (SPEED - rig.velocity() as f32)),
+            Operation::Impedance => Command {
+                mode: Mode::Impedance,
                 position: goal,
                 velocity: SPEED,
                 torque: bears,
@@ -135,6 +170,7 @@ fn rising(mode: Mode, stops: StopConfiguration, brake: bool) -> Rig {
         rig.follow(command, 1e-3);
         time += 1e-3;
     }
+    assert!(rig.velocity() > 0.8 * f64::from(SPEED), "{mode:?}: {} rad/s", rig.velocity());
     rig
 }
 
@@ -149,7 +185,7 @@ struct Stopped {
     state: State,
 }
 
-fn stopped(mode: Mode, way: Way, stops: StopConfiguration, brake: bool) -> Stopped {
+fn stopped(mode: Operation, way: Way, stops: StopConfiguration, brake: bool) -> Stopped {
     let mut rig = rising(mode, stops, brake);
     let start = rig.position();
     match way {
@@ -165,7 +201,7 @@ fn stopped(mode: Mode, way: Way, stops: StopConfiguration, brake: bool) -> Stopp
         Way::Halt => {
             // As `objects::set_points` asks.
             rig.demand.controlword = Controlword(Controlword::ENABLE_OPERATION.0 | Controlword::HALT.0);
-            rig.demand.command = Command { mode: Mode::Hold, ..Command::NOTHING };
+            rig.demand.command = Command { mode: Mode::Hold, limits: limits(mode), ..Command::NOTHING };
         }
         Way::DisableVoltage => rig.demand.controlword = Controlword::DISABLE_VOLTAGE,
         Way::LateCommand => rig.silent = true,
@@ -189,10 +225,21 @@ fn stopped(mode: Mode, way: Way, stops: StopConfiguration, brake: bool) -> Stopp
     Stopped { way: highest - start, sank: highest - lowest, falls, state: rig.state() }
 }
 
+/// Whether a mode's set-point has to be renewed; a profile position and homing end by themselves.
+fn is_renewed(mode: Operation) -> bool {
+    !matches!(mode, Operation::ProfilePosition | Operation::Homing)
+}
+
+/// What it did in each mode in which the way is one.
+fn in_each_mode(way: Way, stops: StopConfiguration, brake: bool) -> Vec<(Operation, Stopped)> {
+    let modes = MODES.into_iter().filter(|mode| way != Way::LateCommand || is_renewed(*mode));
+    modes.map(|mode| (mode, stopped(mode, way, stops, brake))).collect()
+}
+
 /// The worst over all modes.
-fn worst(way: Way, stops: StopConfiguration, brake: bool) -> Stopped {
-    let all = MODES.map(|mode| stopped(mode, way, stops, brake));
-    all.into_iter()
+fn worst(all: &[(Operation, Stopped)]) -> Stopped {
+    all.iter()
+        .map(|(_, stopped)| *stopped)
         .reduce(|a, b| {
             if b.sank > a.sank {
                 Stopped { way: a.way.max(b.way), ..b }
@@ -205,14 +252,15 @@ fn worst(way: Way, stops: StopConfiguration, brake: bool) -> Stopped {
 
 const HEAD: &str = "# What the arm does
 
-A joint that bears 3 kg on 0.3 m, nearly level, rises at 0.5 rad/s and is stopped in every way, with every option code, in four modes
-(position, velocity, torque, impedance). It is the virtual joint with its friction; its numbers are of this joint alone, and the words hold for every one: `tools/plant/tests/joint_stops.rs`
+A joint that bears 3 kg on 0.3 m, nearly level, rises at 0.5 rad/s and is stopped in every way, with every option code, in seven modes
+(profile position, profile velocity, homing to an index, cyclic synchronous position, velocity and torque, impedance). It is the virtual joint with its friction; its numbers are of this joint alone, and the words hold for every one: `tools/plant/tests/joint_stops.rs`
 asserts them, and `UPDATE_DOCS=1 cargo test -p plant --test joint_stops` writes this page anew. The option codes are those of CiA 402-2 (6007h, 605Ah to 605Eh, [objects](objects.md));
 `[stops]` in joint.toml. The brake opens in 0.15 s and closes in 0.1 s, and both times are configured (2109h).
 
-- way: how far it goes on before it turns or stands, rad; the largest of the four modes.
-- sinks: how far it is below that 2 s later, rad; of the mode in which it is most. Below 0.02 rad it *holds*; a brake that has to close first lets it sink a little.
+- way: how far it goes on before it turns or stands, rad; the largest of all modes.
+- sinks: how far it is below that 2 s later, rad; of the mode in which it is most. Whether it holds or falls is the same in all modes. Below 0.02 rad it *holds*; a brake that has to close first lets it sink a little.
 - Before the bridge goes off at once nothing closes a brake: disable voltage, code 0, and faults of the bridge or the current loop have the arm without support for its time.
+- A client that is gone stops nothing in profile position and homing: there no set-point has to be renewed, and the arm goes on to where it was sent, and holds. A lost heartbeat (1016h) stops it there, too.
 
 | stopped by | option | way | sinks | with a brake: way | sinks |
 |---|---|---|---|---|---|
@@ -233,16 +281,21 @@ fn every_way_to_stop_does_what_its_option_says_with_a_load_on_the_arm() {
         for (name, change) in choices(way) {
             let mut stops = StopConfiguration::DEFAULT;
             change(&mut stops);
-            let (without, with) = (worst(way, stops, false), worst(way, stops, true));
+            let (without, with) = (in_each_mode(way, stops, false), in_each_mode(way, stops, true));
             let (way_name, off) = (way.name(), name.ends_with("= 0") || name.is_empty());
             let holds = matches!(way, Way::Halt) || name.ends_with("605Ah = 5") || name.ends_with("605Ah = 6");
-            assert_eq!(without.sank < HOLDS, holds, "{way_name} {name}: {without:?}");
-            // With a brake nothing falls; what is switched off at once sinks for the time in which it closes.
-            assert!(!with.falls, "{way_name} {name}: {with:?}");
-            assert_eq!(with.sank < HOLDS, !off, "{way_name} {name}: {with:?}");
-            if holds && !matches!(way, Way::Halt) {
-                assert_eq!(without.state, State::QuickStopActive);
+            for (mode, without) in &without {
+                assert_eq!(without.sank < HOLDS, holds, "{way_name} {name} {mode:?}: {without:?}");
+                if holds && !matches!(way, Way::Halt) {
+                    assert_eq!(without.state, State::QuickStopActive, "{way_name} {name} {mode:?}");
+                }
             }
+            for (mode, with) in &with {
+                // With a brake nothing falls; what is switched off at once sinks for the time in which it closes.
+                assert!(!with.falls, "{way_name} {name} {mode:?}: {with:?}");
+                assert_eq!(with.sank < HOLDS, !off, "{way_name} {name} {mode:?}: {with:?}");
+            }
+            let (without, with) = (worst(&without), worst(&with));
             let (a, b) = (sinks(&without), sinks(&with));
             writeln!(text, "| {way_name} | {name} | {:.2} | {a} | {:.2} | {b} |", without.way, with.way).unwrap();
         }
@@ -253,6 +306,22 @@ fn every_way_to_stop_does_what_its_option_says_with_a_load_on_the_arm() {
     }
     let found = std::fs::read_to_string(file).unwrap_or_default();
     assert!(found == text, "docs/stops.md is not what the joint does; UPDATE_DOCS=1 writes it anew");
+}
+
+#[test]
+fn a_client_that_is_gone_stops_no_motion_that_ends_by_itself() {
+    for mode in MODES {
+        let stopped = stopped(mode, Way::LateCommand, StopConfiguration::DEFAULT, false);
+        if is_renewed(mode) {
+            assert_eq!(stopped.state, State::Fault, "{mode:?}");
+            continue;
+        }
+        let far = if mode == Operation::Homing { INDEX } else { FAR };
+        // It began 0.2 s before the client went.
+        let rest = f64::from(far - 0.2 * SPEED);
+        assert!((stopped.way - rest).abs() < 0.03, "{mode:?}: {stopped:?}, {rest} rad were left");
+        assert!(stopped.state == State::OperationEnabled && stopped.sank < HOLDS, "{mode:?}: {stopped:?}");
+    }
 }
 
 /// A braked joint that somebody enables, with a target to go to at once.
@@ -329,7 +398,7 @@ fn a_bridge_is_off_only_when_the_brake_has_closed() {
 #[test]
 fn a_joint_that_stopped_for_a_late_command_goes_on_only_when_it_is_asked_anew() {
     let stops = StopConfiguration { late_command: 3, quick_stop: 6, ..StopConfiguration::DEFAULT };
-    let mut rig = rising(Mode::Position, stops, false);
+    let mut rig = rising(Operation::Position, stops, false);
     rig.silent = true;
     rig.run(0.5);
     assert_eq!((rig.state(), rig.latched().is_empty()), (State::QuickStopActive, true));
@@ -351,7 +420,7 @@ fn a_joint_that_stopped_for_a_late_command_goes_on_only_when_it_is_asked_anew() 
 #[test]
 fn a_joint_that_cannot_hold_switches_off_and_closes_its_brake() {
     let stops = StopConfiguration { quick_stop: 6, ..StopConfiguration::DEFAULT };
-    let mut rig = rising(Mode::Position, stops, true);
+    let mut rig = rising(Operation::Position, stops, true);
     rig.demand.controlword = Controlword::QUICK_STOP;
     rig.run(1.0);
     assert!(rig.state() == State::QuickStopActive && rig.joint.joint().outputs().brake_open());
@@ -368,7 +437,7 @@ fn a_joint_that_cannot_hold_switches_off_and_closes_its_brake() {
 #[test]
 fn what_holds_gives_no_more_current_than_a_hot_winding_bears() {
     let stops = StopConfiguration { quick_stop: 6, ..StopConfiguration::DEFAULT };
-    let mut rig = rising(Mode::Position, stops, false);
+    let mut rig = rising(Operation::Position, stops, false);
     rig.demand.controlword = Controlword::QUICK_STOP;
     rig.run(1.0);
     let current = |rig: &Rig| rig.joint.joint().telemetry().current.q.abs();
