@@ -3,12 +3,12 @@
 //!
 //! Without Python, or where these cannot be installed, this is reported as ignored by name; with `CI` set it runs, and fails.
 
-use jointctl::remote::Entry;
+use jointctl::remote::{Entry, RemoteJoint};
 use libtest_mimic::{Arguments, Failed, Trial};
 use node::{Options, SlotImages, VirtualNode, serve};
 use plant::ActuatorParameters;
 use plant::virtual_joint::Setup;
-use python::Packages;
+use python::{DCF_TOOLS, Packages};
 use std::path::Path;
 use std::process::Command;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -38,9 +38,6 @@ const PACKAGES: Packages = Packages {
     install: &["canopen==2.4.1", "python-can==4.6.1", "msgpack==1.2.4", "cantools==41.0.0"],
     import: "canopen, can, msgpack, cantools",
 };
-
-/// Lely's tools, with which ros2_canopen makes its configuration.
-const DCF_TOOLS: Packages = Packages { folder: "python-dcf", install: &["dcf-tools==2.4.2"], import: "dcf, dcfgen" };
 
 fn configure(python: Option<&Path>) -> Result<(), Failed> {
     let python = DCF_TOOLS.required(python)?;
@@ -93,6 +90,23 @@ fn configure(python: Option<&Path>) -> Result<(), Failed> {
     Ok(())
 }
 
+/// Fails where a file has not the identity that the joint answers: a product and a revision, and no vendor.
+fn identity(bus: &str, eds: &str) -> Result<(), String> {
+    let joint = RemoteJoint::open(bus, NODE).map_err(|error| error.to_string())?;
+    for (name, sub_index) in [("VendorNumber", 1), ("ProductNumber", 2), ("RevisionNumber", 3)] {
+        let number = joint.node().number(0x1018, sub_index).map_err(|error| error.to_string())?;
+        let number = u32::from_le_bytes(number);
+        let section =
+            eds.split_once(&format!("\n[1018sub{sub_index}]\n")).and_then(|(_, rest)| rest.split_once("\n\n"));
+        let default = section
+            .is_some_and(|(section, _)| section.lines().any(|line| line == format!("DefaultValue=0x{number:X}")));
+        if !default || !eds.contains(&format!("\n{name}=0x{number:X}\n")) || (number == 0) != (sub_index == 1) {
+            return Err(format!("1018h:{sub_index} of the joint is {number:X}h, and not {name} there"));
+        }
+    }
+    Ok(())
+}
+
 fn compare(python: Option<&Path>) -> Result<(), Failed> {
     let python = PACKAGES.required(python)?;
     let folder = tempfile::tempdir()?;
@@ -116,9 +130,9 @@ fn compare(python: Option<&Path>) -> Result<(), Failed> {
             .args(["eds", "own.eds", "--bus", &format!("udp:{GROUP}:{port}"), "--node", &NODE.to_string()])
             .status();
         let eds = own.and_then(|_| std::fs::read_to_string(folder.path().join("own.eds"))).unwrap_or_default();
-        if !eds.contains("ProductNumber=0x564A6E74\nRevisionNumber=0x1\n") {
+        if let Err(error) = identity(&format!("udp:{GROUP}:{port}"), &eds) {
             stop.store(true, Ordering::Relaxed);
-            return Err(std::io::Error::other(format!("the file for this joint alone has not its identity:\n{eds}")));
+            return Err(std::io::Error::other(format!("the file for this joint alone: {error}\n{eds}")));
         }
         let output = Command::new(python)
             .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/describe.py"))

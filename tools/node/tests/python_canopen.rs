@@ -7,7 +7,7 @@ mod client;
 use client::Joint;
 use libtest_mimic::{Arguments, Failed, Trial};
 use node::SampleImage;
-use python::Packages;
+use python::CANOPEN;
 use std::path::Path;
 use std::process::Command;
 
@@ -16,7 +16,7 @@ const GROUP: &str = "239.74.163.2";
 fn main() {
     let arguments = Arguments::from_args();
     let must_run = std::env::var_os("CI").is_some();
-    let python = if arguments.list { None } else { PACKAGES.python(env!("CARGO_TARGET_TMPDIR")) };
+    let python = if arguments.list { None } else { CANOPEN.python(env!("CARGO_TARGET_TMPDIR")) };
     let ignored = !must_run && python.is_none();
     let (one, two, three, four) = (python.clone(), python.clone(), python.clone(), python);
     let trials = vec![
@@ -34,16 +34,9 @@ fn main() {
     libtest_mimic::run(&arguments, trials).exit();
 }
 
-/// python-canopen with its bus.
-const PACKAGES: Packages = Packages {
-    folder: "python-canopen",
-    install: &["canopen==2.4.1", "python-can==4.6.1", "msgpack==1.2.4"],
-    import: "canopen, can, msgpack",
-};
-
 /// A script on a bus of its own with a joint; what it printed.
 fn run(python: Option<&Path>, script: &str, images: &[Vec<u8>], more: &[&str]) -> Result<String, Failed> {
-    let python = PACKAGES.required(python)?;
+    let python = CANOPEN.required(python)?;
     let port = bus::free_port().ok_or("no port is free")?;
     let mut joint = Joint::new(&format!("udp:{GROUP}:{port}"))?;
     let mut command = Command::new(python);

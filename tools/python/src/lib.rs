@@ -16,6 +16,17 @@ pub struct Packages {
     pub import: &'static str,
 }
 
+/// python-canopen with its buses.
+pub const CANOPEN: Packages = Packages {
+    folder: "python-canopen",
+    install: &["canopen==2.4.1", "python-can==4.6.1", "msgpack==1.2.4"],
+    import: "canopen, can, msgpack",
+};
+
+/// Lely's tools, with which ros2_canopen makes its configuration.
+pub const DCF_TOOLS: Packages =
+    Packages { folder: "python-dcf", install: &["dcf-tools==2.4.2"], import: "dcf, dcfgen" };
+
 impl Packages {
     /// A Python that finds them, in a virtual environment below a test's temporary folder that is made once. None without Python, without its module
     /// `venv`, or where the packages cannot be installed.

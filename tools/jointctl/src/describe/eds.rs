@@ -19,6 +19,12 @@ const DOMAIN: u8 = 2;
 const VARIABLE: u8 = 7;
 const RECORD: u8 = 9;
 
+/// Why a file has no vendor.
+const NO_VENDOR: &str = "VendorNumber: joints answer 0 (1018h:1), as this project has no vendor ID of CiA";
+/// Why a file that was made without a joint has no product.
+const ANY_PRODUCT: &str =
+    "ProductNumber, RevisionNumber: 0 is any; each board has its own, which --bus BUS --node N reads (1018h:2, 3)";
+
 /// Who a joint is, as its object 1018h says; of a joint that is not known everything is 0, which masters take for any.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Identity {
@@ -60,7 +66,14 @@ fn write(text: &mut String, name: &str, now: Duration, identity: Identity) -> st
     writeln!(text, "CreatedBy={program}\nModifiedBy={program}\n")?;
 
     let Identity { vendor, product, revision, .. } = identity;
-    writeln!(text, "[DeviceInfo]\nVendorName=\nVendorNumber=0x{vendor:X}\nProductName=joint")?;
+    writeln!(text, "[DeviceInfo]")?;
+    if vendor == 0 {
+        writeln!(text, ";{NO_VENDOR}")?;
+    }
+    if product == 0 && revision == 0 {
+        writeln!(text, ";{ANY_PRODUCT}")?;
+    }
+    writeln!(text, "VendorName=\nVendorNumber=0x{vendor:X}\nProductName=joint")?;
     writeln!(text, "ProductNumber=0x{product:X}\nRevisionNumber=0x{revision:X}\nOrderCode=")?;
     for rate in [10, 20, 50, 125, 250, 500, 800, 1000] {
         writeln!(text, "BaudRate_{rate}={}", u8::from(rate == 1000))?;
@@ -261,6 +274,7 @@ mod tests {
         let text = text("joint.eds", Duration::ZERO, identity);
         assert!(text.is_ascii());
         assert!(text.contains("\nVendorNumber=0x0\nProductName=joint\nProductNumber=0x564A6E74\nRevisionNumber=0x1\n"));
+        assert!(text.contains(NO_VENDOR) && !text.contains(ANY_PRODUCT));
         for entry in Entry::all() {
             let (index, sub_index) = (entry.object.index, entry.object.sub_index);
             let section = format!("\n[{index:04X}sub{sub_index:X}]\n");
@@ -279,6 +293,17 @@ mod tests {
         assert!(of("6502").contains(&format!("DefaultValue={}\n", Operation::SUPPORTED)), "{}", of("6502"));
         assert!(of("6060").contains("AccessType=rww\nPDOMapping=1\nLowLimit=-2\nHighLimit=10"), "{}", of("6060"));
     }
+
+    #[test]
+    fn a_file_for_any_joint_says_why_it_has_no_identity() {
+        let of = |identity| text("joint.eds", Duration::ZERO, identity);
+        let any = of(Identity::default());
+        assert!(any.contains(&format!(";{NO_VENDOR}\n;{ANY_PRODUCT}\nVendorName=\nVendorNumber=0x0\n")), "{any}");
+        assert!(any.contains("\nProductNumber=0x0\nRevisionNumber=0x0\n") && any.is_ascii());
+        let known = of(Identity { vendor: 0x0123, product: 4, revision: 5, modes: None });
+        assert!(!known.contains(NO_VENDOR) && !known.contains(ANY_PRODUCT));
+    }
+
     #[test]
     fn a_joint_without_profile_modes_has_none_of_their_objects() {
         let without = Identity { modes: Some(0x0003_0380), ..Identity::default() };
