@@ -6,10 +6,13 @@
 mod client;
 
 use client::Joint;
+use jointctl::describe::eds::{self, Identity};
+use jointctl::remote::Entry;
 use libtest_mimic::{Arguments, Failed, Trial};
 use node::SampleImage;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::time::Duration;
 
 const PACKAGE: &str = "canopen@6.2.1";
 
@@ -18,9 +21,12 @@ fn main() {
     let must_run = std::env::var_os("CI").is_some();
     let modules = if arguments.list { Err("only listed".into()) } else { modules() };
     let ignored = !must_run && modules.is_err();
-    let shared = modules.clone();
+    let (shared, second) = (modules.clone(), modules.clone());
     let trials = vec![
         Trial::test("node_canopen_can_do_everything_with_the_joint", move || conformance(&modules)),
+        Trial::test("node_canopen_loads_the_eds_and_drives_the_joint_in_profile_velocity_by_it", move || {
+            by_eds(&second)
+        }),
         Trial::test("node_canopen_transfers_every_length_in_every_way", move || {
             client::every_length(|first, step| run(&shared, "tests/lengths.js", &[], &[first, step]))
         }),
@@ -82,5 +88,14 @@ fn run(modules: &Result<PathBuf, String>, script: &str, images: &[Vec<u8>], more
 fn conformance(modules: &Result<PathBuf, String>) -> Result<(), Failed> {
     let images = [SampleImage::constant(1, 0.25), SampleImage::constant(2, 0.5)];
     let text = run(modules, "tests/conformance.js", &images, &[])?;
+    if text.lines().last() == Some("done") { Ok(()) } else { Err(text.into()) }
+}
+
+fn by_eds(modules: &Result<PathBuf, String>) -> Result<(), Failed> {
+    let folder = tempfile::tempdir()?;
+    let path = folder.path().join("joint.eds");
+    std::fs::write(&path, eds::text("joint.eds", Duration::ZERO, Identity::default()))?;
+    let path = path.to_str().ok_or("a path that is no text")?;
+    let text = run(modules, "tests/eds.js", &[], &[path, &Entry::all().count().to_string()])?;
     if text.lines().last() == Some("done") { Ok(()) } else { Err(text.into()) }
 }
