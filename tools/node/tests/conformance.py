@@ -201,6 +201,30 @@ check(len(node.sdo.upload(0x2300, 0)) == 64 * 36, "the steps before the fault ca
 until(lambda: seen["statusword"] & 0x6F == 0x40, 10.0, lambda: command(0x80))
 check(until(lambda: 0 in emergencies, 10.0, lambda: command(0x00)), "a reset of the fault is EMCY 0000h")
 
+# PDOs that python-canopen maps: a TPDO that comes by itself, an RPDO that acts at once.
+heard = []
+tpdo, rpdo = node.tpdo[4], node.rpdo[4]
+tpdo.read()
+rpdo.read()
+tpdo.clear()
+tpdo.add_variable("position")
+tpdo.trans_type, tpdo.inhibit_time, tpdo.event_timer, tpdo.enabled = 255, 100, 50, True
+tpdo.save()
+check(number("H", 0x1803, 3) == 100 and number("H", 0x1803, 5) == 50, "inhibit time and event timer are the joint's")
+tpdo.add_callback(lambda message: heard.append(message[0].raw))
+check(until(lambda: len(heard) > 3), "a TPDO with an event timer comes without a SYNC")
+rpdo.clear()
+rpdo.add_variable("target velocity")
+rpdo.trans_type, rpdo.enabled = 255, True
+rpdo.save()
+rpdo[0].raw = 321
+rpdo.transmit()
+check(until(lambda: number("i", 0x60FF) == 321), "an RPDO that python-canopen has mapped is taken")
+heartbeats.clear()
+node.nmt.state = "RESET COMMUNICATION"
+check(until(lambda: 0 in heartbeats), "a reset of communication is followed by a boot-up message")
+node.nmt.state = "OPERATIONAL"
+
 # Heartbeats both ways.
 write("H", 50, 0x1017)
 time.sleep(0.1)
