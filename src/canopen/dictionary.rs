@@ -162,7 +162,7 @@ pub trait ObjectDictionary {
         true
     }
 
-    /// LSS: keeps the node id, 1 to 127 or 255, over a loss of power.
+    /// LSS: keeps the node id, 1 to 127 or 255, over a loss of power. [`Abort::LOCAL_CONTROL`]: for the owner alone.
     fn store_node_id(&mut self, node_id: u8) -> Result<(), Abort>;
 
     /// Communication parameters at power-on for a node id of 1 to 127: the stored ones, or the defaults.

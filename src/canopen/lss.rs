@@ -3,6 +3,7 @@
 //! Bit timing is fixed at 1 Mbit/s: configuring that is accepted, any other rate refused, and activating it changes
 //! nothing. Store goes to the application. Works in every NMT state.
 
+use super::abort::Abort;
 use super::dictionary::{Identity, ObjectDictionary};
 use super::parameters::is_node_id;
 use super::shared::NO_NODE_ID;
@@ -11,6 +12,8 @@ use super::shared::NO_NODE_ID;
 const MANUFACTURERS: u8 = 0xFF;
 /// The application cannot do without its node id at this moment.
 const MOVING: u8 = 1;
+/// The application keeps a node id for its owner alone.
+const OWNED: u8 = 2;
 /// "Identify slave", which answers fastscan too, and "identify non-configured slave".
 const IDENTIFIED: u8 = 0x4F;
 const NOT_CONFIGURED: u8 = 0x50;
@@ -100,9 +103,13 @@ impl Lss {
             // Table 0, entry 0: 1 Mbit/s.
             (0x13, Mode::Configuration) => Outcome::answer(command, [u8::from((a, b) != (0, 0)), 0, 0, 0]),
             (0x17, Mode::Configuration) => {
-                // 2: the storage medium failed.
-                let error = if dictionary.store_node_id(self.pending).is_ok() { 0 } else { 2 };
-                Outcome::answer(command, [error, 0, 0, 0])
+                let error = match dictionary.store_node_id(self.pending) {
+                    Ok(()) => [0; 4],
+                    Err(Abort::LOCAL_CONTROL) => [MANUFACTURERS, OWNED, 0, 0],
+                    // The storage medium failed.
+                    Err(_) => [2, 0, 0, 0],
+                };
+                Outcome::answer(command, error)
             }
             (0x5A..=0x5D, Mode::Configuration) => {
                 let value = identity.number(command.wrapping_sub(0x5A)).unwrap_or(0);

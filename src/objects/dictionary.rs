@@ -556,6 +556,7 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
 
     #[inline(never)]
     fn store_node_id(&mut self, node_id: u8) -> Result<(), Abort> {
+        self.authorise()?;
         let update = Update { node_id: Some(node_id), application: Part::Kept, communication: Part::Kept };
         self.store_record(&update)?;
         self.configuration.node_id = node_id;

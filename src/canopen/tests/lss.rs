@@ -65,6 +65,21 @@ fn a_node_that_cannot_do_without_its_id_keeps_it() {
 }
 
 #[test]
+fn a_node_id_that_is_not_stored_is_told_with_the_reason() {
+    let mut node = Node::operational();
+    ask(&mut node, message(0x04, 1));
+    ask(&mut node, message(0x11, 7));
+    for (abort, answer) in [(Abort::LOCAL_CONTROL, [0xFF, 2, 0, 0]), (Abort::HARDWARE, [2, 0, 0, 0])] {
+        node.dictionary.refuses_node_id = Some(abort);
+        assert_eq!(ask(&mut node, message(0x17, 0)), answered(0x17, answer));
+        assert_eq!(node.dictionary.stored_node_id, None);
+    }
+    node.dictionary.refuses_node_id = None;
+    assert_eq!(ask(&mut node, message(0x17, 0)), answered(0x17, [0; 4]));
+    assert_eq!(node.dictionary.stored_node_id, Some(7));
+}
+
+#[test]
 fn a_node_with_an_id_changes_it_with_the_next_reset() {
     let mut node = Node::operational();
     ask(&mut node, message(0x04, 1));

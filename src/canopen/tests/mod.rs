@@ -44,6 +44,8 @@ pub struct Dictionary {
     pub stored: Option<(Group, CommunicationParameters)>,
     pub restored: Option<Group>,
     pub stored_node_id: Option<u8>,
+    /// Why no node id is stored.
+    pub refuses_node_id: Option<Abort>,
     pub keeps_node_id: bool,
     pub parameters: Option<CommunicationParameters>,
     /// The interrupt takes another reset while the task tells of one.
@@ -147,6 +149,7 @@ impl ObjectDictionary for Dictionary {
     }
 
     fn store_node_id(&mut self, node_id: u8) -> Result<(), Abort> {
+        self.refuses_node_id.map_or(Ok(()), Err)?;
         self.stored_node_id = Some(node_id);
         Ok(())
     }

@@ -1,7 +1,9 @@
 //! The objects behind the real server: a client by SDO, a master by PDO, a hostile bus; the host.
 
+mod attacks;
 mod client;
 mod documentation;
+mod evidence;
 mod hardware;
 mod hostile;
 mod images;
@@ -167,6 +169,8 @@ pub struct Node {
     pub observed: Observed,
     queue: VecDeque<Frame>,
     pub now: u32,
+    /// Everything that came over the bus, as whoever listens has it.
+    pub heard: Vec<Frame>,
 }
 
 impl Node {
@@ -208,6 +212,7 @@ impl Node {
             observed: Observed::default(),
             queue: VecDeque::new(),
             now: 0,
+            heard: Vec::new(),
         };
         node.task();
         assert_eq!(node.bus.state(), NmtState::PreOperational);
@@ -260,7 +265,9 @@ impl Node {
 
     /// A frame from the bus, and everything that comes of it.
     pub fn receive(&mut self, id: u16, data: &[u8]) -> Vec<Frame> {
-        let mut sent = self.interrupt(&Frame::new(id, data).unwrap());
+        let frame = Frame::new(id, data).unwrap();
+        self.heard.push(frame);
+        let mut sent = self.interrupt(&frame);
         sent.extend(self.task());
         sent
     }

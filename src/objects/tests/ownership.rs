@@ -43,6 +43,23 @@ impl Node {
     fn owner(&mut self) -> u32 {
         self.number(0x2215, 2) as u32
     }
+
+    fn close(&mut self) {
+        self.download(0x2215, 8, &0u32.to_le_bytes()).unwrap();
+    }
+
+    /// Sends again what was heard.
+    fn replay(&mut self, heard: &[Frame]) {
+        for frame in heard {
+            self.receive(frame.id(), frame.data());
+        }
+    }
+}
+
+/// A new key as its owner sends it.
+fn rotation(owner: &Key, new: &Key, challenge: &Challenge) -> Vec<u8> {
+    let masked = owner.mask(challenge, &new.to_bytes());
+    [masked, owner.respond(Purpose::Rotate, challenge, &masked)].concat()
 }
 
 /// What wants the owner, as an object with a value that it takes otherwise.
@@ -144,6 +161,106 @@ fn a_response_opens_once_and_only_its_own_joint() {
     assert_eq!(node.download(0x2215, 7, &response), Err(REFUSED), "replayed");
     assert_ne!(node.challenge(), challenge);
     assert_eq!(node.download(0x2215, 7, &response), Err(REFUSED), "replayed against the next challenge");
+}
+
+#[test]
+fn a_whole_session_that_was_recorded_and_is_sent_again_changes_nothing() {
+    let mut node = owned();
+    node.heard.clear();
+    node.respond(&key(1), Purpose::Session).unwrap();
+    node.set_real(0x2101, 4, 0.5).unwrap();
+    node.download(0x2100, 1, &[1]).unwrap();
+    node.download(0x605A, 0, &[6, 0]).unwrap();
+    node.download(0x1010, 1, b"save").unwrap();
+    // The key changes and comes back, so that the one that signed all of it is in force.
+    for (owner, new) in [(key(1), key(2)), (key(2), key(1))] {
+        let challenge = node.challenge();
+        node.download(0x2215, 6, &rotation(&owner, &new, &challenge)).unwrap();
+    }
+    node.close();
+    let heard = core::mem::take(&mut node.heard);
+    // Meanwhile the owner has other settings.
+    node.respond(&key(1), Purpose::Session).unwrap();
+    node.set_real(0x2101, 4, 0.75).unwrap();
+    node.download(0x2100, 1, &[1]).unwrap();
+    node.download(0x605A, 0, &[2, 0]).unwrap();
+    node.download(0x1010, 1, b"save").unwrap();
+    node.close();
+    let kept = node.objects.program().kept.last().cloned().unwrap();
+    let (record, drawn) = (node.objects.program().record.clone(), node.objects.program().drawn);
+    let mut restarted = Node::guarded(record.clone(), false, LastReset::REQUESTED, &kept);
+    // Random numbers do not begin anew with the program.
+    restarted.objects.program().drawn = drawn;
+    for mut node in [node, restarted] {
+        let taken = node.objects.program().configured.len();
+        for _ in 0..2 {
+            node.replay(&heard);
+            assert_eq!((node.real(0x2101, 4), node.number(0x605A, 0)), (0.75, 2));
+            assert_eq!((node.owner(), node.number(0x2215, 8)), (key(1).id(), 0));
+        }
+        assert_eq!(node.objects.program().configured.len(), taken);
+        assert_eq!(node.objects.program().record, record);
+        assert!(node.wrong() >= 2, "{}", node.wrong());
+        // The owner is not kept out by it.
+        node.respond(&key(1), Purpose::Session).unwrap();
+    }
+}
+
+#[test]
+fn of_two_rotations_that_race_one_comes_through_whole_or_none() {
+    let challenge = owned().challenge();
+    // What each of both sends, who have the same challenge.
+    let sent = |new: &Key| {
+        let mut node = owned();
+        node.challenge();
+        node.heard.clear();
+        node.download(0x2215, 6, &rotation(&key(1), new, &challenge)).unwrap();
+        node.heard
+    };
+    let (first, second) = (sent(&key(2)), sent(&key(3)));
+    let outcome = |frames: &[Frame]| {
+        let mut node = owned();
+        node.challenge();
+        node.replay(frames);
+        let owner = node.owner();
+        let kept = node.objects.program().kept.iter().filter_map(|guard| guard.key.as_ref().map(Key::id)).next_back();
+        assert_eq!(kept.unwrap_or(key(1).id()), owner, "what is kept is what counts");
+        // What did not come through can be sent again.
+        if owner == key(1).id() {
+            node.replay(&first);
+            assert_eq!(node.owner(), key(2).id());
+        }
+        owner
+    };
+    // There is one SDO channel: a request amid another transfer ends both.
+    for cut in 0..=first.len() {
+        let frames = [&first[..cut], &second, &first[cut..]].concat();
+        let winner = match cut {
+            0 => key(3),
+            cut if cut == first.len() => key(2),
+            _ => key(1),
+        };
+        assert_eq!(outcome(&frames), winner.id(), "behind {cut} frames");
+    }
+    let alternating: Vec<Frame> = first.iter().zip(&second).flat_map(|(a, b)| [*a, *b]).collect();
+    assert_eq!(outcome(&alternating), key(1).id());
+}
+
+#[test]
+fn a_node_id_is_stored_for_the_owner_alone() {
+    fn lss(node: &mut Node, request: [u8; 3]) -> Vec<u8> {
+        let [command, a, b] = request;
+        let sent = node.receive(0x7E5, &[command, a, b, 0, 0, 0, 0, 0]);
+        sent.iter().find(|frame| frame.id() == 0x7E4).map_or(Vec::new(), |frame| frame.data().to_vec())
+    }
+    let mut node = owned();
+    lss(&mut node, [0x04, 1, 0]);
+    assert_eq!(lss(&mut node, [0x11, 9, 0])[..2], [0x11, 0], "until the next reset anybody may change it");
+    assert_eq!(lss(&mut node, [0x17, 0, 0])[..3], [0x17, 0xFF, 2]);
+    assert_eq!(node.objects.program().record, None);
+    node.respond(&key(1), Purpose::Session).unwrap();
+    assert_eq!(lss(&mut node, [0x17, 0, 0])[..2], [0x17, 0]);
+    assert!(node.objects.program().record.is_some());
 }
 
 #[test]
