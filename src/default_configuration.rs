@@ -10,7 +10,8 @@ use crate::friction::regime::MOST_SETS;
 use crate::joint::BoardLimits;
 use crate::joint::configuration::{
     AdaptationRequest, BridgeConfiguration, CompensationConfiguration, Configuration, FACTORY_TRIM,
-    FRICTION_UNCERTAINTY, Gains, GearConfiguration, Limits, MotorConfiguration, ThermalConfiguration, VelocitySource,
+    FRICTION_UNCERTAINTY, Gains, GearConfiguration, Limits, LoadConfiguration, MotorConfiguration,
+    ThermalConfiguration, VelocitySource,
 };
 use crate::joint::stopping::StopConfiguration;
 use crate::motor::angle::{Direction, ElectricalAngle, EncoderAlignment};
@@ -206,6 +207,7 @@ const fn uncommissioned(bus_voltage: (f32, f32), regeneration_band: f32, encoder
             uncertainty: FRICTION_UNCERTAINTY,
             adaptation: AdaptationRequest::Off,
         },
+        load: LoadConfiguration::NONE,
         thermal: ThermalConfiguration {
             winding_capacity: 10.0,
             housing_capacity: 50.0,

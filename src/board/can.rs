@@ -30,6 +30,7 @@ use embassy_sync::channel::Channel;
 use embassy_time::Instant;
 use joint_firmware::canopen::{self, Buffers, Frame, PDOS, Receiver, Route, TransmitQueue, bit_timing};
 use joint_firmware::joint::Demand;
+use joint_firmware::joint::load_feedforward::LOADS;
 use joint_firmware::objects::{JointImage, Observed};
 
 /// The bus's timing ([`bit_timing`]) as the driver takes it. Said here, because embassy would compute it while the program runs, from ten quanta at
@@ -53,6 +54,9 @@ const FIFO: u8 = 3;
 /// Ranges of identifiers with which nobody addresses a joint, as value and mask: answers of SDO servers and LSS slaves. PDOs may not have them
 /// (CiA 301, restricted CAN-IDs).
 const IGNORED: [(u16, u16); 2] = [(0x580, 0x780), (0x7E4, 0x7FF)];
+
+/// Feedforward of the load, bits of Nm: the task's, for the receive interrupt.
+static LOAD: AtomicU32 = AtomicU32::new(0);
 
 /// Everything that the receive interrupt owns.
 struct Bus {
@@ -162,6 +166,14 @@ pub fn start(
 /// Has the interrupt run: a transition of the task's, or a set-point that came by SDO, reaches the joint.
 pub fn attend() {
     NVIC::pend(pac::Interrupt::FDCAN1_IT0);
+}
+
+/// Has the joint's commands carry this feedforward of the load from now on, Nm.
+pub fn bear(load: f32) {
+    if LOADS && LOAD.load(Ordering::Relaxed) != load.to_bits() {
+        LOAD.store(load.to_bits(), Ordering::Relaxed);
+        attend();
+    }
 }
 
 /// What TPDOs carry of the joint from now on; the control step's part is taken from its own report.
@@ -333,7 +345,10 @@ extern "C" fn FDCAN1_IT0() {
     let now = now();
     critical_section::with(|section| transmit(&mut SENDING.borrow_ref_mut(section), now));
     bus.image.follow(bus.shared.state());
-    let demand = bus.image.demand();
+    let mut demand = bus.image.demand();
+    if LOADS {
+        demand.command.bear(f32::from_bits(LOAD.load(Ordering::Relaxed)));
+    }
     bus.feedforward = demand.command.torque;
     bus.demand.publish(&demand);
 }

@@ -6,6 +6,7 @@ use super::configuration::{
     MotorConfiguration, VelocitySource,
 };
 use super::limit_law::LimitGains;
+use super::load_feedforward::{LOADS, LoadGains};
 use super::monitor::OVER_SPEED;
 use super::stopping::StopGains;
 use crate::compensation::Settings;
@@ -303,6 +304,8 @@ pub struct Active {
     pub chopper: ChopperGains,
     /// For adaptation, where a program has it.
     pub adaptation: AdaptationGains,
+    /// For the feedforward of the load, where a program has it.
+    load: [LoadGains; LOADS as usize],
 }
 
 impl Configuration {
@@ -522,6 +525,7 @@ impl Checked {
                 mean_steps,
                 mean_share: 1.0 / mean_steps as f32,
             },
+            load: core::array::from_fn(|_| LoadGains::of(configuration)),
             friction: None,
             thermal: self.thermal,
         }
@@ -533,6 +537,11 @@ impl Active {
     pub fn with_friction(mut self, model: Option<FrictionModel>) -> Self {
         self.friction = model;
         self
+    }
+
+    /// For the feedforward of the load.
+    pub fn load(&self) -> &LoadGains {
+        self.load.first().unwrap_or(&LoadGains::NONE)
     }
 
     /// The sign of the encoder against the rotor's.

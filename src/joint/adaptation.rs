@@ -31,7 +31,7 @@ use super::configuration::AdaptationRequest;
 use super::state_machine::State;
 use crate::compensation::{Acting, Reason};
 use crate::motor::number::{exceeds, greater, lesser, limited, magnitude, or_zero, square_root, within};
-use crate::sine::cos_sin;
+use crate::sine::cos_sin_of;
 
 /// Whether this program adapts. With the feature `little-room` a chip's program does not; on the host nothing changes.
 pub const ADAPTS: bool = !cfg!(all(feature = "little-room", target_os = "none"));
@@ -303,8 +303,7 @@ impl Adaptation {
 
     fn note(&mut self, settings: &Settings, telemetry: &Telemetry) {
         let motion = &telemetry.motion;
-        let turns = motion.position * (0.5 * core::f32::consts::FRAC_1_PI);
-        let (cosine, sine) = cos_sin(((turns - (turns as i32) as f32) * 4_294_967_296.0) as i64 as u32);
+        let (cosine, sine) = cos_sin_of(motion.position);
         let window = &mut self.window;
         if window.looks == 0 {
             *window = Window::default();
@@ -314,8 +313,8 @@ impl Adaptation {
         window.torque += telemetry.mean_torque;
         window.friction += torque(telemetry) / settings.gain;
         window.velocity += motion.velocity;
-        window.sine += sine as f32 * (1.0 / 2_147_483_648.0);
-        window.cosine += cosine as f32 * (1.0 / 2_147_483_648.0);
+        window.sine += sine;
+        window.cosine += cosine;
         if window.looks == LOOKS {
             let (torque, row) = self.row(settings);
             self.window.looks = 0;

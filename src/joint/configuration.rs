@@ -4,6 +4,7 @@
 //! friction is learned anew.
 
 use super::board_limits::BoardLimits;
+use super::load_feedforward::LOADS;
 use super::stopping::StopConfiguration;
 use crate::compensation::SettingsError;
 use crate::motor::angle::EncoderAlignment;
@@ -165,6 +166,66 @@ pub struct CompensationConfiguration {
     pub adaptation: AdaptationRequest,
 }
 
+/// Which torques of the configured load the joint adds by itself ([`super::load_feedforward`]).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum LoadFeedforwardRequest {
+    /// None.
+    #[default]
+    Off = 0,
+    /// Inertia times the reference's acceleration.
+    Acceleration = 1,
+    /// Gravity.
+    Gravity = 2,
+    /// Both.
+    Both = 3,
+}
+
+/// Inertia and gravity at the joint's output, as far as a single joint can know them: an axis that does not move against
+/// gravity.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LoadConfiguration {
+    /// Which torques are added.
+    pub request: LoadFeedforwardRequest,
+    /// Inertia about the joint, rotor times the gear ratio squared included, without payload, kg m²; 0 to 1000.
+    pub inertia: f32,
+    /// Largest gravity torque without payload, with the lever level, Nm; 0 to 2000.
+    pub gravity: f32,
+    /// Position in which the lever, and with it the payload, hangs straight down, rad; -1000 to 1000.
+    pub hanging: f32,
+    /// Payload, kg; 0 to 1000.
+    pub payload_mass: f32,
+    /// Distance of the payload's centre of mass from the axis, m; 0 to 10.
+    pub payload_arm: f32,
+}
+
+impl LoadConfiguration {
+    /// Nothing is known, and nothing is added.
+    pub const NONE: Self = Self {
+        request: LoadFeedforwardRequest::Off,
+        inertia: 0.0,
+        gravity: 0.0,
+        hanging: 0.0,
+        payload_mass: 0.0,
+        payload_arm: 0.0,
+    };
+
+    fn check(&self) -> Result<(), ConfigurationError> {
+        in_range!("inertia of the load", "kg m²", self.inertia, 0.0, 1000.0)?;
+        in_range!("gravity torque", "Nm", self.gravity, 0.0, 2000.0)?;
+        in_range!("hanging position", "rad", self.hanging, -1000.0, 1000.0)?;
+        in_range!("payload's mass", "kg", self.payload_mass, 0.0, 1000.0)?;
+        in_range!("payload's arm", "m", self.payload_arm, 0.0, 10.0)?;
+        Ok(())
+    }
+}
+
+impl Default for LoadConfiguration {
+    fn default() -> Self {
+        Self::NONE
+    }
+}
+
 /// The bridge and its timing: what the board knows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BridgeConfiguration {
@@ -234,6 +295,8 @@ pub struct Configuration {
     pub stops: StopConfiguration,
     /// Compensation.
     pub compensation: CompensationConfiguration,
+    /// Load.
+    pub load: LoadConfiguration,
     /// Heat.
     pub thermal: ThermalConfiguration,
 }
@@ -382,6 +445,6 @@ impl Configuration {
         let factory = f32::from(FACTORY_TRIM);
         let trim = f32::from(self.oscillator_trim);
         in_range!("oscillator trim", "", trim, factory - TRIM_STEPS, factory + TRIM_STEPS)?;
-        Ok(())
+        if LOADS { self.load.check() } else { Ok(()) }
     }
 }

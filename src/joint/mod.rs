@@ -15,7 +15,7 @@
 //!
 //! In place of the motion loop and the current loop, for commissioning: [`open_loop`](crate::motor::open_loop).
 //!
-//! Beside it, outside the interrupt: [`configuration`] what the joint is, [`board_limits`] what it may be on its board, [`active`] the same prepared for
+//! Beside it, outside the interrupt: [`adaptation`] how friction has changed, [`load_feedforward`] the torque of the configured load, [`configuration`] what the joint is, [`board_limits`] what it may be on its board, [`active`] the same prepared for
 //! the step.
 
 pub mod active;
@@ -28,6 +28,7 @@ pub mod fault;
 pub mod friction_feedforward;
 pub mod history;
 pub mod limit_law;
+pub mod load_feedforward;
 mod mean_torque;
 pub mod monitor;
 pub mod motion_law;

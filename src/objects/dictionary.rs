@@ -374,6 +374,7 @@ impl<'a, P: Program> Objects<'a, P> {
             self.images.owner.note(&configuration);
         }
         self.staged.compensation = configuration.compensation;
+        self.staged.load = configuration.load;
         self.staged.stops = configuration.stops;
         Ok(())
     }

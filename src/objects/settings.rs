@@ -3,7 +3,10 @@
 
 use crate::compensation::Request;
 use crate::joint::adaptation::ADAPTS;
-use crate::joint::configuration::{AdaptationRequest, Configuration, VelocitySource};
+use crate::joint::configuration::{
+    AdaptationRequest, Configuration, LoadConfiguration, LoadFeedforwardRequest, VelocitySource,
+};
+use crate::joint::load_feedforward::LOADS;
 use crate::joint::stopping::StopConfiguration;
 use crate::motor::angle::Direction;
 
@@ -72,6 +75,11 @@ settings! {
     Slew => compensation.slew,
     StandstillVelocity => compensation.standstill_velocity,
     Uncertainty => compensation.uncertainty,
+    LoadInertia => load.inertia,
+    LoadGravity => load.gravity,
+    HangingPosition => load.hanging,
+    PayloadMass => load.payload_mass,
+    PayloadArm => load.payload_arm,
     WindingCapacity => thermal.winding_capacity,
     HousingCapacity => thermal.housing_capacity,
     WindingToHousing => thermal.winding_to_housing,
@@ -86,6 +94,7 @@ settings! {
     VelocitySource,
     OscillatorTrim,
     Adaptation,
+    LoadFeedforward,
     QuickStop,
     Shutdown,
     DisableOperation,
@@ -110,6 +119,7 @@ impl Setting {
             Self::Request => copy.compensation.request as u32,
             Self::OscillatorTrim => copy.oscillator_trim.into(),
             Self::Adaptation => copy.compensation.adaptation as u32,
+            Self::LoadFeedforward => copy.load.request as u32,
             Self::QuickStop => copy.stops.quick_stop.into(),
             Self::Shutdown => copy.stops.shutdown.into(),
             Self::DisableOperation => copy.stops.disable_operation.into(),
@@ -144,6 +154,7 @@ impl Setting {
             (Self::Adaptation, 0) => configuration.compensation.adaptation = AdaptationRequest::Off,
             (Self::Adaptation, 1) if ADAPTS => configuration.compensation.adaptation = AdaptationRequest::Shadow,
             (Self::Adaptation, 2) if ADAPTS => configuration.compensation.adaptation = AdaptationRequest::On,
+            (Self::LoadFeedforward, _) if LOADS => return set_feedforward(&mut configuration.load, number),
             _ => return self.set_option(&mut configuration.stops, number),
         }
         true
@@ -168,4 +179,11 @@ impl Setting {
         }
         possible
     }
+}
+
+fn set_feedforward(load: &mut LoadConfiguration, number: u32) -> bool {
+    use LoadFeedforwardRequest::{Acceleration, Both, Gravity, Off};
+    let request = [Off, Acceleration, Gravity, Both].into_iter().find(|request| *request as u32 == number);
+    load.request = request.unwrap_or(load.request);
+    request.is_some()
 }

@@ -16,10 +16,11 @@ use super::shared::DEFAULT_RANGES;
 use super::table::OBJECTS;
 use crate::canopen::{CommunicationParameters, NO_NODE_ID};
 use crate::joint::configuration::Configuration;
+use crate::joint::load_feedforward::LOADS;
 
-/// Longest record: what all objects take, 1,221 bytes, and three more. A page of flash would hold 2,016; the stack has
-/// to, too.
-pub const RECORD: usize = 1_224;
+/// Longest record: what all objects take, 1,221 bytes, and three more; with a load's settings 6 items more. A page of
+/// flash would hold 2,016; the stack has to, too.
+pub const RECORD: usize = 1_224 + 6 * ITEM * LOADS as usize;
 const _: () = assert!(RECORD <= crate::parameters::slots::PAGE - crate::parameters::slots::OVERHEAD);
 const FORMAT: u8 = 1;
 const ITEM: usize = 7;
@@ -29,7 +30,7 @@ const ITEM: usize = 7;
 pub struct Stored {
     /// 1 to 127, or 255 for none: what LSS stored. Defaults are restored without it.
     pub node_id: u8,
-    /// 2101h to 2106h and 2200h, and 2012h.
+    /// 2101h to 2109h and 2200h to 2202h, and 2012h.
     pub application: Option<(Configuration, [f32; RANGES])>,
 }
 
@@ -49,7 +50,7 @@ pub enum Part<T> {
 pub struct Update<'a> {
     /// The node id that LSS stored, or none for the one before.
     pub node_id: Option<u8>,
-    /// 2101h to 2106h and 2200h, and 2012h.
+    /// 2101h to 2109h and 2200h to 2202h, and 2012h.
     pub application: Part<(&'a Configuration, [f32; RANGES])>,
     /// 1000h to 1FFFh, and the node id that they are for: another node id gets the defaults.
     pub communication: Part<(u8, &'a CommunicationParameters)>,

@@ -2,6 +2,7 @@
 
 mod adaptation;
 mod connection;
+mod load;
 
 use crate::board::watchdog::{self, Watchdog};
 use crate::board::{self, Led, Peripherals, StartError, control, faults, options};

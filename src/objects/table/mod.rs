@@ -8,6 +8,7 @@ mod communication;
 mod configuration;
 mod friction;
 mod image;
+mod load;
 mod motion;
 mod profile;
 mod supervision;
@@ -142,9 +143,21 @@ pub const fn is_of_profiles(object: &Object) -> bool {
     )
 }
 
+/// Whether an object is there for the model of the load: not every program has it
+/// ([`LOADS`](crate::joint::load_feedforward::LOADS)).
+pub const fn is_of_the_load(object: &Object) -> bool {
+    matches!(object.index, 0x2202)
+}
+
+/// Whether a program without profile modes goes without an object: it has no room for the load's model either.
+pub const fn needs_room(object: &Object) -> bool {
+    is_of_profiles(object) || is_of_the_load(object)
+}
+
 /// Whether this program has the row.
 const fn is_there(object: &Object) -> bool {
-    crate::joint::PROFILES || !is_of_profiles(object)
+    (crate::joint::PROFILES || !is_of_profiles(object))
+        && (crate::joint::load_feedforward::LOADS || !is_of_the_load(object))
 }
 
 /// Rows of a room.
@@ -183,8 +196,8 @@ macro_rules! room {
 use room;
 
 /// In the order of their indices.
-const ROOMS: [Room; 6] =
-    [motion::ROOM, configuration::ROOM, friction::ROOM, image::ROOM, supervision::ROOM, profile::ROOM];
+const ROOMS: [Room; 7] =
+    [motion::ROOM, configuration::ROOM, friction::ROOM, load::ROOM, image::ROOM, supervision::ROOM, profile::ROOM];
 
 /// The application's objects, sorted by index and sub-index.
 pub static OBJECTS: [Object; LENGTH] = ALL.0;

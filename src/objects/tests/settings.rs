@@ -1,6 +1,7 @@
 //! The configuration: staged, taken as a whole, stored, restored.
 
 use super::*;
+use crate::joint::configuration::LoadFeedforwardRequest;
 use crate::joint::state_machine::State;
 use crate::motor::setting::Name;
 use crate::objects::field::{Field, Range};
@@ -94,6 +95,28 @@ fn compensation_acts_at_once_also_under_way_and_the_rest_does_not() {
 }
 
 #[test]
+fn a_payload_acts_at_once_also_under_way_and_leaves_what_is_staged() {
+    let mut node = Node::operational();
+    node.set_real(0x2104, 3, 0.5).unwrap();
+    node.observed.telemetry.state = State::OperationEnabled;
+    node.set_real(0x2202, 6, 0.4).unwrap();
+    node.set_real(0x2202, 5, 2.5).unwrap();
+    node.download(0x2202, 1, &[3]).unwrap();
+    let load = node.objects.program().configured.last().unwrap().load;
+    assert_eq!((load.payload_mass, load.payload_arm, load.request), (2.5, 0.4, LoadFeedforwardRequest::Both));
+    for (sub_index, value) in [(2, -1e-3), (3, 2_000.5), (4, f32::NAN), (5, 1_001.0), (6, 10.1)] {
+        assert_eq!(node.set_real(0x2202, sub_index, value), Err(0x0609_0030), "{value}");
+        assert_eq!(node.number(0x2100, 3) >> 8, 0x22_0200 | u64::from(sub_index), "index and sub-index of the setting");
+    }
+    assert_eq!(node.download(0x2202, 1, &[4]), Err(0x0609_0030));
+    assert_eq!((node.real(0x2202, 5), node.number(0x2202, 1), node.real(0x2104, 3)), (2.5, 3, 0.5));
+    node.observed.telemetry.state = State::SwitchOnDisabled;
+    take(&mut node).unwrap();
+    let taken = *node.objects.program().configured.last().unwrap();
+    assert_eq!((taken.gains.stiffness, taken.load.payload_mass), (0.5, 2.5));
+}
+
+#[test]
 fn a_control_step_that_takes_nothing_is_told_from_a_refusal() {
     let mut node = Node::new();
     node.objects.program().busy = true;
@@ -176,7 +199,7 @@ fn whole() -> Vec<u8> {
 #[test]
 fn the_whole_record_comes_back_and_fits() {
     let record = whole();
-    assert_eq!(record.len(), 1_221);
+    assert_eq!(record.len(), 1_263);
     let configuration = Configuration { node_id: 17, ..crate::default_configuration::MOTEUS_R4.joint };
     let stored = Stored::decode(&record, &BOARD.joint).unwrap();
     assert_eq!((stored.configuration(&BOARD.joint), stored.ranges()), (configuration, [1.0, 2.0, 3.0, 4.0, 5.0]));

@@ -6,6 +6,7 @@ mod program;
 mod store;
 
 use super::adaptation::Adapting;
+use super::load::Bearing;
 use super::{NotStarted, Started};
 use crate::board::control::{Commands, Report};
 use crate::board::flash::Parameters;
@@ -51,7 +52,12 @@ impl Connection {
     pub fn spawn(self, slow: Spawner) -> Watching {
         // Spawned once, so its only place is free.
         slow.spawn(defmt::unwrap!(bus::serve(self.node)));
-        Watching { statistics: FrictionStatistics::default(), memory: Memory::default(), adapting: Adapting::NOTHING }
+        Watching {
+            statistics: FrictionStatistics::default(),
+            memory: Memory::default(),
+            adapting: Adapting::NOTHING,
+            bearing: Bearing::NOTHING,
+        }
     }
 }
 
@@ -61,10 +67,11 @@ pub struct Watching {
     /// Of the model in shadow.
     memory: Memory,
     adapting: Adapting,
+    bearing: Bearing,
 }
 
 impl Watching {
-    /// Every millisecond: computes the model in shadow, adapts the one that acts, and leaves for the bus what is known
+    /// Every millisecond: computes the model in shadow, adapts the one that acts, bears the load, and leaves for the bus what is known
     /// of the joint. Temperatures in °C.
     pub fn look(&mut self, bridge_temperature: f32, winding_temperature: f32) {
         let Some(Report { telemetry, latched, .. }) = control::report() else { return };
@@ -73,6 +80,7 @@ impl Watching {
             seen.compensated.output.shadow = torque;
         }
         self.statistics.note(&seen);
+        self.bearing.look(&telemetry);
         can::observe(&Observed {
             telemetry,
             latched,

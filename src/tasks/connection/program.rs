@@ -1,6 +1,6 @@
 //! What the board does for the objects: configurations and friction models to the control step, records to flash. Thread mode.
 
-use super::super::adaptation;
+use super::super::{adaptation, load};
 use super::store::Store;
 use crate::board::{self, BoardConfiguration, Offering, Prepared, Subscriber, oscillator, shadow};
 use core::cell::RefCell;
@@ -68,8 +68,7 @@ impl BoardProgram {
         // Nothing has been offered, so there is a place.
         let prepared = defmt::unwrap!(prepare(&mut self.active, configuration, image))?;
         let thermal = prepared.value().thermal;
-        adaptation::prepared(prepared.value(), true);
-        prepared.offer();
+        put_to_use(prepared, true);
         Ok(thermal)
     }
 
@@ -90,12 +89,19 @@ impl BoardProgram {
 fn offer(active: &mut Offering<Active>, configuration: &Configuration, image: &[u8]) -> bool {
     match prepare(active, configuration, image) {
         Some(Ok(prepared)) => {
-            adaptation::prepared(prepared.value(), true);
-            prepared.offer();
+            put_to_use(prepared, true);
             true
         }
         _ => false,
     }
+}
+
+/// Offers what is prepared to the control step, and tells the tasks that use it; with another friction model or the one
+/// before.
+fn put_to_use(prepared: Prepared<Active>, new_model: bool) {
+    adaptation::prepared(prepared.value(), new_model);
+    load::prepared(prepared.value());
+    prepared.offer();
 }
 
 /// The friction model is prepared in its place, because the stack would not bear it beside the rest.
@@ -125,8 +131,7 @@ impl Program for BoardProgram {
             },
         );
         let prepared = prepared.ok_or(NotConfigured::Busy)?.map_err(NotConfigured::Refused)?;
-        adaptation::prepared(prepared.value(), false);
-        prepared.offer();
+        put_to_use(prepared, false);
         oscillator::trim(configuration.oscillator_trim);
         Ok(())
     }

@@ -378,10 +378,11 @@ impl VirtualNode {
         let per_work = u64::from(self.rate / 1_000).max(1);
         for _ in 0..steps {
             let demand = self.image.demand();
+            let feedforward = self.joint.bearing(&demand).command.torque;
             let telemetry = self.joint.step(&demand, 0.0);
             self.steps += 1;
             if self.steps.is_multiple_of(per_work) {
-                self.observe(&telemetry, demand.command.torque);
+                self.observe(&telemetry, feedforward);
                 self.work();
             }
         }

@@ -10,7 +10,7 @@ use joint_firmware::canopen::{Access, CommunicationParameters, PDOS, PdoParamete
 use joint_firmware::objects::Operation;
 use joint_firmware::objects::default_communication;
 use joint_firmware::objects::field::{Constant, Field};
-use joint_firmware::objects::table::{DataType, is_of_profiles};
+use joint_firmware::objects::table::{DataType, needs_room};
 use std::fmt::Write;
 use std::time::Duration;
 
@@ -42,7 +42,7 @@ impl Identity {
     /// Whether the joint has this object.
     fn has(&self, entries: &[Entry], index: u16) -> bool {
         let mut of_index = entries.iter().filter(|entry| entry.object.index == index);
-        self.modes.is_none_or(Operation::has_profiles) || !of_index.any(|entry| is_of_profiles(entry.object))
+        self.modes.is_none_or(Operation::has_profiles) || !of_index.any(|entry| needs_room(entry.object))
     }
 }
 
@@ -310,10 +310,10 @@ mod tests {
         let [with, without] =
             [Identity::default(), without].map(|identity| text("joint.eds", Duration::ZERO, identity));
         let sections = |text: &str| text.lines().filter(|line| line.starts_with('[')).count();
-        let of_profiles = Entry::all().filter(|entry| is_of_profiles(entry.object)).count();
-        // And two records with their number of entries.
-        assert_eq!(sections(&with) - sections(&without), of_profiles + 4);
-        for index in ["6081", "607Dsub0", "6099sub2", "60F4", "6072"] {
+        let absent = Entry::all().filter(|entry| needs_room(entry.object)).count();
+        // And two records with their number of entries, and the load's record.
+        assert_eq!(sections(&with) - sections(&without), absent + 5);
+        for index in ["2202sub5", "6081", "607Dsub0", "6099sub2", "60F4", "6072"] {
             assert!(
                 with.contains(&format!("\n[{index}]\n")) && !without.contains(&format!("\n[{index}]\n")),
                 "{index}"

@@ -42,7 +42,7 @@ const fn field(
 }
 
 /// All keys.
-pub const FIELDS: [Field; 59] = [
+pub const FIELDS: [Field; 65] = [
     field("", "node_id", "", None, "Node on the CAN bus, 1 to 127; 255 where none is assigned yet"),
     field("", "oscillator_trim", "", Some((54.0, 74.0)), "Trim of the board's oscillator, steps of some 0.3 %"),
     field("motor", "resistance", "Ohm", Some((1e-3, 100.0)), "Resistance of a phase at 25 °C"),
@@ -259,6 +259,24 @@ pub const FIELDS: [Field; 59] = [
         None,
         "Adaptation in service: \"off\", \"shadow\" (without effect) or \"on\"",
     ),
+    field(
+        "load",
+        "request",
+        "",
+        None,
+        "Torques of the load that the joint adds by itself: \"off\", \"acceleration\", \"gravity\" or \"both\"",
+    ),
+    field(
+        "load",
+        "inertia",
+        "kg m^2",
+        Some((0.0, 1000.0)),
+        "Inertia about the joint without payload, rotor times the gear ratio squared included",
+    ),
+    field("load", "gravity", "Nm", Some((0.0, 2000.0)), "Largest gravity torque without payload, with the lever level"),
+    field("load", "hanging", "rad", Some((-1000.0, 1000.0)), "Position in which the lever hangs straight down"),
+    field("load", "payload_mass", "kg", Some((0.0, 1000.0)), "Payload"),
+    field("load", "payload_arm", "m", Some((0.0, 10.0)), "Distance of the payload's centre of mass from the axis"),
     field("thermal", "winding_capacity", "J/K", None, "Heat capacity of the winding; to 10000"),
     field("thermal", "housing_capacity", "J/K", None, "Heat capacity of the housing; to 100000"),
     field("thermal", "winding_to_housing", "K/W", Some((0.01, 100.0)), "Thermal resistance from winding to housing"),

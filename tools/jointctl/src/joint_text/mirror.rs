@@ -6,7 +6,8 @@
 use joint_firmware::compensation::Request;
 use joint_firmware::joint::configuration::{
     AdaptationRequest, CompensationConfiguration, Configuration, FACTORY_TRIM, FRICTION_UNCERTAINTY, Gains,
-    GearConfiguration, Limits, MotorConfiguration, ThermalConfiguration, VelocitySource,
+    GearConfiguration, Limits, LoadConfiguration, LoadFeedforwardRequest, MotorConfiguration, ThermalConfiguration,
+    VelocitySource,
 };
 use joint_firmware::joint::stopping::StopConfiguration;
 use joint_firmware::motor::angle::{Direction, ElectricalAngle, EncoderAlignment};
@@ -35,6 +36,8 @@ struct ConfigurationText {
     stops: StopConfiguration,
     #[serde(with = "CompensationText")]
     compensation: CompensationConfiguration,
+    #[serde(default, with = "LoadText")]
+    load: LoadConfiguration,
     #[serde(with = "ThermalText")]
     thermal: ThermalConfiguration,
 }
@@ -173,6 +176,28 @@ enum AdaptationText {
     Off,
     Shadow,
     On,
+}
+
+/// A file of an earlier program has none of this.
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "LoadConfiguration", deny_unknown_fields)]
+struct LoadText {
+    #[serde(with = "LoadFeedforwardText")]
+    request: LoadFeedforwardRequest,
+    inertia: f32,
+    gravity: f32,
+    hanging: f32,
+    payload_mass: f32,
+    payload_arm: f32,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "LoadFeedforwardRequest", rename_all = "kebab-case")]
+enum LoadFeedforwardText {
+    Off,
+    Acceleration,
+    Gravity,
+    Both,
 }
 
 /// Files of earlier programs have none.

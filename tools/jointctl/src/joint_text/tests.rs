@@ -1,6 +1,8 @@
 use super::*;
 use joint_firmware::compensation::Request;
-use joint_firmware::joint::configuration::{AdaptationRequest, VelocitySource};
+use joint_firmware::joint::configuration::{
+    AdaptationRequest, LoadConfiguration, LoadFeedforwardRequest, VelocitySource,
+};
 use joint_firmware::motor::angle::{Direction, ElectricalAngle};
 use plant::ActuatorParameters;
 use plant::virtual_joint::Setup;
@@ -25,6 +27,17 @@ fn a_configuration_comes_back_from_its_text_bit_by_bit() {
             [Request::Off, Request::Physical, Request::PhysicalAndNetwork, Request::NetworkInShadow][seed as usize % 4];
         configuration.compensation.adaptation =
             [AdaptationRequest::Off, AdaptationRequest::Shadow, AdaptationRequest::On][seed as usize % 3];
+        configuration.load = LoadConfiguration {
+            request: [
+                LoadFeedforwardRequest::Off,
+                LoadFeedforwardRequest::Acceleration,
+                LoadFeedforwardRequest::Gravity,
+                LoadFeedforwardRequest::Both,
+            ][seed as usize % 4],
+            payload_mass: 0.1 * seed as f32,
+            payload_arm: 0.3,
+            ..configuration.load
+        };
         configuration.gear.ratio *= if seed % 5 == 0 { -1.0 } else { 1.0 };
         let text = to_text(&configuration).unwrap();
         assert_eq!(from_text(&text, Path::new("joint.toml"), &bridge).unwrap(), configuration, "{text}");

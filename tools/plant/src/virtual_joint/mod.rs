@@ -12,6 +12,7 @@ use joint_firmware::friction::FrictionModel;
 use joint_firmware::joint::active::SLOW_RATE;
 use joint_firmware::joint::adaptation::{self, Adaptation, LOOK_RATE};
 use joint_firmware::joint::configuration::ConfigurationError;
+use joint_firmware::joint::load_feedforward::LoadFeedforward;
 use joint_firmware::joint::state_machine::{Controlword, State};
 use joint_firmware::joint::{Active, Bridge, BridgeState, Demand, Joint, Measurements, Slow, Telemetry};
 use joint_firmware::motor::thermal::WindingTemperature;
@@ -71,6 +72,9 @@ pub struct VirtualJoint {
     winding: WindingTemperature,
     slow: Slow,
     adaptation: Adaptation,
+    load: LoadFeedforward,
+    /// What the feedforward of the load adds, Nm.
+    load_torque: f32,
     look_divider: u64,
     build: Build,
     period: f64,
@@ -104,6 +108,8 @@ impl VirtualJoint {
             winding,
             slow: Slow { gear_temperature: temperature as f32, ..Slow::default() },
             adaptation: Adaptation::NOTHING,
+            load: LoadFeedforward::NOTHING,
+            load_torque: 0.0,
             look_divider: (rate / f64::from(LOOK_RATE)).round() as u64,
             build: Build::Whole,
             period: 1.0 / rate,
@@ -139,10 +145,19 @@ impl VirtualJoint {
         &self.active
     }
 
+    /// A demand as the control step gets it: with the feedforward of the load.
+    #[must_use]
+    pub fn bearing(&self, demand: &Demand) -> Demand {
+        let mut demand = *demand;
+        demand.command.bear(self.load_torque);
+        demand
+    }
+
     /// One control step, then one PWM period of physics with an external torque (Nm at the link).
     pub fn step(&mut self, demand: &Demand, external_torque: f64) -> Telemetry {
         self.measured = signals::measurements(&self.actuator.measure(), self.overrun);
         self.overrun = false;
+        let demand = &self.bearing(demand);
         let (active, slow, measured) = (&self.active, &self.slow, &self.measured);
         self.bridge = match self.build {
             Build::Whole => self.joint.control_step(active, demand, slow, measured),
@@ -162,6 +177,7 @@ impl VirtualJoint {
         let telemetry = self.joint.telemetry();
         if self.steps.is_multiple_of(self.look_divider) {
             self.slow.factors = self.adaptation.look(&adaptation::Settings::of(&self.active), &telemetry);
+            self.load_torque = self.load.look(self.active.load(), &telemetry);
         }
         telemetry
     }

@@ -6,7 +6,8 @@ use joint_firmware::compensation::Request;
 use joint_firmware::joint::BoardLimits;
 use joint_firmware::joint::configuration::{
     AdaptationRequest, BridgeConfiguration, CompensationConfiguration, Configuration, FACTORY_TRIM,
-    FRICTION_UNCERTAINTY, Gains, GearConfiguration, Limits, MotorConfiguration, ThermalConfiguration, VelocitySource,
+    FRICTION_UNCERTAINTY, Gains, GearConfiguration, Limits, LoadConfiguration, MotorConfiguration,
+    ThermalConfiguration, VelocitySource,
 };
 use joint_firmware::joint::stopping::StopConfiguration;
 use joint_firmware::motor::angle::{Direction, ElectricalAngle, EncoderAlignment};
@@ -121,6 +122,7 @@ impl Setup {
                     uncertainty: FRICTION_UNCERTAINTY,
                     adaptation: AdaptationRequest::Off,
                 },
+                load: LoadConfiguration::NONE,
                 thermal: ThermalConfiguration {
                     winding_capacity: joint.thermal.winding_capacity as f32,
                     housing_capacity: joint.thermal.housing_capacity as f32,
