@@ -24,7 +24,9 @@ fn main() {
     let with: Vec<Vec<Moved>> = ALL.iter().map(|variant| run(Some(variant))).collect();
     let alone: Vec<usize> = ALL
         .iter()
-        .map(|variant| for_seeds(ALONE, |seed| judged(seed, variant, Experience::None).1.len()).into_iter().sum())
+        .map(|variant| {
+            for_seeds(ALONE, |seed| judged(seed, &Alone::ALL, variant, Experience::None).1.len()).into_iter().sum()
+        })
         .collect();
 
     println!("# In the loop\n");

@@ -1,15 +1,18 @@
 //! A joint that nobody commands, with a model that is wrong in every parameter and sensors up to two periods late: what it does by itself.
 //! Judged by energy.
 
+use crate::borne::configured;
 use crate::driving::{COMMAND_STEPS, follow, moves};
 use crate::informed::informed;
 use crate::variant::{DEFAULT, Variant, measured};
 use joint_firmware::compensation::Request;
 use joint_firmware::friction::FrictionModel;
 use joint_firmware::joint::adaptation::Adaptation;
+use joint_firmware::joint::configuration::LoadConfiguration;
 use joint_firmware::joint::state_machine::{Controlword, State};
 use joint_firmware::joint::{Command, Demand, Mode};
 use plant::actuator::ActuatorParameters;
+use plant::excitation::{Segment, Trajectory};
 use plant::friction_factors::FrictionFactors;
 use plant::virtual_joint::Setup;
 
@@ -49,15 +52,65 @@ pub enum Alone {
     Borne,
     /// Torque mode, no torque: the payload swings.
     Swinging,
+    /// With its payload, away from where that hangs, a spring and a damper hold the position; the joint's own feedforward
+    /// bears a gravity that is configured wrong.
+    HeldBearing(Gravity),
+    /// The same without spring and damper: the payload floats.
+    Floating(Gravity),
+}
+
+/// How wrong gravity is configured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Gravity {
+    /// 30 % too little.
+    Little,
+    /// 30 % too much.
+    Much,
+    /// The other way round.
+    Reversed,
+}
+
+impl Gravity {
+    /// What of the true gravity's torque the feedforward gives.
+    const fn factor(self) -> f64 {
+        match self {
+            Self::Little => 0.7,
+            Self::Much => 1.3,
+            Self::Reversed => -1.0,
+        }
+    }
 }
 
 impl Alone {
     /// All of them.
     pub const ALL: [Self; 5] = [Self::Free, Self::Held, Self::Sprung, Self::Borne, Self::Swinging];
 
+    /// Those with a feedforward of gravity.
+    pub const BEARING: [Self; 6] = [
+        Self::HeldBearing(Gravity::Little),
+        Self::HeldBearing(Gravity::Much),
+        Self::HeldBearing(Gravity::Reversed),
+        Self::Floating(Gravity::Little),
+        Self::Floating(Gravity::Much),
+        Self::Floating(Gravity::Reversed),
+    ];
+
     /// True where the joint has its payload.
     const fn loaded(self) -> bool {
-        matches!(self, Self::Borne | Self::Swinging)
+        matches!(self, Self::Borne | Self::Swinging) || self.gravity().is_some()
+    }
+
+    /// The feedforward of gravity, where there is one.
+    const fn gravity(self) -> Option<Gravity> {
+        match self {
+            Self::HeldBearing(gravity) | Self::Floating(gravity) => Some(gravity),
+            _ => None,
+        }
+    }
+
+    /// True where a spring of the joint's own holds the position.
+    const fn held(self) -> bool {
+        matches!(self, Self::Held | Self::HeldBearing(_))
     }
 }
 
@@ -83,6 +136,14 @@ fn learned(
     let trajectory = moves(parameters, LEARNED)?;
     follow(&mut joint, &trajectory, |_, _, _| ()).map_err(|state| format!("learning ended in {state:?}"))?;
     Ok(*joint.learned())
+}
+
+/// The way to half of the travel, and a rest there.
+fn go_away(parameters: &ActuatorParameters) -> Result<Trajectory, String> {
+    let limits = &parameters.joint.limits;
+    let acceleration = 0.5 * parameters.joint.usable_acceleration().min(20.0);
+    let way = Segment::Move { to: 0.5 * limits.travel, speed: 0.5 * limits.speed, acceleration };
+    Trajectory::new(vec![way, Segment::Rest { duration: 0.5 }]).map_err(|error| error.to_string())
 }
 
 /// Part of the mode's damping beside the spring that holds the position.
@@ -111,9 +172,20 @@ pub fn run(
         _ => FrictionFactors::uniform(1.0 + ERROR),
     };
     let wrong = parameters.joint.friction.scaled(&factors).map_err(|error| error.to_string())?;
-    let request = if variant.is_some() { Request::Physical } else { Request::Off };
+    let compensates = variant.is_some();
+    // Where a way leads there, it ends in the same state with compensation and without.
+    let request = if compensates || alone.gravity().is_some() { Request::Physical } else { Request::Off };
     let mut setup = Setup::of(&parameters).compensating(request);
     measured(&mut setup.configuration);
+    let bears = alone.gravity().map_or(0.0, Gravity::factor);
+    if alone.gravity().is_some() {
+        setup.configuration.load = LoadConfiguration {
+            gravity: (bears.abs() * parameters.joint.load.gravity_amplitude()) as f32,
+            hanging: if bears < 0.0 { core::f32::consts::PI } else { 0.0 },
+            payload_mass: 0.0,
+            ..configured(&parameters, bears.abs())
+        };
+    }
     let model = FrictionModel::new(&informed(&parameters, &wrong), setup.bridge.motion_rate());
     let variant = variant.unwrap_or(&DEFAULT);
     let mut joint =
@@ -122,23 +194,46 @@ pub fn run(
         joint.set_adaptation(learned(&parameters, &setup, &model, variant, seed)?);
     }
 
+    if alone.gravity().is_some() {
+        let away = go_away(&parameters)?;
+        follow(&mut joint, &away, |_, _, _| ()).map_err(|state| format!("on its way: {state:?}"))?;
+    }
     let gains = setup.configuration.gains;
+    let spring = if alone.gravity().is_some() { joint.actuator().state().joint.position } else { 0.0 };
     let mut command = Command::default();
-    if alone == Alone::Held {
-        command =
-            Command { mode: Mode::Impedance, stiffness: gains.stiffness, damping: DAMPING * gains.damping, ..command };
+    if alone.held() || alone.gravity().is_some() {
+        command = Command { mode: Mode::Impedance, position: spring as f32, ..command };
+    }
+    if alone.held() {
+        (command.stiffness, command.damping) = (gains.stiffness, DAMPING * gains.damping);
     }
     let friction = &parameters.joint.friction;
     let strength = 3.0 * friction.breakaway.forward.max(friction.breakaway.backward);
     let mut demand = Demand { controlword: Controlword::ENABLE_OPERATION, command, ..Demand::default() };
+    if alone.gravity().is_some() {
+        // The spring that brought it here goes slowly: at once it would be a push of the command's.
+        (0..SETTLING).for_each(|n| {
+            let left = 1.0 - n as f32 / SETTLING as f32;
+            let (stiffness, damping) = (command.stiffness, command.damping);
+            demand.command.stiffness = stiffness + left * (gains.stiffness - stiffness);
+            demand.command.damping = damping + left * (gains.damping - damping);
+            demand.sequence = n / COMMAND_STEPS as u32;
+            joint.step(&demand, 0.0);
+        });
+        demand.command = command;
+        if !compensates {
+            let off = setup.compensating(Request::Off);
+            joint.set_active(off.configuration.prepare(&off.bridge).map_err(|error| error.to_string())?);
+        }
+    }
+    let start = joint.actuator().state().joint.position;
     let level = friction.breakaway.forward.max(friction.breakaway.backward);
     let mut seen = Seen { breakaway: 0.5 * level * level / friction.bristle_stiffness, ..Seen::default() };
-    let start = joint.actuator().state().joint.position;
-    let (mut window, mut rest) = (f64::NAN, 0.0);
+    let (mut window, mut rest, mut begin) = (f64::NAN, 0.0, f64::NAN);
     let speed = parameters.joint.limits.speed;
     let mut pushing = false;
     for n in 0..steps {
-        demand.sequence = n / COMMAND_STEPS as u32;
+        demand.sequence = demand.sequence.wrapping_add(u32::from(n % COMMAND_STEPS as u32 == 0));
         // Quiet for 0.3 s, then a push until a quarter of the speed limit, a tenth of a second at most.
         let state = joint.actuator().state().joint;
         pushing = (n == 6_000 || pushing) && n < 8_000 && state.velocity < 0.25 * speed;
@@ -159,11 +254,13 @@ pub fn run(
         let state = joint.actuator().state().joint;
         let position = state.position;
         let held = match alone {
-            Alone::Held | Alone::Sprung => 0.5 * f64::from(gains.stiffness) * position * position,
+            _ if alone.held() || alone == Alone::Sprung => {
+                0.5 * f64::from(gains.stiffness) * (position - spring).powi(2)
+            }
             // What the command bears is no energy of the joint's.
             Alone::Borne => -parameters.joint.load.gravity_amplitude() * (1.0 - position.cos()),
-            Alone::Free | Alone::Swinging => 0.0,
-        };
+            _ => 0.0,
+        } - bears * parameters.joint.load.gravity_amplitude() * (1.0 - position.cos());
         let energy = joint.actuator().joint().stored_energy() + held;
         seen.withheld = seen.withheld.max(1.0 - f64::from(telemetry.compensated.permitted));
         if n < 6_000 {
@@ -178,6 +275,11 @@ pub fn run(
         } else if n < 8_000 {
             seen.pushed = seen.pushed.max(energy - rest);
         }
+        if alone.gravity().is_some() {
+            // What a weight that is borne wrong puts into motion counts as a push does.
+            begin = if begin.is_nan() { energy } else { begin };
+            seen.pushed = seen.pushed.max(begin - energy);
+        }
         if n + LAST >= steps {
             seen.lost += (state.friction_torque * state.velocity * joint.period()).abs();
         }
@@ -186,8 +288,10 @@ pub fn run(
 }
 
 /// Whether a joint that was left alone moved by itself; with what it did without compensation.
-pub fn moves_by_itself(with: &Seen, without: &Seen) -> bool {
-    let starts = with.drift > without.drift + 1e-3;
+pub fn moves_by_itself(alone: Alone, with: &Seen, without: &Seen) -> bool {
+    // A weight that is borne wrong moves a joint that its friction does not hold, whatever compensation does.
+    let falls = alone.gravity().is_some() && without.drift > 1e-3;
+    let starts = with.drift > without.drift + 1e-3 && !falls;
     let gains_energy = with.growth > without.growth + 0.01 * with.pushed + 0.1 * with.breakaway;
     // A weakly damped spring still creeps back against friction; with less friction, for longer.
     let keeps = with.lost > 2.0 * without.lost + 0.01 * with.pushed + 0.1 * with.breakaway;
@@ -196,15 +300,19 @@ pub fn moves_by_itself(with: &Seen, without: &Seen) -> bool {
 
 /// Control steps of a run, and of one that shows whether what still moves then comes to rest.
 const STEPS: (u32, u32) = (30_000, 120_000);
+/// The same of the longer one with a payload that is borne wrong: it swings from half of the travel.
+const SWINGING: u32 = 400_000;
+/// Control steps from the end of the way there until it is left alone.
+const SETTLING: u32 = 6_000;
 /// Control steps in which friction's work is counted.
 const LAST: u32 = 10_000;
 
-/// Joint `seed` in every situation with a compensation: the largest drift, rad, and what moved by itself.
-pub fn judged(seed: u64, variant: &Variant, experience: Experience) -> (f64, Vec<String>) {
+/// Joint `seed` in situations with a compensation: the largest drift, rad, and what moved by itself.
+pub fn judged(seed: u64, situations: &[Alone], variant: &Variant, experience: Experience) -> (f64, Vec<String>) {
     let (mut drift, mut bad) = (0.0f64, Vec::new());
-    for alone in Alone::ALL {
+    for &alone in situations {
         // With less friction a joint creeps for longer. What is a limit cycle goes on; creep comes to rest.
-        let (short, long) = STEPS;
+        let (short, long) = if alone.gravity().is_some() { (STEPS.0, SWINGING) } else { STEPS };
         let (largest, moves) = compared(seed, alone, variant, experience, short);
         drift = drift.max(largest);
         if moves.is_some() {
@@ -219,7 +327,7 @@ fn compared(seed: u64, alone: Alone, variant: &Variant, experience: Experience, 
     let (with, without) =
         (run(seed, alone, Some(variant), experience, steps), run(seed, alone, None, experience, steps));
     let moves = match (&with, &without) {
-        (Ok(with), Ok(without)) => moves_by_itself(with, without),
+        (Ok(with), Ok(without)) => moves_by_itself(alone, with, without),
         _ => true,
     };
     let drift = with.as_ref().map_or(0.0, |with| with.drift);

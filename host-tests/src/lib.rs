@@ -3,6 +3,7 @@
 
 pub mod bare_core;
 pub mod bare_metal;
+pub mod borne;
 pub mod certified;
 pub mod commission;
 pub mod control_steps;

@@ -8,27 +8,34 @@ use host_tests::variant::{ADAPTIVE, DEFAULT, Variant};
 
 /// Random joints.
 const JOINTS: u64 = 1000;
+/// Random joints whose feedforward bears their payload.
+const BEARING: u64 = 100;
 /// Random joints that have learned before.
 const EXPERIENCED: u64 = 200;
 
 #[test]
 fn no_joint_starts_to_move_or_keeps_moving_by_itself() {
-    leave_alone(JOINTS, &DEFAULT, Experience::None);
+    leave_alone(JOINTS, &Alone::ALL, &DEFAULT, Experience::None);
+}
+
+#[test]
+fn neither_does_one_whose_feedforward_bears_a_gravity_that_is_wrong_by_30_percent_or_reversed() {
+    leave_alone(BEARING, &Alone::BEARING, &DEFAULT, Experience::None);
 }
 
 #[test]
 fn neither_does_one_that_has_learned_its_friction_before() {
-    leave_alone(EXPERIENCED, &ADAPTIVE, Experience::Moved);
+    leave_alone(EXPERIENCED, &Alone::ALL, &ADAPTIVE, Experience::Moved);
 }
 
-fn leave_alone(joints: u64, variant: &Variant, experience: Experience) {
-    let judged = for_seeds(0..joints, |seed| judged(seed, variant, experience));
+fn leave_alone(joints: u64, situations: &[Alone], variant: &Variant, experience: Experience) {
+    let judged = for_seeds(0..joints, |seed| judged(seed, situations, variant, experience));
     let drift = judged.iter().fold(0.0f64, |largest, (drift, _)| largest.max(*drift));
     let bad: Vec<String> = judged.into_iter().flat_map(|(_, bad)| bad).collect();
     println!(
         "{joints} joints, {experience:?}, model wrong by {ERROR} in every parameter: largest drift {drift:.2e} rad, bad {} of {}",
         bad.len(),
-        joints as usize * Alone::ALL.len()
+        joints as usize * situations.len()
     );
     assert!(bad.is_empty(), "{}", bad.join("\n"));
 }
