@@ -189,9 +189,9 @@ mod tests {
         history.add(0.0, values.to_vec());
         let page = history.page();
         for expected in [
-            "state         in a fault\n",
-            "faults        command deadline missed (8100h)\n",
-            "position      +1.2500 rad\n",
+            "state           in a fault\n",
+            "faults          command deadline missed (8100h)\n",
+            "position        +1.2500 rad\n",
             "bridge not measured",
         ] {
             assert!(page.contains(expected), "{expected}: {page}");
