@@ -43,7 +43,7 @@ pub struct Errors {
 /// that ramp (60F4h).
 ///
 /// # Errors
-/// What plant or firmware refuse, and a joint that does not stay enabled.
+/// Refusals of plant or firmware, and a joint that does not stay enabled.
 pub fn moved(seed: u64, mode: Mode, load: impl Fn(&ActuatorParameters) -> LoadConfiguration) -> Result<Errors, String> {
     let failed = |error: String| format!("joint {seed}, {mode:?}: {error}");
     let parameters = ActuatorParameters::randomised(seed).aligned();

@@ -59,7 +59,7 @@ pub enum Alone {
     Floating(Gravity),
 }
 
-/// How wrong gravity is configured.
+/// Errors of the configured gravity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Gravity {
     /// 30 % too little.
@@ -71,7 +71,7 @@ pub enum Gravity {
 }
 
 impl Gravity {
-    /// What of the true gravity's torque the feedforward gives.
+    /// Part of the true gravity's torque that the feedforward gives.
     const fn factor(self) -> f64 {
         match self {
             Self::Little => 0.7,

@@ -65,7 +65,7 @@ impl Load {
     }
 }
 
-/// What the feedforward needs of a configuration.
+/// Parameters of the feedforward, from a configuration.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LoadGains {
     /// Which torques.

@@ -139,7 +139,7 @@ fn on_the_esc1() -> Result<(), Failed> {
     at.bench.expect("button: the bridge stays off until the next reset")
 }
 
-/// What the bench's driver fault is told by: a line of the log, 2302h:1 and 2, 2302h:4.
+/// Signs of the bench's driver fault: a line of the log, 2302h:1 and 2, 2302h:4.
 type Told = (&'static str, [u16; 2], u32);
 
 fn driver_faults() -> Result<(), Failed> {
