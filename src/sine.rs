@@ -35,8 +35,8 @@ pub fn cos_sin(angle: u32) -> (i32, i32) {
     (if octant & 1 << 30 != 0 { -cos } else { cos }, if angle & 1 << 31 != 0 { -sin } else { sin })
 }
 
-/// Cosine and sine of an angle, rad; amplitude 1 - 1.3e-5, error beside that at most 9e-6 and what a single-precision number
-/// of this size leaves of an angle. Beyond 2^31 turns, and for NaN, those of some angle.
+/// Cosine and sine of an angle, rad; amplitude 1 - 1.3e-5, error beside that at most 9e-6 and what a single-precision
+/// number of this size leaves of an angle. Beyond 2^31 turns, and for NaN, those of some angle.
 pub fn cos_sin_of(radians: f32) -> (f32, f32) {
     let turns = radians * (0.5 * core::f32::consts::FRAC_1_PI);
     let (cos, sin) = cos_sin(((turns - (turns as i32) as f32) * 4_294_967_296.0) as i64 as u32);

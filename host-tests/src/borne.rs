@@ -1,5 +1,5 @@
-//! A random joint with its payload, moved with and without the feedforward of its load, whose configuration is right or wrong
-//! by a factor.
+//! A random joint with its payload, moved with and without the feedforward of its load, whose configuration is right or
+//! wrong by a factor.
 
 use crate::driving::{COMMAND_STEPS, demand, moves};
 use crate::informed::informed;
@@ -12,8 +12,8 @@ use joint_firmware::joint::{Command, Demand, Mode};
 use plant::actuator::ActuatorParameters;
 use plant::virtual_joint::Setup;
 
-/// The load of an actuator as a user would configure it, every number of it times `factor`: rotor and link, and the payload by
-/// mass and arm.
+/// The load of an actuator as a user would configure it, every number of it times `factor`: rotor and link, and the
+/// payload by mass and arm.
 pub fn configured(parameters: &ActuatorParameters, factor: f64) -> LoadConfiguration {
     let joint = &parameters.joint;
     let load = &joint.load;
@@ -36,11 +36,11 @@ pub struct Errors {
     pub torque: f64,
 }
 
-/// Moves joint `seed` over most of its travel and speed for some 10 s in a mode, friction compensated by a model that knows the
-/// plant's parameters, with a load feedforward as `load` configures it.
+/// Moves joint `seed` over most of its travel and speed for some 10 s in a mode, friction compensated by a model that
+/// knows the plant's parameters, with a load feedforward as `load` configures it.
 ///
-/// In impedance mode the error is that from the trajectory; in position mode, which has a ramp of its own, from the reference of
-/// that ramp (60F4h).
+/// In impedance mode the error is that from the trajectory; in position mode, which has a ramp of its own, from the
+/// reference of that ramp (60F4h).
 ///
 /// # Errors
 /// Refusals of plant or firmware, and a joint that does not stay enabled.

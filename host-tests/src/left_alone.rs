@@ -52,8 +52,8 @@ pub enum Alone {
     Borne,
     /// Torque mode, no torque: the payload swings.
     Swinging,
-    /// With its payload, away from where that hangs, a spring and a damper hold the position; the joint's own feedforward
-    /// bears a gravity that is configured wrong.
+    /// With its payload, away from where that hangs, a spring and a damper hold the position; the joint's own
+    /// feedforward bears a gravity that is configured wrong.
     HeldBearing(Gravity),
     /// The same without spring and damper: the payload floats.
     Floating(Gravity),

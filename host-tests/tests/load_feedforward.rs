@@ -1,6 +1,6 @@
-//! The feedforward of the load on random joints with a payload: what it takes off the position error and off the torque that the
-//! controller has to find, and how much of that is left where inertia and payload are wrong by 30 %. docs/load.md has the
-//! figures.
+//! The feedforward of the load on random joints with a payload: what it takes off the position error and off the torque
+//! that the controller has to find, and how much of that is left where inertia and payload are wrong by 30 %.
+//! docs/load.md has the figures.
 
 use host_tests::borne::{Errors, configured, moved};
 use host_tests::in_the_loop::{for_seeds, median};
@@ -11,8 +11,8 @@ use plant::actuator::ActuatorParameters;
 /// Seeds of the random joints.
 const SEEDS: std::ops::Range<u64> = 1..21;
 
-/// A row of the table in docs/load.md, and a tenth of it: position error and torque error with a configuration that is right or
-/// wrong by a factor, % of those without feedforward, median and worst.
+/// A row of the table in docs/load.md, and a tenth of it: position error and torque error with a configuration that is
+/// right or wrong by a factor, % of those without feedforward, median and worst.
 struct Row {
     mode: Mode,
     factor: f64,

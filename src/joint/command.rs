@@ -124,8 +124,8 @@ impl Command {
 }
 
 impl Command {
-    /// Adds the feedforward of the load ([`super::load_feedforward`]), Nm, to a command that has a reference velocity. It
-    /// pushes nowhere. Zero leaves every bit as it is.
+    /// Adds the feedforward of the load ([`super::load_feedforward`]), Nm, to a command that has a reference velocity.
+    /// It pushes nowhere. Zero leaves every bit as it is.
     #[inline(always)]
     pub fn bear(&mut self, load: f32) {
         if load != 0.0 && !matches!(self.mode, Mode::Torque | Mode::OpenLoop) {

@@ -181,8 +181,8 @@ pub enum LoadFeedforwardRequest {
     Both = 3,
 }
 
-/// Inertia and gravity at the joint's output, as far as a single joint can know them: an axis that does not move against
-/// gravity.
+/// Inertia and gravity at the joint's output, as far as a single joint can know them: an axis that does not move
+/// against gravity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LoadConfiguration {
     /// Which torques are added.

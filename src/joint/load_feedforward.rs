@@ -7,14 +7,16 @@
 //! ```
 //!
 //! from the reference velocity `v` and the measured position `q` of that step and a [`LoadConfiguration`]: inertia `J`,
-//! gravity torque `G`, hanging position `q0`, payload `m` at an arm `l`. It joins the command's torque, as a torque offset
-//! (60B2h) would, in modes that have a reference velocity ([`Command::bear`](super::Command::bear)): the control step
-//! does nothing for it. Torque mode has none, so the energy guard never takes it for a push or for what holds the joint.
+//! gravity torque `G`, hanging position `q0`, payload `m` at an arm `l`. It joins the command's torque, as a torque
+//! offset (60B2h) would, in modes that have a reference velocity ([`Command::bear`](super::Command::bear)): the control
+//! step does nothing for it. Torque mode has none, so the energy guard never takes it for a push or for what holds the
+//! joint.
 //!
-//! The acceleration is what a lag of [`DERIVATIVE`] leaves of the reference velocity, held to the larger one of the ramps'
-//! accelerations; what the bound cuts off comes later, so that no change of velocity is lost. Gravity follows by at most
-//! [`GRAVITY_RATE`] times the torque limit a second: another payload under way is no blow. Motion asks for less than
-//! that: a gravity of 35 % of the torque limit at 12 rad/s, the most in the ranges of the plant's random joints, for 4.2.
+//! The acceleration is what a lag of [`DERIVATIVE`] leaves of the reference velocity, held to the larger one of the
+//! ramps' accelerations; what the bound cuts off comes later, so that no change of velocity is lost. Gravity follows by
+//! at most [`GRAVITY_RATE`] times the torque limit a second: another payload under way is no blow. Motion asks for less
+//! than that: a gravity of 35 % of the torque limit at 12 rad/s, the most in the ranges of the plant's random joints,
+//! for 4.2.
 //!
 //! Source: inverse dynamics as a feedforward, B. Siciliano, L. Sciavicco, L. Villani, G. Oriolo, Robotics, section 8.5.
 

@@ -1,5 +1,5 @@
-//! Feedforward of the load, between the task of the bus, which knows the configuration, and the receive interrupt, which
-//! makes the control step's commands.
+//! Feedforward of the load, between the task of the bus, which knows the configuration, and the receive interrupt,
+//! which makes the control step's commands.
 
 use crate::board::can;
 use core::cell::Cell;

@@ -1,5 +1,6 @@
-//! Currents at the greatest duty, with the flashed programs in motion: the amplifiers have settled to within 1 % when the converters begin to sample,
-//! and hardly more. Sampled as early after a low side's edge as the greatest duties of 0.9 and 0.95 had it, which both boards once permitted, they have not.
+//! Currents at the greatest duty, with the flashed programs in motion: the amplifiers have settled to within 1 % when
+//! the converters begin to sample, and hardly more. Sampled as early after a low side's edge as the greatest duties of
+//! 0.9 and 0.95 had it, which both boards once permitted, they have not.
 
 use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4};
 use emulator::bus::{Bus as _, Width};
@@ -39,7 +40,8 @@ struct Shown {
 }
 
 impl Shown {
-    /// Within 1 % from the beginning on: the settling time that the boards' configurations take from the vendors. At any smaller duty more is shown:
+    /// Within 1 % from the beginning on: the settling time that the boards' configurations take from the vendors. At
+    /// any smaller duty more is shown:
     /// hardly more says that the greatest was met, and that it is no smaller than it need be.
     fn is_settled(&self) -> bool {
         (0.99..0.995).contains(&self.begun) && (0.995..0.999).contains(&self.held)

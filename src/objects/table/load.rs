@@ -1,5 +1,5 @@
-//! 2202h: the load, and its feedforward. The settings act at once, also while the joint moves; 1010h stores them with the
-//! configuration.
+//! 2202h: the load, and its feedforward. The settings act at once, also while the joint moves; 1010h stores them with
+//! the configuration.
 
 use super::*;
 use crate::objects::field::Field::AtOnce as S;

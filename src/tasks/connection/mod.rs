@@ -71,8 +71,8 @@ pub struct Watching {
 }
 
 impl Watching {
-    /// Every millisecond: computes the model in shadow, adapts the one that acts, bears the load, and leaves for the bus what is known
-    /// of the joint. Temperatures in °C.
+    /// Every millisecond: computes the model in shadow, adapts the one that acts, bears the load, and leaves for the
+    /// bus what is known of the joint. Temperatures in °C.
     pub fn look(&mut self, bridge_temperature: f32, winding_temperature: f32) {
         let Some(Report { telemetry, latched, .. }) = control::report() else { return };
         let mut seen = telemetry;

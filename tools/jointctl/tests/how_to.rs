@@ -1,6 +1,7 @@
 //! Pages of `docs/` that lead a user of another master to a moving joint: their lines and scripts as they stand.
 //!
-//! Without Python, or where the masters cannot be installed, these are reported as ignored by name; with `CI` set they run, and fail.
+//! Without Python, or where the masters cannot be installed, these are reported as ignored by name; with `CI` set they
+//! run, and fail.
 
 use jointctl::remote::RemoteJoint;
 use libtest_mimic::{Arguments, Failed, Trial};
@@ -166,7 +167,8 @@ fn ros2_canopen(python: Option<&Path>) -> Result<(), Failed> {
     shell("python3 -m py_compile joints.launch.py", folder.path(), &DCF_TOOLS, python).map(drop)
 }
 
-/// A concise DCF (CiA 302-3, object 1F22h): a count, and index, sub-index, length and value of each entry, little-endian.
+/// A concise DCF (CiA 302-3, object 1F22h): a count, and index, sub-index, length and value of each entry,
+/// little-endian.
 fn entries(mut bytes: &[u8]) -> Option<Vec<(u16, u8, Vec<u8>)>> {
     let (count, rest) = bytes.split_first_chunk()?;
     bytes = rest;

@@ -1,4 +1,5 @@
-//! Attacks on an owned joint over the bus, at rest and in motion, in simulated time. `docs/attacks.md` lists these and all others.
+//! Attacks on an owned joint over the bus, at rest and in motion, in simulated time. `docs/attacks.md` lists these and
+//! all others.
 
 mod master;
 

@@ -168,7 +168,8 @@ fn a_shorter_deadline_of_the_configuration_counts_and_a_longer_one_does_not() {
     }
 }
 
-/// A joint under a voltage that its current limit lowers, after two seconds; and the largest current in the windings, A.
+/// A joint under a voltage that its current limit lowers, after two seconds; and the largest current in the windings,
+/// A.
 fn at_its_limit(seed: u64, limit: Option<f32>, frame: Frame) -> (Rig, f32) {
     let (parameters, mut setup) = unknown(seed);
     if let Some(limit) = limit {

@@ -128,8 +128,8 @@ fn limits(mode: Operation) -> CommandLimits {
 
 /// A loaded arm, nearly level, that rises in a mode.
 ///
-/// Commands are those of `objects::set_points`. Homing moves as a profile does, and the zero that follows changes nothing
-/// of the motion.
+/// Commands are those of `objects::set_points`. Homing moves as a profile does, and the zero that follows changes
+/// nothing of the motion.
 fn rising(mode: Operation, stops: StopConfiguration, brake: bool) -> Rig {
     let parameters = reference().with_payload(3.0, 0.3);
     let mut setup = Setup::of(&parameters);

@@ -85,7 +85,8 @@ impl Network {
         stored
     }
 
-    /// Ends every configuration: a node that was given an id, and has not begun to use it, begins, and sends its boot-up message.
+    /// Ends every configuration: a node that was given an id, and has not begun to use it, begins, and sends its
+    /// boot-up message.
     pub fn end_configuration(&self) -> Result<(), ClientError> {
         self.lss(&request::switch_global(false))
     }

@@ -154,7 +154,8 @@ impl Network {
         Self { reader, patience: Settings::default().timeout }
     }
 
-    /// The same network for a master that waits longer, or less long, for a node's answer: behind a gateway, or on a busy machine.
+    /// The same network for a master that waits longer, or less long, for a node's answer: behind a gateway, or on a
+    /// busy machine.
     pub fn with_patience(self, patience: Duration) -> Self {
         Self { patience, ..self }
     }

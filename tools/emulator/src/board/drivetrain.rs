@@ -220,7 +220,8 @@ impl Drivetrain {
         if is_high { 0.0 } else { (low - self.dead_time.unwrap_or(0.0)).max(0.0) }
     }
 
-    /// The sample, while the bridge switched since the last call, whose low side had conducted for the shortest time; none where it did not switch.
+    /// The sample, while the bridge switched since the last call, whose low side had conducted for the shortest time;
+    /// none where it did not switch.
     pub fn take_least_settled(&mut self) -> Option<Settling> {
         self.least_settled.take()
     }
@@ -350,7 +351,8 @@ mod tests {
         assert!(conducting(254.0, 2) > 0.0 && conducting(256.0, 2) == 0.0);
     }
 
-    /// The currents are sampled from 13 cycles after the trigger, a count before the top, for 12.5 clocks of four cycles.
+    /// The currents are sampled from 13 cycles after the trigger, a count before the top, for 12.5 clocks of four
+    /// cycles.
     #[test]
     fn at_the_duties_that_were_permitted_once_the_amplifiers_had_not_settled_and_at_those_of_now_they_have() {
         let [_, _, moteus, _] = super::super::moteus_r4::STEP_RESPONSE;

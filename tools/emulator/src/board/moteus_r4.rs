@@ -43,7 +43,8 @@ const R4_11: u8 = 4;
 /// Amplifier control of the gate driver: gain 5, 10, 20, 40 by its bits 7 and 6.
 const AMPLIFIERS: usize = 6;
 /// Step response at each gain: the settling time to 1 % of the driver's data sheet (SLVSDY6, "Electrical characteristics") begins 500 ns after the
-/// edge. Together they are what the board's vendor has measured to be needed at gain 20, and assumes at the others (docs/boards.md).
+/// edge. Together they are what the board's vendor has measured to be needed at gain 20, and assumes at the others
+/// (docs/boards.md).
 pub(super) const STEP_RESPONSE: [Amplifier; 4] = [
     Amplifier::settling(500e-9, 250e-9),
     Amplifier::settling(500e-9, 500e-9),

@@ -32,8 +32,8 @@ fn is_taken(network: &Network, id: u8) -> Result<bool, RemoteError> {
     }
 }
 
-/// Joints that somebody gave an id to and left there, before they began to use it: they begin now. They answer neither a scan nor a fastscan
-/// before.
+/// Joints that somebody gave an id to and left there, before they began to use it: they begin now. They answer neither
+/// a scan nor a fastscan before.
 fn begun(network: &Network, wait: Duration) -> Result<Vec<Addressed>, RemoteError> {
     let heartbeats = network.heartbeats();
     network.end_configuration()?;
@@ -59,9 +59,9 @@ fn find(network: &Network, wait: Duration) -> Result<Option<Address>, RemoteErro
     Ok(None)
 }
 
-/// Gives every joint without a node id the next free one from `first` on, and has it keep it where `store`; those that were given one and
-/// left before they used it begin with that. `wait` is how long a node may take to answer each of a scan's 133 questions. Tells each as
-/// soon as it is done: where a later one fails, the earlier stay.
+/// Gives every joint without a node id the next free one from `first` on, and has it keep it where `store`; those that
+/// were given one and left before they used it begin with that. `wait` is how long a node may take to answer each of a
+/// scan's 133 questions. Tells each as soon as it is done: where a later one fails, the earlier stay.
 pub fn assign(
     network: &Network,
     first: u8,

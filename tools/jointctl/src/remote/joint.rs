@@ -52,8 +52,8 @@ impl RemoteJoint {
         let (began, mut again) = (Instant::now(), 1);
         let device_type = loop {
             match asked.number(0x1000, 0) {
-                // A client that vanished within a block leaves the node waiting for the rest: it takes the first request for data, and
-                // says so by an abort once its own time-out is over.
+                // A client that vanished within a block leaves the node waiting for the rest: it takes the first
+                // request for data, and says so by an abort once its own time-out is over.
                 Err(ClientError::NoAnswer { heard, .. }) if heard.contains(&node) && again > 0 => again -= 1,
                 Err(ClientError::NoAnswer { .. }) if began.elapsed() < patience => {}
                 Err(ClientError::NoAnswer { object, heard, .. }) => {

@@ -118,7 +118,8 @@ pub fn a_joint_that_was_left_with_an_id_that_it_does_not_use_yet_is_found_again(
     network.send(&Frame::new(cob_id::LSS_MASTER, &request::configure_node_id(9)).unwrap()).unwrap();
     assert_eq!(answers.next(Duration::from_secs(60)).unwrap().unwrap().frame.data()[..2], [0x11, 0]);
     let mut told = Vec::new();
-    // The machine may be busy: it has five seconds for the boot-up message, and is not asked for another joint meanwhile.
+    // The machine may be busy: it has five seconds for the boot-up message, and is not asked for another joint
+    // meanwhile.
     let mut tell = |done: &address::Addressed| told.push(*done);
     assert_eq!(address::assign(&network, 1, true, Duration::from_secs(1), &mut tell).unwrap(), 1);
     assert_eq!(told, [address::Addressed { node: 9, address }]);

@@ -29,8 +29,8 @@ pub enum Command {
     Power(bool),
 }
 
-/// Faults of a gate driver with registers and a fault line. All but [`Forgot`](Self::Forgot) last until another command ends them; what the driver latches
-/// stays until it is cleared.
+/// Faults of a gate driver with registers and a fault line. All but [`Forgot`](Self::Forgot) last until another command
+/// ends them; what the driver latches stays until it is cleared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DriverFault {
     /// Over-current of a transistor, by its voltage.
