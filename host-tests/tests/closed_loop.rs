@@ -2,13 +2,19 @@
 //! fitted, and moved with the image that came out. The torque that friction would have taken arrives, slow reversals
 //! track, what is left in torque mode and in the cold is as published, and adaptation makes up for friction that has
 //! changed.
+//!
+//! What drift and hands do is judged on five of the joints, and of these the worst alone is held to what is published; with
+//! `JOINT_SAMPLES=all` on all of them, and the median, too.
 
 use host_tests::in_the_loop::{InTorqueMode, Moved, RandomJoint, for_seeds, median};
+use host_tests::samples::{count, every};
 use host_tests::variant::{ADAPTIVE, DEFAULT};
 use plant::friction_factors::FrictionFactors;
 
 /// Seeds of the random joints.
 const SEEDS: std::ops::Range<u64> = 1..21;
+/// Joints in service.
+const SERVED: (u64, u64) = (5, 20);
 /// Largest relative torque error with compensation, median and worst, %: README's 4.0 and 10.6, and a tenth of them.
 const TORQUE_ERROR: (f64, f64) = (4.4, 11.7);
 /// Least factor by which the position error of slow reversals falls, median: README's 5.3 less a tenth.
@@ -56,8 +62,14 @@ struct Found {
     torque_mode: InTorqueMode,
     /// Torque errors from 0 °C, without compensation and with it, %.
     cold: [f64; 2],
-    /// In service, by [`factors`], without adaptation and with it.
-    in_service: Vec<[Moved; 2]>,
+    /// Where it was judged in service.
+    served: Option<Served>,
+}
+
+/// A joint in service.
+struct Served {
+    /// By [`factors`], without adaptation and with it.
+    by_factors: Vec<[Moved; 2]>,
     /// Pushed, and resisted.
     touched: [f64; 2],
 }
@@ -67,12 +79,19 @@ fn found(seed: u64) -> Result<Found, String> {
     let in_service = |(_, factors): &(_, FrictionFactors)| {
         Ok::<_, String>([joint.in_service(&DEFAULT, factors)?, joint.in_service(&ADAPTIVE, factors)?])
     };
+    let serves = seed < SEEDS.start + count(SERVED.0, SERVED.1);
     Ok(Found {
         moved: [joint.without()?, joint.with(&DEFAULT)?],
         torque_mode: joint.in_torque_mode(&DEFAULT)?,
         cold: joint.in_the_cold(&DEFAULT)?,
-        in_service: factors().iter().map(in_service).collect::<Result<_, _>>()?,
-        touched: [joint.touched(&ADAPTIVE, false)?, joint.touched(&ADAPTIVE, true)?],
+        served: serves
+            .then(|| {
+                Ok::<_, String>(Served {
+                    by_factors: factors().iter().map(in_service).collect::<Result<_, _>>()?,
+                    touched: [joint.touched(&ADAPTIVE, false)?, joint.touched(&ADAPTIVE, true)?],
+                })
+            })
+            .transpose()?,
     })
 }
 
@@ -82,12 +101,17 @@ fn both(values: impl Iterator<Item = f64>) -> (f64, f64) {
     (median(values.clone()), values.into_iter().fold(0.0, f64::max))
 }
 
+/// True where it is as published, the median where every joint was judged.
+fn held((middle, worst): (f64, f64), limits: (f64, f64)) -> bool {
+    (!every() || middle <= limits.0) && worst <= limits.1
+}
+
 /// Adaptation in service is as published.
-fn adapts(found: &[Found]) {
+fn adapts(found: &[&Served]) {
     println!("torque errors in service [%]: moves, slow reversals, median (worst)");
     for (n, (what, _)) in factors().iter().enumerate() {
         let row = |with: usize| {
-            let of = |errors: fn(&Moved) -> f64| both(found.iter().map(|found| errors(&found.in_service[n][with])));
+            let of = |errors: fn(&Moved) -> f64| both(found.iter().map(|found| errors(&found.by_factors[n][with])));
             (of(|moved| moved.moves.torque), of(|moved| moved.reversals.torque))
         };
         for with in 0..2 {
@@ -97,21 +121,18 @@ fn adapts(found: &[Found]) {
         }
     }
     for (n, (what, _)) in factors().iter().enumerate() {
-        let (moves, worst) = both(found.iter().map(|found| found.in_service[n][1].moves.torque));
-        let (reversals, worst_reversals) = both(found.iter().map(|found| found.in_service[n][1].reversals.torque));
+        let moves = both(found.iter().map(|found| found.by_factors[n][1].moves.torque));
+        let reversals = both(found.iter().map(|found| found.by_factors[n][1].reversals.torque));
         let limit = IN_SERVICE[n];
-        assert!(moves <= limit.0 && worst <= limit.1, "{what}: moves {moves} %, worst {worst} %");
-        assert!(
-            reversals <= limit.2 && worst_reversals <= limit.3,
-            "{what}: slow reversals {reversals} %, worst {worst_reversals} %"
-        );
+        assert!(held(moves, (limit.0, limit.1)), "{what}: moves, median and worst {moves:?} %");
+        assert!(held(reversals, (limit.2, limit.3)), "{what}: slow reversals, median and worst {reversals:?} %");
     }
     for (n, what) in ["pushed", "resisted"].iter().enumerate() {
         let (middle, worst) = both(found.iter().map(|found| found.touched[n]));
         println!(
             "{what} by a hand: adaptation changes by {middle:.1} % of Coulomb friction (median), worst {worst:.1} %"
         );
-        assert!(middle <= TOUCHED[n].0 && worst <= TOUCHED[n].1, "{what}: {middle} %, worst {worst} %");
+        assert!(held((middle, worst), TOUCHED[n]), "{what}: {middle} %, worst {worst} %");
     }
 }
 
@@ -121,7 +142,7 @@ fn the_torque_that_friction_takes_is_given_back_and_slow_reversals_track() {
     let rows: Vec<[Moved; 2]> = found.iter().map(|found| found.moved).collect();
     let torque_mode: Vec<InTorqueMode> = found.iter().map(|found| found.torque_mode).collect();
     let cold: Vec<[f64; 2]> = found.iter().map(|found| found.cold).collect();
-    adapts(&found);
+    adapts(&found.iter().filter_map(|found| found.served.as_ref()).collect::<Vec<_>>());
     println!("joint  moves: torque error [%]   slow reversals: RMS position error [mrad]");
     for (seed, moved) in SEEDS.zip(&rows) {
         let [slow_before, slow_after] = moved.map(|moved| 1e3 * moved.reversals.tracking);
