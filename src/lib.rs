@@ -17,7 +17,7 @@
 //! - **host**: a computer, with the standard library.
 //! - **any context**: all of them.
 //!
-//! "001, eq. 5" is an equation of a paper: `docs/sources.md`.
+//! "001, eq. 5" is an equation of a paper: `docs/bibliography.md`.
 #![cfg_attr(not(test), no_std)]
 #![deny(unsafe_code)]
 
