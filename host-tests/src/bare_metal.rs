@@ -130,7 +130,7 @@ pub fn build(board: &str, temporary: &str) -> Result<PathBuf, String> {
     built(command, "joint-firmware", temporary, folder.join(board))
 }
 
-/// Builds a board's program by a line that README shows, below a test's temporary folder; its path.
+/// Builds a board's program by a line of docs/on-the-bus.md, below a test's temporary folder; its path.
 ///
 /// # Errors
 /// A line that does not call cargo, or what the compiler says.

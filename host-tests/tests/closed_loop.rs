@@ -15,16 +15,17 @@ use plant::friction_factors::FrictionFactors;
 const SEEDS: std::ops::Range<u64> = 1..21;
 /// Joints in service.
 const SERVED: (u64, u64) = (5, 20);
-/// Largest relative torque error with compensation, median and worst, %: README's 4.0 and 10.6, and a tenth of them.
+/// Largest relative torque error with compensation, median and worst, %: 4.0 and 10.6 of docs/results-loop.md, and a
+/// tenth of them.
 const TORQUE_ERROR: (f64, f64) = (4.4, 11.7);
-/// Least factor by which the position error of slow reversals falls, median: README's 5.3 less a tenth.
+/// Least factor by which the position error of slow reversals falls, median: docs/results-loop.md's 5.3 less a tenth.
 const TRACKING_GAIN: f64 = 4.8;
 
-/// The same for moves that begin at 0 °C: README's 10.6 and 29.9, and a tenth of them.
+/// The same for moves that begin at 0 °C: docs/results-loop.md's 10.6 and 29.9, and a tenth of them.
 const COLD: (f64, f64) = (11.7, 32.9);
 
 /// Friction left in torque mode at most, led by hand, and moved by a command that tells its offset and one that does
-/// not, median and worst, %: README's figures and a tenth of them.
+/// not, median and worst, %: docs/results-loop.md's figures and a tenth of them.
 const TORQUE_MODE: [(f64, f64); 3] = [(69.6, 74.1), (10.3, 44.1), (68.9, 70.3)];
 
 /// Torque errors in service, moves and slow reversals, median and worst, %, with adaptation: docs/adaptation.md's

@@ -1,4 +1,4 @@
-//! Recorded joints: the fixed-point image predicts unseen samples as README says.
+//! Recorded joints: the fixed-point image predicts unseen samples as docs/results-recordings.md says.
 //!
 //! The recordings are others' and are not part of this repository: they are looked for in `$JOINT_DATA`, else in
 //! `../shared/data` beside it. Where they are absent every test here is reported as ignored, by name.
@@ -14,7 +14,8 @@ use nalgebra::{DMatrix, DVector};
 use std::path::{Path, PathBuf};
 
 /// Data set, and for each test set the best test RMSE of three SciPy baselines (Coulomb and viscous friction; with Stribeck,
-/// asymmetric, quadratic and load-dependent terms; with a network on top) and that of the image as README has it, in the effort's unit.
+/// asymmetric, quadratic and load-dependent terms; with a network on top) and that of the image, both of
+/// docs/results-recordings.md, in the effort's unit.
 const PUBLISHED: [(&str, &[(f64, f64)]); 10] = [
     ("emps", &[(3.161, 1.701)]),
     ("ur10e_joint1", &[(0.0927, 0.0676)]),

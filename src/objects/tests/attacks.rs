@@ -7,7 +7,7 @@ use std::fmt::Write;
 const HEAD: &str = "# Attacks
 
 What was tried against a joint over its bus and against what it stores, what it does then, and the tests that show it. `src/objects/tests/attacks.rs` has the rows and fails where a test is gone;
-`UPDATE_DOCS=1 cargo test -p joint-firmware --lib objects` writes this page anew. An *owned* joint has a key; README's \"Who owns a joint\" says how it gets one. Tests below `emulated` run
+`UPDATE_DOCS=1 cargo test -p joint-firmware --lib objects` writes this page anew. An *owned* joint has a key; [ownership.md](ownership.md) says how it gets one. Tests below `emulated` run
 the program of a board as it is flashed, on an emulated core. Nothing of this has run on hardware.
 
 Not defended, and not meant to be:

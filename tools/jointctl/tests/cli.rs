@@ -1,5 +1,7 @@
 //! The program as a user meets it: exit codes, messages, files.
 
+mod figure;
+
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -17,7 +19,7 @@ fn demo(folder: &Path, out: &str) -> Output {
 }
 
 #[test]
-fn the_demo_writes_an_image_its_twin_and_a_report_and_the_same_choices_give_the_same_bytes() {
+fn the_demo_writes_an_image_and_a_report_the_same_choices_give_the_same_bytes_and_readme_shows_the_joint() {
     let folder = tempfile::tempdir().unwrap();
     for out in ["first", "second"] {
         let output = demo(folder.path(), out);
@@ -32,6 +34,10 @@ fn the_demo_writes_an_image_its_twin_and_a_report_and_the_same_choices_give_the_
         assert!(!read("first").is_empty());
         assert!(read("first") == read("second"), "{file} differs between two runs");
     }
+    let sim = ["sim", "--image", "first/friction.img", "--scenario", "slow-reversal", "--out", "sim", "--json"];
+    let moved = jointctl(folder.path(), &sim);
+    assert!(moved.status.success(), "{}", stderr(&moved));
+    figure::is_shown_by_readme(&folder.path().join("sim"), &serde_json::from_slice(&moved.stdout).unwrap());
 }
 
 #[test]

@@ -109,7 +109,7 @@ fn python_canopen(python: Option<&Path>) -> Result<(), Failed> {
     };
     let expected = format!("cargo run --release -p jointctl -- sim --bus udp:{GROUP}:{PORT} --node {NODE}\n");
     if *sim != expected {
-        // README's test runs it; a joint with more patience takes its place here.
+        // The test of docs/on-the-bus.md runs it; a joint with more patience takes its place here.
         return Err(format!("{sim}: not what is run in its place").into());
     }
     std::fs::write(folder.path().join("move.py"), own(script))?;

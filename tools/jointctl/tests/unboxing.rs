@@ -1,26 +1,28 @@
-//! README's way from unboxing to a turning motor, as somebody goes it who has no board: from step 5 on, with the
-//! programs as they are flashed on emulated boards, and with the commands as they stand there, but for bus and folders.
+//! The way of docs/on-a-board.md from unboxing to a turning motor, as somebody goes it who has no board: from step 5 on,
+//! with the programs as they are flashed on emulated boards, and with the commands as they stand there, but for bus and folders.
 //! Between steps 6 and 7 the power is off.
 //!
 //! Needs the boards' target; where it is missing the tests are reported as ignored, by name; with `CI` set they run and
 //! fail. Real time counts here, as it does for the user: one board at a time, and where a command says that the machine
-//! was too slow, it is repeated as README says.
+//! was too slow, it is repeated as the page says.
 
 mod shown;
 
 use host_tests::bare_metal::{BOARDS, build_by, target_installed};
 use libtest_mimic::{Arguments, Failed, Trial};
 use plant::ActuatorParameters;
-use shown::{between, lines};
+use shown::{ON_THE_BUS, lines};
 use std::fs::File;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
+/// Page with the steps.
+const ON_A_BOARD: &str = include_str!("../../../docs/on-a-board.md");
 /// Bus of step 5; here each board has a port of its own.
 const BUS: &str = "socketcan:can0";
-/// Place in which README's line builds a program; tests keep theirs elsewhere.
+/// Place in which the line of docs/on-the-bus.md builds a program; tests keep theirs elsewhere.
 const PROGRAM: &str = "target/thumbv7em-none-eabihf/release/joint-firmware";
 /// Words of commands for which the machine was too slow.
 const LATE: [&str; 4] = ["(8100h)", "command deadline missed", "no answer within", "LSS fastscan did not come within"];
@@ -127,17 +129,23 @@ impl Desk {
     }
 }
 
-/// A number of README's, between two texts of it.
+/// The text between two others that stand in a page.
+fn between<'a>(page: &'a str, begin: &str, end: &str) -> &'a str {
+    let (_, behind) = page.split_once(begin).unwrap_or_else(|| panic!("'{begin}' is not in the page"));
+    behind.split_once(end).unwrap_or_else(|| panic!("'{end}' does not follow '{begin}' in the page")).0
+}
+
+/// A number of the page's, between two texts of it.
 fn number(text: &str, before: &str, behind: &str) -> Result<f64, Failed> {
     let found = text.split_once(before).and_then(|(_, rest)| rest.split_once(behind));
-    Ok(found.ok_or_else(|| format!("README does not say '{before}...{behind}'"))?.0.parse()?)
+    Ok(found.ok_or_else(|| format!("the page does not say '{before}...{behind}'"))?.0.parse()?)
 }
 
 /// The board on a bus of its own, and that bus.
 fn desk(board: &str) -> Result<(Desk, String), Failed> {
     let port = bus::free_port().ok_or("no port is free")?;
     let bus = format!("udp:239.74.163.2:{port}");
-    let shown = lines(between("byte for byte what probe-rs would flash", "Its log comes to the terminal."));
+    let shown = lines(between(ON_THE_BUS, "byte for byte what probe-rs would flash", "Its log comes to the terminal."));
     let [named, build, sim, address] = &shown[..] else { return Err(format!("{shown:?} are other lines").into()) };
     holds(named == "BOARD=moteus-r4", || format!("{named} names no board"))?;
     holds(address == "jointctl address --bus $B --first 5 --wait 300", || format!("{address} is not that of step 5"))?;
@@ -149,15 +157,15 @@ fn desk(board: &str) -> Result<(Desk, String), Failed> {
 }
 
 fn from_unboxing(board: &str) -> Result<(), Failed> {
-    let text = between("Try steps 5 to 7 first without a board", "1. No motor connected");
+    let text = between(ON_A_BOARD, "Try steps 5 to 7 first without a board", "1. No motor connected");
     let gear = number(text, "the gear ratio is ", " and the torque constant ")?;
     let constant = number(text, " and the torque constant ", " Nm/A")?;
     let actual = ActuatorParameters::reference();
     let motor = (actual.joint.motor.gear_ratio, actual.joint.motor.torque_constant);
-    holds((gear, constant) == motor, || format!("README says {gear} and {constant} of a motor with {motor:?}"))?;
-    holds(text.contains("`address` wants `--wait 300`"), || "README does not say how patient to be".into())?;
+    holds((gear, constant) == motor, || format!("the page says {gear} and {constant} of a motor with {motor:?}"))?;
+    holds(text.contains("`address` wants `--wait 300`"), || "the page does not say how patient to be".into())?;
 
-    let steps = lines(between("5. Connect the bus.", "A new joint's gains are soft"));
+    let steps = lines(between(ON_A_BOARD, "5. Connect the bus.", "A new joint's gains are low"));
     let (mut desk, bus) = desk(board)?;
     let [set, steps @ ..] = &steps[..] else { return Err("there are no steps".into()) };
     holds(set == &format!("B={BUS}"), || format!("{set} is another bus"))?;

@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 /// Arguments of `fit`.
 #[derive(Debug, Args)]
 pub struct Fit {
-    /// Description of the data set (README, "Your own joint")
+    /// Description of the data set (docs/your-own-joint.md)
     dataset: PathBuf,
     /// Folder for image, report and figures; files of the same names are replaced, others are left alone
     #[arg(long, value_name = "DIR")]

@@ -156,7 +156,7 @@ impl Recording {
 pub fn description(node: u8, table: &str) -> String {
     let (name, table) = (toml::Value::from(format!("node {node}")), toml::Value::from(table));
     format!(
-        "# A joint recorded over its bus: see README, \"Your own joint\".\n\
+        "# A joint recorded over its bus: see docs/your-own-joint.md.\n\
          name = {name}\n\n[source]\nfiles = [{table}]\n{}",
         include_str!("recording.toml")
     )

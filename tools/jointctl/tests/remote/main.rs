@@ -9,7 +9,7 @@ mod configuration;
 mod images;
 mod motion;
 mod owner;
-mod readme;
+mod page;
 mod refused;
 mod retrain;
 mod served;
@@ -72,8 +72,8 @@ fn main() {
             a_key_is_replaced_and_taken_back_by_who_has_it,
             the_program_takes_the_key_as_an_option_or_from_the_environment,
         }
-        readme {
-            the_section_on_the_bus_runs_line_by_line,
+        page {
+            the_page_on_the_bus_runs_line_by_line,
         }
         refused {
             a_wrong_node_id_is_told_from_a_bus_where_nobody_is,

@@ -1,15 +1,9 @@
-//! Commands that README shows, as they stand there.
+//! Commands that the documentation shows, as they stand there.
 
-/// The text.
-pub const README: &str = include_str!("../../../../README.md");
+/// Page on the joint on a bus.
+pub const ON_THE_BUS: &str = include_str!("../../../../docs/on-the-bus.md");
 
-/// The text between two others that stand in it.
-pub fn between(begin: &str, end: &str) -> &'static str {
-    let (_, behind) = README.split_once(begin).unwrap_or_else(|| panic!("'{begin}' is not in README"));
-    behind.split_once(end).unwrap_or_else(|| panic!("'{end}' does not follow '{begin}' in README")).0
-}
-
-/// Its commands, without what explains them.
+/// Commands of a page, without what explains them.
 pub fn lines(text: &str) -> Vec<String> {
     let mut lines = Vec::new();
     let mut inside = false;

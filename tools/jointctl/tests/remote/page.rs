@@ -1,11 +1,11 @@
-//! README's section on the bus, line by line as it stands.
+//! docs/on-the-bus.md, line by line as it stands.
 
 use crate::served::{Served, image, program};
-use crate::shown::{between, lines};
+use crate::shown::{ON_THE_BUS, lines};
 use std::io::{BufRead, BufReader};
 use std::process::Stdio;
 
-/// The bus of the section; here each run has a port of its own.
+/// The bus of the page; here each run has a port of its own.
 const BUS: &str = "udp:239.74.163.2:43113";
 const PROGRAM: &str = "cargo run --release -p jointctl --";
 /// Beginnings of lines that others run: python-canopen's are those of `python_canopen.rs`, boards' programs those of
@@ -19,7 +19,7 @@ const ELSEWHERE: [&str; 6] = [
     "jointctl address",
 ];
 
-pub fn the_section_on_the_bus_runs_line_by_line() {
+pub fn the_page_on_the_bus_runs_line_by_line() {
     let port = bus::free_port().unwrap();
     let bus = format!("udp:239.74.163.2:{port}");
     let folder = tempfile::tempdir().unwrap();
@@ -32,7 +32,7 @@ pub fn the_section_on_the_bus_runs_line_by_line() {
         command
     };
     let (mut served, mut run) = (None, Vec::new());
-    for line in lines(between("\n## The joint on a bus\n", "\n## ")) {
+    for line in lines(ON_THE_BUS) {
         let own = line.replace(BUS, &bus).replace("$B", &bus);
         if ELSEWHERE.iter().any(|beginning| line.starts_with(beginning)) {
             continue;
@@ -61,5 +61,5 @@ pub fn the_section_on_the_bus_runs_line_by_line() {
         }
     }
     let expected = "scan info move upload discard upload retrain info set monitor";
-    assert_eq!(run.join(" "), expected, "what the section shows");
+    assert_eq!(run.join(" "), expected, "what the page shows");
 }
