@@ -17,6 +17,7 @@ mod power_cut;
 mod same_run;
 mod settings;
 mod settling;
+mod supported_modes;
 mod workbench;
 
 use host_tests::bare_metal::target_installed;
@@ -42,6 +43,7 @@ fn main() {
         same_run::trials(),
         settings::trials(),
         settling::trials(),
+        supported_modes::trials(),
         workbench::trials(),
     ];
     let trials = rooms.into_iter().flatten().map(|trial| trial.with_ignored_flag(ignored)).collect();
