@@ -1,0 +1,454 @@
+//! A robot from its two files, checked: tree, drives and the coupling between motors and joints.
+
+use crate::articulated_body::forward_dynamics;
+use crate::drives::{Drive, RobotDescription};
+use crate::inertia::LinkInertia;
+use crate::mass_matrix::mass_matrix;
+use crate::newton_euler::inverse_dynamics;
+use crate::placement::Placement;
+use crate::tree::{Joint, JointKind, Tree};
+use crate::urdf::{Allowed, Urdf, UrdfJoint, parse};
+use nalgebra::{DMatrix, DVector, Vector3};
+
+/// A defect of a robot's files.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{file}{}: {defect}", line.map_or(String::new(), |line| format!(":{line}")))]
+pub struct RobotError {
+    /// The file.
+    pub file: String,
+    /// The line, from 1; None where the whole file is meant.
+    pub line: Option<u32>,
+    /// The defect, its place and the remedy.
+    pub defect: Defect,
+}
+
+/// Kinds of defects.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Defect {
+    /// No XML, or no robot.
+    #[error("no URDF: {reason}")]
+    Xml {
+        /// Why.
+        reason: String,
+    },
+    /// No TOML, or unknown keys.
+    #[error("{reason}")]
+    Toml {
+        /// Why.
+        reason: String,
+    },
+    /// An element or attribute is not there.
+    #[error("{of} has no {value}; add it")]
+    Missing {
+        /// Link or joint.
+        of: String,
+        /// The element or attribute.
+        value: String,
+    },
+    /// An attribute does not hold its numbers.
+    #[error("{attribute} is {text:?}, expected {count} finite numbers; xacro files are to be expanded first")]
+    NotANumber {
+        /// The attribute.
+        attribute: String,
+        /// Its text.
+        text: String,
+        /// Expected numbers.
+        count: usize,
+    },
+    /// Two links or joints of one name.
+    #[error("{what} {name} is there twice; rename one of them")]
+    Twice {
+        /// "link" or "joint".
+        what: &'static str,
+        /// The name.
+        name: String,
+    },
+    /// An inertia that no body has.
+    #[error(
+        "link {link}: no body has a mass of {mass} kg with principal inertias of {:e}, {:e} and {:e} kg m^2: the mass is to be above 0, \
+         each inertia at least 0 and at most the sum of the other two; check units, signs and ixx to izz", principal[0], principal[1], principal[2]
+    )]
+    Impossible {
+        /// The link.
+        link: String,
+        /// Its mass, kg.
+        mass: f64,
+        /// Its principal inertias, kg m^2.
+        principal: [f64; 3],
+    },
+    /// A joint of an unknown kind.
+    #[error("joint {joint} is of type {kind:?}; known are revolute, continuous, prismatic and fixed")]
+    Kind {
+        /// The joint.
+        joint: String,
+        /// Its type.
+        kind: String,
+    },
+    /// A joint that follows another.
+    #[error("joint {joint} mimics {other}; make it fixed, or list it under `locked` in robot.toml without <mimic>")]
+    Mimic {
+        /// The joint.
+        joint: String,
+        /// The other.
+        other: String,
+    },
+    /// A joint refers to a link that is not there.
+    #[error("joint {joint}: there is no link {link}; check parent and child")]
+    NoLink {
+        /// The joint.
+        joint: String,
+        /// The link.
+        link: String,
+    },
+    /// A link has two parents.
+    #[error(
+        "link {link} is the child of joint {first} and of joint {second}: this is no tree; closed chains are not supported, cut one of them"
+    )]
+    TwoParents {
+        /// The link.
+        link: String,
+        /// One joint.
+        first: String,
+        /// The other.
+        second: String,
+    },
+    /// Not one link without a parent.
+    #[error("{} are no child of any joint: a tree has one base; join them by fixed joints", roots.join(", "))]
+    Roots {
+        /// Links without a parent.
+        roots: Vec<String>,
+    },
+    /// Links that the base does not lead to.
+    #[error("joint {joint} is part of a ring of joints that no base leads to: this is no tree; correct its parent")]
+    Ring {
+        /// A joint of the ring.
+        joint: String,
+    },
+    /// A link that moves without mass.
+    #[error(
+        "link {link} moves with joint {joint} and has no mass, nor has anything that is fixed to it; give it an <inertial>"
+    )]
+    Massless {
+        /// The link.
+        link: String,
+        /// Its joint.
+        joint: String,
+    },
+    /// A joint without a drive.
+    #[error(
+        "joint {joint} of the URDF moves and has no [joint.{joint}]; describe its drive, or list it under `locked`"
+    )]
+    NoDrive {
+        /// The joint.
+        joint: String,
+    },
+    /// A drive without a joint.
+    #[error("joint {joint} is not in the URDF{}", near.as_ref().map_or(String::new(), |near| format!("; {near} is meant, perhaps")))]
+    Unknown {
+        /// The name.
+        joint: String,
+        /// A similar one.
+        near: Option<String>,
+    },
+    /// A drive of a joint that does not move.
+    #[error("joint {joint} has a drive, but {why}; remove one of the two")]
+    DoesNotMove {
+        /// The joint.
+        joint: String,
+        /// Why it does not move.
+        why: &'static str,
+    },
+    /// A number beyond its range.
+    #[error("joint {joint}: {key} is {value}, expected {expected}")]
+    Range {
+        /// The joint.
+        joint: String,
+        /// The key.
+        key: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it may be.
+        expected: &'static str,
+    },
+    /// Two files with two ratios.
+    #[error("joint {joint}: ratio is {ratio}, the URDF's mechanicalReduction {reduction}; make them agree")]
+    Ratio {
+        /// The joint.
+        joint: String,
+        /// Ratio of robot.toml.
+        ratio: f64,
+        /// Ratio of the URDF.
+        reduction: f64,
+    },
+    /// A coupling that is no square matrix, or singular.
+    #[error("coupling of {}: {reason}", joints.join(", "))]
+    Coupling {
+        /// Its joints.
+        joints: Vec<String>,
+        /// Why it cannot be used.
+        reason: String,
+    },
+    /// Nothing moves.
+    #[error("no joint moves; describe at least one drive")]
+    NothingMoves,
+}
+
+/// A robot.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Robot {
+    /// Name in the URDF.
+    pub name: String,
+    /// Joints and links; rotor inertias are not part of it.
+    pub tree: Tree,
+    /// Name of each joint's link.
+    pub links: Vec<String>,
+    /// Drive of each joint's motor.
+    pub drives: Vec<Drive>,
+    /// Motor velocities = coupling * joint velocities.
+    pub coupling: DMatrix<f64>,
+}
+
+impl Robot {
+    /// A robot from the texts of `robot.toml` and URDF, and the names by which errors call them.
+    ///
+    /// # Errors
+    /// The first defect, with file, joint and remedy.
+    pub fn new(toml: &str, toml_file: &str, urdf: &str, urdf_file: &str) -> Result<Self, RobotError> {
+        let description = describe(toml, toml_file)?;
+        let urdf = parse(urdf, urdf_file)?;
+        let in_toml = |defect| RobotError { file: toml_file.to_owned(), line: None, defect };
+        let in_urdf = |defect| RobotError { file: urdf_file.to_owned(), line: None, defect };
+        consistent(&description, &urdf).map_err(in_toml)?;
+        let (tree, links) = tree(&description, &urdf).map_err(|(in_drives, defect)| match in_drives {
+            true => in_toml(defect),
+            false => in_urdf(defect),
+        })?;
+        let drives: Vec<Drive> = tree.joints.iter().map(|joint| description.joint[&joint.name]).collect();
+        let coupling = coupling(&description, &tree, &drives).map_err(in_toml)?;
+        Ok(Self { name: urdf.name, tree, links, drives, coupling })
+    }
+
+    /// Joint torques per unit of each motor's effort: joint torques = this * efforts.
+    pub fn gains(&self) -> DMatrix<f64> {
+        let gains = DVector::from_iterator(self.drives.len(), self.drives.iter().map(|drive| drive.gain));
+        self.coupling.transpose() * DMatrix::from_diagonal(&gains)
+    }
+
+    /// Efforts of the motors from joint torques.
+    pub fn efforts(&self, torques: &[f64]) -> Vec<f64> {
+        let solved = self.gains().lu().solve(&DVector::from_row_slice(torques));
+        solved.map_or_else(|| vec![f64::NAN; torques.len()], |efforts| efforts.iter().copied().collect())
+    }
+
+    /// Inertia that the rotors add to the mass matrix, from their own inertias, kg m^2.
+    pub fn rotor_matrix(&self, rotors: &[f64]) -> DMatrix<f64> {
+        self.coupling.transpose() * DMatrix::from_diagonal(&DVector::from_row_slice(rotors)) * &self.coupling
+    }
+
+    /// Joint torques of a motion, rotors included.
+    pub fn inverse_dynamics(&self, q: &[f64], v: &[f64], a: &[f64], rotors: &[f64]) -> Vec<f64> {
+        let links = inverse_dynamics(&self.tree, q, v, a);
+        let rotors = self.rotor_matrix(rotors) * DVector::from_row_slice(a);
+        links.iter().zip(rotors.iter()).map(|(link, rotor)| link + rotor).collect()
+    }
+
+    /// Accelerations under joint torques, friction taken off. By articulated bodies where each rotor belongs to its
+    /// joint alone, else through the mass matrix. None where a joint would move without inertia.
+    pub fn forward_dynamics(&self, q: &[f64], v: &[f64], torque: &[f64], rotors: &[f64]) -> Option<Vec<f64>> {
+        let added = self.rotor_matrix(rotors);
+        let own = DMatrix::from_diagonal(&added.diagonal());
+        if (&added - own).norm() == 0.0 {
+            let mut tree = self.tree.clone();
+            for (joint, armature) in tree.joints.iter_mut().zip(added.diagonal().iter()) {
+                joint.armature += armature;
+            }
+            return forward_dynamics(&tree, q, v, torque);
+        }
+        let bias = inverse_dynamics(&self.tree, q, v, &vec![0.0; q.len()]);
+        let left = DVector::from_iterator(q.len(), torque.iter().zip(&bias).map(|(torque, bias)| torque - bias));
+        let solved = (mass_matrix(&self.tree, q) + added).cholesky()?.solve(&left);
+        Some(solved.iter().copied().collect())
+    }
+}
+
+/// The content of `robot.toml`; `file` is named in errors.
+///
+/// # Errors
+/// No TOML, unknown keys, or numbers beyond their range.
+pub fn describe(text: &str, file: &str) -> Result<RobotDescription, RobotError> {
+    let error = |defect| RobotError { file: file.to_owned(), line: None, defect };
+    let description: RobotDescription =
+        toml::from_str(text).map_err(|e| error(Defect::Toml { reason: e.to_string().trim_end().to_owned() }))?;
+    for (joint, drive) in &description.joint {
+        let not_zero = "a finite number other than 0";
+        let rotor = drive.rotor_inertia.unwrap_or_default();
+        for (key, value, fits, expected) in [
+            ("gain", drive.gain, drive.gain.is_finite() && drive.gain != 0.0, not_zero),
+            ("ratio", drive.ratio, drive.ratio.is_finite() && drive.ratio != 0.0, not_zero),
+            ("rotor_inertia", rotor, rotor.is_finite() && rotor >= 0.0, "a finite number, 0 or greater"),
+        ] {
+            if !fits {
+                return Err(error(Defect::Range { joint: joint.clone(), key, value, expected }));
+            }
+        }
+    }
+    if let Some(value) = description.gravity.into_iter().find(|component| !component.is_finite()) {
+        let joint = "base".to_owned();
+        return Err(error(Defect::Range { joint, key: "gravity", value, expected: "finite numbers" }));
+    }
+    Ok(description)
+}
+
+/// Names and ratios of both files agree.
+fn consistent(description: &RobotDescription, urdf: &Urdf) -> Result<(), Defect> {
+    let named = |name: &String| urdf.joints.iter().find(|joint| joint.name == *name);
+    let unknown = |name: &String| {
+        let similar = |joint: &&UrdfJoint| {
+            let (a, b) = (joint.name.to_lowercase(), name.to_lowercase());
+            a.contains(&b) || b.contains(&a) || a.chars().filter(|c| b.contains(*c)).count() + 1 >= a.len()
+        };
+        let near = urdf.joints.iter().filter(|joint| joint.allowed != Allowed::Fixed).find(similar);
+        Defect::Unknown { joint: name.clone(), near: near.map(|joint| joint.name.clone()) }
+    };
+    for (name, drive) in &description.joint {
+        let joint = named(name).ok_or_else(|| unknown(name))?;
+        if joint.allowed == Allowed::Fixed {
+            return Err(Defect::DoesNotMove { joint: name.clone(), why: "it is fixed in the URDF" });
+        }
+        if description.locked.contains(name) {
+            return Err(Defect::DoesNotMove { joint: name.clone(), why: "it is listed under `locked`" });
+        }
+        // A reduction of 1 is the value that generators write for none.
+        if let Some(reduction) =
+            joint.reduction.filter(|r| *r != 1.0 && (r.abs() - drive.ratio.abs()).abs() > 1e-6 * r.abs())
+        {
+            return Err(Defect::Ratio { joint: name.clone(), ratio: drive.ratio, reduction });
+        }
+    }
+    match description.locked.iter().find(|name| named(name).is_none()) {
+        Some(name) => Err(unknown(name)),
+        None => Ok(()),
+    }
+}
+
+/// Joints and links, parents first, with what is fixed to a link joined to it. An error with `true` belongs to
+/// robot.toml.
+fn tree(description: &RobotDescription, urdf: &Urdf) -> Result<(Tree, Vec<String>), (bool, Defect)> {
+    let in_urdf = |defect| (false, defect);
+    let exists = |name: &String| urdf.links.iter().any(|link| link.name == *name);
+    for joint in &urdf.joints {
+        if let Some(link) = [&joint.parent, &joint.child].into_iter().find(|link| !exists(link)) {
+            return Err(in_urdf(Defect::NoLink { joint: joint.name.clone(), link: link.clone() }));
+        }
+        let same = |other: &&UrdfJoint| other.child == joint.child && other.name != joint.name;
+        if let Some(other) = urdf.joints.iter().find(same) {
+            let (link, first, second) = (joint.child.clone(), joint.name.clone(), other.name.clone());
+            return Err(in_urdf(Defect::TwoParents { link, first, second }));
+        }
+    }
+    let is_child = |link: &String| urdf.joints.iter().any(|joint| joint.child == *link);
+    let roots: Vec<String> = urdf.links.iter().map(|link| link.name.clone()).filter(|link| !is_child(link)).collect();
+    match &roots[..] {
+        [] => {
+            let joint = urdf.joints.first().map_or(String::new(), |joint| joint.name.clone());
+            return Err(in_urdf(Defect::Ring { joint }));
+        }
+        [_] => {}
+        _ => return Err(in_urdf(Defect::Roots { roots })),
+    }
+    let mut walk = Walk { description, urdf, joints: vec![], links: vec![], reached: vec![] };
+    walk.behind(&roots[0], None, Placement::identity())?;
+    if let Some(joint) = urdf.joints.iter().find(|joint| !walk.reached.contains(&joint.name)) {
+        return Err(in_urdf(Defect::Ring { joint: joint.name.clone() }));
+    }
+    if walk.joints.is_empty() {
+        return Err((true, Defect::NothingMoves));
+    }
+    for (joint, link) in walk.joints.iter().zip(&walk.links) {
+        if joint.link.mass == 0.0 {
+            return Err(in_urdf(Defect::Massless { link: link.clone(), joint: joint.name.clone() }));
+        }
+    }
+    Ok((Tree { joints: walk.joints, gravity: Vector3::from(description.gravity) }, walk.links))
+}
+
+struct Walk<'a> {
+    description: &'a RobotDescription,
+    urdf: &'a Urdf,
+    joints: Vec<Joint>,
+    links: Vec<String>,
+    reached: Vec<String>,
+}
+
+impl Walk<'_> {
+    /// Adds a link, which `placement` places in the link of the moving joint `carrier`, and all behind it.
+    fn behind(&mut self, link: &str, carrier: Option<usize>, placement: Placement) -> Result<(), (bool, Defect)> {
+        let own = self.urdf.links.iter().find(|own| own.name == link).and_then(|own| own.inertia);
+        if let (Some(carrier), Some(own)) = (carrier, own) {
+            let joint = &mut self.joints[carrier];
+            joint.link = joint.link.joined(&own.in_parent(&placement));
+        }
+        for joint in self.urdf.joints.iter().filter(|joint| joint.parent == link) {
+            self.reached.push(joint.name.clone());
+            let frame = placement.then(&joint.placement);
+            let kind = match joint.allowed {
+                Allowed::Rotation => JointKind::Revolute,
+                Allowed::Translation => JointKind::Prismatic,
+                Allowed::Fixed => {
+                    self.behind(&joint.child, carrier, frame)?;
+                    continue;
+                }
+            };
+            if self.description.locked.contains(&joint.name) {
+                self.behind(&joint.child, carrier, frame)?;
+                continue;
+            }
+            if !self.description.joint.contains_key(&joint.name) {
+                return Err((true, Defect::NoDrive { joint: joint.name.clone() }));
+            }
+            self.joints.push(Joint {
+                name: joint.name.clone(),
+                parent: carrier,
+                placement: frame,
+                kind,
+                axis: joint.axis,
+                link: LinkInertia::zero(),
+                armature: 0.0,
+            });
+            self.links.push(joint.child.clone());
+            self.behind(&joint.child, Some(self.joints.len() - 1), Placement::identity())?;
+        }
+        Ok(())
+    }
+}
+
+/// The matrix from joint to motor velocities.
+fn coupling(description: &RobotDescription, tree: &Tree, drives: &[Drive]) -> Result<DMatrix<f64>, Defect> {
+    let mut matrix = DMatrix::from_diagonal(&DVector::from_iterator(drives.len(), drives.iter().map(|d| d.ratio)));
+    let Some(coupled) = &description.coupling else { return Ok(matrix) };
+    let n = coupled.joints.len();
+    let wrong = |reason: &str| Defect::Coupling { joints: coupled.joints.clone(), reason: reason.to_owned() };
+    if coupled.matrix.len() != n || coupled.matrix.iter().any(|row| row.len() != n) {
+        return Err(wrong(&format!("matrix is not {n} x {n}; it has a row per motor and a column per joint")));
+    }
+    let place = |name: &String| tree.joints.iter().position(|joint| joint.name == *name);
+    let mut places = Vec::new();
+    for name in &coupled.joints {
+        let at = place(name).ok_or_else(|| Defect::Unknown { joint: name.clone(), near: None })?;
+        if drives[at].ratio != 1.0 {
+            return Err(wrong(&format!("{name} has a ratio of {} as well; leave it out", drives[at].ratio)));
+        }
+        places.push(at);
+    }
+    for (row, &i) in coupled.matrix.iter().zip(&places) {
+        for (value, &j) in row.iter().zip(&places) {
+            matrix[(i, j)] = *value;
+        }
+    }
+    let part = DMatrix::from_fn(n, n, |i, j| coupled.matrix[i][j]);
+    let largest = part.amax();
+    if !largest.is_finite() || part.svd(false, false).singular_values.min() <= 1e-9 * largest {
+        return Err(wrong("matrix is singular: the motors could not hold every motion of the joints; correct it"));
+    }
+    Ok(matrix)
+}

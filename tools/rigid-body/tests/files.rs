@@ -1,0 +1,161 @@
+//! Bad files: each error names file, joint or link, and what to do.
+
+use rigid_body::{LinkInertia, Robot};
+
+const LINK: &str = r#"<inertial><origin xyz="0 0 0.1"/><mass value="2"/>
+    <inertia ixx="0.02" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.01"/></inertial>"#;
+
+fn urdf() -> String {
+    format!(
+        r#"<robot name="two">
+<link name="base"/>
+<joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/></joint>
+<link name="upper">{LINK}</link>
+<joint name="elbow" type="continuous"><parent link="upper"/><child link="lower"/><origin xyz="0 0 0.4" rpy="0 0 0"/><axis xyz="0 1 0"/></joint>
+<link name="lower">{LINK}</link>
+<joint name="flange" type="fixed"><parent link="lower"/><child link="tool"/><origin xyz="0 0 0.3"/></joint>
+<link name="tool">{LINK}</link>
+</robot>"#
+    )
+}
+
+const TOML: &str =
+    "urdf = 'two.urdf'\n[joint.shoulder]\ngain = 2.0\n[joint.elbow]\nratio = 50.0\nrotor_inertia = 1e-4\n";
+
+fn robot(toml: &str, urdf: &str) -> Result<Robot, String> {
+    Robot::new(toml, "robot.toml", urdf, "two.urdf").map_err(|error| error.to_string())
+}
+
+#[test]
+fn a_robot_is_read_and_what_is_fixed_to_a_link_is_part_of_it() {
+    let robot = robot(TOML, &urdf()).unwrap();
+    let names: Vec<_> = robot.tree.joints.iter().map(|joint| joint.name.as_str()).collect();
+    assert_eq!(names, ["shoulder", "elbow"]);
+    let forearm = robot.tree.joints[1].link;
+    assert_eq!(forearm.mass, 4.0);
+    assert!((forearm.centre().z - 0.25).abs() < 1e-12);
+    assert_eq!((robot.gains()[(0, 0)], robot.gains()[(1, 1)]), (2.0, 50.0));
+    assert_eq!(robot.rotor_matrix(&[0.0, 1e-4])[(1, 1)], 0.25);
+}
+
+#[test]
+fn each_defect_names_its_file_its_joint_and_a_remedy() {
+    let good = urdf();
+    let with = |from: &str, to: &str| (TOML.to_owned(), good.replacen(from, to, 1));
+    let toml = |text: &str| (text.to_owned(), good.clone());
+    let coupled = |rest: &str| (format!("{}[coupling]\n{rest}", TOML.replace("ratio = 50.0\n", "")), good.clone());
+    let cases = [
+        (with("</robot>", ""), "two.urdf", "no URDF"),
+        (with("mass value=\"2\"", "mass value=\"$(arg m)\""), "two.urdf:", "xacro"),
+        (with("<child link=\"lower\"/>", "<child link=\"lowre\"/>"), "two.urdf", "joint elbow: there is no link lowre"),
+        (
+            with("<link name=\"base\"/>", "<link name=\"base\"/><link name=\"x\"/>"),
+            "two.urdf",
+            "base, x are no child of any joint",
+        ),
+        (with("<parent link=\"base\"/>", "<parent link=\"lower\"/>"), "two.urdf", "joint shoulder is part of a ring"),
+        (
+            with("</robot>", "<joint name='j' type='fixed'><parent link='base'/><child link='tool'/></joint></robot>"),
+            "two.urdf",
+            "link tool is the child of joint flange and of joint j",
+        ),
+        (
+            with("<link name=\"tool\">", "<link name=\"upper\"></link><link name=\"tool\">"),
+            "two.urdf",
+            "link upper is there twice",
+        ),
+        (with(LINK, ""), "two.urdf", "link upper moves with joint shoulder and has no mass"),
+        (
+            with("izz=\"0.01\"", "izz=\"0.05\""),
+            "two.urdf:",
+            "link upper: no body has a mass of 2 kg with principal inertias",
+        ),
+        (with("mass value=\"2\"", "mass value=\"-2\""), "two.urdf:", "link upper"),
+        (with("iyz=\"0\"", ""), "two.urdf:", "upper has no inertial/inertia iyz"),
+        (with("continuous", "planar"), "two.urdf:", "joint elbow is of type \"planar\""),
+        (with("<axis xyz=\"0 1 0\"/></joint>", "<axis xyz=\"0 0 0\"/></joint>"), "two.urdf:", "shoulder has no axis"),
+        (
+            with(
+                "</robot>",
+                "<transmission name='t'><joint name='elbow'/><actuator name='m'><mechanicalReduction>100</mechanicalReduction></actuator></transmission></robot>",
+            ),
+            "robot.toml",
+            "joint elbow: ratio is 50, the URDF's mechanicalReduction 100",
+        ),
+        (
+            toml("urdf = 'two.urdf'\n[joint.shoulder]\n"),
+            "robot.toml",
+            "joint elbow of the URDF moves and has no [joint.elbow]",
+        ),
+        (
+            toml(&format!("{TOML}[joint.elbo]\n")),
+            "robot.toml",
+            "joint elbo is not in the URDF; elbow is meant, perhaps",
+        ),
+        (
+            toml(&format!("{TOML}[joint.flange]\n")),
+            "robot.toml",
+            "joint flange has a drive, but it is fixed in the URDF",
+        ),
+        (
+            toml(&format!("locked = ['elbow']\n{TOML}")),
+            "robot.toml",
+            "joint elbow has a drive, but it is listed under `locked`",
+        ),
+        (
+            toml(&TOML.replace("50.0", "0.0")),
+            "robot.toml",
+            "joint elbow: ratio is 0, expected a finite number other than 0",
+        ),
+        (toml(&TOML.replace("ratio", "ration")), "robot.toml", "ration"),
+        (coupled("joints = ['shoulder', 'elbow']\nmatrix = [[1.0, 1.0]]"), "robot.toml", "matrix is not 2 x 2"),
+        (
+            coupled("joints = ['shoulder', 'elbow']\nmatrix = [[1.0, 1.0], [2.0, 2.0]]"),
+            "robot.toml",
+            "matrix is singular",
+        ),
+        (coupled("joints = ['wrist']\nmatrix = [[1.0]]"), "robot.toml", "joint wrist is not in the URDF"),
+    ];
+    for ((toml, urdf), file, text) in cases {
+        let error = robot(&toml, &urdf).expect_err(text);
+        assert!(error.starts_with(file) && error.contains(text), "{error:?}, expected {file}: {text}");
+    }
+}
+
+#[test]
+fn a_differential_shares_torques_and_rotors_and_its_forward_dynamics_is_the_inverse() {
+    let text = format!(
+        "{}[coupling]\njoints = ['shoulder', 'elbow']\nmatrix = [[30.0, 30.0], [30.0, -30.0]]\n",
+        TOML.replace("ratio = 50.0\n", "")
+    );
+    let robot = robot(&text, &urdf()).unwrap();
+    assert_eq!(robot.gains()[(0, 0)], 60.0);
+    assert_eq!(robot.gains()[(1, 1)], -30.0);
+    let (q, v, a, rotors) = ([0.3, -0.7], [1.0, 0.5], [2.0, -3.0], [1e-4, 3e-4]);
+    let torque = robot.inverse_dynamics(&q, &v, &a, &rotors);
+    let found = robot.forward_dynamics(&q, &v, &torque, &rotors).unwrap();
+    assert!(found.iter().zip(a).all(|(found, a)| (found - a).abs() < 1e-9), "{found:?}");
+    let efforts = robot.efforts(&torque);
+    let back = robot.gains() * nalgebra::DVector::from_vec(efforts);
+    assert!(back.iter().zip(&torque).all(|(back, torque)| (back - torque).abs() < 1e-9));
+}
+
+#[test]
+fn identified_values_are_written_into_the_urdf_and_read_back_and_the_rest_stays() {
+    use rigid_body::urdf::{LinkValues, with_values};
+    let before = robot(TOML, &urdf()).unwrap();
+    let values = |j: usize| LinkValues {
+        joint: before.tree.joints[j].name.clone(),
+        link: before.links[j].clone(),
+        inertia: LinkInertia::from_centre(3.0, nalgebra::Vector3::new(0.0, 0.1, 0.2), nalgebra::Matrix3::identity()),
+        damping: 0.5,
+        friction: 1.5,
+    };
+    let text = with_values(&urdf(), "two.urdf", &[values(0), values(1)]).unwrap();
+    assert!(text.contains("<link name=\"tool\"></link>") && text.contains("damping=\"5e-1\" friction=\"1.5e0\""));
+    let after = robot(TOML, &text).unwrap();
+    for joint in &after.tree.joints {
+        assert!(joint.link.parameters().iter().zip(values(0).inertia.parameters()).all(|(a, b)| (a - b).abs() < 1e-12));
+    }
+    assert_eq!(after.tree.joints[1].placement, before.tree.joints[1].placement);
+}
