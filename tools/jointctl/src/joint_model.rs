@@ -91,6 +91,7 @@ pub fn rigid_state(samples: &Samples, index: usize) -> RigidState {
         mass: extra("mass"),
         length: extra("length"),
         lagged: LAGS.map(|lag| samples.acceleration[samples.shifted(index, -lag)] - now),
+        given: extra("rigid"),
     }
 }
 

@@ -42,6 +42,8 @@ pub struct RigidModel {
     pub mass_and_length: bool,
     /// How many of [`LAGS`] have a regressor; not without inertia.
     pub lags: usize,
+    /// A rigid part that is computed elsewhere (a robot's); needs the column `rigid` of the samples.
+    pub given: bool,
 }
 
 /// One regressor of the rigid part.
@@ -61,11 +63,13 @@ pub enum RigidRegressor {
     LoadGravityCosine,
     /// a at one of [`LAGS`], by its number, less a of now.
     LaggedAcceleration(usize),
+    /// The rigid part that is computed elsewhere.
+    Given,
 }
 
 impl RigidRegressor {
     /// All regressors, in the order of their index.
-    pub const ALL: [Self; 6 + LAGS.len()] = [
+    pub const ALL: [Self; 7 + LAGS.len()] = [
         Self::Inertia,
         Self::GravitySine,
         Self::GravityCosine,
@@ -80,6 +84,7 @@ impl RigidRegressor {
         Self::LaggedAcceleration(5),
         Self::LaggedAcceleration(6),
         Self::LaggedAcceleration(7),
+        Self::Given,
     ];
 
     /// Position in [`ALL`](Self::ALL).
@@ -93,12 +98,13 @@ impl RigidRegressor {
             Self::LoadGravitySine => 4,
             Self::LoadGravityCosine => 5,
             Self::LaggedAcceleration(lag) => 6 + lag,
+            Self::Given => 6 + LAGS.len(),
         }
     }
 
     /// True for those that gravity has.
     pub const fn is_gravity(self) -> bool {
-        !matches!(self, Self::Inertia | Self::LoadInertia | Self::LaggedAcceleration(_))
+        !matches!(self, Self::Inertia | Self::LoadInertia | Self::LaggedAcceleration(_) | Self::Given)
     }
 
     /// Symbol of its coefficient.
@@ -111,6 +117,7 @@ impl RigidRegressor {
             Self::LoadGravitySine => "g_s,ml",
             Self::LoadGravityCosine => "g_c,ml",
             Self::LaggedAcceleration(lag) => return format!("I_{:+.0}", -1e3 * LAGS[lag]),
+            Self::Given => "g",
         };
         text.to_owned()
     }
@@ -123,6 +130,7 @@ impl RigidRegressor {
             Self::GravitySine | Self::GravityCosine => effort.clone(),
             Self::LoadInertia => format!("{effort} s^2/(kg m^2 {position})"),
             Self::LoadGravitySine | Self::LoadGravityCosine => format!("{effort}/(kg m)"),
+            Self::Given => "-".to_owned(),
         }
     }
 }
@@ -136,6 +144,7 @@ impl fmt::Display for RigidRegressor {
                 return write!(f, "acceleration {time:.0} ms {side}");
             }
             Self::Inertia => "inertia",
+            Self::Given => "factor of the given rigid part",
             Self::GravitySine => "gravity, sine of position",
             Self::GravityCosine => "gravity, cosine of position",
             Self::LoadInertia => "inertia per m l^2",
@@ -159,6 +168,7 @@ impl RigidModel {
                 RigidRegressor::LoadGravitySine => sine && self.mass_and_length,
                 RigidRegressor::LoadGravityCosine => cosine && self.mass_and_length,
                 RigidRegressor::LaggedAcceleration(lag) => self.inertia && *lag < self.lags,
+                RigidRegressor::Given => self.given,
             })
             .collect()
     }
@@ -177,6 +187,8 @@ pub struct RigidState {
     pub length: f64,
     /// Acceleration at each of [`LAGS`] less that of now, rad/s^2 or m/s^2; 0 where it is not known.
     pub lagged: [f64; LAGS.len()],
+    /// Rigid part that is computed elsewhere, in the unit of the effort; 0 where there is none.
+    pub given: f64,
 }
 
 /// Coefficients of the rigid part; those that the model does not have are 0.
@@ -197,6 +209,9 @@ pub struct RigidParameters {
     /// Coefficients of the acceleration at each of [`LAGS`] less that of now.
     #[serde(default)]
     pub lagged: [f64; LAGS.len()],
+    /// Factor of the rigid part that is computed elsewhere.
+    #[serde(default)]
+    pub given: f64,
 }
 
 impl RigidParameters {
@@ -214,7 +229,8 @@ impl RigidParameters {
         let mut values = [0.0; RigidRegressor::ALL.len()];
         let (rigid, lagged) = values.split_at_mut(6);
         rigid.copy_from_slice(&[a, sine, cosine, moment * state.length * a, moment * sine, moment * cosine]);
-        lagged.copy_from_slice(&state.lagged);
+        lagged[..LAGS.len()].copy_from_slice(&state.lagged);
+        lagged[LAGS.len()] = state.given;
         values
     }
 
@@ -234,6 +250,7 @@ impl RigidParameters {
             RigidRegressor::LoadGravitySine => &mut self.load_gravity_sine,
             RigidRegressor::LoadGravityCosine => &mut self.load_gravity_cosine,
             RigidRegressor::LaggedAcceleration(lag) => &mut self.lagged[lag],
+            RigidRegressor::Given => &mut self.given,
         }
     }
 }
@@ -244,7 +261,8 @@ mod tests {
 
     #[test]
     fn a_pendulum_with_known_load_has_a_constant_and_a_proportional_part() {
-        let model = RigidModel { inertia: true, gravity: Gravity::Sine, mass_and_length: true, lags: 0 };
+        let model =
+            RigidModel { inertia: true, gravity: Gravity::Sine, mass_and_length: true, ..RigidModel::default() };
         use RigidRegressor::*;
         assert_eq!(model.regressors(), [Inertia, GravitySine, LoadInertia, LoadGravitySine]);
         assert!(RigidModel::default().regressors().is_empty());
@@ -264,7 +282,14 @@ mod tests {
 
     #[test]
     fn regressors_stand_at_their_index_and_are_the_derivatives_of_the_effort() {
-        let state = RigidState { position: 0.4, acceleration: 2.0, mass: 1.5, length: 0.3, lagged: [0.1; LAGS.len()] };
+        let state = RigidState {
+            position: 0.4,
+            acceleration: 2.0,
+            mass: 1.5,
+            length: 0.3,
+            lagged: [0.1; LAGS.len()],
+            given: 0.7,
+        };
         for (place, regressor) in RigidRegressor::ALL.into_iter().enumerate() {
             assert_eq!(regressor.index(), place);
             let mut one = RigidParameters::default();

@@ -100,6 +100,7 @@ fn key(regressor: RigidRegressor) -> String {
         RigidRegressor::LoadInertia => "load_inertia",
         RigidRegressor::LoadGravitySine => "load_gravity_sine",
         RigidRegressor::LoadGravityCosine => "load_gravity_cosine",
+        RigidRegressor::Given => "given",
         RigidRegressor::LaggedAcceleration(lag) => return format!("lagged_acceleration_{lag}"),
     };
     key.to_owned()

@@ -249,6 +249,9 @@ pub struct RigidDescription {
     pub back_emf: bool,
     /// A constant effort.
     pub offset: bool,
+    /// A rigid part that is computed elsewhere; no key of the file, but set by `robot::fit`.
+    #[serde(skip)]
+    pub given: bool,
 }
 
 impl Default for RigidDescription {
@@ -259,6 +262,7 @@ impl Default for RigidDescription {
             mass_and_length: false,
             back_emf: false,
             offset: true,
+            given: false,
         }
     }
 }

@@ -23,7 +23,9 @@ mod warning;
 pub use description::{Description, EffortUnit, Gravity, PositionUnit, RigidDescription};
 pub use error::DatasetError;
 pub use lag::Lag;
-pub use prepare::{MINIMUM_SAMPLES, Note, Prepared, Recording, SIGNAL_LIMIT, prepare, prepare_as, prepare_with};
+pub use prepare::{
+    MINIMUM_SAMPLES, Note, Prepared, Recording, SIGNAL_LIMIT, prepare, prepare_as, prepare_text, prepare_with,
+};
 pub use validate::parse;
 pub use warning::Warning;
 

@@ -114,9 +114,19 @@ fn prepare_changed(
 ) -> Result<Prepared, DatasetError> {
     let text =
         std::fs::read_to_string(path).map_err(|source| DatasetError::Unreadable { file: path.to_owned(), source })?;
-    let mut description = validate::parse(&text, path)?;
+    prepare_text(&text, path, environment, change)
+}
+
+/// As [`prepare_with`], from a description's text; what it names is relative to `path`.
+pub fn prepare_text(
+    text: &str,
+    path: &Path,
+    environment: Environment,
+    change: impl FnOnce(&mut Description),
+) -> Result<Prepared, DatasetError> {
+    let mut description = validate::parse(text, path)?;
     change(&mut description);
-    let recordings = Recordings::load(&description, path, &text, environment)?;
+    let recordings = Recordings::load(&description, path, text, environment)?;
     let layout = Layout::of(&description, uses_velocity_column(&description));
     let extracted = extract(&recordings, &description, layout)?;
     let (treated, repairs) = motions(&recordings, &extracted, &description, layout)?;

@@ -183,7 +183,7 @@ pub fn fit(prepared: &mut Prepared, options: &Options, progress: &dyn Progress) 
     let physical = &identified[chosen];
     let states = firmware_states(samples)?;
 
-    let static_load = rigid_model.gravity != Gravity::None;
+    let static_load = rigid_model.gravity != Gravity::None || rigid_model.given;
     let inputs = options.inputs.unwrap_or_else(|| learn::inputs(samples, static_load));
     let thresholds = &prepared.thresholds;
     let reference = simplest(&identified).fold_errors();
@@ -342,6 +342,7 @@ pub fn rigid_model(description: &RigidDescription) -> RigidModel {
         },
         mass_and_length: description.mass_and_length,
         lags: 0,
+        given: description.given,
     }
 }
 

@@ -68,6 +68,9 @@ pub fn check(samples: &Samples, rigid: &RigidModel) -> Result<(), IdentifyError>
             columns.push((name, column));
         }
     }
+    if rigid.given {
+        columns.push(("rigid", samples.extra.get("rigid").ok_or(IdentifyError::MissingColumn { column: "rigid" })?));
+    }
     for (column, values) in columns {
         if values.len() != expected {
             return Err(IdentifyError::Length { column, found: values.len(), expected });

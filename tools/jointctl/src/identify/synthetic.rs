@@ -13,7 +13,7 @@ use rand_distr::{Distribution, Normal};
 
 /// Inertia, and gravity of unknown direction.
 pub const RIGID: RigidModel =
-    RigidModel { inertia: true, gravity: Gravity::SineAndCosine, mass_and_length: false, lags: 0 };
+    RigidModel { inertia: true, gravity: Gravity::SineAndCosine, mass_and_length: false, lags: 0, given: false };
 
 /// The rigid part that belongs to it.
 pub fn rigid() -> RigidParameters {

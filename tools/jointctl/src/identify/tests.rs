@@ -207,7 +207,7 @@ fn a_known_load_splits_inertia_and_gravity() {
     samples.extra.insert("length".into(), column([0.20, 0.15, 0.10]));
     let truth = RigidParameters { inertia: 0.02, load_inertia: 1.0, load_gravity_sine: 9.81, ..Default::default() };
     drive(&mut samples, &truth, &friction(Terms::of(&[Term::Viscous, Term::Coulomb])), 0.01, 9);
-    let model = RigidModel { inertia: true, gravity: Gravity::Sine, mass_and_length: true, lags: 0 };
+    let model = RigidModel { gravity: Gravity::Sine, mass_and_length: true, ..RIGID };
     let found = identify(&mut samples, &model, Preset::Nscf, &Options::default()).unwrap();
     for (symbol, value) in [("I", 0.02), ("g_s", 0.0), ("I_ml2", 1.0), ("g_s,ml", 9.81)] {
         let e = of(&found, symbol);
