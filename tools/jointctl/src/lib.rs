@@ -6,7 +6,7 @@
 //!
 //! Beside it, [`simulation`] closes the firmware's control step over a simulated actuator, [`joint_text`] is a joint's configuration
 //! as a file, and [`excite`] finds motions that identify a joint. [`remote`] is a joint over a bus,
-//! [`describe`] tells other people's tools of it.
+//! [`describe`] tells other people's tools of it. [`robot`] identifies all joints of an arm at once and hands each to this pipeline.
 
 pub mod augment;
 pub mod certificate_search;
@@ -41,6 +41,7 @@ pub mod quantize;
 pub mod remote;
 pub mod report;
 pub mod rigid;
+pub mod robot;
 pub mod sample_table;
 pub mod samples;
 pub mod simulation;

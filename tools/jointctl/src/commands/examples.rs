@@ -4,10 +4,14 @@ use clap::Command;
 
 /// What a command is called below `jointctl`, and lines as one types them. `JOINTCTL_BUS` and `JOINTCTL_NODE` stand for `--bus` and
 /// `--node`.
-const EXAMPLES: [(&str, &[&str]); 35] = [
+const EXAMPLES: [(&str, &[&str]); 36] = [
     ("demo", &["jointctl demo", "jointctl demo --seed 7 --out demo-7"]),
     ("fit", &["jointctl fit elbow.toml", "jointctl fit elbow.toml --all"]),
     ("evaluate", &["jointctl evaluate elbow/friction.img other.toml"]),
+    (
+        "robot fit",
+        &["jointctl robot fit recording.toml", "jointctl robot fit recording.toml --network never --out arm"],
+    ),
     ("image inspect", &["jointctl image inspect elbow/friction.img"]),
     ("image verify", &["jointctl image verify elbow/friction.signed --key joint.key"]),
     ("image convert", &["jointctl image convert elbow/friction.img friction.toml"]),

@@ -21,6 +21,7 @@ pub mod objects;
 pub mod record;
 pub mod remote;
 pub mod retrain;
+pub mod robot;
 pub mod sim;
 pub mod upload;
 
@@ -45,6 +46,9 @@ pub enum Command {
     Fit(fit::Fit),
     /// Judge an image on a recorded joint
     Evaluate(evaluate::Evaluate),
+    /// Identify all joints of a robot from one recording of all of them
+    #[command(subcommand)]
+    Robot(robot::RobotCommand),
     /// Inspect, verify or convert a parameter image
     #[command(subcommand)]
     Image(image::ImageCommand),
@@ -116,6 +120,9 @@ pub enum CommandError {
     /// The fit.
     #[error(transparent)]
     Fit(#[from] crate::fit::FitError),
+    /// A robot.
+    #[error(transparent)]
+    Robot(#[from] crate::robot::RobotFitError),
     /// Writing of results.
     #[error(transparent)]
     Output(#[from] crate::output::OutputError),
@@ -217,6 +224,7 @@ pub fn run(arguments: Arguments) -> Result<(), CommandError> {
         Command::Demo(demo) => demo.run(),
         Command::Fit(fit) => fit.run(),
         Command::Evaluate(evaluate) => evaluate.run(),
+        Command::Robot(robot) => robot.run(),
         Command::Image(image) => image.run(),
         Command::Key(key) => key.run(),
         Command::Sign(sign) => sign.run(),

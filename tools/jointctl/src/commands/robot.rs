@@ -1,0 +1,74 @@
+//! `jointctl robot`: all joints of a robot from one recording of all of them.
+
+use super::CommandError;
+use super::fit::{Choices, print_warnings};
+use crate::progress::{Progress, Terminal};
+use crate::robot::{FittedRobot, Options, files, fit, record};
+use clap::{Args, Subcommand};
+use std::path::PathBuf;
+
+/// What to do with a robot.
+#[derive(Debug, Subcommand)]
+pub enum RobotCommand {
+    /// Identify rigid bodies and the friction image of every joint from one recording
+    Fit(Box<RobotFit>),
+}
+
+/// Arguments of `robot fit`.
+#[derive(Debug, Args)]
+pub struct RobotFit {
+    /// Description of the recording, which names the robot (docs/robot.md)
+    recording: PathBuf,
+    /// Folder for images, URDF, parameters and reports; files of the same names are replaced, others are left alone
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Use only the first seconds of the samples for training and validation
+    #[arg(long, value_name = "S")]
+    seconds: Option<f64>,
+    /// Choices of each joint's fit.
+    #[command(flatten)]
+    choices: Choices,
+    /// Print errors and parameters as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+impl RobotCommand {
+    /// Runs the command.
+    pub fn run(&self) -> Result<(), CommandError> {
+        let Self::Fit(fit) = self;
+        fit.run()
+    }
+}
+
+impl RobotFit {
+    fn run(&self) -> Result<(), CommandError> {
+        let progress = Terminal::new();
+        progress.stage("load and clean");
+        let mut recording = record(&self.recording, &|name| std::env::var(name).ok())?;
+        let options = Options { joint: self.choices.options()?, seconds: self.seconds };
+        let fitted = fit(&mut recording, &options, &progress)?;
+        progress.finish();
+        for (joint, prepared) in recording.robot.tree.joints.iter().zip(&recording.joints) {
+            if !prepared.warnings.is_empty() {
+                eprintln!("{}:", joint.name);
+                print_warnings(&prepared.warnings);
+            }
+        }
+        let out = self.out.clone().unwrap_or_else(|| PathBuf::from(self.recording.file_stem().unwrap_or_default()));
+        files::write(&out, &recording, &fitted)?;
+        match self.json {
+            true => println!("{}", files::summary(&recording, &fitted)),
+            false => print(&fitted, &out),
+        }
+        Ok(())
+    }
+}
+
+fn print(fitted: &FittedRobot, out: &std::path::Path) {
+    for note in &fitted.bodies.notes {
+        println!("{note}");
+    }
+    println!("{}", files::table(fitted));
+    println!("written to {}", out.display());
+}

@@ -1,0 +1,231 @@
+//! Efforts of all joints as linear functions of one vector: inertial parameters (ten per link), rotor inertias,
+//! friction; host.
+//!
+//! The effort of motor m is [1/k C^-T (Y phi) + (C a) J / k + friction]_m, with the coupling C, gains k and rotor
+//! inertias J of the robot: see the crate `rigid-body`. Rotor inertias that the robot's file states are taken off the
+//! effort instead.
+
+use super::friction_columns::Friction;
+use super::recording::Recording;
+use crate::samples::Part;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+use rigid_body::Robot;
+use rigid_body::inertia::PARAMETERS;
+use rigid_body::regressor::regressor;
+
+/// Groups of samples that are left out in turn.
+pub const GROUPS: usize = 4;
+
+/// The places of the unknowns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Layout {
+    /// Joints.
+    pub joints: usize,
+    /// Friction columns of each joint.
+    pub friction: Friction,
+}
+
+impl Layout {
+    /// Number of inertial parameters.
+    pub const fn inertial(self) -> usize {
+        PARAMETERS * self.joints
+    }
+
+    /// Number of unknowns of the rigid bodies: inertial parameters and rotor inertias.
+    pub const fn rigid(self) -> usize {
+        self.inertial() + self.joints
+    }
+
+    /// Number of all unknowns.
+    pub const fn unknowns(self) -> usize {
+        self.rigid() + self.joints * self.friction.width()
+    }
+}
+
+/// Rigid-body columns of all joints at one state, in units of effort: joints x unknowns of the rigid bodies.
+pub fn rigid_columns(robot: &Robot, q: &[f64], v: &[f64], a: &[f64]) -> DMatrix<f64> {
+    let n = q.len();
+    let links = regressor(&robot.tree, q, v, a);
+    let mut columns = DMatrix::zeros(n, PARAMETERS * n + n);
+    let to_efforts = robot.gains().try_inverse().unwrap_or_else(|| DMatrix::identity(n, n));
+    columns.columns_mut(0, PARAMETERS * n).copy_from(&(&to_efforts * links));
+    let motors = &robot.coupling * DVector::from_row_slice(a);
+    let rotors = &to_efforts * robot.coupling.transpose() * DMatrix::from_diagonal(&motors);
+    columns.columns_mut(PARAMETERS * n, n).copy_from(&rotors);
+    columns
+}
+
+/// All samples of all joints.
+#[derive(Clone, Debug)]
+pub struct Rows {
+    /// Places of the unknowns.
+    pub layout: Layout,
+    /// Rigid-body columns of every sample.
+    pub rigid: Vec<DMatrix<f64>>,
+    /// Friction columns of every joint, sample by sample.
+    pub friction: Vec<Vec<f64>>,
+    /// Efforts of every joint less those of rotors that are known.
+    pub effort: Vec<Vec<f64>>,
+    /// Group of each sample for training and validation; None: not used.
+    pub group: Vec<Option<usize>>,
+}
+
+impl Rows {
+    /// The rows of a recording. `load` has the theoretical effort of each joint, where it is known already.
+    pub fn of(recording: &Recording, friction: Friction, load: Option<&[Vec<f64>]>) -> Self {
+        let robot = &recording.robot;
+        let layout = Layout { joints: robot.tree.len(), friction };
+        let rigid: Vec<DMatrix<f64>> = (0..recording.len())
+            .into_par_iter()
+            .map(|i| {
+                let [q, v, a] = recording.state(i);
+                rigid_columns(robot, &q, &v, &a)
+            })
+            .collect();
+        Self::with(recording, layout, rigid, load)
+    }
+
+    /// The same samples with other friction columns.
+    pub fn again(self, recording: &Recording, friction: Friction, load: Option<&[Vec<f64>]>) -> Self {
+        Self::with(recording, Layout { friction, ..self.layout }, self.rigid, load)
+    }
+
+    fn with(recording: &Recording, layout: Layout, mut rigid: Vec<DMatrix<f64>>, load: Option<&[Vec<f64>]>) -> Self {
+        let mut effort: Vec<Vec<f64>> = recording.joints.iter().map(|joint| joint.samples.effort.clone()).collect();
+        for (k, drive) in recording.robot.drives.iter().enumerate() {
+            let column = layout.inertial() + k;
+            let Some(inertia) = drive.rotor_inertia else { continue };
+            for (i, columns) in rigid.iter().enumerate() {
+                effort.iter_mut().enumerate().for_each(|(j, effort)| effort[i] -= inertia * columns[(j, column)]);
+            }
+        }
+        // Known: its column must not be there a second time.
+        for (k, _) in recording.robot.drives.iter().enumerate().filter(|(_, drive)| drive.rotor_inertia.is_some()) {
+            rigid.iter_mut().for_each(|columns| columns.column_mut(layout.inertial() + k).fill(0.0));
+        }
+        let joints = recording.joints.iter().enumerate();
+        let friction =
+            joints.map(|(j, one)| layout.friction.columns(&one.samples, load.map(|load| &load[j][..]))).collect();
+        Self { layout, rigid, friction, effort, group: groups(recording) }
+    }
+
+    /// The values of all unknowns' columns that joint `j` has at a sample.
+    pub fn row(&self, j: usize, sample: usize) -> DVector<f64> {
+        let Layout { joints, friction } = self.layout;
+        let (rigid, width) = (self.layout.rigid(), friction.width());
+        let mut row = DVector::zeros(self.layout.unknowns());
+        row.rows_mut(0, rigid).copy_from(&self.rigid[sample].row(j).transpose());
+        let own = &self.friction[j][width * sample..width * (sample + 1)];
+        row.rows_mut(rigid + width * j, width).copy_from_slice(own);
+        debug_assert!(j < joints);
+        row
+    }
+
+    /// Effort of the rigid bodies of every joint, sample by sample, without rotors that are known.
+    pub fn rigid_efforts(&self, unknowns: &DVector<f64>) -> Vec<Vec<f64>> {
+        let rigid = unknowns.rows(0, self.layout.rigid());
+        let all: Vec<DVector<f64>> = self.rigid.par_iter().map(|columns| columns * rigid).collect();
+        (0..self.layout.joints).map(|j| all.iter().map(|efforts| efforts[j]).collect()).collect()
+    }
+
+    /// What the unknowns leave of the effort of joint `j` at a sample.
+    pub fn residual(&self, unknowns: &DVector<f64>, j: usize, sample: usize) -> f64 {
+        let (rigid, width) = (self.layout.rigid(), self.layout.friction.width());
+        let body: f64 = self.rigid[sample].row(j).iter().zip(unknowns.iter()).map(|(c, x)| c * x).sum();
+        let own = &self.friction[j][width * sample..width * (sample + 1)];
+        let friction: f64 = own.iter().zip(unknowns.iter().skip(rigid + width * j)).map(|(c, x)| c * x).sum();
+        self.effort[j][sample] - body - friction
+    }
+
+    /// Normal equations of joint `j` over the samples of each group, with a weight for each sample.
+    pub fn normal(&self, j: usize, weight: impl Fn(usize) -> f64 + Sync) -> Vec<Normal> {
+        let n = self.layout.unknowns();
+        let samples: Vec<usize> = (0..self.group.len()).collect();
+        (0..GROUPS)
+            .into_par_iter()
+            .map(|group| {
+                let used: Vec<usize> = samples.iter().copied().filter(|&i| self.group[i] == Some(group)).collect();
+                // As matrices: a product of blocks is faster than sums of rows.
+                let active: Vec<usize> = self.active(j);
+                let mut matrix = DMatrix::zeros(used.len(), active.len());
+                let mut effort = DVector::zeros(used.len());
+                for (line, &i) in used.iter().enumerate() {
+                    let (row, root) = (self.row(j, i), weight(i).max(0.0).sqrt());
+                    active.iter().enumerate().for_each(|(at, &column)| matrix[(line, at)] = root * row[column]);
+                    effort[line] = root * self.effort[j][i];
+                }
+                let (part, right) = (matrix.tr_mul(&matrix), matrix.tr_mul(&effort));
+                let mut normal = Normal::zero(n);
+                for (a, &row) in active.iter().enumerate() {
+                    normal.right[row] = right[a];
+                    active.iter().enumerate().for_each(|(b, &column)| normal.matrix[(row, column)] = part[(a, b)]);
+                }
+                normal.square = effort.norm_squared();
+                normal.count = used.len();
+                normal
+            })
+            .collect()
+    }
+
+    /// Unknowns that the effort of joint `j` can depend on.
+    fn active(&self, j: usize) -> Vec<usize> {
+        let (rigid, width) = (self.layout.rigid(), self.layout.friction.width());
+        let mut active: Vec<usize> =
+            (0..rigid).filter(|&k| self.rigid.iter().step_by(7).any(|columns| columns[(j, k)] != 0.0)).collect();
+        active.extend(rigid + width * j..rigid + width * (j + 1));
+        active
+    }
+}
+
+/// Groups of the samples for training and validation: runs, or parts of them where there are fewer than [`GROUPS`].
+fn groups(recording: &Recording) -> Vec<Option<usize>> {
+    let used = |i: &usize| matches!(recording.part(*i), Part::Train | Part::Validation);
+    let samples: Vec<usize> = (0..recording.len()).filter(used).collect();
+    let run = &recording.joints[0].samples.run;
+    let mut runs: Vec<u32> = samples.iter().map(|&i| run[i]).collect();
+    runs.dedup();
+    let parts = GROUPS.div_ceil(runs.len().max(1));
+    let mut groups = vec![None; recording.len()];
+    let mut next = 0;
+    for of_run in samples.chunk_by(|a, b| run[*a] == run[*b]) {
+        for part in of_run.chunks(of_run.len().div_ceil(parts)) {
+            part.iter().for_each(|&i| groups[i] = Some(next % GROUPS));
+            next += 1;
+        }
+    }
+    groups
+}
+
+/// Normal equations: sums over samples.
+#[derive(Clone, Debug)]
+pub struct Normal {
+    /// Sum of w row^T row.
+    pub matrix: DMatrix<f64>,
+    /// Sum of w row^T effort.
+    pub right: DVector<f64>,
+    /// Sum of w effort^2.
+    pub square: f64,
+    /// Samples.
+    pub count: usize,
+}
+
+impl Normal {
+    /// No sample.
+    pub fn zero(n: usize) -> Self {
+        Self { matrix: DMatrix::zeros(n, n), right: DVector::zeros(n), square: 0.0, count: 0 }
+    }
+
+    /// Adds `factor` times the sums of another.
+    pub fn add(&mut self, other: &Self, factor: f64) {
+        self.matrix += factor * &other.matrix;
+        self.right.axpy(factor, &other.right, 1.0);
+        self.square += factor * other.square;
+        self.count += other.count;
+    }
+
+    /// Sum of w (effort - row x)^2.
+    pub fn residual(&self, x: &DVector<f64>) -> f64 {
+        (self.square - 2.0 * self.right.dot(x) + x.dot(&(&self.matrix * x))).max(0.0)
+    }
+}

@@ -1,0 +1,120 @@
+//! Files of an identified robot: for each joint image and report, for the controller URDF and parameters; host.
+
+use super::fit::FittedRobot;
+use super::recording::Recording;
+use crate::commands::CommandError;
+use crate::commands::fit::bytes;
+use crate::image_text;
+use crate::output::{OutputFile, write_directory};
+use crate::report::render;
+use rigid_body::inertia::NAMES;
+use rigid_body::urdf::{LinkValues, with_values};
+use serde_json::{Value, json};
+use std::fmt::Write;
+use std::path::Path;
+
+/// Writes everything into `out`, all or nothing.
+pub fn write(out: &Path, recording: &Recording, fitted: &FittedRobot) -> Result<(), CommandError> {
+    let mut files = Vec::new();
+    for (joint, one) in recording.robot.tree.joints.iter().zip(&fitted.joints) {
+        for file in render(&one.report)? {
+            files.push(OutputFile::new(Path::new(&joint.name).join(&file.path), file.contents));
+        }
+        let folder = Path::new(&joint.name);
+        files.push(OutputFile::new(folder.join("friction.img"), bytes(&one.image, out)?));
+        files.push(OutputFile::new(folder.join("friction.toml"), image_text::to_text(&one.image)));
+    }
+    files.push(OutputFile::new("robot.urdf", urdf(recording, fitted)?));
+    files.push(OutputFile::new("parameters.toml", parameters(recording, fitted)));
+    files.push(OutputFile::new("robot.json", summary(recording, fitted).to_string()));
+    Ok(write_directory(out, &files)?)
+}
+
+/// The URDF with the identified inertias, and with the viscous and Coulomb friction of the simplest model as `damping`
+/// and `friction` (URDF has no more), on the joint's side.
+pub fn urdf(recording: &Recording, fitted: &FittedRobot) -> Result<String, CommandError> {
+    let robot = &recording.robot;
+    let (solution, rows) = &fitted.bodies.simplest;
+    let gains = robot.gains();
+    let values: Vec<LinkValues> = (0..robot.tree.len())
+        .map(|j| {
+            let at = rows.layout.rigid() + rows.layout.friction.width() * j;
+            let of_joint = |effort: f64| (effort * gains[(j, j)]).max(0.0);
+            LinkValues {
+                joint: robot.tree.joints[j].name.clone(),
+                link: robot.links[j].clone(),
+                inertia: fitted.links[j],
+                damping: of_joint(solution.unknowns[at]),
+                friction: of_joint(solution.unknowns[at + 1]),
+            }
+        })
+        .collect();
+    with_values(&recording.urdf, "robot.urdf", &values).map_err(|error| CommandError::Robot(error.into()))
+}
+
+/// Parameters of the controller as TOML.
+pub fn parameters(recording: &Recording, fitted: &FittedRobot) -> String {
+    let mut text =
+        "# Units: kg, kg m, kg m^2 about the frame of the joint; rotor inertia on the motor's side.\n".to_owned();
+    for (j, joint) in recording.robot.tree.joints.iter().enumerate() {
+        let _ = writeln!(text, "\n[link.{:?}]\njoint = {:?}", recording.robot.links[j], joint.name);
+        for (name, value) in NAMES.iter().zip(fitted.links[j].parameters()) {
+            let _ = writeln!(text, "{name} = {value:e}");
+        }
+        let _ = writeln!(text, "rotor_inertia = {:e}", fitted.rotors[j]);
+    }
+    text
+}
+
+/// The errors on test samples as a table.
+pub fn table(fitted: &FittedRobot) -> String {
+    let mut text = format!(
+        "{:<24}{:>10}{:>12}{:>12}{:>12}{:>9}  model of the image\n",
+        "joint", "effort", "simplest", "bodies", "image", "%"
+    );
+    for joint in &fitted.errors {
+        let _ = writeln!(
+            text,
+            "{:<24}{:>10.4}{:>12.4}{:>12.4}{:>12.4}{:>9.2}  {}",
+            format!("{}, {}", joint.joint, joint.unit),
+            joint.effort,
+            joint.simplest,
+            joint.bodies,
+            joint.image,
+            100.0 * joint.image / joint.effort,
+            joint.model
+        );
+    }
+    let [simplest, bodies, image] = fitted.mean_percent();
+    let _ = write!(text, "mean relative error: simplest {simplest:.2} %, bodies {bodies:.2} %, images {image:.2} %");
+    text
+}
+
+/// Errors, parameters with standard errors and how they were chosen.
+pub fn summary(recording: &Recording, fitted: &FittedRobot) -> Value {
+    let bodies = &fitted.bodies;
+    let rigid = bodies.rows.layout.rigid();
+    let base: Vec<Value> = bodies
+        .base
+        .solved
+        .iter()
+        .zip(&bodies.base.standard_errors)
+        .filter(|(column, _)| **column < rigid)
+        .map(|(&column, error)| {
+            let n = recording.robot.tree.len();
+            let name = match column.checked_sub(10 * n) {
+                Some(rotor) => format!("rotor of {}", recording.robot.tree.joints[rotor].name),
+                None => format!("{} of {}", NAMES[column % 10], recording.robot.links[column / 10]),
+            };
+            json!({ "parameter": name, "value": bodies.base.unknowns[column], "standard_error": error })
+        })
+        .collect();
+    let [simplest, rigid_bodies, images] = fitted.mean_percent();
+    json!({
+        "errors": fitted.errors,
+        "mean_relative_percent": { "simplest": simplest, "bodies": rigid_bodies, "images": images },
+        "base_parameters": base,
+        "condition": bodies.base.condition,
+        "choice": bodies.notes,
+    })
+}

@@ -1,0 +1,27 @@
+//! All joints of a robot from one recording of all of them: rigid bodies, then the friction image of each joint; host.
+//!
+//! 1. [`recording`]: `recording.toml` names the robot and the columns of each joint; every joint is cleaned, filtered
+//!    and split as a data set of one joint is.
+//! 2. [`friction_columns`], [`equations`]: efforts as linear functions of inertial parameters, rotor inertias and a
+//!    simple friction.
+//! 3. [`least_squares`]: base parameters with standard errors (IDIM-LS: ordinary, weighted, iteratively reweighted);
+//!    [`convex`]: all inertial parameters, each link physical; [`choose`]: the friction beside them and the
+//!    regularisation, by motions that were left out.
+//! 4. [`joints`]: the torque of the rigid bodies is the theoretical torque of each joint, and the pipeline of one
+//!    joint does the rest: terms, pre-sliding, network, certificate, fixed point.
+//! 5. [`fit`] is the whole way, [`files`] its output.
+//!
+//! The dynamics are those of the crate `rigid-body`.
+
+pub mod choose;
+pub mod convex;
+pub mod equations;
+pub mod files;
+pub mod fit;
+pub mod friction_columns;
+pub mod joints;
+pub mod least_squares;
+pub mod recording;
+
+pub use fit::{FittedRobot, Options, fit};
+pub use recording::{Recording, RobotFitError, record};

@@ -1,0 +1,257 @@
+//! `recording.toml`: a data set of one joint's keys, with the columns of every joint, as samples of all joints at the
+//! same times; host.
+//!
+//! ```toml
+//! name = "arm, first series"
+//! robot = "robot.toml"                     # beside this file
+//!
+//! [source]
+//! files = ["slow.csv", "fast.csv"]
+//!
+//! [columns]
+//! time = { column = "t_s" }
+//!
+//! [joints.shoulder]                        # every joint of the robot
+//! position = { column = "q1_rad" }
+//! effort = { column = "i1_A", unit = "A" }
+//! ```
+//!
+//! All other keys are those of `docs/dataset.md` and hold for all joints; `[rigid]` is what the robot's links are. A
+//! delay of the effort is not identified, but can be given (`filter.effort_lag`).
+
+use crate::choice::Folds;
+use crate::dataset::load::Environment;
+use crate::dataset::{DatasetError, Prepared, prepare_text};
+use crate::samples::Part;
+use rigid_body::{Robot, RobotError};
+use std::path::{Path, PathBuf};
+
+/// Speed below which a joint stood still, RMS in rad/s or m/s.
+const STILL: f64 = 1e-3;
+
+/// Why a robot was not identified.
+#[derive(Debug, thiserror::Error)]
+pub enum RobotFitError {
+    /// A file cannot be read.
+    #[error("cannot read {}: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The recording's description.
+    #[error("{}: {reason}", path.display())]
+    Description {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong and what to do.
+        reason: String,
+    },
+    /// The robot's files.
+    #[error(transparent)]
+    Robot(#[from] RobotError),
+    /// The samples of one joint.
+    #[error("joint {joint}: {source}")]
+    Dataset {
+        /// The joint.
+        joint: String,
+        /// What is wrong.
+        source: DatasetError,
+    },
+    /// A joint that did not move.
+    #[error(
+        "{}: joint {joint} stood still ({speed:.1e} RMS, at least {STILL:e} is needed): record a motion of it, or list it under `locked` in the \
+         robot's file if it was at position 0", path.display()
+    )]
+    Still {
+        /// The recording's description.
+        path: PathBuf,
+        /// The joint.
+        joint: String,
+        /// Its speed, rad/s or m/s.
+        speed: f64,
+    },
+    /// The samples of two joints are not the same rows.
+    #[error(
+        "{}: after cleaning joint {joint} has {found} samples, the first joint {expected}; rows that are missing for one joint only have to be \
+         missing for all: give `clean.dropout` conditions that hold for all", path.display()
+    )]
+    Rows {
+        /// The recording's description.
+        path: PathBuf,
+        /// The joint.
+        joint: String,
+        /// Its samples.
+        found: usize,
+        /// Those of the first joint.
+        expected: usize,
+    },
+    /// Too few samples, or a motion that determines nothing.
+    #[error("{0}")]
+    Undetermined(String),
+    /// The friction of one joint.
+    #[error("joint {joint}: {source}")]
+    Fit {
+        /// The joint.
+        joint: String,
+        /// What is wrong.
+        source: crate::fit::FitError,
+    },
+}
+
+/// All joints of a robot at the same times.
+#[derive(Clone, Debug)]
+pub struct Recording {
+    /// The robot.
+    pub robot: Robot,
+    /// The text of its URDF.
+    pub urdf: String,
+    /// Every joint as a data set of its own, in the robot's order.
+    pub joints: Vec<Prepared>,
+    /// Name in the description.
+    pub name: String,
+}
+
+impl Recording {
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.joints.first().map_or(0, |joint| joint.samples.len())
+    }
+
+    /// True without a sample.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The use of a sample: unused where it is for one joint.
+    pub fn part(&self, sample: usize) -> Part {
+        let mut parts = self.joints.iter().map(|joint| joint.samples.part[sample]);
+        let first = self.joints[0].samples.part[sample];
+        if parts.any(|part| part == Part::Unused) { Part::Unused } else { first }
+    }
+
+    /// Positions, velocities and accelerations of all joints at a sample.
+    pub fn state(&self, sample: usize) -> [Vec<f64>; 3] {
+        let of = |column: fn(&crate::samples::Samples) -> &Vec<f64>| -> Vec<f64> {
+            self.joints.iter().map(|joint| column(&joint.samples)[sample]).collect()
+        };
+        [of(|s| &s.position), of(|s| &s.velocity), of(|s| &s.acceleration)]
+    }
+
+    /// Leaves the first `seconds` of samples for training and validation, in the order of the runs; those of tests
+    /// stay.
+    pub fn keep_first(&mut self, seconds: f64) {
+        for joint in &mut self.joints {
+            let samples = &mut joint.samples;
+            let mut left = (seconds / samples.period()).round() as usize;
+            for part in samples.part.iter_mut().filter(|part| matches!(part, Part::Train | Part::Validation)) {
+                if left == 0 {
+                    *part = Part::Unused;
+                }
+                left = left.saturating_sub(1);
+            }
+            let found = crate::choice::grouping::find(samples, &joint.recordings, &[], &[]);
+            joint.folds = found.unwrap_or_else(|_| Folds::default());
+        }
+    }
+}
+
+/// Reads robot and recording that the TOML file at `path` describes; `environment` gives the variables in paths.
+///
+/// # Errors
+/// [`RobotFitError`], with file, joint and what to do.
+pub fn record(path: &Path, environment: Environment) -> Result<Recording, RobotFitError> {
+    let wrong = |reason: String| RobotFitError::Description { path: path.to_owned(), reason };
+    let text = read(path)?;
+    let mut common: toml::Table = toml::from_str(&text).map_err(|e| wrong(e.to_string().trim_end().to_owned()))?;
+    let Some(toml::Value::String(robot)) = common.remove("robot") else {
+        return Err(wrong(
+            "the key `robot` is missing: it names the file of the robot, as in robot = \"robot.toml\"".into(),
+        ));
+    };
+    let Some(toml::Value::Table(mut joints)) = common.remove("joints") else {
+        return Err(wrong("there is no [joints.NAME] with the columns of a joint".into()));
+    };
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let robot_file = folder.join(expanded(&robot, environment).map_err(wrong)?);
+    let robot_text = read(&robot_file)?;
+    let described = rigid_body::robot::describe(&robot_text, &robot_file.to_string_lossy())?;
+    let in_robot = |reason| RobotFitError::Description { path: robot_file.clone(), reason };
+    let urdf_file = expanded(&described.urdf, environment).map_err(in_robot)?;
+    let urdf_file = robot_file.parent().unwrap_or(Path::new("")).join(urdf_file);
+    let urdf = read(&urdf_file)?;
+    let robot = Robot::new(&robot_text, &robot_file.to_string_lossy(), &urdf, &urdf_file.to_string_lossy())?;
+    let name = common.get("name").and_then(toml::Value::as_str).unwrap_or("robot").to_owned();
+    let mut prepared = Vec::new();
+    for joint in &robot.tree.joints {
+        let Some(toml::Value::Table(columns)) = joints.remove(&joint.name) else {
+            return Err(wrong(format!(
+                "joint {0} of {1} has no [joints.{0}]: name its columns, or list it under `locked` there",
+                joint.name,
+                robot_file.display()
+            )));
+        };
+        let text = of_one_joint(&common, &columns, &joint.name).map_err(wrong)?;
+        let one = prepare_text(&text, path, environment, |_| ())
+            .map_err(|source| RobotFitError::Dataset { joint: joint.name.clone(), source })?;
+        prepared.push(one);
+    }
+    if let Some(name) = joints.keys().next() {
+        return Err(wrong(format!(
+            "[joints.{name}] is no moving joint of {}; remove it, or correct its name",
+            robot_file.display()
+        )));
+    }
+    let recording = Recording { robot, urdf, joints: prepared, name };
+    check(&recording, path)?;
+    Ok(recording)
+}
+
+fn check(recording: &Recording, path: &Path) -> Result<(), RobotFitError> {
+    let path = || path.to_owned();
+    let first = &recording.joints[0].samples;
+    for (joint, prepared) in recording.robot.tree.joints.iter().zip(&recording.joints) {
+        let (joint, samples) = (joint.name.clone(), &prepared.samples);
+        if samples.time != first.time || samples.run != first.run {
+            return Err(RobotFitError::Rows { path: path(), joint, found: samples.len(), expected: first.len() });
+        }
+        let squares: f64 = samples.velocity.iter().map(|v| v * v).sum();
+        let speed = (squares / samples.len().max(1) as f64).sqrt();
+        if speed < STILL {
+            return Err(RobotFitError::Still { path: path(), joint, speed });
+        }
+    }
+    Ok(())
+}
+
+fn read(path: &Path) -> Result<String, RobotFitError> {
+    std::fs::read_to_string(path).map_err(|source| RobotFitError::Read { path: path.to_owned(), source })
+}
+
+/// A path whose beginning `$NAME`, `${NAME}` or `${NAME:-default}` is replaced by that variable.
+fn expanded(text: &str, environment: Environment) -> Result<String, String> {
+    let Some(after) = text.strip_prefix("${") else { return Ok(text.to_owned()) };
+    let Some((inside, rest)) = after.split_once('}') else { return Err(format!("{text}: there is no }}")) };
+    let (name, default) = inside.split_once(":-").map_or((inside, None), |(name, default)| (name, Some(default)));
+    let value = environment(name).filter(|value| !value.is_empty()).or(default.map(str::to_owned));
+    value.map(|value| value + rest).ok_or_else(|| format!("{text}: the variable {name} is not set; set it"))
+}
+
+/// The description of one joint's data set.
+fn of_one_joint(common: &toml::Table, columns: &toml::Table, joint: &str) -> Result<String, String> {
+    let mut one = common.clone();
+    let table = |one: &mut toml::Table, key: &str| match one.entry(key).or_insert(toml::Table::new().into()) {
+        toml::Value::Table(table) => Ok(std::mem::take(table)),
+        _ => Err(format!("[{key}] is no table")),
+    };
+    let mut all = table(&mut one, "columns")?;
+    all.extend(columns.clone());
+    one.insert("columns".into(), all.into());
+    let mut filter = table(&mut one, "filter")?;
+    filter.entry("lag_limit").or_insert(0.0.into());
+    one.insert("filter".into(), filter.into());
+    let name = common.get("name").and_then(toml::Value::as_str).unwrap_or("robot");
+    one.insert("name".into(), format!("{name}, {joint}").into());
+    toml::to_string(&one).map_err(|error| error.to_string())
+}
