@@ -11,7 +11,7 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 
 /// Weights of the prior that compete.
-const GAMMAS: [f64; 8] = [1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0, 1000.0];
+const GAMMAS: [f64; 10] = [1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0, 1e3, 1e4, 1e5];
 /// The weight with which frictions compete.
 const MIDDLE: f64 = 0.1;
 /// Samples for training and validation below which nothing is identified.
