@@ -1,5 +1,5 @@
 //! The robot, not only the joint: six joints of a UR10e identified from one recording, judged on a motion that was
-//! never looked at.
+//! used for no choice.
 //!
 //! The figures are published in docs/robot.md, which this program writes with `UPDATE_DOCS=1` and holds to them
 //! otherwise. The recordings are others' and are looked for in `$JOINT_DATA`, else in `../shared/data` beside the
