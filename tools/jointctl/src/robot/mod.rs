@@ -9,7 +9,7 @@
 //!    regularisation, by motions that were left out.
 //! 4. [`joints`]: the torque of the rigid bodies is the theoretical torque of each joint, and the pipeline of one
 //!    joint does the rest: terms, pre-sliding, network, certificate, fixed point.
-//! 5. [`fit`] is the whole way, [`files`] its output.
+//! 5. [`mod@fit`] is the whole way, [`files`] its output.
 //!
 //! The dynamics are those of the crate `rigid-body`.
 
