@@ -311,7 +311,6 @@ impl Bus {
     fn take(&mut self, frame: &Frame) {
         // What is known of the joint is much to copy, and TPDOs alone need it.
         let now = now();
-        self.image.at(now);
         if self.receiver.is_sync(frame, now)
             && let Some(mut observed) = observed()
         {
@@ -345,7 +344,6 @@ extern "C" fn FDCAN1_IT0() {
     }
     let now = now();
     critical_section::with(|section| transmit(&mut SENDING.borrow_ref_mut(section), now));
-    bus.image.at(now);
     bus.image.follow(bus.shared.state());
     let mut demand = bus.image.demand();
     if LOADS {

@@ -1,7 +1,6 @@
 //! One face for all objects, the server's and the application's, and one SDO transfer's reading or writing of an
 //! entry; the task.
 
-use super::COUNTER_AND_DATE;
 use super::abort::Abort;
 use super::communication::{Communication, Object};
 use super::dictionary::{Access, Entry, Length, ObjectDictionary};
@@ -38,14 +37,7 @@ impl<'a, D: ObjectDictionary> Objects<'_, 'a, D> {
             Some(object) => {
                 let mut bytes = [0; 4];
                 bytes.iter_mut().zip(value).for_each(|(byte, given)| *byte = *given);
-                let object = object?;
-                let watched = COUNTER_AND_DATE && object.is_stored();
-                let before = if watched { self.communication.read(object).ok() } else { None };
-                self.communication.write(object, u32::from_le_bytes(bytes), self.dictionary)?;
-                if watched && self.communication.read(object).ok() != before {
-                    self.communication.date([0; 2]);
-                }
-                Ok(())
+                self.communication.write(object?, u32::from_le_bytes(bytes), self.dictionary)
             }
         }
     }

@@ -4,15 +4,11 @@
 //! mapping. Where a master maps object 2010h:1 beside its set-points, one that repeats itself without thinking is not alive: the PDO with the
 //! number of the one before renews nothing.
 //!
-//! A joint whose configuration is lost is asked for nothing but a fault reset: it stays in "switch on disabled".
-//!
 //! Outside OPERATIONAL, and in it until a controlword comes, the joint is asked for a quick stop and no torque. It is the node's own
 //! demand, and its sequence changes with the transition only: a joint that still brakes when the command deadline is over has a fault.
 
 use super::field::{Field, SetPoint};
-use super::interpolation::Interpolation;
 use super::observed::Observed;
-use super::operation::Operation;
 use super::set_points::SetPoints;
 use super::shared::Shared;
 use super::table;
@@ -33,9 +29,6 @@ pub struct JointImage<'a> {
     arrived: Arrived,
     sequence: u32,
     coupled_sequence: u32,
-    interpolation: [Interpolation; PROFILES as usize],
-    /// µs.
-    now: u32,
 }
 
 /// What has arrived of an RPDO.
@@ -64,8 +57,6 @@ impl<'a> JointImage<'a> {
             arrived: Arrived::default(),
             sequence: 0,
             coupled_sequence: 0,
-            interpolation: [Interpolation::default(); PROFILES as usize],
-            now: 0,
         }
     }
 
@@ -94,41 +85,18 @@ impl<'a> JointImage<'a> {
         }
     }
 
-    /// The time of what comes, µs, wrapping. Before [`Receiver::receive`](crate::canopen::Receiver::receive).
-    pub fn at(&mut self, now: u32) {
-        self.now = now;
-        for way in &mut self.interpolation {
-            way.settle(now, self.shared);
-        }
-    }
-
-    /// What is asked of the joint at the time that [`JointImage::at`] told.
+    /// What is asked of the joint now.
     pub fn demand(&self) -> Demand {
         let coupled = Coupled { velocity: self.points.coupled_velocity(), sequence: self.coupled_sequence };
         if self.state != NmtState::Operational {
             let controlword = Controlword::QUICK_STOP;
             return Demand { controlword, command: Command::default(), sequence: self.sequence, coupled };
         }
-        let word = Controlword(self.points.controlword);
         Demand {
-            controlword: if self.shared.is_locked() { word.reset_alone() } else { word },
-            command: self.command(),
+            controlword: Controlword(self.points.controlword),
+            command: self.points.command(self.shared),
             sequence: self.sequence,
             coupled,
-        }
-    }
-
-    fn command(&self) -> Command {
-        let command = self.points.command(self.shared);
-        let interpolation = self.interpolation.first();
-        interpolation.map_or(command, |way| way.apply(command, self.now, self.shared))
-    }
-
-    /// Another set-point is in force, or none.
-    fn interpolate(&mut self) {
-        let cyclic = matches!(self.points.mode, Operation::Position | Operation::Velocity);
-        for way in &mut self.interpolation {
-            way.follow(self.points.command(self.shared), cyclic, self.now, self.shared);
         }
     }
 
@@ -157,7 +125,6 @@ impl<'a> JointImage<'a> {
         self.arriving.succeed(&self.points, position, actual);
         self.points = self.arriving;
         self.points.publish(self.shared);
-        self.interpolate();
     }
 }
 
@@ -193,7 +160,6 @@ impl ProcessImage for JointImage<'_> {
         self.arriving = none;
         self.arrived = Arrived::default();
         self.points.publish(self.shared);
-        self.interpolate();
         self.sequence = self.sequence.wrapping_add(1);
         self.coupled_sequence = self.coupled_sequence.wrapping_add(1);
     }

@@ -17,7 +17,6 @@ mod power_cut;
 mod same_run;
 mod settings;
 mod settling;
-mod supported_modes;
 mod workbench;
 
 use host_tests::bare_metal::target_installed;
@@ -43,7 +42,6 @@ fn main() {
         same_run::trials(),
         settings::trials(),
         settling::trials(),
-        supported_modes::trials(),
         workbench::trials(),
     ];
     let trials = rooms.into_iter().flatten().map(|trial| trial.with_ignored_flag(ignored)).collect();
