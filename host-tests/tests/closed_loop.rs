@@ -3,8 +3,8 @@
 //! track, what is left in torque mode and in the cold is as published, and adaptation makes up for friction that has
 //! changed.
 //!
-//! What drift and hands do is judged on five of the joints, and of these the worst alone is held to what is published; with
-//! `JOINT_SAMPLES=all` on all of them, and the median, too.
+//! Drift and touch are judged on five of the joints, by the worst of them; with `JOINT_SAMPLES=all` on all of them, and by
+//! the median, too.
 
 use host_tests::in_the_loop::{InTorqueMode, Moved, RandomJoint, for_seeds, median};
 use host_tests::samples::{count, every};

@@ -6,7 +6,8 @@
 //!
 //! Beside it, [`simulation`] closes the firmware's control step over a simulated actuator, [`joint_text`] is a joint's configuration
 //! as a file, and [`excite`] finds motions that identify a joint. [`remote`] is a joint over a bus,
-//! [`describe`] tells other people's tools of it. [`robot`] identifies all joints of an arm at once and hands each to this pipeline.
+//! [`describe`] tells other people's tools of it. [`robot`] identifies all joints of an arm at once and hands each to
+//! this pipeline.
 
 pub mod augment;
 pub mod certificate_search;

@@ -7,7 +7,7 @@ use crate::robot::{FittedRobot, Options, files, fit, record};
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
 
-/// What to do with a robot.
+/// Commands for all joints of a robot.
 #[derive(Debug, Subcommand)]
 pub enum RobotCommand {
     /// Identify rigid bodies and the friction image of every joint from one recording

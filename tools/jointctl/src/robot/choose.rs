@@ -32,7 +32,7 @@ pub struct Bodies {
     pub friction: Friction,
     /// Weight of the prior that was chosen.
     pub gamma: f64,
-    /// How it was chosen.
+    /// Reasons of the choices, a line each.
     pub notes: Vec<String>,
 }
 

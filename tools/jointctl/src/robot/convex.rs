@@ -21,7 +21,7 @@ const STEPS: usize = 80;
 /// Decrement below which the minimum is reached.
 const DECREMENT: f64 = 1e-9;
 
-/// What the parameters are held to.
+/// Prior of the inertial parameters.
 #[derive(Clone, Debug)]
 pub struct Prior {
     links: Vec<Matrix4<f64>>,

@@ -129,7 +129,7 @@ impl Rows {
         (0..self.layout.joints).map(|j| all.iter().map(|efforts| efforts[j]).collect()).collect()
     }
 
-    /// What the unknowns leave of the effort of joint `j` at a sample.
+    /// Residual of the effort of joint `j` at a sample.
     pub fn residual(&self, unknowns: &DVector<f64>, j: usize, sample: usize) -> f64 {
         let (rigid, width) = (self.layout.rigid(), self.layout.friction.width());
         let body: f64 = self.rigid[sample].row(j).iter().zip(unknowns.iter()).map(|(c, x)| c * x).sum();
