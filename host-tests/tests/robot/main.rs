@@ -20,7 +20,7 @@ fn main() {
     let arguments = Arguments::from_args();
     let data = data();
     let ignored = data.is_none();
-    let name = "the_ur10e_is_predicted_as_published_on_a_motion_that_was_never_looked_at";
+    let name = "the_ur10e_is_predicted_as_published_on_a_motion_that_was_used_for_no_choice";
     let trials = vec![
         Trial::test(name, move || as_published(&data.unwrap_or_default())).with_ignored_flag(ignored),
         Trial::test("the_page_says_what_its_figures_say", page::is_whole),
