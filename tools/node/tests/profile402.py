@@ -167,9 +167,11 @@ for velocity in (400, 0):
     node.rpdo[2]["target velocity"].raw = velocity
     node.rpdo[2].start(0.01)
     until(lambda: node.statusword & 0x400 and abs(node.sdo[0x606C].raw - velocity) < 100, f"{velocity} mrad/s is reached")
+    if velocity == 0:
+        # Below 606Fh for the time of 6070h: later than the target is reached. Commands go on until then.
+        until(lambda: node.statusword & 0x1000, "the joint stands")
     node.rpdo[2].stop()
     node.rpdo[2].period = None
-check(node.statusword & 0x1000, "the joint stands")
 check(not emergencies, f"nothing was reported: {emergencies}")
 node.state = "SWITCH ON DISABLED"
 network.sync.stop()
