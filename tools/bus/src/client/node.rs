@@ -3,6 +3,13 @@
 use super::error::{ClientError, Object};
 use super::network::Network;
 use super::sdo::{Method, Settings, Transfer};
+use std::time::Duration;
+
+/// Times that an object is read before another client that disturbs each time is an error.
+const READS: u32 = 5;
+
+/// Pause before the second read, in milliseconds; twice as long before each that follows.
+const PAUSE_MS: u64 = 2;
 
 /// A node, by its id.
 #[derive(Clone, Debug)]
@@ -37,15 +44,27 @@ impl Node {
         Object { node: self.id, index, sub_index }
     }
 
-    /// Reads an object.
+    /// Reads an object. Another client's request that comes in between ends the transfer, and it is read again, five times in all:
+    /// reading changes nothing. Writing is not repeated.
     pub fn upload(&self, index: u16, sub_index: u8) -> Result<Vec<u8>, ClientError> {
         self.upload_by(index, sub_index, Method::Automatic)
     }
 
     /// Reads an object in a certain way.
     pub fn upload_by(&self, index: u16, sub_index: u8, method: Method) -> Result<Vec<u8>, ClientError> {
-        let transfer = Transfer::upload(self.object(index, sub_index), method, self.settings);
-        self.network.run(transfer, self.settings.timeout)
+        let read = || {
+            let transfer = Transfer::upload(self.object(index, sub_index), method, self.settings);
+            self.network.run(transfer, self.settings.timeout)
+        };
+        let mut outcome = read();
+        for again in 1..READS {
+            if !matches!(outcome, Err(ClientError::OtherClient { .. })) {
+                break;
+            }
+            std::thread::sleep(Duration::from_millis(PAUSE_MS << (again - 1)));
+            outcome = read();
+        }
+        outcome
     }
 
     /// Writes an object.

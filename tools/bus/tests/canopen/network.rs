@@ -129,6 +129,42 @@ fn a_second_client_is_noticed_and_nothing_is_half_done() {
     drop(running);
 }
 
+/// Disturbs the first `times` reads of 2001h on the bus, each in its second frame, until it has done so.
+fn disturb(bus: &str, times: usize) -> std::thread::JoinHandle<()> {
+    let other = open(bus).unwrap();
+    std::thread::spawn(move || {
+        let question = Frame::new(0x605, &[0x40, 0, 0x10, 0, 0, 0, 0, 0]).unwrap();
+        let begins = |frame: &Frame| frame.id() == 0x605 && frame.data().starts_with(&[0x40, 0x01, 0x20]);
+        let mut left = times;
+        while left > 0 {
+            let heard = other.receive(Duration::from_secs(60)).unwrap().expect("a read begins");
+            if begins(&heard) {
+                other.send(&question).unwrap();
+                left -= 1;
+            }
+        }
+    })
+}
+
+#[test]
+fn a_read_that_another_client_disturbs_is_repeated_four_times() {
+    let bus = "virtual:reads";
+    let (network, running) = pair(bus, 5, 0);
+    let node = network.node(5).unwrap();
+    // Long enough for the other one to come in between.
+    node.download(0x2001, 0, &pattern(2000)).unwrap();
+    for times in [1, 4] {
+        let other = disturb(bus, times);
+        assert_eq!(node.upload_by(0x2001, 0, Method::Segmented).unwrap(), pattern(2000), "{times}");
+        other.join().unwrap();
+    }
+    let other = disturb(bus, 5);
+    let error = node.upload_by(0x2001, 0, Method::Segmented).unwrap_err();
+    assert!(matches!(error, ClientError::OtherClient { .. }), "{error}");
+    other.join().unwrap();
+    drop(running);
+}
+
 #[test]
 fn two_threads_of_one_program_wait_for_each_other() {
     let (network, _running) = pair("virtual:threads", 5, 0);
