@@ -17,6 +17,7 @@ pub mod left_alone;
 pub mod limits;
 pub mod parameters;
 pub mod peer_networks;
+pub mod recordings;
 pub mod samples;
 pub mod states;
 pub mod variant;

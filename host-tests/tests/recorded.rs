@@ -1,8 +1,8 @@
 //! Recorded joints: the fixed-point image predicts unseen samples as docs/results-recordings.md says.
 //!
-//! The recordings are others' and are not part of this repository: they are looked for in `$JOINT_DATA`, else in
-//! `../shared/data` beside it. Where they are absent every test here is reported as ignored, by name.
+//! Without the recordings ([`host_tests::recordings`]) every test here is reported as ignored, by name.
 
+use host_tests::recordings;
 use jointctl::dataset::{Prepared, prepare_with};
 use jointctl::filter::LowPassFilter;
 use jointctl::fit::{Options, fit};
@@ -35,7 +35,7 @@ const FIXED_POINT: f64 = 2e-3;
 
 fn main() {
     let arguments = Arguments::from_args();
-    let data = data();
+    let data = recordings::folder();
     let ignored = data.is_none();
     let root = data.unwrap_or_default();
     let mut trials: Vec<Trial> = PUBLISHED
@@ -59,13 +59,6 @@ fn main() {
     libtest_mimic::run(&arguments, trials).exit();
 }
 
-/// The folder of the recordings, if it is there.
-fn data() -> Option<PathBuf> {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
-    let folder = std::env::var_os("JOINT_DATA").map_or_else(beside, PathBuf::from);
-    folder.canonicalize().ok().filter(|folder| folder.join("emps").is_dir())
-}
-
 /// The folder of the descriptions that come with the program.
 fn descriptions() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../tools/jointctl/datasets")
@@ -73,8 +66,7 @@ fn descriptions() -> PathBuf {
 
 /// The samples of the data set `name` in `root`.
 fn prepared(name: &str, root: &Path) -> Result<Prepared, Failed> {
-    let root = root.to_string_lossy().into_owned();
-    let environment = |variable: &str| (variable == "JOINT_DATA").then(|| root.clone());
+    let environment = recordings::environment(root)?;
     Ok(prepare_with(&descriptions().join(format!("{name}.toml")), &environment)?)
 }
 

@@ -2,14 +2,14 @@
 //! that are computed on the same samples.
 //!
 //! The figures are published in docs/motions.md, which this program writes with `UPDATE_DOCS=1` and holds to them otherwise. The recordings
-//! are others' and are looked for in `$JOINT_DATA`, else in `../shared/data` beside the repository: without them, or without Python,
-//! what needs them is reported as ignored by name; with `CI` set a missing Python fails. `MOTIONS=xl330` judges, or writes, only the
+//! are others' ([`host_tests::recordings`]): without them, or without Python, what needs them is reported as ignored by name; with `CI` set a missing Python fails. `MOTIONS=xl330` judges, or writes, only the
 //! recordings whose name begins with that.
 
 mod judge;
 mod list;
 mod page;
 
+use host_tests::recordings;
 use judge::judge;
 use libtest_mimic::{Arguments, Failed, Trial};
 use page::Row;
@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 fn main() {
     let arguments = Arguments::from_args();
     let must_run = std::env::var_os("CI").is_some();
-    let data = data();
+    let data = recordings::folder();
     let python = if arguments.list || data.is_none() { None } else { PACKAGES.python(env!("CARGO_TARGET_TMPDIR")) };
     let ignored = data.is_none() || !must_run && python.is_none();
     let every = "every_motion_that_is_left_out_is_predicted_as_published_beside_three_baselines";
@@ -31,13 +31,6 @@ fn main() {
     ];
     trials.extend(page::trials());
     libtest_mimic::run(&arguments, trials).exit();
-}
-
-/// The folder of the recordings, if it is there.
-fn data() -> Option<PathBuf> {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
-    let folder = std::env::var_os("JOINT_DATA").map_or_else(beside, PathBuf::from);
-    folder.canonicalize().ok().filter(|folder| folder.join("emps").is_dir())
 }
 
 fn as_published(data: &Path, python: Option<&Path>) -> Result<(), Failed> {

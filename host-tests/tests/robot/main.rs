@@ -2,11 +2,11 @@
 //! used for no choice.
 //!
 //! The figures are published in docs/robot.md, which this program writes with `UPDATE_DOCS=1` and holds to them
-//! otherwise. The recordings are others' and are looked for in `$JOINT_DATA`, else in `../shared/data` beside the
-//! repository: without them this is reported as ignored.
+//! otherwise. Without the recordings ([`host_tests::recordings`]) this is reported as ignored.
 
 mod page;
 
+use host_tests::recordings;
 use jointctl::fit::Options as JointOptions;
 use jointctl::progress::Silent;
 use jointctl::robot::{FittedRobot, Options, fit, record};
@@ -18,7 +18,7 @@ const TRAINING: [Option<f64>; 3] = [None, Some(16.0), Some(8.0)];
 
 fn main() {
     let arguments = Arguments::from_args();
-    let data = data();
+    let data = recordings::folder();
     let ignored = data.is_none();
     let name = "the_ur10e_is_predicted_as_published_on_a_motion_that_was_used_for_no_choice";
     let trials = vec![
@@ -29,16 +29,9 @@ fn main() {
     libtest_mimic::run(&arguments, trials).exit();
 }
 
-fn data() -> Option<PathBuf> {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
-    let folder = std::env::var_os("JOINT_DATA").map_or_else(beside, PathBuf::from);
-    folder.canonicalize().ok().filter(|folder| folder.join("ur10e").is_dir())
-}
-
 fn as_published(data: &Path) -> Result<(), Failed> {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tools/jointctl/robots/ur10e_fourier.toml");
-    let data = data.to_string_lossy().into_owned();
-    let recording = record(&file, &|name| (name == "JOINT_DATA").then(|| data.clone()))?;
+    let recording = record(&file, &recordings::environment(data)?)?;
     let mut rows = Vec::new();
     for seconds in TRAINING {
         let joint = JointOptions { trainer: None, reference: false, ..JointOptions::default() };
