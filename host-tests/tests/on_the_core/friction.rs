@@ -14,6 +14,7 @@ use host_tests::bare_metal::{BOARDS, Board};
 use host_tests::certified::{drawn, random};
 use host_tests::image_bytes::encoded;
 use host_tests::parameters::q16;
+use host_tests::samples::count;
 use host_tests::states::coupled;
 use joint_firmware::compensation::{Acting, Reason};
 use joint_firmware::friction::physical::Terms;
@@ -26,9 +27,9 @@ use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeSet;
 use std::sync::OnceLock;
 
-/// Certified images.
-const IMAGES: usize = 160;
-/// Batches of states for each of them: 1,024,000 states in all, for each board's way of compiling.
+/// Certified images: in the test command, and in all.
+const IMAGES: (u64, u64) = (40, 160);
+/// Batches of states for each of them: 1,024,000 states of all images, for each board's way of compiling.
 const BATCHES: usize = 25;
 
 pub fn trials(missing: &Missing) -> Vec<Trial> {
@@ -45,7 +46,7 @@ fn images() -> &'static (Vec<(u64, Image)>, u64) {
     static IMAGES_DRAWN: OnceLock<(Vec<(u64, Image)>, u64)> = OnceLock::new();
     IMAGES_DRAWN.get_or_init(|| {
         let certified = (0..).filter_map(|seed| Some((seed, drawn(seed).ok()?)));
-        let images: Vec<_> = certified.take(IMAGES).collect();
+        let images: Vec<_> = certified.take(count(IMAGES.0, IMAGES.1) as usize).collect();
         let last = images.last().map_or(0, |(seed, _)| *seed);
         (images, last + 1)
     })
