@@ -45,6 +45,24 @@ impl OutputFile {
     }
 }
 
+/// Checks that a file could be written: `path` names no folder, and the nearest folder above it that exists takes a file.
+///
+/// # Errors
+/// [`OutputError`]; nothing is left behind.
+pub fn check_writable(path: &Path) -> Result<(), OutputError> {
+    if path.file_name().is_none() {
+        return Err(OutputError::NoName(path.to_owned()));
+    }
+    if path.is_dir() {
+        return Err(io_error("replace", path, io::ErrorKind::IsADirectory.into()));
+    }
+    let above = path.ancestors().skip(1).find(|folder| folder.symlink_metadata().is_ok());
+    let folder = above.filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let probe = folder.join(format!(".writable-{}", std::process::id()));
+    let tried = File::create(&probe).and_then(|_| fs::remove_file(&probe));
+    tried.map_err(|source| io_error("write", path, source))
+}
+
 /// Writes one file, replacing an existing one at once. Missing parent directories are made.
 ///
 /// # Errors
@@ -223,6 +241,20 @@ mod tests {
             OutputFile::new("figures/a.svg", "new a"),
             OutputFile::new("report.json", "new numbers"),
         ]
+    }
+
+    #[test]
+    fn a_path_that_cannot_be_written_is_told_before_and_nothing_is_left_behind() {
+        let place = tempfile::tempdir().unwrap();
+        fs::write(place.path().join("file"), "old").unwrap();
+        for good in ["file", "new", "new/folder/file"] {
+            check_writable(&place.path().join(good)).unwrap();
+        }
+        for (bad, told) in [("file/below", "Not a directory"), (".", "directory"), ("..", "does not name a file")] {
+            let error = check_writable(&place.path().join(bad)).unwrap_err().to_string();
+            assert!(error.contains(told), "{bad}: {error}");
+        }
+        assert_eq!(fs::read_dir(place.path()).unwrap().count(), 1);
     }
 
     #[test]

@@ -90,7 +90,7 @@ fn an_image_survives_the_way_to_toml_and_back_and_a_damaged_one_is_refused() {
         ("effort = \"Nm\"", "effort = \"lbf\"", "known are Nm, N, A, V"),
     ] {
         std::fs::write(folder.path().join("edited.toml"), text.replacen(edit, to, 1)).unwrap();
-        let refused = run(&["image", "convert", "edited.toml", "again.img"]);
+        let refused = run(&["image", "convert", "edited.toml", "again.img", "--force"]);
         assert!(!refused.status.success() && stderr(&refused).contains(expected), "{}", stderr(&refused));
     }
     assert_eq!(read("again.img"), read("demo/friction.img"), "a refused conversion left its target as it was");
@@ -172,7 +172,10 @@ fn a_fit_that_fails_says_why_and_leaves_earlier_results_as_they_were() {
     std::fs::write(out.join("friction.img"), b"earlier").unwrap();
     std::fs::write(folder.path().join("joint.toml"), DESCRIPTION).unwrap();
     std::fs::write(folder.path().join("log.csv"), "t,q,tau\n0,0,0\n0.01,0.1,x\n").unwrap();
-    let output = jointctl(folder.path(), &["fit", "joint.toml"]);
+    let refused = jointctl(folder.path(), &["fit", "joint.toml"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(stderr(&refused).contains("friction.img exists; --force replaces it"), "{}", stderr(&refused));
+    let output = jointctl(folder.path(), &["fit", "joint.toml", "--force"]);
     assert_eq!(output.status.code(), Some(1));
     let text = stderr(&output);
     assert!(
@@ -257,7 +260,7 @@ fn an_excitation_is_found_within_the_limits_passes_its_check_and_fails_that_of_a
     for file in ["motion.csv", "motion.toml"] {
         let checked = run(&["excite", "--check", file]);
         assert!(checked.status.success(), "{}", stderr(&checked));
-        let simulated = run(&["sim", "--scenario", "excitation", "--excitation", file]);
+        let simulated = run(&["sim", "--scenario", "excitation", "--excitation", file, "--force"]);
         assert!(simulated.status.success(), "{}", stderr(&simulated));
         let log = std::fs::read_to_string(folder.path().join("sim/excitation-off.csv")).unwrap();
         // Ten seconds and the move to the middle of the positions, every 4 ms.
@@ -289,6 +292,36 @@ fn wrong_arguments_are_refused_with_their_limits() {
         assert!(stderr(&output).contains(expected), "{arguments:?}: {}", stderr(&output));
     }
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "nothing is written on the way to an error");
+}
+
+#[test]
+fn nothing_that_exists_is_replaced_without_being_told_to_and_a_path_that_cannot_be_written_is_told_before_any_work() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let run = |arguments: &[&str]| jointctl(folder.path(), arguments);
+    for name in ["demo", "sim"] {
+        std::fs::create_dir(path(name)).unwrap();
+    }
+    let files = ["demo/loop.html", "sim/joint.toml", "excitation.toml", "joint.eds", "joint.dbc", "bus.yml"];
+    let names = ["demo", "sim", "excite", "eds", "dbc", "bus-yml --node 5"];
+    for (file, name) in files.into_iter().zip(names) {
+        std::fs::write(path(file), "mine").unwrap();
+        let refused = run(&name.split(' ').collect::<Vec<_>>());
+        assert_eq!(refused.status.code(), Some(2), "{name}: {}", stderr(&refused));
+        let told = format!("{} exists; --force replaces it", Path::new(file).file_name().unwrap().display());
+        assert!(stderr(&refused).contains(&told), "{name}: {}", stderr(&refused));
+        assert_eq!(std::fs::read(path(file)).unwrap(), b"mine");
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), files.len());
+    for arguments in
+        [&["demo", "--out", "joint.eds/demo"][..], &["eds", "joint.eds/below"], &["excite", "--out", "sim"]]
+    {
+        let refused = run(&[arguments, &["--force"]].concat());
+        let text = stderr(&refused);
+        assert!(refused.status.code() == Some(1) && text.contains("cannot "), "{arguments:?}: {text}");
+    }
+    assert!(run(&["eds", "--force"]).status.success());
+    assert_ne!(std::fs::read(path("joint.eds")).unwrap(), b"mine");
 }
 
 const DESCRIPTION: &str = r#"

@@ -22,6 +22,9 @@ arguments, and a test fails where it says anything else.
 
 `move` that is interrupted failed (1), `enable` that is interrupted is done (0): it lasts until somebody ends it. Both disable the joint first.
 
+No file that exists is replaced without `--force`. A file that exists, a folder in a file's place and a folder that cannot be written to are told before any
+work, and before a joint moves.
+
 Results go to standard output, progress, warnings and errors to standard error. `--json` prints the same result as JSON on standard output,
 angles in rad and torques in Nm unless a unit stands beside the number; numbers that were not measured are `null`.
 

@@ -51,8 +51,7 @@ fn configure(python: Option<&Path>) -> Result<(), Failed> {
         return Err(String::from_utf8_lossy(&written.stderr).into_owned().into());
     }
     let refused = write(&[])?;
-    if refused.status.code() != Some(2)
-        || !String::from_utf8_lossy(&refused.stderr).contains("bus.yml exists; --replace")
+    if refused.status.code() != Some(2) || !String::from_utf8_lossy(&refused.stderr).contains("bus.yml exists; --force")
     {
         return Err(format!("bus-yml replaces a file without being told to: {refused:?}").into());
     }
@@ -69,7 +68,7 @@ fn configure(python: Option<&Path>) -> Result<(), Failed> {
         // The last one is what dcfgen takes below.
         (["--period", "10"], 0),
     ] {
-        let output = write(&[&more[..], &["--replace"]].concat())?;
+        let output = write(&[&more[..], &["--force"]].concat())?;
         if output.status.code() != Some(code) {
             return Err(format!("{more:?}: {output:?}, wanted {code}").into());
         }

@@ -11,16 +11,20 @@
 //!
 //! - [`VirtualNode`]: the whole node; frames and time passed in, so that tests run it faster than real time
 //! - [`serve`]: the node on a bus, in real time
-//! - [`EmulatedNode`]: a board's own program, as it is flashed, in its place
-//! - [`FlashFile`]: the emulated board's parameters in a file
-//! - [`Workbench`]: what somebody at the bench does to an emulated board, by lines of text
 //! - [`PacedNodes`]: several nodes on one modelled wire, in simulated time
 //! - [`Storage`]: what outlasts a loss of power, in memory or in files
 //! - [`flash`]: a flash with the rules of the STM32G4's
 //! - [`hostile`]: server and objects without the joint, and a judge of what arbitrary frames do to them
+//!
+//! With the feature `emulator`:
+//!
+//! - `EmulatedNode`: a board's own program, as it is flashed, in the place of the virtual joint
+//! - `FlashFile`: the emulated board's parameters in a file
+//! - `Workbench`: an emulated board's surroundings, changed by lines of text
 
 #![forbid(unsafe_code)]
 
+#[cfg(feature = "emulator")]
 mod emulated;
 pub mod flash;
 pub mod hostile;
@@ -32,6 +36,7 @@ mod serve;
 mod storage;
 mod virtual_node;
 
+#[cfg(feature = "emulator")]
 pub use emulated::{Command, DriverFault, EmulatedNode, FlashFile, FlashFileError, Workbench};
 pub use images::SlotImages;
 pub use paced::{PacedEvent, PacedNodes, REACTION, TASK};

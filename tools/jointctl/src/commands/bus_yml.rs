@@ -2,6 +2,7 @@
 
 use super::CommandError;
 use super::describe::identity;
+use super::force::Force;
 use super::remote::Patience;
 use crate::describe::bus_yml::{Joint, Master, PERIODS, text};
 use crate::describe::eds::{self, Identity};
@@ -32,9 +33,9 @@ pub struct BusYml {
     /// Folder to write bus.yml and the EDS to
     #[arg(long, value_name = "DIR", default_value = ".")]
     out: PathBuf,
-    /// Replace files that exist
-    #[arg(long)]
-    replace: bool,
+    /// Permission to replace.
+    #[command(flatten)]
+    force: Force,
     /// How long joints may take.
     #[command(flatten)]
     patience: Patience,
@@ -120,9 +121,7 @@ impl BusYml {
             }
         }
         let paths = files.iter().map(|file| self.out.join(&file.path)).collect::<Vec<_>>();
-        if let Some(path) = paths.iter().find(|path| !self.replace && path.exists()) {
-            return Err(CommandError::Arguments(format!("{} exists; --replace replaces it", path.display())));
-        }
+        self.force.permits(&paths)?;
         write_directory(&self.out, &files)?;
         for path in paths {
             println!("written: {}", path.display());

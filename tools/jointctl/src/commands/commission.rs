@@ -1,6 +1,7 @@
 //! `jointctl commission`: from a new board to a turning motor.
 
 use super::CommandError;
+use super::force::Force;
 use super::remote::{Where, catch_interrupts, running};
 use crate::commission::joint::Joint;
 use crate::commission::{Failure, Guide, Plan, Stage, Stopped, commission, find_index, page};
@@ -66,10 +67,12 @@ pub struct Commission {
     /// Acknowledge a fault whose cause is gone first
     #[arg(long)]
     reset: bool,
-    /// Folder for commission.html and commission.toml; files of the same names are replaced, others are left alone
-    /// [default: commission-N]
+    /// Folder for commission.html and commission.toml; other files in it are left alone [default: commission-N]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Permission to replace.
+    #[command(flatten)]
+    force: Force,
 }
 
 impl Commission {
@@ -111,8 +114,9 @@ impl Commission {
             println!("node {node}: the encoder knows its zero until its next loss of power");
             return Ok(());
         }
-        let found = commission(&mut bench, &plan, &mut guide)?;
         let out = self.out.clone().unwrap_or_else(|| PathBuf::from(format!("commission-{node}")));
+        self.force.permits_in(&out, &page::FILES)?;
+        let found = commission(&mut bench, &plan, &mut guide)?;
         write_directory(&out, &page::files(&found, node)?)?;
         println!("node {node}: commissioned. Written: {}", out.join("commission.html").display());
         if found.index.is_some() {

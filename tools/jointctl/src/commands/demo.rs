@@ -1,7 +1,8 @@
 //! `jointctl demo`: the whole round on a virtual joint that nobody has to own: excite, record, fit, and move with the image.
 
 use super::CommandError;
-use super::fit::{Choices, print_summary, write};
+use super::fit::{Choices, FILES, print_summary, write};
+use super::force::Force;
 use crate::dataset::prepare;
 use crate::fit::fit;
 use crate::output::{OutputFile, write_directory};
@@ -31,6 +32,9 @@ pub struct Demo {
     /// Draw the joint at random, from this seed, instead of the reference joint
     #[arg(long, value_name = "N")]
     joint: Option<u64>,
+    /// Permission to replace.
+    #[command(flatten)]
+    force: Force,
     /// Choices of the fit.
     #[command(flatten)]
     choices: Choices,
@@ -43,6 +47,7 @@ impl Demo {
     /// Runs the command.
     pub fn run(&self) -> Result<(), CommandError> {
         let options = self.choices.options()?;
+        self.force.permits_in(&self.out, &[&FILES[..], &["log.csv", "dataset.toml", "loop.html"]].concat())?;
         let progress = Terminal::new();
         progress.stage("excite the virtual joint and record it");
         let plant = self.joint.map_or_else(ActuatorParameters::reference, ActuatorParameters::randomised).aligned();

@@ -1,6 +1,7 @@
 //! `jointctl eds`, `jointctl dbc`: the joint's objects and frames for other people's tools.
 
 use super::CommandError;
+use super::force::Force;
 use super::remote::Patience;
 use crate::describe::{dbc, eds};
 use crate::output::write_file;
@@ -16,6 +17,9 @@ pub struct Eds {
     /// File to write
     #[arg(default_value = "joint.eds")]
     file: PathBuf,
+    /// Permission to replace.
+    #[command(flatten)]
+    force: Force,
     /// The bus of a joint whose identity (1018h) the file is to have: a master then takes no other [default: any joint]
     #[arg(long, value_name = "BUS", requires = "node")]
     bus: Option<String>,
@@ -30,6 +34,7 @@ pub struct Eds {
 impl Eds {
     /// Runs the command.
     pub fn run(&self) -> Result<(), CommandError> {
+        self.force.permits([&self.file])?;
         let name = self.file.file_name().unwrap_or_default().to_string_lossy();
         // A clock before 1970 dates the file 1970.
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
@@ -58,6 +63,9 @@ pub struct Dbc {
     /// File to write
     #[arg(default_value = "joint.dbc")]
     file: PathBuf,
+    /// Permission to replace.
+    #[command(flatten)]
+    force: Force,
     /// Node id of a joint, 1 to 127; repeatable
     #[arg(long, value_name = "N", default_values_t = [1])]
     node: Vec<u8>,
@@ -69,6 +77,7 @@ pub struct Dbc {
 impl Dbc {
     /// Runs the command.
     pub fn run(&self) -> Result<(), CommandError> {
+        self.force.permits([&self.file])?;
         let mut nodes = self.node.clone();
         nodes.sort_unstable();
         nodes.dedup();

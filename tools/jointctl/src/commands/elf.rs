@@ -1,7 +1,7 @@
-//! `jointctl sim --elf`: a board's program, as it is flashed, on an emulated board on a CAN bus.
+//! A board's program on an emulated board on a CAN bus.
 
 use super::CommandError;
-use clap::{Args, ValueEnum};
+use super::on_board::{Behind, Board};
 use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired};
 use emulator::chip::time::Instant;
 use emulator::emulation::Emulation;
@@ -11,7 +11,7 @@ use node::{EmulatedNode, FlashFile, Workbench, serve};
 use plant::ActuatorParameters;
 use std::fs::File;
 use std::io::{BufRead, BufReader, stdin};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::sync::mpsc::{Receiver, channel};
 
@@ -23,40 +23,16 @@ const AMBIENT: f64 = 25.0;
 /// for a second.
 const REST: u32 = 3;
 
-/// Arguments of `sim` that put a board's program on the bus.
-#[derive(Debug, Args)]
-pub struct OnBoard {
-    /// Run this program of a board, as probe-rs would flash it, on an emulated board instead of a virtual joint; its log goes to the terminal. Without
-    /// --storage what it stores is forgotten when it ends
-    #[arg(long, value_name = "ELF", requires_all = ["bus", "board"], conflicts_with_all = ["node", "serial", "image", "config"])]
-    elf: Option<PathBuf>,
-    /// The board that the program is for
-    #[arg(long, value_name = "BOARD", value_enum, requires = "elf")]
-    board: Option<Board>,
-    /// What somebody does to the board, a command a line, from this file, or from the terminal with "-"; "help" lists the commands. Each is answered
-    /// in one line
-    #[arg(long, value_name = "FILE", requires = "elf")]
-    commands: Option<PathBuf>,
-}
-
-/// The boards.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Board {
-    #[value(name = "b-g431b-esc1")]
-    BG431BEsc1,
-    #[value(name = "moteus-r4")]
-    MoteusR4,
-}
-
-/// What is behind a board.
-#[derive(Debug)]
-pub enum Behind {
-    /// The reference actuator at a low voltage, aligned, with the board's usual encoder.
-    Reference,
-    /// An actuator with the board's usual encoder, as it is mounted there.
-    Actuator(Box<ActuatorParameters>),
-    /// An actuator with its encoder's counts too.
-    Described(Box<ActuatorParameters>),
+/// Surroundings of a board.
+pub struct Bench<'a> {
+    /// The bus, as `--bus` names it.
+    pub bus: &'a str,
+    /// Folder of what the board stores.
+    pub storage: Option<&'a Path>,
+    /// File with a command a line, "-" for the terminal.
+    pub commands: Option<&'a Path>,
+    /// Ends it.
+    pub stop: &'a AtomicBool,
 }
 
 /// What keeps a board busy on a bus.
@@ -68,27 +44,14 @@ struct Session<'a> {
     stop: &'a AtomicBool,
 }
 
-impl OnBoard {
-    /// Whether a program is named.
-    pub const fn is_named(&self) -> bool {
-        self.elf.is_some()
-    }
-
-    /// Runs the program on the bus until `stop`, with its parameters in a folder where one is named. What the machine was too slow for, s.
-    pub fn run(
-        &self,
-        bus: &str,
-        behind: &Behind,
-        storage: Option<&Path>,
-        stop: &AtomicBool,
-    ) -> Result<f64, CommandError> {
-        let (Some(path), Some(board)) = (&self.elf, self.board) else { return Ok(0.0) };
-        let lines = self.commands.as_deref().map(lines).transpose()?;
-        let session = Session { elf: path, bus, storage, lines, stop };
-        match board {
-            Board::BG431BEsc1 => session.run(wired(behind, BG431BEsc1::new)?),
-            Board::MoteusR4 => session.run(wired(behind, MoteusR4::new)?),
-        }
+/// Runs the program `elf` of a board until it is stopped. Time that the machine was too slow for, s.
+pub fn run(elf: &Path, board: Board, behind: &Behind, bench: Bench) -> Result<f64, CommandError> {
+    let Bench { bus, storage, commands, stop } = bench;
+    let lines = commands.map(lines).transpose()?;
+    let session = Session { elf, bus, storage, lines, stop };
+    match board {
+        Board::BG431BEsc1 => session.run(wired(behind, BG431BEsc1::new)?),
+        Board::MoteusR4 => session.run(wired(behind, MoteusR4::new)?),
     }
 }
 

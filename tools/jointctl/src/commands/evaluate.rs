@@ -2,6 +2,7 @@
 
 use super::CommandError;
 use super::fit::print_warnings;
+use super::force::Force;
 use super::image::{read, verify};
 use crate::dataset::prepare;
 use crate::evaluate::{Prediction, error_tables, fixed_point_difference, rigid_beside};
@@ -33,6 +34,9 @@ pub struct Evaluate {
     /// FILE.gz is compressed
     #[arg(long, value_name = "FILE")]
     export: Option<PathBuf>,
+    /// Permission to replace.
+    #[command(flatten)]
+    force: Force,
     /// Print the tables as JSON
     #[arg(long)]
     json: bool,
@@ -41,6 +45,7 @@ pub struct Evaluate {
 impl Evaluate {
     /// Runs the command.
     pub fn run(&self) -> Result<(), CommandError> {
+        self.force.permits(&self.export)?;
         let progress = Terminal::new();
         progress.stage("load and clean");
         let image = read(&self.image)?;

@@ -1,6 +1,7 @@
 //! `jointctl excite`: a motion that identifies a joint, and a check of one that is given.
 
 use super::CommandError;
+use super::force::Force;
 use super::joint::JointChoice;
 use crate::excite::check::{Findings, check};
 use crate::excite::file::{SAMPLE_PERIOD, coefficients, read, table};
@@ -42,6 +43,9 @@ pub struct Excite {
     /// Table to write; the coefficients are written beside it, with the ending .toml
     #[arg(long, value_name = "FILE", default_value = "excitation.csv")]
     out: PathBuf,
+    /// Permission to replace.
+    #[command(flatten)]
+    force: Force,
     /// Check this table (or, with the ending .toml, these coefficients) instead: limits and condition number
     #[arg(long, value_name = "FILE", conflicts_with = "out")]
     check: Option<PathBuf>,
@@ -65,6 +69,7 @@ impl Excite {
             let text = format!("--out is {}: its ending .toml is that of the coefficients", self.out.display());
             return Err(CommandError::Arguments(text));
         }
+        self.force.permits([&self.out, &twin])?;
         let effort = Effort { duration: self.duration, harmonics: self.harmonics, seed: self.seed, ..Effort::THOROUGH };
         let found = optimise(&bounds, &effort)?;
         let (time, motion): (Vec<_>, Vec<_>) = found.excitation.samples(SAMPLE_PERIOD).unzip();

@@ -1,6 +1,7 @@
 //! `jointctl fit`: from a described data set to an image, its TOML twin and a report.
 
 use super::CommandError;
+use super::force::Force;
 use crate::choice::{Decision, TermRule};
 use crate::dataset::{Prepared, Warning, prepare};
 use crate::fit::{Fitted, Options, Trainer, fit};
@@ -20,9 +21,12 @@ use std::path::{Path, PathBuf};
 pub struct Fit {
     /// Description of the data set (docs/your-own-joint.md)
     dataset: PathBuf,
-    /// Folder for image, report and figures; files of the same names are replaced, others are left alone
+    /// Folder for image, report and figures; other files in it are left alone [default: the description's name]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Permission to replace.
+    #[command(flatten)]
+    force: Force,
     /// Table of the prepared samples with their part and every model's prediction, for other programs (docs/baselines.md);
     /// FILE.gz is compressed
     #[arg(long, value_name = "FILE")]
@@ -200,6 +204,8 @@ impl Fit {
         let options = self.choices.options()?;
         let stem = self.dataset.file_stem().unwrap_or_default();
         let out = self.out.clone().unwrap_or_else(|| PathBuf::from(stem));
+        self.force.permits_in(&out, &FILES)?;
+        self.force.permits(&self.export)?;
         let progress = Terminal::new();
         progress.stage("load and clean");
         let mut prepared = prepare(&self.dataset)?;
@@ -219,6 +225,9 @@ impl Fit {
         Ok(())
     }
 }
+
+/// Files of a fit, but for its figures.
+pub const FILES: [&str; 4] = ["friction.img", "friction.toml", "report.html", "report.json"];
 
 /// Writes image, TOML twin, report and figures into `out`, all or nothing.
 pub fn write(fitted: &Fitted, out: &Path) -> Result<(), CommandError> {

@@ -2,6 +2,7 @@
 
 use super::CommandError;
 use super::fit::bytes;
+use super::force::Force;
 use crate::image_text;
 use crate::key_file;
 use crate::output::write_file;
@@ -43,6 +44,9 @@ pub struct Convert {
     from: PathBuf,
     /// File to write
     to: PathBuf,
+    /// Permission to replace.
+    #[command(flatten)]
+    force: Force,
     /// Compute the golden vectors anew, after an edit of the parameters
     #[arg(long)]
     recompute_golden: bool,
@@ -94,6 +98,7 @@ impl Convert {
             true => image_text::to_text(&image).into_bytes(),
             false => bytes(&image, &self.from)?,
         };
+        self.force.permits([&self.to])?;
         write_file(&self.to, &contents)?;
         Ok(())
     }

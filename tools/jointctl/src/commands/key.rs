@@ -2,6 +2,7 @@
 
 use super::CommandError;
 use super::fit::bytes;
+use super::force::Force;
 use super::image::{read, verify};
 use super::remote::Where;
 use crate::key_file;
@@ -101,6 +102,9 @@ pub struct Sign {
     /// File to write: the image with its tag behind it [default: the image's name with the ending .signed]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// Permission to replace.
+    #[command(flatten)]
+    force: Force,
 }
 
 impl Sign {
@@ -116,6 +120,7 @@ impl Sign {
         let tag = key.sign(&upload);
         upload.extend_from_slice(&tag);
         let out = self.out.clone().unwrap_or_else(|| self.image.with_extension("signed"));
+        self.force.permits([&out])?;
         write_file(&out, &upload)?;
         let target = match (image.target.product, image.target.serial) {
             (0, 0) => "any joint".to_owned(),

@@ -1,6 +1,7 @@
 //! `jointctl info`, `get`, `set`: a joint's objects, by the names of docs/objects.md or by index.
 
 use super::CommandError;
+use super::force::Force;
 use super::remote::{Patience, Where};
 use crate::output::write_file;
 use crate::remote::entry::Entry;
@@ -47,6 +48,9 @@ pub struct Get {
     /// Write the bytes of the one object to a file: an image, a fault history
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// Permission to replace.
+    #[command(flatten)]
+    force: Force,
     /// Name all objects, with index, type, access, unit and limits; needs no bus
     #[arg(long, conflicts_with_all = ["objects", "out"])]
     list: bool,
@@ -72,6 +76,7 @@ impl Get {
             return Ok(());
         };
         let named = self.objects.iter().map(|name| Entry::find(name)).collect::<Result<Vec<_>, _>>()?;
+        self.force.permits(&self.out)?;
         let joint = Where { bus: bus.clone(), node, key: None, patience: self.patience }.joint()?;
         if let Some(path) = &self.out {
             let [entry] = named.concat()[..] else {

@@ -1,6 +1,7 @@
 //! `jointctl record`: what a joint does, as a data set for `jointctl fit`.
 
 use super::CommandError;
+use super::force::Force;
 use super::remote::{Where, catch_interrupts, running};
 use crate::output::{OutputFile, write_directory};
 use crate::progress::{Progress, Terminal};
@@ -22,7 +23,7 @@ pub struct Record {
     /// Which joint.
     #[command(flatten)]
     on: Where,
-    /// Table to write; dataset.toml is written beside it. Neither may exist, unless --replace is given
+    /// Table to write; dataset.toml is written beside it. Neither may exist, unless --force is given
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// How long, s [default: until Ctrl-C]
@@ -34,9 +35,9 @@ pub struct Record {
     /// Send no SYNC, follow that of another client
     #[arg(long, conflicts_with = "rate")]
     follow: bool,
-    /// Replace files that exist
-    #[arg(long)]
-    replace: bool,
+    /// Permission to replace.
+    #[command(flatten)]
+    force: Force,
 }
 
 impl Record {
@@ -54,12 +55,7 @@ impl Record {
             return Err(CommandError::Arguments(text));
         };
         let folder = self.out.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        // Before anything is recorded that could not be written.
-        let existing = [self.out.clone(), folder.join(DESCRIPTION)].into_iter().find(|path| path.exists());
-        if let Some(path) = existing.filter(|_| !self.replace) {
-            let text = format!("{} exists; --replace replaces the table and {DESCRIPTION} beside it", path.display());
-            return Err(CommandError::Arguments(text));
-        }
+        self.force.permits_in(folder, &[name, DESCRIPTION])?;
         let joint = self.on.joint()?;
         catch_interrupts()?;
         let pace = if self.follow { Pace::Follow } else { Pace::Send(self.rate) };

@@ -1,7 +1,8 @@
 //! `jointctl retrain`: the whole round on a joint over a bus: excite, record, fit, compare, commit.
 
 use super::CommandError;
-use super::fit::write;
+use super::fit::{FILES, write};
+use super::force::Force;
 use super::remote::{Where, catch_interrupts, running};
 use crate::fit::Options;
 use crate::progress::Terminal;
@@ -17,10 +18,12 @@ pub struct Retrain {
     /// Which joint.
     #[command(flatten)]
     on: Where,
-    /// Folder for recording, image and report; files of the same names are replaced, others are left alone
-    /// [default: retrain-N]
+    /// Folder for recording, image and report; other files in it are left alone [default: retrain-N]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Permission to replace.
+    #[command(flatten)]
+    force: Force,
     /// Duration of each of the two motions that are recorded, s
     #[arg(long, value_name = "S", default_value_t = 10.0)]
     duration: f64,
@@ -50,6 +53,7 @@ impl Retrain {
         let key = self.on.key()?;
         let joint = self.on.joint()?;
         let out = self.out.clone().unwrap_or_else(|| PathBuf::from(format!("retrain-{}", joint.id())));
+        self.force.permits_in(&out, &[&FILES[..], &["log.csv", "dataset.toml"]].concat())?;
         let options = Options {
             trainer: Options::default().trainer.filter(|_| self.restarts > 0),
             restarts: self.restarts.max(1),

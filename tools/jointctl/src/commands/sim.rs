@@ -2,9 +2,10 @@
 
 use super::CommandError;
 use super::bus::OnBus;
-use super::elf::OnBoard;
+use super::force::Force;
 use super::image::{read, verify};
 use super::joint::JointChoice;
+use super::on_board::OnBoard;
 use crate::excite::file as excitation;
 use crate::joint_text;
 use crate::output::{OutputFile, write_directory};
@@ -51,6 +52,9 @@ pub struct Sim {
     /// Folder for logs, page, and the files that describe joint and actuator
     #[arg(long, value_name = "DIR", default_value = "sim")]
     out: PathBuf,
+    /// Permission to replace.
+    #[command(flatten)]
+    force: Force,
     /// Print the table as a JSON array, an object for each row
     #[arg(long, conflicts_with = "bus")]
     json: bool,
@@ -89,6 +93,7 @@ impl Sim {
             }
             return self.on_bus.run(bus, &plant, &setup, image.as_ref());
         }
+        self.force.permits_in(&self.out, &["joint.toml", "plant.toml", "sim.html"])?;
         let friction = self.friction(&setup)?;
         let samples = self.excitation.as_deref().map(excitation::read).transpose()?;
         let mut scenarios = if self.scenario.is_empty() { Scenario::ALL.to_vec() } else { self.scenario.clone() };

@@ -13,6 +13,8 @@ use std::fmt::Write as _;
 /// The page's and the text's names.
 const PAGE: &str = "commission.html";
 const TEXT: &str = "commission.toml";
+/// Files of a commissioning.
+pub const FILES: [&str; 2] = [PAGE, TEXT];
 
 /// Page and text of what was found on a node.
 ///

@@ -85,17 +85,14 @@ pub fn a_joint_is_looked_at_set_moved_and_fed_from_the_command_line() {
     assert!(text.contains("joint_5:\n") && text.contains("  revision_number: 0x"), "{text}");
     // Two periods have to fit into the command deadline.
     desk.prints(&["set", "command-deadline", "0.06"], &["command-deadline (2103h:"]);
-    desk.prints(&["bus-yml", "--out", "master", "--replace", "--period", "30"], &["written: master/bus.yml"]);
-    desk.fails(
-        &["bus-yml", "--out", "master", "--replace", "--period", "31"],
-        &["node 5", "0.06 s", "0.062 s or more"],
-    );
+    desk.prints(&["bus-yml", "--out", "master", "--force", "--period", "30"], &["written: master/bus.yml"]);
+    desk.fails(&["bus-yml", "--out", "master", "--force", "--period", "31"], &["node 5", "0.06 s", "0.062 s or more"]);
     desk.prints(&["set", "command-deadline", "0.1"], &["command-deadline (2103h:"]);
     desk.prints(&["store"], &["node 5: stored"]);
     desk.prints(&["move", "velocity", "-0.4", "--duration", "1"], &["rad/s", "node 5: disabled"]);
     desk.prints(&["monitor", "--once"], &["state           disabled", "position      ", "gear "]);
     desk.prints(&["record", "--out", "log.csv", "--duration", "1"], &[" samples in ", "Written: log.csv"]);
-    desk.misunderstands(&["record", "--out", "log.csv", "--duration", "1"], &["log.csv exists; --replace replaces"]);
+    desk.misunderstands(&["record", "--out", "log.csv", "--duration", "1"], &["log.csv exists; --force replaces"]);
     desk.prints(&["upload", "first.img", "--commit"], &["version 1 is stored; in use"]);
     desk.prints(&["upload", "second.img"], &["version 1 is stored; an image is verified", "Not in use"]);
     desk.prints(&["upload", "second.img", "--trial", "60"], &["on trial for another "]);
