@@ -2,8 +2,9 @@
 
 use super::cob_id;
 use super::error::ClientError;
+use super::frame::frame;
 use super::lss::{Address, Fastscan, IDENTIFIED, Step, request};
-use super::network::{Network, Subscription, frame};
+use super::network::{Network, Subscription};
 use super::sdo::Message;
 use std::time::{Duration, Instant};
 

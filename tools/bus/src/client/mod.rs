@@ -20,6 +20,7 @@
 mod abort;
 pub mod emergency;
 mod error;
+mod frame;
 pub mod heartbeat;
 pub mod lss;
 mod lss_master;

@@ -2,8 +2,8 @@
 
 use super::cob_id;
 use super::error::{ClientError, Object};
+use super::frame::frame;
 use super::nmt::{Command, Target};
-use super::node::Node;
 use super::sdo::{Failure, Settings, Transfer};
 use super::{Emergency, NmtState};
 use crate::{BusError, Frame, Transport};
@@ -199,11 +199,6 @@ impl Network {
         Subscription { frames, dropped, network: self.clone() }
     }
 
-    /// A node by its id, 1 to 127.
-    pub fn node(&self, id: u8) -> Result<Node, ClientError> {
-        if matches!(id, 1..=127) { Ok(Node::new(self.clone(), id)) } else { Err(ClientError::NodeId(id)) }
-    }
-
     /// Sends an NMT command. Nodes do not answer it; see [`Network::heartbeats`].
     pub fn command(&self, command: Command, target: Target) -> Result<(), ClientError> {
         if let Target::Node(id @ (0 | 128..)) = target {
@@ -296,12 +291,6 @@ fn hear(transfer: &mut Transfer, received: &Received, answers: u16, began: Insta
     } else {
         transfer.disturbed();
     }
-}
-
-/// A frame of this crate's own making: identifiers are constants or made of them, and no data is longer than 8 bytes.
-pub(super) fn frame(id: u16, data: &[u8]) -> Frame {
-    let data = data.get(..8).unwrap_or(data);
-    Frame::new(id & 0x7FF, data).unwrap_or_else(|| unreachable!("11 bits and 8 bytes are a frame"))
 }
 
 /// Frames of one interest, in the order of arrival. Ends with being dropped.

@@ -1,7 +1,7 @@
 //! NMT commands: CiA 301 section 7.2.8.3.1; host.
 
 use super::cob_id;
-use super::network::frame;
+use super::frame::frame;
 use crate::Frame;
 
 /// What a node is told.

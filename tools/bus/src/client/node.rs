@@ -11,6 +11,13 @@ const READS: u32 = 5;
 /// Pause before the second read, in milliseconds; twice as long before each that follows.
 const PAUSE_MS: u64 = 2;
 
+impl Network {
+    /// A node by its id, 1 to 127.
+    pub fn node(&self, id: u8) -> Result<Node, ClientError> {
+        if matches!(id, 1..=127) { Ok(Node::new(self.clone(), id)) } else { Err(ClientError::NodeId(id)) }
+    }
+}
+
 /// A node, by its id.
 #[derive(Clone, Debug)]
 pub struct Node {
@@ -20,7 +27,7 @@ pub struct Node {
 }
 
 impl Node {
-    pub(super) fn new(network: Network, id: u8) -> Self {
+    fn new(network: Network, id: u8) -> Self {
         let settings = Settings { timeout: network.patience(), ..Settings::default() };
         Self { network, id, settings }
     }

@@ -15,7 +15,7 @@ use super::execute::by_condition;
 use super::execute::pairs::{compared_of, conditional_of, pair_of};
 use super::execute::system::nothing;
 use super::operation::{Done, Execute, Flow, Leave, Operands, Operation, Part, Rest, Step, Trap, behind};
-use super::translation::{Left, Translation};
+use super::translation::{Left, TRANSLATED, Translation};
 use crate::bus::Bus;
 
 /// Instructions of a stretch, at most.
@@ -53,9 +53,6 @@ struct Stretch {
     /// How often it has begun, or, from `TRANSLATED` on, which function begins there.
     runs: u32,
 }
-
-/// Numbers of functions begin here; nothing begins so often.
-pub(super) const TRANSLATED: u32 = 1 << 31;
 
 /// All stretches.
 #[derive(Clone)]

@@ -3,27 +3,14 @@
 //! Every fold descends from the fit over all rows: the shapes start where all motions put them and move to where the rest of the motions
 //! wants them.
 
+use super::fold_rows::FoldRows;
 use super::nonlinear::{Effort, Fit, Problem};
-use super::observations::{Row, decimated};
-use crate::choice::Folds;
 use crate::friction_model::FrictionModel;
 use crate::rigid::RigidParameters;
 use rayon::prelude::*;
 
-/// Most rows that a fold is fitted to.
-const FITTED_ROWS: usize = 4_000;
-/// Most rows that a fold is judged by.
-const JUDGED_ROWS: usize = 2_500;
 /// How far a fold descends.
 const DESCENT: Effort = Effort { iterations: 10, tolerance: 1e-5 };
-
-/// The rows that one fold fits to, and those that it leaves out.
-#[derive(Clone, Debug)]
-pub struct FoldRows {
-    grouping: usize,
-    fitted: Vec<Row>,
-    judged: Vec<Row>,
-}
 
 /// A structure fitted without one fold.
 #[derive(Clone, Debug)]
@@ -36,23 +23,6 @@ pub struct FoldFit {
     pub rigid: RigidParameters,
     /// Friction.
     pub friction: FrictionModel,
-}
-
-/// The rows of every fold, from all rows and the folds that leave each of them out.
-pub fn fold_rows(rows: &[Row], left_out: &[u8], folds: &Folds) -> Vec<FoldRows> {
-    let of_fold = |fold: usize| {
-        let (judged, fitted): (Vec<_>, Vec<_>) =
-            rows.iter().zip(left_out).partition(|(_, left_out)| **left_out >> fold & 1 == 1);
-        let rows = |pairs: Vec<(&Row, &u8)>, limit| {
-            decimated(&pairs.into_iter().map(|(row, _)| *row).collect::<Vec<Row>>(), limit)
-        };
-        FoldRows {
-            grouping: folds.groupings[fold],
-            fitted: rows(fitted, FITTED_ROWS),
-            judged: rows(judged, JUDGED_ROWS),
-        }
-    };
-    (0..folds.len()).map(of_fold).collect()
 }
 
 /// The fit's structure without each fold.

@@ -3,18 +3,15 @@
 //! The measure is the part of a column's square that the other linear columns do not explain: the inverse of its variance inflation factor.
 //! Where it is small, noise decides how the sum of several terms is divided among them, and on another motion the parts no longer cancel.
 
+use super::freedom::Freedom;
 use super::layout::Role;
-use super::linear::{add_to_normal_sums, dependences, inverse, normal_equations, normal_sums, sum_over_rows};
+use super::linear::{OWN_PART, add_to_normal_sums, dependences, inverse, normal_equations, normal_sums, sum_over_rows};
 use super::nonlinear::Fit;
 use super::observations::Row;
-use super::selection::Freedom;
 use crate::friction_model::Term;
 use crate::friction_parameter::FrictionParameter as P;
 use crate::rigid::RigidRegressor;
 use nalgebra::DMatrix;
-
-/// Least own part of a term that the data determine: its standard error is then ten times that of a term that stands alone.
-pub const OWN_PART: f64 = 0.01;
 
 /// True where the column that a freedom adds to the fit has at least [`OWN_PART`] of its own, and for freedoms without one.
 pub fn stands_for_itself(fit: &Fit, freedom: Freedom) -> bool {

@@ -8,6 +8,9 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 
+/// Least own part of a term that the data determine: its standard error is then ten times that of a term that stands alone.
+pub const OWN_PART: f64 = 0.01;
+
 /// Rows that one thread sums up at a time.
 const CHUNK: usize = 1024;
 /// A column of which less than this fraction of its square is left when the columns before it are projected out cannot be

@@ -14,6 +14,8 @@
 mod crossed;
 mod determined;
 mod estimates;
+mod fold_rows;
+mod freedom;
 mod grid;
 mod lags;
 mod layout;
@@ -194,7 +196,7 @@ pub fn identify(
     };
     notes.extend(lags);
     let (parameters, undetermined) = estimates::estimates(&fit, problem.train.len(), &options.units);
-    if problem.own_part_of_offset < determined::OWN_PART && !fit.friction.terms.contains(Term::Constant) {
+    if problem.own_part_of_offset < linear::OWN_PART && !fit.friction.terms.contains(Term::Constant) {
         notes.push(format!(
             "no offset: over these positions the rigid part explains all but {:.2} % of it",
             100.0 * problem.own_part_of_offset
@@ -283,7 +285,7 @@ fn left_out(samples: &Samples, folds: &Folds) -> Vec<u8> {
 impl Problem {
     /// Fills in the rows of every fold.
     fn leave_out(&mut self, samples: &Samples, folds: &Folds) {
-        self.folds = crossed::fold_rows(&self.train, &left_out(samples, folds), folds);
+        self.folds = fold_rows::fold_rows(&self.train, &left_out(samples, folds), folds);
     }
 }
 

@@ -8,6 +8,7 @@
 
 use super::crossed::{FoldFit, crossed, errors, overall};
 use super::determined::stands_for_itself;
+use super::freedom::Freedom;
 use super::grid::{search, search_from};
 use super::nonlinear::{Fit, Problem};
 use crate::choice::{Comparison, TermRule, compare, rank};
@@ -15,7 +16,6 @@ use crate::friction_model::{Term, Terms};
 use crate::presets::{Preset, Structure};
 use crate::rigid::RigidModel;
 use rayon::prelude::*;
-use std::fmt;
 
 /// Temperature terms are considered when the train samples cover at least this many kelvin.
 pub const TEMPERATURE_RANGE: f64 = 5.0;
@@ -25,27 +25,6 @@ const STEP: f64 = 5e-4;
 const STEPS: usize = 12;
 /// Terms of every model, unless they are forbidden: the simplest model.
 const ALWAYS: [Term; 3] = [Term::Constant, Term::Viscous, Term::Coulomb];
-
-/// What a structure can lose or gain.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Freedom {
-    /// A term.
-    Term(Term),
-    /// A Coulomb friction for each direction.
-    AsymmetricCoulomb,
-    /// A height of the Stribeck peak for each direction.
-    AsymmetricBreakaway,
-}
-
-impl fmt::Display for Freedom {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Term(term) => write!(f, "{term:?}"),
-            Self::AsymmetricCoulomb => f.write_str("asymmetry of the Coulomb friction"),
-            Self::AsymmetricBreakaway => f.write_str("asymmetry of the breakaway friction"),
-        }
-    }
-}
 
 /// The terms that the data can support, and why others are left out.
 fn supported(problem: &Problem, rigid: &RigidModel) -> (Structure, Vec<String>) {

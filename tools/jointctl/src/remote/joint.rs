@@ -2,8 +2,8 @@
 
 use super::entry::Entry;
 use super::error::RemoteError;
-use super::owner::Owner;
 use super::present::{PATIENCE, present};
+use super::session::Owner;
 use super::value::Value;
 use bus::client::sdo::Settings;
 use bus::client::{ClientError, Network, Node, Object};

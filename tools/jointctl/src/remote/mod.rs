@@ -32,6 +32,7 @@ pub mod record;
 pub mod refusal;
 pub mod retrain;
 pub mod route;
+mod session;
 pub mod stream;
 pub mod telemetry;
 pub mod value;

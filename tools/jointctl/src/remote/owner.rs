@@ -5,31 +5,14 @@
 use super::entry::Entry;
 use super::error::RemoteError;
 use super::joint::RemoteJoint;
+use super::session::Owner;
 use super::value::Value;
-use bus::client::{Abort, ClientError, Node};
+use bus::client::{Abort, ClientError};
 use joint_firmware::objects::field::{Field, OwnerField};
 use joint_firmware::objects::ownership::FORGET;
 use joint_firmware::parameters::authentication::{CHALLENGE, Challenge, Key, Purpose};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-
-/// The owner of a joint at work: ends the session that was opened for it.
-#[derive(Debug)]
-pub(super) struct Owner {
-    key: Key,
-    node: Node,
-    opened: AtomicBool,
-}
-
-impl Drop for Owner {
-    fn drop(&mut self) {
-        if self.opened.load(Ordering::Relaxed) {
-            let Entry { object, .. } = Entry::of(Field::Owner(OwnerField::Session));
-            // Where it cannot be ended it ends by itself.
-            let _ = self.node.download(object.index, object.sub_index, &0u32.to_le_bytes());
-        }
-    }
-}
 
 impl RemoteJoint {
     /// The same joint, with its owner's key for what needs a session.

@@ -1,7 +1,7 @@
 //! Arithmetic, logic, shifts, bit fields, multiplications: as `execute` does them.
 
-use super::emit::Emitter;
-use super::registers::{CARRY, Compared, OVERFLOW};
+use super::emit::{Compared, Emitter};
+use super::registers::{CARRY, OVERFLOW};
 use super::{Action, Instruction};
 use crate::cpu::arithmetic::{ARITHMETIC, CARRY_CLEARED, CARRY_KEPT, EXTEND, LEFT, RIGHT};
 use crate::cpu::execute::data_processing::{

@@ -4,23 +4,30 @@
 //! instructions are counted together, the latter in the upper half of a word, once for each block. A block begins only if its last instruction begins
 //! before something is due.
 
-use super::host::{Compiler, LONGEST};
-use super::memory::LEAST;
-use super::region::{Place, Region};
-use super::registers::Compared;
+use super::region::{LEAST, Place, Region};
 use super::{Action, Fields, Instruction, Left};
 use crate::cpu::operation::{Flow, behind};
 use crate::cpu::timing::REFILL;
 use cranelift_codegen::ir::condcodes::IntCC;
 use cranelift_codegen::ir::immediates::Offset32;
 use cranelift_codegen::ir::{
-    AliasRegionData, Block, Function, Inst, InstBuilder, MemFlagsData, Opcode, SigRef, Type, UserFuncName, Value, types,
+    AliasRegionData, Block, Function, Inst, InstBuilder, MemFlagsData, Opcode, SigRef, Signature, Type, UserFuncName,
+    Value, types,
 };
+use cranelift_codegen::isa::TargetFrontendConfig;
 use cranelift_frontend::{FunctionBuilder, FunctionBuilderContext, Variable};
 use std::collections::{HashMap, HashSet};
 
 /// An instruction in the count of instructions and cycles.
 const ONE: u64 = 1 << 32;
+
+/// Operands of the last comparison, whose flags are still those.
+#[derive(Clone, Copy)]
+pub(super) enum Compared {
+    Words(Value, Value),
+    /// None of them is a NaN.
+    Floats(Value, Value),
+}
 
 pub(super) struct Emitter<'a, 'b> {
     pub b: FunctionBuilder<'b>,
@@ -63,13 +70,26 @@ pub(super) struct Emitter<'a, 'b> {
     pub waiting: Vec<Place>,
 }
 
+/// Cycles that a function may take at once.
+pub(super) const LONGEST: u64 = 1 << 30;
+
+/// Calling conventions of the host.
+pub(super) struct Conventions {
+    /// Signature of a function.
+    pub own: Signature,
+    /// Signature of what calls one instruction.
+    pub of_call: Signature,
+    pub frontend: TargetFrontendConfig,
+}
+
 /// The function of the region from an address on; none where that is nothing.
-pub(super) fn function(compiler: &Compiler, fields: &Fields, region: &Region) -> Option<Function> {
+pub(super) fn function(conventions: Conventions, fields: &Fields, region: &Region) -> Option<Function> {
+    let Conventions { own, of_call, frontend } = conventions;
     let entry = region.entry;
     if !region.holds(entry) || region.memory < LEAST {
         return None;
     }
-    let mut function = Function::with_name_signature(UserFuncName::default(), compiler.signature());
+    let mut function = Function::with_name_signature(UserFuncName::default(), own);
     let mut context = FunctionBuilderContext::new();
     let mut b = FunctionBuilder::new(&mut function, &mut context);
     let begin = b.create_block();
@@ -83,7 +103,7 @@ pub(super) fn function(compiler: &Compiler, fields: &Fields, region: &Region) ->
     let (of_core, of_data) = (region_of(0, "core"), region_of(1, "memory"));
     let core = MemFlagsData::trusted().with_alias_region(Some(of_core));
     let data = MemFlagsData::new().with_notrap().with_alias_region(Some(of_data));
-    let signature = b.import_signature(compiler.signature_of_call());
+    let signature = b.import_signature(of_call);
     let now = b.ins().load(types::I64, core, cpu, fields.now);
     let attention = b.ins().load(types::I64, core, cpu, fields.attention);
     let left = b.ins().isub(attention, now);
@@ -142,7 +162,7 @@ pub(super) fn function(compiler: &Compiler, fields: &Fields, region: &Region) ->
     }
     emitter.end();
     emitter.b.seal_all_blocks();
-    emitter.b.finalize(compiler.isa.frontend_config());
+    emitter.b.finalize(frontend);
     drop_unused(&mut function);
     Some(function)
 }

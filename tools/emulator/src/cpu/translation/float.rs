@@ -1,7 +1,7 @@
 //! The floating-point unit, where the host's arithmetic is the unit's (see `cpu::float`).
 
-use super::emit::Emitter;
-use super::registers::{CARRY, Compared, NEGATIVE, OVERFLOW, ZERO};
+use super::emit::{Compared, Emitter};
+use super::registers::{CARRY, NEGATIVE, OVERFLOW, ZERO};
 use super::{Action, Instruction};
 use crate::cpu::execute::floating_point::{NARROW, TOWARDS_ZERO, UNSIGNED, VADD, VDIV, VMLA, VMLS, VMUL, VNMUL, VSUB};
 use crate::cpu::execute::load_store::CHANGES;

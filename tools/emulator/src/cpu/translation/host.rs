@@ -2,8 +2,9 @@
 //!
 //! Cranelift compiles for x86-64 and AArch64 alike; on other hosts nothing is translated.
 
+use super::emit::{self, Conventions, LONGEST};
 use super::region::Region;
-use super::{Fields, Left, emit};
+use super::{Fields, Left};
 use crate::bus::Bus;
 use crate::cpu::Cpu;
 use cranelift_codegen::Context;
@@ -78,7 +79,9 @@ impl Compiler {
     }
 
     fn compile_anew(&self, fields: &Fields, region: &Region) -> Option<Function> {
-        let mut context = Context::for_function(emit::function(self, fields, region)?);
+        let (own, of_call) = (self.signature(), self.signature_of_call());
+        let conventions = Conventions { own, of_call, frontend: self.isa.frontend_config() };
+        let mut context = Context::for_function(emit::function(conventions, fields, region)?);
         let compiled = context.compile(&*self.isa, &mut ControlPlane::default()).ok()?;
         // Nothing is called, and constants lie with the code: it can lie anywhere.
         if !compiled.buffer.relocs().is_empty() {
@@ -93,9 +96,6 @@ impl Compiler {
         Some(Function { begin: code.get(start..)?.as_ptr(), _code: code, memory: region.memory })
     }
 }
-
-/// Cycles that a function may take at once.
-pub(super) const LONGEST: u64 = 1 << 30;
 
 /// Executes one instruction, which lies at `address`, for a function that has counted `spent` so far. `how` has what is known of the core: whether the
 /// instruction before loaded or stored one register, IT state, IT state behind it. The cycles up to which what is translated may go on; 0 where the

@@ -9,8 +9,6 @@ use crate::cpu::operation::Operands;
 use cranelift_codegen::ir::condcodes::IntCC;
 use cranelift_codegen::ir::{InstBuilder, Type, Value, types};
 
-/// Bytes of memory that there have to be.
-pub(super) const LEAST: u32 = 1024;
 /// Where it begins.
 const SRAM: u32 = 0x2000_0000;
 

@@ -21,7 +21,6 @@ mod registers;
 
 use super::Cpu;
 use super::operation::{Action, Operands, Operation, Timing};
-use super::stretch::TRANSLATED;
 use crate::bus::Bus;
 use host::{Compiler, Function};
 use region::Region;
@@ -29,6 +28,9 @@ use std::collections::HashSet;
 use std::ops::Range;
 use std::sync::Arc;
 use std::time::Instant;
+
+/// Numbers of functions begin here; no stretch begins so often.
+pub(super) const TRANSLATED: u32 = 1 << 31;
 
 /// So often a stretch begins before what begins with it is translated.
 const OFTEN: u32 = 4096;

@@ -5,6 +5,9 @@ use crate::cpu::operation::{Flow, behind};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::ops::Range;
 
+/// Bytes of memory that there have to be.
+pub(super) const LEAST: u32 = 1024;
+
 /// Instructions of a region, at most.
 const LARGEST: usize = 256;
 

@@ -1,6 +1,6 @@
 //! Registers, flags, and the conditions that they are asked for.
 
-use super::emit::Emitter;
+use super::emit::{Compared, Emitter};
 use crate::cpu::execute::data_processing::{ALWAYS, OUTSIDE_IT, TEST};
 use cranelift_codegen::ir::condcodes::{FloatCC, IntCC};
 use cranelift_codegen::ir::{InstBuilder, Type, Value, types};
@@ -11,14 +11,6 @@ pub(super) const NEGATIVE: usize = 0;
 pub(super) const ZERO: usize = 1;
 pub(super) const CARRY: usize = 2;
 pub(super) const OVERFLOW: usize = 3;
-
-/// Operands of the last comparison, whose flags are still those.
-#[derive(Clone, Copy)]
-pub(super) enum Compared {
-    Words(Value, Value),
-    /// None of them is a NaN.
-    Floats(Value, Value),
-}
 
 impl Emitter<'_, '_> {
     /// A constant of 32 bits.
