@@ -342,8 +342,6 @@ extern "C" fn FDCAN1_IT0() {
         let Some(frame) = receive() else { break };
         bus.take(&frame);
     }
-    let now = now();
-    critical_section::with(|section| transmit(&mut SENDING.borrow_ref_mut(section), now));
     bus.image.follow(bus.shared.state());
     let mut demand = bus.image.demand();
     if LOADS {
@@ -351,4 +349,8 @@ extern "C" fn FDCAN1_IT0() {
     }
     bus.feedforward = demand.command.torque;
     bus.demand.publish(&demand);
+    // The joint knows: the rest can wait.
+    bus.image.leave_copies();
+    let now = now();
+    critical_section::with(|section| transmit(&mut SENDING.borrow_ref_mut(section), now));
 }

@@ -14,7 +14,7 @@
 //! ```text
 //!  receive interrupt   image.observe(&observed)
 //!                      receiver.receive(&frame, now, &mut image, send)      route to the task's queue
-//!                      image.follow(node.state()); publish(image.demand())
+//!                      image.follow(node.state()); publish(image.demand()); image.leave_copies()
 //!  task                server.receive(&frame, now, &mut objects)            where shared.has_written(): pend the interrupt
 //!                      objects.poll(milliseconds, &observed)
 //!                      objects.take_emergency() -> server.emergency(..)

@@ -4,6 +4,9 @@
 //! mapping. Where a master maps object 2010h:1 beside its set-points, one that repeats itself without thinking is not alive: the PDO with the
 //! number of the one before renews nothing.
 //!
+//! A demand comes before everything that can wait: copies of the set-points for the task are left behind it, by
+//! [`JointImage::leave_copies`].
+//!
 //! Outside OPERATIONAL, and in it until a controlword comes, the joint is asked for a quick stop and no torque. It is the node's own
 //! demand, and its sequence changes with the transition only: a joint that still brakes when the command deadline is over has a fault.
 
@@ -29,6 +32,8 @@ pub struct JointImage<'a> {
     arrived: Arrived,
     sequence: u32,
     coupled_sequence: u32,
+    /// The task has not been left a copy of the set-points in force.
+    changed: bool,
 }
 
 /// What has arrived of an RPDO.
@@ -57,6 +62,7 @@ impl<'a> JointImage<'a> {
             arrived: Arrived::default(),
             sequence: 0,
             coupled_sequence: 0,
+            changed: false,
         }
     }
 
@@ -74,7 +80,7 @@ impl<'a> JointImage<'a> {
         }
         if PROFILES && self.points.go_on(self.shared) {
             self.arriving = self.points;
-            self.points.publish(self.shared);
+            self.changed = true;
         }
         let Some((set_point, value)) = self.shared.take_written() else { return };
         if set_point.is_choice() || self.state == NmtState::Operational {
@@ -82,6 +88,14 @@ impl<'a> JointImage<'a> {
             self.put(set_point, value);
             self.arriving.insist(set_point);
             self.come_into_force();
+        }
+    }
+
+    /// Leaves copies of the set-points in force for the task, and for TPDOs. At the end of every receive interrupt, once
+    /// the demand is published.
+    pub fn leave_copies(&mut self) {
+        if core::mem::take(&mut self.changed) {
+            self.points.publish(self.shared);
         }
     }
 
@@ -124,7 +138,7 @@ impl<'a> JointImage<'a> {
         let actual = if PROFILES { self.shared.position() } else { 0 };
         self.arriving.succeed(&self.points, position, actual);
         self.points = self.arriving;
-        self.points.publish(self.shared);
+        self.changed = true;
     }
 }
 
@@ -149,6 +163,11 @@ impl ProcessImage for JointImage<'_> {
         }
     }
 
+    /// TPDOs are sampled now, and some carry set-points.
+    fn sync(&mut self) {
+        self.leave_copies();
+    }
+
     fn state_changed(&mut self, state: NmtState) {
         let none = self.points.forgotten();
         // A transition by the task comes here twice: after it, and with the next frame.
@@ -156,10 +175,10 @@ impl ProcessImage for JointImage<'_> {
             return;
         }
         self.state = state;
-        self.points = none;
         self.arriving = none;
         self.arrived = Arrived::default();
-        self.points.publish(self.shared);
+        self.points = none;
+        self.changed = true;
         self.sequence = self.sequence.wrapping_add(1);
         self.coupled_sequence = self.coupled_sequence.wrapping_add(1);
     }
@@ -196,5 +215,25 @@ mod tests {
         // The set-points are still there: it is the guard that held them back.
         image.state = NmtState::Operational;
         assert_eq!(image.demand(), asked);
+    }
+
+    /// A frame and a SYNC that wait for one interrupt: its TPDOs are sampled before anything else of it.
+    #[test]
+    fn a_tpdo_of_the_sync_behind_a_set_point_shows_it_and_the_task_sees_it_once_the_demand_is_published() {
+        let shared = Shared::new();
+        let mut image = JointImage::new(&shared);
+        image.state_changed(NmtState::Operational);
+        let [mode, shown] = [0x6060, 0x6061].map(|index| MappedObject::new(index, 0, 8));
+        for number in [9, 8] {
+            image.receive(mode, number);
+            image.received(0);
+            image.sync();
+            assert_eq!(image.transmit(shown), number);
+        }
+        image.receive(mode, 9);
+        image.received(0);
+        assert_eq!(shared.set_point(SetPoint::Mode), 8);
+        image.leave_copies();
+        assert_eq!(shared.set_point(SetPoint::Mode), 9);
     }
 }

@@ -235,6 +235,7 @@ impl Node {
             Route::Done => {}
         }
         self.image.follow(self.bus.state());
+        self.image.leave_copies();
         sent
     }
 
@@ -259,6 +260,7 @@ impl Node {
         }
         // Pended by the task: a written set-point, a transition.
         self.image.follow(self.bus.state());
+        self.image.leave_copies();
         assert!(!self.shared.has_written());
         sent
     }

@@ -276,6 +276,7 @@ impl VirtualNode {
             Route::Done => {}
         }
         self.image.follow(self.bus.state());
+        self.image.leave_copies();
     }
 
     /// The task is busy for `time` from now on: what it does in no simulated time, as verifying an image, takes it time on a board. Control
@@ -295,6 +296,7 @@ impl VirtualNode {
         self.restart();
         self.swap();
         self.image.follow(self.bus.state());
+        self.image.leave_copies();
     }
 
     /// Requests and what the server sends by itself, for as long as there is room for it.
@@ -315,6 +317,7 @@ impl VirtualNode {
                     let answer = self.server.receive(&frame, now, &mut self.objects);
                     // One set-point at a time waits for the interrupt.
                     self.image.follow(self.bus.state());
+                    self.image.leave_copies();
                     self.act();
                     answer
                 }

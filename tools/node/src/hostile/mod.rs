@@ -231,6 +231,7 @@ impl<'a> HostileNode<'a> {
         let silent = matches!(frame.id(), 0 | 0x601..=0x67F | 0x701..=0x77F | 0x7E5) && after == before;
         hold!(!silent || frame.id() == 0 || demand == asked, "{frame:02x?} asked for {demand:?} after {asked:?}");
         self.image.follow(after);
+        self.image.leave_copies();
         self.judge_demand()
     }
 
@@ -251,6 +252,7 @@ impl<'a> HostileNode<'a> {
                 Some(frame) => {
                     let answer = self.server.receive(&frame, now, &mut self.objects);
                     self.image.follow(self.bus.state());
+                    self.image.leave_copies();
                     self.act()?;
                     answer
                 }
@@ -271,6 +273,7 @@ impl<'a> HostileNode<'a> {
             before = after;
         }
         self.image.follow(self.bus.state());
+        self.image.leave_copies();
         self.judge_demand()?;
         self.judge_sent()?;
         let program = self.objects.program();
