@@ -311,6 +311,7 @@ impl Bus {
     fn take(&mut self, frame: &Frame) {
         // What is known of the joint is much to copy, and TPDOs alone need it.
         let now = now();
+        self.image.at(now);
         if self.receiver.is_sync(frame, now)
             && let Some(mut observed) = observed()
         {
@@ -342,6 +343,8 @@ extern "C" fn FDCAN1_IT0() {
         let Some(frame) = receive() else { break };
         bus.take(&frame);
     }
+    let now = now();
+    bus.image.at(now);
     bus.image.follow(bus.shared.state());
     let mut demand = bus.image.demand();
     if LOADS {
@@ -351,6 +354,5 @@ extern "C" fn FDCAN1_IT0() {
     bus.demand.publish(&demand);
     // The joint knows: the rest can wait.
     bus.image.leave_copies();
-    let now = now();
     critical_section::with(|section| transmit(&mut SENDING.borrow_ref_mut(section), now));
 }

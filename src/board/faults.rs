@@ -9,6 +9,7 @@ use core::ptr::{addr_of, addr_of_mut};
 use core::sync::atomic::{AtomicU8, AtomicU32, Ordering};
 use cortex_m::peripheral::SCB;
 use embassy_stm32::pac;
+use joint_firmware::objects::STORES;
 use joint_firmware::parameters::ecc::{self, Decision, Storage};
 use joint_firmware::reset_record::LastReset;
 use joint_firmware::reset_record::{Cause, Record, WORDS};
@@ -17,8 +18,16 @@ use joint_firmware::reset_record::{Cause, Record, WORDS};
 #[unsafe(link_section = ".panic")]
 static mut RECORD: MaybeUninit<[u32; WORDS]> = MaybeUninit::uninit();
 
+/// Number of records that may still be written to flash: kept over a reset of the chip, which is how a master resets
+/// the node.
+#[unsafe(link_section = ".panic")]
+static mut STORES_LEFT: MaybeUninit<u32> = MaybeUninit::uninit();
+
 /// Configurable fault status register (ARM DDI 0403, B3.2.15).
 const CFSR: *const u32 = 0xe000_ed28 as *const u32;
+
+/// Tells the number of stores from memory that nothing has written.
+const STORES_CHECK: u32 = 0x5354_4F00;
 
 /// Words of the parameter slots that read with a double error: torn by a loss of power while they were written.
 static TORN_WORDS: AtomicU32 = AtomicU32::new(0);
@@ -56,20 +65,13 @@ fn reset_with(record: Record) -> ! {
 pub fn report() {
     let flags = pac::RCC.csr().read();
     pac::RCC.csr().modify(|w| w.set_rmvf(true));
-    CAUSES.store((flags.0 >> 25) as u8, Ordering::Relaxed);
-    defmt::info!(
-        "start: power {}, watchdog {}, window watchdog {}, software {}, pin {}, option bytes {}, low power {}",
-        flags.borrstf(),
-        flags.iwdgrstf(),
-        flags.wwdgrstf(),
-        flags.sftrstf(),
-        flags.pinrstf(),
-        flags.oblrstf(),
-        flags.lpwrrstf()
-    );
-    if flags.borrstf() {
+    let causes = (flags.0 >> 25) as u8;
+    CAUSES.store(causes, Ordering::Relaxed);
+    defmt::info!("start: reset by {=u8:#010b}, bits as in object 2301h:1", causes);
+    if causes & LastReset::POWER != 0 {
         // Without power the record is noise, and where parity is checked reading it would be an error.
         store([0; WORDS]);
+        keep_stores_left(STORES);
         return;
     }
     let Some(record) = Record::decode(&words()) else { return };
@@ -85,15 +87,26 @@ pub fn report() {
         Cause::Unexpected => defmt::intern!("interrupt without a handler"),
     };
     defmt::error!(
-        "stopped by {} at {:#010x}, detail {:#x} ({}) {=[u8]:a}; {} in a row",
+        "stopped by {} at {:#010x}, {} in a row; detail and place are in object 2301h",
         cause,
         record.address,
-        record.detail,
-        record.detail,
-        // As bytes: a check that they are a text would be half a KiB of flash.
-        record.place_bytes(),
         record.repeats
     );
+}
+
+/// Number of records that may be written: as before the reset, or as after power-up where a debugger has put another
+/// program in the place of one that kept nothing. After [`report`].
+pub fn stores_left() -> u8 {
+    // SAFETY: a plain word, any value of which is valid; written by `keep_stores_left` alone, in the same context.
+    let kept = unsafe { addr_of!(STORES_LEFT).cast::<u32>().read_volatile() };
+    let left = kept ^ STORES_CHECK;
+    if left < u32::from(STORES) { left as u8 } else { STORES }
+}
+
+/// Keeps it.
+pub fn keep_stores_left(left: u8) {
+    // SAFETY: as above.
+    unsafe { addr_of_mut!(STORES_LEFT).cast::<u32>().write_volatile(u32::from(left) ^ STORES_CHECK) };
 }
 
 /// What [`report`] has logged.

@@ -1,6 +1,7 @@
 //! One face for all objects, the server's and the application's, and one SDO transfer's reading or writing of an
 //! entry; the task.
 
+use super::COUNTER_AND_DATE;
 use super::abort::Abort;
 use super::communication::{Communication, Object};
 use super::dictionary::{Access, Entry, Length, ObjectDictionary};
@@ -37,7 +38,14 @@ impl<'a, D: ObjectDictionary> Objects<'_, 'a, D> {
             Some(object) => {
                 let mut bytes = [0; 4];
                 bytes.iter_mut().zip(value).for_each(|(byte, given)| *byte = *given);
-                self.communication.write(object?, u32::from_le_bytes(bytes), self.dictionary)
+                let object = object?;
+                let watched = COUNTER_AND_DATE && object.is_stored();
+                let before = if watched { self.communication.read(object).ok() } else { None };
+                self.communication.write(object, u32::from_le_bytes(bytes), self.dictionary)?;
+                if watched && self.communication.read(object).ok() != before {
+                    self.communication.date([0; 2]);
+                }
+                Ok(())
             }
         }
     }

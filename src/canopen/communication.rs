@@ -2,13 +2,13 @@
 
 use super::abort::Abort;
 use super::dictionary::{Access, Entry, Group, Identity, Length, Mappable, ObjectDictionary};
-use super::emergency::{Emergencies, HISTORY};
+use super::emergency::{Emergencies, HISTORY, Lasting};
 use super::heartbeat::Producer;
-use super::parameters::{CONSUMERS, CommunicationParameters, INVALID, MAPPED, NO_REMOTE, is_free};
+use super::parameters::{CONSUMERS, CommunicationParameters, HIGHEST_COUNTER, INVALID, MAPPED, NO_REMOTE, is_free};
 use super::pdo::MappedObject;
 use super::pdo::mapping::{self, Direction};
 use super::shared::{PdoRegisters, Shared};
-use super::{SDO_RECEIVE, SDO_TRANSMIT};
+use super::{COUNTER_AND_DATE, SDO_RECEIVE, SDO_TRANSMIT};
 
 /// Signatures of objects 1010h and 1011h: the ASCII characters in the order of transmission.
 const SAVE: u32 = u32::from_le_bytes(*b"save");
@@ -31,6 +31,9 @@ pub(super) enum Object<'a> {
     EmergencyInhibit,
     Consumer(u8),
     Heartbeat,
+    SyncOverflow,
+    /// Date 0, time 1.
+    Verification(u8),
     ErrorBehaviour,
     Pdo(&'a PdoRegisters, Direction, Parameter),
 }
@@ -42,6 +45,7 @@ pub(super) enum Parameter {
     Transmission,
     Inhibit,
     EventTimer,
+    SyncStart,
     Count,
     /// Mapping entry 0 to 7.
     Mapped(u8),
@@ -59,16 +63,34 @@ impl Object<'_> {
             Self::Constant(_, bytes) => (bytes, ReadOnly),
             Self::ErrorRegister => (1, ReadOnly),
             Self::History(_) => (4, ReadOnly),
-            Self::HistoryLength | Self::ErrorBehaviour => (1, ReadWrite),
+            Self::HistoryLength | Self::ErrorBehaviour | Self::SyncOverflow => (1, ReadWrite),
             Self::EmergencyInhibit | Self::Heartbeat => (2, ReadWrite),
-            Self::SyncCobId | Self::Store(_) | Self::Restore(_) | Self::EmergencyCobId | Self::Consumer(_) => {
-                (4, ReadWrite)
-            }
+            Self::SyncCobId
+            | Self::Store(_)
+            | Self::Restore(_)
+            | Self::EmergencyCobId
+            | Self::Consumer(_)
+            | Self::Verification(_) => (4, ReadWrite),
             Self::Pdo(_, _, Parameter::CobId | Parameter::Mapped(_)) => (4, ReadWrite),
-            Self::Pdo(_, _, Parameter::Transmission | Parameter::Count) => (1, ReadWrite),
+            Self::Pdo(_, _, Parameter::Transmission | Parameter::Count | Parameter::SyncStart) => (1, ReadWrite),
             Self::Pdo(_, _, Parameter::Inhibit | Parameter::EventTimer) => (2, ReadWrite),
         };
         Entry { length: Length::Value(length), access, mappable: Mappable::default() }
+    }
+
+    /// True where object 1010h stores it.
+    pub(super) const fn is_stored(self) -> bool {
+        matches!(
+            self,
+            Self::SyncCobId
+                | Self::EmergencyCobId
+                | Self::EmergencyInhibit
+                | Self::Consumer(_)
+                | Self::Heartbeat
+                | Self::SyncOverflow
+                | Self::ErrorBehaviour
+                | Self::Pdo(..)
+        )
     }
 }
 
@@ -80,6 +102,7 @@ pub(super) struct Communication<'s, 'a> {
     pub(super) emergencies: &'s mut Emergencies,
     pub(super) producer: &'s mut Producer,
     pub(super) error_behaviour: &'s mut u8,
+    pub(super) verification: &'s mut [u32; 2],
 }
 
 impl<'a> Communication<'_, 'a> {
@@ -111,6 +134,10 @@ impl<'a> Communication<'_, 'a> {
             (0x1017, 0) => Heartbeat,
             (0x1018, 0) => highest(4),
             (0x1018, number @ 1..=4) => Constant(self.identity.number(number.wrapping_sub(1)).unwrap_or(0), 4),
+            (0x1019, 0) if COUNTER_AND_DATE => SyncOverflow,
+            (0x1020, 0) if COUNTER_AND_DATE => highest(2),
+            (0x1020, number @ 1..=2) if COUNTER_AND_DATE => Verification(number.wrapping_sub(1)),
+            (0x1019 | 0x1020, _) if COUNTER_AND_DATE => return Some(Err(Abort::NO_SUB_INDEX)),
             (0x1029, 0) => highest(1),
             (0x1029, 1) => ErrorBehaviour,
             (0x1200, 0) => highest(2),
@@ -135,11 +162,13 @@ impl<'a> Communication<'_, 'a> {
         };
         let registers = all.get(usize::from(index & 0x1FF))?;
         let parameter = match (mapping, sub_index) {
+            (false, 0) if COUNTER_AND_DATE && direction == Transmit => return Some(Ok(Object::Constant(6, 1))),
             (false, 0) => return Some(Ok(Object::Constant(5, 1))),
             (false, 1) => Parameter::CobId,
             (false, 2) => Parameter::Transmission,
             (false, 3) if direction == Transmit => Parameter::Inhibit,
             (false, 5) => Parameter::EventTimer,
+            (false, 6) if COUNTER_AND_DATE && direction == Transmit => Parameter::SyncStart,
             (true, 0) => Parameter::Count,
             (true, number @ 1..) if usize::from(number) <= MAPPED => Parameter::Mapped(number.wrapping_sub(1)),
             _ => return Some(Err(Abort::NO_SUB_INDEX)),
@@ -163,12 +192,19 @@ impl<'a> Communication<'_, 'a> {
                 self.shared.consumers.get(usize::from(consumer)).ok_or(Abort::NO_SUB_INDEX)?.setting()
             }
             Object::Heartbeat => self.producer.period().into(),
+            Object::SyncOverflow if COUNTER_AND_DATE => self.shared.sync_overflow().into(),
+            Object::Verification(part) if COUNTER_AND_DATE => {
+                *self.verification.get(usize::from(part)).ok_or(Abort::NO_SUB_INDEX)?
+            }
             Object::ErrorBehaviour => (*self.error_behaviour).into(),
+            Object::SyncOverflow | Object::Verification(_) => return Err(Abort::NO_OBJECT),
             Object::Pdo(registers, direction, parameter) => match parameter {
                 Parameter::CobId => mapping::cob_id(registers, direction),
                 Parameter::Transmission => registers.transmission().into(),
                 Parameter::Inhibit => registers.inhibit().into(),
                 Parameter::EventTimer => registers.event_timer().into(),
+                Parameter::SyncStart if COUNTER_AND_DATE => registers.sync_start().into(),
+                Parameter::SyncStart => return Err(Abort::NO_SUB_INDEX),
                 Parameter::Count => registers.count().into(),
                 Parameter::Mapped(entry) => registers.mapped(entry).ok_or(Abort::NO_SUB_INDEX)?.0,
             },
@@ -193,15 +229,32 @@ impl<'a> Communication<'_, 'a> {
             Object::SyncCobId if is_free(value) => self.shared.set_sync_cob_id(value as u16),
             Object::SyncCobId => return Err(Abort::VALUE),
             Object::Store(group) if value == SAVE => {
-                let parameters = self.parameters();
+                let mut parameters = self.parameters();
+                if COUNTER_AND_DATE && group != Group::All {
+                    // Date and time are those of everything.
+                    parameters.verification = [0; 2];
+                }
                 dictionary.store(group, &parameters)?;
+                self.date(parameters.verification);
             }
-            Object::Restore(group) if value == LOAD => dictionary.restore(group)?,
+            Object::Restore(group) if value == LOAD => {
+                dictionary.restore(group)?;
+                self.date([0; 2]);
+            }
             Object::Store(_) | Object::Restore(_) => return Err(Abort::STORE),
             Object::EmergencyCobId => self.set_emergency_cob_id(value)?,
             Object::EmergencyInhibit => self.emergencies.inhibit = value as u16,
             Object::Consumer(consumer) => self.set_consumer(consumer, value)?,
             Object::Heartbeat => self.producer.set_period(value as u16),
+            // There is no cycle period (1006h) that would be in the way: this node never produces SYNC.
+            Object::SyncOverflow if COUNTER_AND_DATE && value != 1 && value <= u32::from(HIGHEST_COUNTER) => {
+                self.shared.set_sync_overflow(value as u8);
+                self.emergencies.end(Lasting::SyncLength);
+            }
+            Object::Verification(part) if COUNTER_AND_DATE => {
+                *self.verification.get_mut(usize::from(part)).ok_or(Abort::NO_SUB_INDEX)? = value;
+            }
+            Object::SyncOverflow | Object::Verification(_) => return Err(Abort::VALUE),
             Object::ErrorBehaviour if value <= 2 => *self.error_behaviour = value as u8,
             Object::ErrorBehaviour => return Err(Abort::VALUE),
             Object::Pdo(registers, direction, parameter) => match parameter {
@@ -209,6 +262,8 @@ impl<'a> Communication<'_, 'a> {
                 Parameter::Transmission => mapping::set_transmission(registers, value as u8)?,
                 Parameter::Inhibit => mapping::set_inhibit(registers, value as u16)?,
                 Parameter::EventTimer => registers.set_event_timer(value as u16),
+                Parameter::SyncStart if COUNTER_AND_DATE => mapping::set_sync_start(registers, value as u8)?,
+                Parameter::SyncStart => return Err(Abort::NO_SUB_INDEX),
                 Parameter::Count => mapping::set_count(registers, direction, value as u8, dictionary)?,
                 Parameter::Mapped(entry) => {
                     let object = MappedObject(value);
@@ -222,6 +277,13 @@ impl<'a> Communication<'_, 'a> {
             },
         }
         Ok(())
+    }
+
+    /// Date and time of the configuration are others now.
+    pub(super) fn date(&mut self, verification: [u32; 2]) {
+        if COUNTER_AND_DATE {
+            *self.verification = verification;
+        }
     }
 
     fn set_emergency_cob_id(&mut self, value: u32) -> Result<(), Abort> {
@@ -256,6 +318,10 @@ impl<'a> Communication<'_, 'a> {
         parameters.emergency_cob_id = self.emergencies.cob_id;
         parameters.emergency_inhibit = self.emergencies.inhibit;
         parameters.heartbeat = self.producer.period();
+        if COUNTER_AND_DATE {
+            parameters.sync_overflow = self.shared.sync_overflow();
+            parameters.verification = *self.verification;
+        }
         parameters.error_behaviour = *self.error_behaviour;
         for (setting, registers) in parameters.consumers.iter_mut().zip(&self.shared.consumers) {
             *setting = registers.setting();

@@ -157,6 +157,11 @@ pub trait ObjectDictionary {
     /// Object 1011h: lets `group` be the defaults after the next reset.
     fn restore(&mut self, group: Group) -> Result<(), Abort>;
 
+    /// True where an object that [`ObjectDictionary::store`] makes outlast a reset has changed since the last call.
+    fn has_changed(&mut self) -> bool {
+        false
+    }
+
     /// LSS: whether the node id may be changed now.
     fn may_change_node_id(&self) -> bool {
         true

@@ -26,7 +26,8 @@ pub mod code {
     pub const PDO_SHORT: u16 = 0x8210;
     /// An RPDO was too long; its first bytes were processed.
     pub const PDO_LONG: u16 = 0x8220;
-    /// SYNC has data, which object 1019h would have to announce. It counts all the same; reported once in an NMT state.
+    /// SYNC has a counter that object 1019h does not announce, or lacks one. It counts all the same; reported once in
+    /// an NMT state, and with each value of 1019h.
     pub const SYNC_LENGTH: u16 = 0x8240;
     /// An RPDO did not arrive within its event timer.
     pub const PDO_DEADLINE: u16 = 0x8250;
@@ -45,8 +46,8 @@ pub(super) struct Emergencies {
     pub(super) inhibit: u16,
     /// The application's bits of the error register.
     application: u8,
-    /// The server's own errors that last, a bit for each: monitored nodes in 0 to 6, error passive in 7, RPDO deadlines from 8 on, SYNC with data
-    /// in 15.
+    /// The server's own errors that last, a bit for each: monitored nodes in 0 to 6, error passive in 7, RPDO deadlines
+    /// from 8 on, SYNC of another length in 15.
     lasting: u16,
     history: Deque<u32, HISTORY>,
     pending: Deque<[u8; 8], PENDING>,
@@ -63,8 +64,8 @@ pub(super) enum Lasting {
     Deadline(u8),
     /// Of the controller.
     ErrorPassive,
-    /// SYNC with data.
-    LongSync,
+    /// SYNC of another length than object 1019h says.
+    SyncLength,
 }
 
 impl Lasting {
@@ -73,7 +74,7 @@ impl Lasting {
             Self::Heartbeat(consumer) => 1 << (consumer & 7),
             Self::Deadline(pdo) => 0x100 << (pdo & 7),
             Self::ErrorPassive => 1 << 7,
-            Self::LongSync => 1 << 15,
+            Self::SyncLength => 1 << 15,
         }
     }
 }

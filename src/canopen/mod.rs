@@ -35,11 +35,11 @@
 //! NMT slave, boot-up, heartbeat producer and consumer (4 nodes), SYNC consumer, EMCY producer with history, 4 RPDOs
 //! and 4 TPDOs with run-time mapping of whole bytes (types 0 to 240, 254, 255; inhibit time, event timer, RPDO
 //! deadline), one SDO server (expedited, segmented, block, with CRC), 1010h/1011h, LSS with fastscan. Objects 1000h,
-//! 1001h, 1003h, 1005h, 1008h to 100Ah, 1010h, 1011h, 1014h to 1018h, 1029h, 1200h, 1400h to 1403h, 1600h to 1603h,
+//! 1001h, 1003h, 1005h, 1008h to 100Ah, 1010h, 1011h, 1014h to 1020h, 1029h, 1200h, 1400h to 1403h, 1600h to 1603h,
 //! 1800h to 1803h, 1A00h to 1A03h are the server's own.
 //!
-//! Not supported: node guarding and remotely requested PDOs (they need remote frames), SYNC producer and counter
-//! (1019h), TIME, SDO client, multiplexed PDOs.
+//! Not supported: node guarding and remotely requested PDOs (they need remote frames), SYNC producer, TIME, SDO client,
+//! multiplexed PDOs.
 //!
 //! A TPDO of type 0, 254 or 255 is sent once when the node becomes operational, then after [`Shared::trigger`].
 
@@ -76,6 +76,10 @@ pub use sdo::SdoSettings;
 pub use server::Server;
 pub use shared::{NO_NODE_ID, Shared};
 pub use transmit_queue::{Buffers, PATIENCE, TransmitQueue, URGENT};
+
+/// Presence of the SYNC counter (1019h, 1800h:6) and of date and time of the configuration (1020h) in this program.
+/// With the feature `little-room` a chip's program has none; on the host nothing changes.
+pub const COUNTER_AND_DATE: bool = !cfg!(all(feature = "little-room", target_os = "none"));
 
 /// Identifiers of the predefined connection set, CiA 301 section 7.3.3; the node id is added to the last three.
 const NMT: u16 = 0x000;

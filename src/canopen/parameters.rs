@@ -9,6 +9,8 @@ pub const MAPPED: usize = 8;
 /// Nodes that object 1016h can monitor.
 pub const CONSUMERS: usize = 4;
 
+/// The highest that the SYNC counter may reach, object 1019h.
+pub(super) const HIGHEST_COUNTER: u8 = 240;
 /// "Does not exist" in the COB-ID of a PDO or of EMCY.
 pub(super) const INVALID: u32 = 1 << 31;
 /// "No remote request" in the COB-ID of a TPDO; always set here.
@@ -25,6 +27,8 @@ pub struct PdoParameters {
     pub inhibit: u16,
     /// Sub-index 5, ms: a TPDO is sent at least so often; an RPDO has to arrive so often. 0 is never.
     pub event_timer: u16,
+    /// Sub-index 6 of a TPDO: SYNC counter from which on its SYNCs count, 1 to 240; 0: from any.
+    pub sync_start: u8,
     /// Sub-index 0 of the mapping.
     pub count: u8,
     /// Sub-indices 1 to 8 of the mapping.
@@ -49,6 +53,7 @@ impl PdoParameters {
             transmission: 255,
             inhibit: 0,
             event_timer: 0,
+            sync_start: 0,
             count: 0,
             mapping: [MappedObject(0); MAPPED],
         }
@@ -68,6 +73,10 @@ pub struct CommunicationParameters {
     pub consumers: [u32; CONSUMERS],
     /// 1017h: distance of two heartbeats, ms; 0 is none.
     pub heartbeat: u16,
+    /// 1019h: the value behind which the SYNC counter begins anew at 1, 2 to 240; 0: SYNC has no counter.
+    pub sync_overflow: u8,
+    /// 1020h:1 and 2: date and time of the configuration, as its tool counts them; 0 where it is another one.
+    pub verification: [u32; 2],
     /// 1029h:1: on a communication error 0 leaves OPERATIONAL for PRE-OPERATIONAL, 1 changes nothing, 2 stops.
     pub error_behaviour: u8,
     /// RPDOs.
@@ -86,6 +95,8 @@ impl CommunicationParameters {
             emergency_inhibit: 0,
             consumers: [0; CONSUMERS],
             heartbeat: 0,
+            sync_overflow: 0,
+            verification: [0; 2],
             error_behaviour: 0,
             receive: [0x200, 0x300, 0x400, 0x500].map(pdo),
             transmit: [0x180, 0x280, 0x380, 0x480].map(pdo),

@@ -71,11 +71,12 @@ impl<'a> Receiver<'a> {
             }
             id if id == self.shared.sync_cob_id() => {
                 if self.is_sync(frame, now) {
-                    // There is no object 1019h: a counter is not expected.
-                    if !frame.data().is_empty() {
-                        self.shared.note_long_sync();
+                    let counts = self.shared.sync_overflow() != 0;
+                    if frame.data().len() != usize::from(counts) {
+                        self.shared.note_sync_length_error();
                     }
-                    self.synchronise(now, image, send);
+                    let counter = if let [counter] = frame.data() { *counter } else { 0 };
+                    self.synchronise(now, counter, image, send);
                 }
             }
             id @ 0x701..=0x77F => self.hear((id & 0x7F) as u8, frame.data(), now),
@@ -121,13 +122,14 @@ impl<'a> Receiver<'a> {
         image.state_changed(epoch.state());
     }
 
-    fn synchronise(&mut self, now: u32, image: &mut impl ProcessImage, mut send: impl FnMut(Frame)) {
+    /// `counter`: SYNC's, 0 where it has none.
+    fn synchronise(&mut self, now: u32, counter: u8, image: &mut impl ProcessImage, mut send: impl FnMut(Frame)) {
         self.synchronised = Some(now);
         image.sync();
         for ((registers, synchronous), pdo) in self.shared.transmit.iter().zip(&mut self.synchronous).zip(0..) {
             if registers.id().is_some() {
                 let frame = || assemble(registers, |object| Some(image.transmit(object)));
-                synchronous.next(self.shared, registers, pdo, frame).into_iter().for_each(&mut send);
+                synchronous.next(self.shared, registers, pdo, counter, frame).into_iter().for_each(&mut send);
             }
         }
         for ((registers, waiting), pdo) in self.shared.receive.iter().zip(&mut self.waiting).zip(0..) {

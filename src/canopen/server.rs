@@ -7,14 +7,14 @@ use super::emergency::{Emergencies, Lasting, code};
 use super::frame::Frame;
 use super::heartbeat::{Change, Consumers, Producer};
 use super::lss::Lss;
-use super::nmt::NmtState;
+use super::nmt::{NmtState, Reset};
 use super::parameters::{CommunicationParameters, PDOS, is_node_id};
 use super::pdo::MappedObject;
 use super::pdo::transmit::{Timers, assemble};
 use super::sdo::{SdoServer, SdoSettings};
 use super::shared::{Epoch, NO_NODE_ID, Shared};
 use super::time::{MILLISECOND, elapsed};
-use super::{HEARTBEAT, LSS_MASTER, LSS_SLAVE, SDO_RECEIVE, SDO_TRANSMIT};
+use super::{COUNTER_AND_DATE, HEARTBEAT, LSS_MASTER, LSS_SLAVE, SDO_RECEIVE, SDO_TRANSMIT};
 
 /// The task's part of a node.
 #[derive(Debug)]
@@ -34,6 +34,8 @@ pub struct Server<'a> {
     producer: Producer,
     consumers: Consumers,
     error_behaviour: u8,
+    /// 1020h.
+    verification: [u32; 2],
     timers: [Timers; PDOS],
 }
 
@@ -55,6 +57,7 @@ impl<'a> Server<'a> {
             producer: Producer::default(),
             consumers: Consumers::default(),
             error_behaviour: 0,
+            verification: [0; 2],
             timers: [Timers::default(); PDOS],
         }
     }
@@ -162,8 +165,11 @@ impl<'a> Server<'a> {
         &'s mut self,
         dictionary: &'s mut D,
     ) -> (&'s mut SdoServer, Objects<'s, 'a, D>) {
-        let Self { shared, identity, sdo, emergencies, producer, error_behaviour, .. } = self;
-        let communication = Communication { shared, identity, emergencies, producer, error_behaviour };
+        let Self { shared, identity, sdo, emergencies, producer, error_behaviour, verification, .. } = self;
+        if COUNTER_AND_DATE && dictionary.has_changed() {
+            *verification = [0; 2];
+        }
+        let communication = Communication { shared, identity, emergencies, producer, error_behaviour, verification };
         (sdo, Objects { communication, dictionary })
     }
 
@@ -177,7 +183,7 @@ impl<'a> Server<'a> {
         if !epoch.state().communicates() {
             self.sdo.cancel(dictionary);
         }
-        self.emergencies.end(Lasting::LongSync);
+        self.emergencies.end(Lasting::SyncLength);
         for (pdo, timers) in (0..).zip(&mut self.timers) {
             timers.stop();
             self.emergencies.end(Lasting::Deadline(pdo));
@@ -205,6 +211,13 @@ impl<'a> Server<'a> {
         }
         let parameters = dictionary.communication_parameters(node_id);
         self.shared.set_sync_cob_id((parameters.sync_cob_id & 0x7FF) as u16);
+        if COUNTER_AND_DATE {
+            self.shared.set_sync_overflow(parameters.sync_overflow);
+            // The application goes on with what it has: it is as stored only where nothing has changed.
+            let goes_on = self.shared.reset() == Some(Reset::Communication);
+            let same = self.verification == parameters.verification;
+            self.verification = if goes_on && !same { [0; 2] } else { parameters.verification };
+        }
         for (registers, pdo) in self.shared.receive.iter().zip(&parameters.receive) {
             registers.load(pdo);
         }
@@ -250,8 +263,8 @@ impl<'a> Server<'a> {
                 Some(Change::Dismissed { consumer }) => self.emergencies.end(Lasting::Heartbeat(consumer)),
             }
         }
-        if self.shared.take_long_sync() {
-            self.emergencies.begin(Lasting::LongSync, code::SYNC_LENGTH, 0);
+        if self.shared.take_sync_length_error() {
+            self.emergencies.begin(Lasting::SyncLength, code::SYNC_LENGTH, 0);
         }
         let (short, long) = self.shared.take_length_errors();
         let operational = self.shared.state() == NmtState::Operational;

@@ -9,11 +9,11 @@
 //!    not exist (bit 31 of its COB-ID), which is CiA 301's own procedure; the COB-ID is written last (release) and
 //!    read first (acquire).
 
-use super::HEARTBEAT;
 use super::frame::Frame;
 use super::nmt::{NmtState, Reset};
 use super::parameters::{CONSUMERS, INVALID, MAPPED, PDOS, PdoParameters};
 use super::pdo::MappedObject;
+use super::{COUNTER_AND_DATE, HEARTBEAT};
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU16, AtomicU32, Ordering};
 
 /// "Not configured": the node is silent but for LSS.
@@ -33,6 +33,7 @@ pub struct Shared {
     /// What the newest reset was; that there was one, the count of transitions says.
     reset: AtomicU8,
     sync_cob_id: AtomicU16,
+    sync_overflow: AtomicU8,
     pub(super) receive: [PdoRegisters; PDOS],
     pub(super) transmit: [PdoRegisters; PDOS],
     pub(super) consumers: [ConsumerRegisters; CONSUMERS],
@@ -40,8 +41,8 @@ pub struct Shared {
     events: AtomicU8,
     /// RPDOs that came too short (bits 0 to 3) or too long (bits 4 to 7).
     length_errors: AtomicU8,
-    /// A SYNC had data.
-    long_sync: AtomicBool,
+    /// A SYNC was not as long as it should be.
+    sync_length_error: AtomicBool,
 }
 
 /// An NMT state and how many transitions came before.
@@ -67,12 +68,13 @@ impl Shared {
             state: AtomicU32::new(NmtState::Initialising as u32),
             reset: AtomicU8::new(NO_RESET),
             sync_cob_id: AtomicU16::new(0x80),
+            sync_overflow: AtomicU8::new(0),
             receive: [const { PdoRegisters::new() }; PDOS],
             transmit: [const { PdoRegisters::new() }; PDOS],
             consumers: [const { ConsumerRegisters::new() }; CONSUMERS],
             events: AtomicU8::new(0),
             length_errors: AtomicU8::new(0),
-            long_sync: AtomicBool::new(false),
+            sync_length_error: AtomicBool::new(false),
         }
     }
 
@@ -169,6 +171,15 @@ impl Shared {
         self.sync_cob_id.store(cob_id, Ordering::Relaxed);
     }
 
+    /// 1019h; 0 where SYNC has no counter.
+    pub(super) fn sync_overflow(&self) -> u8 {
+        if COUNTER_AND_DATE { self.sync_overflow.load(Ordering::Relaxed) } else { 0 }
+    }
+
+    pub(super) fn set_sync_overflow(&self, overflow: u8) {
+        self.sync_overflow.store(overflow, Ordering::Relaxed);
+    }
+
     /// Whether TPDO `pdo` has an event to send; forgets it.
     pub(super) fn take_event(&self, pdo: u8) -> bool {
         self.events.fetch_and(!bit(pdo), Ordering::Relaxed) & bit(pdo) != 0
@@ -183,14 +194,14 @@ impl Shared {
         self.length_errors.fetch_or(noted, Ordering::Relaxed);
     }
 
-    pub(super) fn note_long_sync(&self) {
-        self.long_sync.store(true, Ordering::Relaxed);
+    pub(super) fn note_sync_length_error(&self) {
+        self.sync_length_error.store(true, Ordering::Relaxed);
     }
 
-    /// True where a SYNC had data since the last time.
-    pub(super) fn take_long_sync(&self) -> bool {
-        let had = self.long_sync.load(Ordering::Relaxed);
-        self.long_sync.store(false, Ordering::Relaxed);
+    /// True where a SYNC was not as long as it should be since the last time.
+    pub(super) fn take_sync_length_error(&self) -> bool {
+        let had = self.sync_length_error.load(Ordering::Relaxed);
+        self.sync_length_error.store(false, Ordering::Relaxed);
         had
     }
 
@@ -216,6 +227,7 @@ pub(super) struct PdoRegisters {
     transmission: AtomicU8,
     inhibit: AtomicU16,
     event_timer: AtomicU16,
+    sync_start: AtomicU8,
     count: AtomicU8,
     mapping: [AtomicU32; MAPPED],
     /// Changes whenever the PDO comes into being: data that waits for SYNC belongs to the mapping it came with.
@@ -230,6 +242,7 @@ impl PdoRegisters {
             transmission: AtomicU8::new(255),
             inhibit: AtomicU16::new(0),
             event_timer: AtomicU16::new(0),
+            sync_start: AtomicU8::new(0),
             count: AtomicU8::new(0),
             mapping: [const { AtomicU32::new(0) }; MAPPED],
             generation: AtomicU8::new(0),
@@ -258,6 +271,10 @@ impl PdoRegisters {
 
     pub(super) fn event_timer(&self) -> u16 {
         self.event_timer.load(Ordering::Relaxed)
+    }
+
+    pub(super) fn sync_start(&self) -> u8 {
+        self.sync_start.load(Ordering::Relaxed)
     }
 
     pub(super) fn count(&self) -> u8 {
@@ -298,6 +315,10 @@ impl PdoRegisters {
         self.event_timer.store(event_timer, Ordering::Relaxed);
     }
 
+    pub(super) fn set_sync_start(&self, counter: u8) {
+        self.sync_start.store(counter, Ordering::Relaxed);
+    }
+
     pub(super) fn set_count(&self, count: u8) {
         self.count.store(count, Ordering::Relaxed);
     }
@@ -318,6 +339,9 @@ impl PdoRegisters {
         self.set_transmission(parameters.transmission);
         self.set_inhibit(parameters.inhibit);
         self.set_event_timer(parameters.event_timer);
+        if COUNTER_AND_DATE {
+            self.set_sync_start(parameters.sync_start);
+        }
         self.set_count(parameters.count);
         for (place, object) in self.mapping.iter().zip(parameters.mapping) {
             place.store(object.0, Ordering::Relaxed);
@@ -335,6 +359,7 @@ impl PdoRegisters {
             transmission: self.transmission(),
             inhibit: self.inhibit(),
             event_timer: self.event_timer(),
+            sync_start: if COUNTER_AND_DATE { self.sync_start() } else { 0 },
             count: self.count(),
             mapping,
         }

@@ -145,7 +145,7 @@ impl Faults {
 
     /// One bit a fault, at its number.
     #[inline(always)]
-    pub(super) const fn bits(self) -> u32 {
+    pub const fn bits(self) -> u32 {
         self.0
     }
 

@@ -94,6 +94,11 @@ impl Controlword {
         self.has(1 << 6)
     }
 
+    /// Fault reset where it is set, and "disable voltage".
+    pub const fn reset_alone(self) -> Self {
+        Self(self.0 & Self::FAULT_RESET.0)
+    }
+
     /// Not a fault reset, with which nothing else counts: every command of the profile has bit 7 clear.
     const fn commands(self) -> bool {
         !self.has(1 << 7)

@@ -1,9 +1,11 @@
 //! Communication parameters of the joint: which PDOs there are at first, and each parameter as a number at its index; the task.
 
-use crate::canopen::{CommunicationParameters, MappedObject, PDOS, PdoParameters};
+use crate::canopen::{COUNTER_AND_DATE, CommunicationParameters, MappedObject, PDOS, PdoParameters};
 
 const CONTROLWORD: MappedObject = MappedObject::new(0x6040, 0, 16);
 const STATUSWORD: MappedObject = MappedObject::new(0x6041, 0, 16);
+/// Date and time of the configuration: they hold for all that is stored.
+pub(super) const VERIFICATION: u16 = 0x1020;
 /// Slow telemetry, ms.
 const SLOW: u16 = 100;
 
@@ -49,14 +51,25 @@ pub(super) fn store(
     mut item: impl FnMut(u16, u8, u32) -> Option<()>,
 ) -> Option<()> {
     const RECEIVE: u16 = 0x1400;
-    const INDICES: [(u16, u16); 7] =
-        [(0x1005, 1), (0x1014, 4), (0x1029, 1), (RECEIVE, 4), (0x1600, 4), (0x1800, 4), (0x1A00, 4)];
+    const INDICES: [(u16, u16); 9] = [
+        (0x1005, 1),
+        (0x1014, 4),
+        (0x1019, 1),
+        (VERIFICATION, 1),
+        (0x1029, 1),
+        (RECEIVE, 4),
+        (0x1600, 4),
+        (0x1800, 4),
+        (0x1A00, 4),
+    ];
     const _: () = assert!(PDOS == 4);
     for (first, count) in INDICES {
         for index in first..first + count {
-            // Sub-indices 0 to 8 are the most that any has. RPDOs have no inhibit time.
-            for sub_index in (0..=8).filter(|sub_index| first != RECEIVE || *sub_index != 3) {
-                if let Some(value) = get(parameters, index, sub_index) {
+            // Sub-indices 0 to 8 are the most that any has. RPDOs have no inhibit time and no start value.
+            for sub_index in (0..=8).filter(|sub_index| first != RECEIVE || !matches!(*sub_index, 3 | 6)) {
+                // Without a date nothing is to be told from a record that never had one.
+                let dated = |value: &u32| !COUNTER_AND_DATE || first != VERIFICATION || *value != 0;
+                if let Some(value) = get(parameters, index, sub_index).filter(dated) {
                     item(index, sub_index, value)?;
                 }
             }
@@ -81,6 +94,8 @@ fn place(parameters: &mut CommunicationParameters, index: u16, sub_index: u8) ->
         (0x1015, 0) => Place::Short(&mut parameters.emergency_inhibit),
         (0x1016, _) => Place::Word(parameters.consumers.get_mut(consumer?)?),
         (0x1017, 0) => Place::Short(&mut parameters.heartbeat),
+        (0x1019, 0) if COUNTER_AND_DATE => Place::Byte(&mut parameters.sync_overflow),
+        (VERIFICATION, _) if COUNTER_AND_DATE => Place::Word(parameters.verification.get_mut(consumer?)?),
         (0x1029, 1) => Place::Byte(&mut parameters.error_behaviour),
         (0x1400..=0x1BFF, _) => return pdo_place(parameters, index, sub_index),
         _ => return None,
@@ -95,6 +110,7 @@ fn pdo_place(parameters: &mut CommunicationParameters, index: u16, sub_index: u8
         (false, 2) => Place::Byte(&mut pdo.transmission),
         (false, 3) => Place::Short(&mut pdo.inhibit),
         (false, 5) => Place::Short(&mut pdo.event_timer),
+        (false, 6) if COUNTER_AND_DATE => Place::Byte(&mut pdo.sync_start),
         (true, 0) => Place::Byte(&mut pdo.count),
         (true, entry) => Place::Word(&mut pdo.mapping.get_mut(usize::from(entry).checked_sub(1)?)?.0),
         _ => return None,

@@ -1,11 +1,12 @@
 //! The joint's objects as [`canopen`](crate::canopen) asks for them; the task.
 
+mod configured;
 mod guarded;
 
 use super::emergency::{Emergency, LOST, LOST_BIT, Reports, of_refusal};
 use super::field::{
-    ConfigurationField, Field, HardwareField, ImageField, OpenLoopField, OwnerField, ProfileParameter, RANGES, Range,
-    ResetField, SetPoint,
+    ConfigurationField, Field, HardwareField, ImageField, OpenLoopField, OwnerField, ProfileParameter, Range,
+    ResetField, SetPoint, StorageField,
 };
 use super::images::{Circumstances, Failure, Images, StoredImages, abort};
 use super::number::to_i32;
@@ -13,13 +14,17 @@ use super::observed::{Observed, signed};
 use super::operation::Operation;
 use super::ownership::{SESSIONS, UPLOAD};
 use super::profile_modes::{PROFILE_MODES, ProfileModes, Wish};
-use super::program::{NotConfigured, Program};
+use super::program::Program;
 use super::refused::Refused;
 use super::settings::Setting;
 use super::shared::Shared;
-use super::stored::{Part, RECORD, Update, communication_parameters, is_range};
+use super::start::Start;
+use super::store_budget::StoreBudget;
+use super::stored::{Part, Update, communication_parameters, is_range};
 use super::{hardware, history, last_reset, open_loop, table};
-use crate::canopen::{Abort, Access, CommunicationParameters, Entry, Event, Group, Length, NmtState, ObjectDictionary};
+use crate::canopen::{
+    Abort, Access, COUNTER_AND_DATE, CommunicationParameters, Entry, Event, Group, Length, NmtState, ObjectDictionary,
+};
 use crate::hardware::chip_options::COMMAND;
 use crate::joint::PROFILES;
 use crate::joint::configuration::Configuration;
@@ -39,17 +44,6 @@ const ERASING: f32 = 0.03;
 /// rad.
 const QUARTER_TURN: f32 = core::f32::consts::FRAC_PI_2;
 
-/// What the objects start with.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Start {
-    /// Configuration in use, with which the control step runs.
-    pub configuration: Configuration,
-    /// Ranges of the impedance frame, by number.
-    pub ranges: [f32; RANGES],
-    /// Code and parameters lie in one bank of flash: writing stops the program, so the motor has to be off, and nearly at rest.
-    pub single_bank: bool,
-}
-
 /// The task's part of the objects.
 #[derive(Debug)]
 pub struct Objects<'a, P> {
@@ -64,10 +58,13 @@ pub struct Objects<'a, P> {
     /// As it was when its number was read.
     window: Cell<Window>,
     single_bank: bool,
+    stores: StoreBudget,
     now: u64,
     heartbeat_lost: bool,
     /// Whether the start has been reported.
     told_reset: bool,
+    /// A stored object has another value than when it was asked for last.
+    changed: bool,
     /// Whether a master has started the node since the program began.
     was_started: bool,
     /// As it was when communication began; what is stored holds for it.
@@ -80,12 +77,13 @@ pub struct Objects<'a, P> {
 impl<'a, P: Program> Objects<'a, P> {
     /// One for each [`Shared`].
     pub fn new(shared: &'a Shared, program: P, mut images: Images<'a>, start: &Start) -> Self {
-        let Start { configuration, ranges, single_bank } = *start;
+        let Start { configuration, ranges, lost, single_bank, stores_left } = *start;
         images.owner.note(&configuration);
         for (range, value) in Range::ALL.into_iter().zip(ranges) {
             shared.set_range(range, value);
         }
         shared.rate(&configuration);
+        shared.lock(lost);
         let objects = Self {
             shared,
             program,
@@ -97,9 +95,11 @@ impl<'a, P: Program> Objects<'a, P> {
             refused: Refused::default(),
             window: Cell::new(Window::NOTHING),
             single_bank,
+            stores: StoreBudget::new(stores_left),
             now: 0,
             heartbeat_lost: false,
             told_reset: false,
+            changed: false,
             was_started: false,
             node_id: Cell::new(0),
             reports: Reports::default(),
@@ -111,18 +111,20 @@ impl<'a, P: Program> Objects<'a, P> {
     }
 
     /// Begins anew, as at power-on: for a program that goes on running when the node is reset
-    /// ([`Event::Reset`](crate::canopen::Event::Reset)). What is staged, tried, or waits to be reported is forgotten.
+    /// ([`Event::Reset`](crate::canopen::Event::Reset)). What is staged, tried, or waits to be reported is forgotten;
+    /// how often a record may be written is not.
     pub fn restart(&mut self, life: LifeCycle, stored_images: StoredImages, start: &Start) {
-        let Start { configuration, ranges, single_bank } = *start;
+        let Start { configuration, ranges, lost, single_bank, .. } = *start;
         self.images.restart(life, stored_images);
         self.images.owner.note(&configuration);
         (self.configuration, self.staged, self.refused) = (configuration, configuration, Refused::default());
         self.single_bank = single_bank;
-        (self.heartbeat_lost, self.told_reset) = (false, false);
+        (self.heartbeat_lost, self.told_reset, self.changed) = (false, false, false);
         for (range, value) in Range::ALL.into_iter().zip(ranges) {
             self.shared.set_range(range, value);
         }
         self.shared.rate(&configuration);
+        self.shared.lock(lost);
         self.window.set(Window::NOTHING);
         self.reports = Reports::default();
         self.emergencies.clear();
@@ -143,6 +145,9 @@ impl<'a, P: Program> Objects<'a, P> {
     pub fn poll(&mut self, now: u64, observed: &Observed) {
         self.now = now;
         self.observed = *observed;
+        if self.stores.refill(now as u32) {
+            self.program.note_stores_left(self.stores.left());
+        }
         self.images.tick(now, self.heartbeat_lost);
         while !self.emergencies.is_full()
             && let Some(emergency) = self.reports.next(observed, &self.program.hardware().driver, now)
@@ -207,11 +212,16 @@ impl<'a, P: Program> Objects<'a, P> {
     }
 
     fn report(&mut self, mut emergency: Emergency) {
-        if self.program.damaged() != 0 {
+        if self.damaged() != 0 {
             emergency.register |= LOST_BIT;
         }
         // What does not fit is in the objects all the same.
         let _ = self.emergencies.push_back(emergency);
+    }
+
+    /// Damaged parts of the storage: bits as of EMCY [`LOST`].
+    fn damaged(&self) -> u8 {
+        self.program.damaged() | u8::from(self.shared.is_locked()) << 1
     }
 
     /// Under current, or one command away from it.
@@ -290,6 +300,8 @@ impl<'a, P: Program> Objects<'a, P> {
             Field::Owner(part) => self.images.owner.get(part, self.is_present(), self.now).into(),
             Field::Reset(part) => last_reset::get(&self.program.last_reset(), part).into(),
             Field::Hardware(part) => hardware::get(&self.program.hardware(), part).into(),
+            Field::Storage(StorageField::Damaged) => self.damaged().into(),
+            Field::Storage(StorageField::StoresLeft) => self.stores.left().into(),
             Field::Server | Field::History => 0,
         }
     }
@@ -316,66 +328,8 @@ impl<'a, P: Program> Objects<'a, P> {
         if self.armed() {
             return Err(Abort::DEVICE_STATE);
         }
+        self.changed |= COUNTER_AND_DATE && value != self.shared.range(range);
         self.shared.set_range(range, value);
-        Ok(())
-    }
-
-    /// Has the control step take a configuration. Functions of their own, here and below, because the stack has to bear their copies of records: not
-    /// beside the proof of an image.
-    #[inline(never)]
-    fn configure(&mut self, configuration: &Configuration) -> Result<(), Abort> {
-        match self.program.configure(configuration) {
-            Ok(()) => {
-                self.refused = Refused::default();
-                self.configuration = *configuration;
-                self.shared.rate(configuration);
-                Ok(())
-            }
-            Err(NotConfigured::Refused(error)) => {
-                self.refused = Refused::by(&error);
-                Err(Abort::VALUE)
-            }
-            Err(NotConfigured::Busy) => {
-                self.refused = Refused::busy();
-                Err(Abort::DEVICE_STATE)
-            }
-        }
-    }
-
-    #[inline(never)]
-    fn command_configuration(&mut self, command: u32) -> Result<(), Abort> {
-        match command {
-            1 if self.armed() => Err(Abort::DEVICE_STATE),
-            1 => {
-                self.authorise()?;
-                let staged = self.staged;
-                self.configure(&staged)
-            }
-            2 => {
-                self.staged = self.configuration;
-                self.refused = Refused::default();
-                Ok(())
-            }
-            _ => Err(Abort::VALUE),
-        }
-    }
-
-    #[inline(never)]
-    fn write_at_once(&mut self, setting: Setting, number: u32) -> Result<(), Abort> {
-        if !self.images.owner.is_lowered(setting, number) {
-            self.authorise()?;
-        }
-        let mut configuration = self.configuration;
-        if !setting.set(&mut configuration, number) {
-            return Err(Abort::VALUE);
-        }
-        self.configure(&configuration)?;
-        if self.authorise().is_ok() {
-            self.images.owner.note(&configuration);
-        }
-        self.staged.compensation = configuration.compensation;
-        self.staged.load = configuration.load;
-        self.staged.stops = configuration.stops;
         Ok(())
     }
 
@@ -389,18 +343,6 @@ impl<'a, P: Program> Objects<'a, P> {
             return Err(Abort::DEVICE_STATE);
         }
         Ok(())
-    }
-
-    /// A function of its own: the record is more than 1 KiB of stack.
-    #[inline(never)]
-    fn store_record(&mut self, update: &Update) -> Result<(), Abort> {
-        if !self.is_writable() {
-            return Err(Abort::DEVICE_STATE);
-        }
-        let mut record = [0; RECORD];
-        let length = self.program.record(|before| update.encode(before, &mut record)).ok_or(Abort::MEMORY)?;
-        let record = record.get(..length).ok_or(Abort::MEMORY)?;
-        self.program.store(record).map_err(|error| self.refuse(error.into()))
     }
 }
 
@@ -467,7 +409,12 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
             Field::Range(range) => self.write_range(range, f32::from_bits(word)),
             Field::Setting(setting) => {
                 self.authorise()?;
-                if setting.set(&mut self.staged, word) { Ok(()) } else { Err(Abort::VALUE) }
+                let before = if COUNTER_AND_DATE { setting.get(&self.staged) } else { 0 };
+                if !setting.set(&mut self.staged, word) {
+                    return Err(Abort::VALUE);
+                }
+                self.changed |= COUNTER_AND_DATE && setting.get(&self.staged) != before;
+                Ok(())
             }
             Field::AtOnce(setting) => self.write_at_once(setting, word),
             Field::Profile(parameter) if PROFILES => {
@@ -481,6 +428,7 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
                 self.shared.set_parameter(parameter, word);
                 Ok(())
             }
+            Field::Micro(setting) if PROFILES => self.write_limit(setting, word as i32),
             Field::Configuration(ConfigurationField::Command) => self.command_configuration(word),
             Field::Image(field) => self.write_image(field, word),
             Field::Owner(field) => self.write_owner(field, word),
@@ -551,6 +499,10 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
         })
     }
 
+    fn has_changed(&mut self) -> bool {
+        core::mem::take(&mut self.changed)
+    }
+
     fn may_change_node_id(&self) -> bool {
         !self.needs_control()
     }
@@ -582,7 +534,7 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
                     if let Some(emergency) = last_reset::emergency(&self.program.last_reset()) {
                         self.report(emergency);
                     }
-                    let damaged = self.program.damaged();
+                    let damaged = self.damaged();
                     if damaged != 0 {
                         self.report(Emergency { code: LOST, register: 0, information: [damaged, 0, 0, 0, 0] });
                     }

@@ -21,7 +21,8 @@ pub const FLASH: u16 = 0x5530;
 pub const WATCHDOG: u16 = 0x6010;
 /// The program stopped by itself before this start. Information: object 2301h:1 and 2.
 pub const STOPPED: u16 = 0x6100;
-/// Stored parameters are damaged, and what was stored before, or the defaults, are in use. Information: bits: 0 friction images, 1 configuration, 2 key.
+/// Stored parameters are damaged, and what was stored before, or the defaults, are in use. Information: bits: 0
+/// friction images, 1 configuration (the joint is not enabled then), 2 key.
 pub const LOST: u16 = 0x6310;
 /// Bit of the error register for them: the manufacturer's.
 pub(super) const LOST_BIT: u8 = 1 << 7;
@@ -106,6 +107,11 @@ impl Reports {
         self.misfits &= !observed.adaptation.fits();
         None
     }
+}
+
+/// The end of what the manufacturer's bit of the error register told.
+pub(super) fn over(latched: Faults) -> Emergency {
+    Emergency { code: RESET, register: register(latched), information: [0; 5] }
 }
 
 /// What a refused image is reported as.

@@ -27,7 +27,7 @@ pub enum Field {
     AtOnce(Setting),
     /// A setting in use as a whole number of thousandths, to be read.
     Milli(Setting),
-    /// The same of millionths.
+    /// A limit in use as a whole number of millionths. Written, it is taken at once, while the motor is off.
     Micro(Setting),
     /// Taking the configuration, and why it was refused.
     Configuration(ConfigurationField),
@@ -43,6 +43,17 @@ pub enum Field {
     Reset(ResetField),
     /// What the board tells of its hardware.
     Hardware(HardwareField),
+    /// State of the storage.
+    Storage(StorageField),
+}
+
+/// A part of the storage's state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StorageField {
+    /// Parts that were found damaged.
+    Damaged,
+    /// Number of records that may be written.
+    StoresLeft,
 }
 
 /// A part of what the board tells of its hardware.
@@ -185,23 +196,28 @@ pub enum ProfileParameter {
     HomingAcceleration = 9,
     /// Speed on the way to a switch, raw velocity: no method looks for one.
     SwitchSpeed = 10,
+    /// Time between two set-points of the cyclic modes; 0: they are not interpolated.
+    InterpolationTime = 11,
+    /// Its unit, as a power of ten in seconds, an INTEGER8.
+    InterpolationExponent = 12,
 }
 
 /// Number of [`ProfileParameter`]s that a program has.
-pub(super) const PROFILE_PARAMETERS: usize = if PROFILES { 11 } else { 0 };
+pub(super) const PROFILE_PARAMETERS: usize = if PROFILES { 13 } else { 0 };
 
 impl ProfileParameter {
     /// Whether it may have this value: not an acceleration of zero, nor a method that there is none of.
     pub(super) const fn permits(self, value: u32) -> bool {
         match self {
             Self::HomingMethod => matches!(value, 0 | 33 | 34 | 35 | 37),
+            Self::InterpolationExponent => matches!(value as i8, -6..=0),
             Self::HomingSpeed | Self::HomingAcceleration | Self::SwitchSpeed => value > 0,
             _ => true,
         }
     }
 
     /// At the start.
-    pub const DEFAULTS: [u32; 11] = [u32::MAX, 0, 10_000, 0, 50, 20, 0, 0, 100, u32::MAX, 100];
+    pub const DEFAULTS: [u32; 13] = [u32::MAX, 0, 10_000, 0, 50, 20, 0, 0, 100, u32::MAX, 100, 0, -3i8 as u8 as u32];
 }
 
 /// A part of the impedance frame.

@@ -9,10 +9,11 @@
 //! [`table`] declares every object once; the server's entries, `docs/objects.md` and the texts that a host makes (EDS, DBC) come
 //! from it. [`field`] is what an object can be about. The rest has one idea a file: [`Observed`] and its scaling, [`settings`] of the
 //! configuration, [`Operation`] for the modes, `profile_positions` and `profile_modes` for those in which positions have
-//! a hand-shake and an end, [`Images`] for the life cycle, [`Ownership`] for key and sessions, [`Stored`] for what 1010h keeps, [`emergency`] for codes.
+//! a hand-shake and an end, [`Images`] for the life cycle, [`Ownership`] for key and sessions, [`Stored`] for what
+//! 1010h keeps, [`Start`] for what a joint begins with, [`emergency`] for codes.
 //!
 //! ```text
-//!  receive interrupt   image.observe(&observed)
+//!  receive interrupt   image.at(now); image.observe(&observed)
 //!                      receiver.receive(&frame, now, &mut image, send)      route to the task's queue
 //!                      image.follow(node.state()); publish(image.demand()); image.leave_copies()
 //!  task                server.receive(&frame, now, &mut objects)            where shared.has_written(): pend the interrupt
@@ -33,6 +34,7 @@ mod friction_statistics;
 mod hardware;
 mod history;
 mod images;
+mod interpolation;
 mod last_reset;
 mod number;
 mod observed;
@@ -47,6 +49,8 @@ mod refused;
 mod set_points;
 pub mod settings;
 mod shared;
+mod start;
+mod store_budget;
 mod stored;
 pub mod table;
 
@@ -54,7 +58,7 @@ pub mod table;
 mod tests;
 
 pub use communication::default_communication;
-pub use dictionary::{Objects, Start};
+pub use dictionary::Objects;
 pub use friction_statistics::FrictionStatistics;
 pub use history::STEP;
 pub use images::{Images, StoredImages};
@@ -65,4 +69,6 @@ pub use process_image::JointImage;
 pub use program::{NotConfigured, Program};
 pub use set_points::impedance_frame;
 pub use shared::{DEFAULT_RANGES, Shared};
+pub use start::Start;
+pub use store_budget::STORES;
 pub use stored::{Part, RECORD, Stored, Update};

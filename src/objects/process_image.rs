@@ -7,10 +7,13 @@
 //! A demand comes before everything that can wait: copies of the set-points for the task are left behind it, by
 //! [`JointImage::leave_copies`].
 //!
+//! A joint whose configuration is lost is asked for nothing but a fault reset: it stays in "switch on disabled".
+//!
 //! Outside OPERATIONAL, and in it until a controlword comes, the joint is asked for a quick stop and no torque. It is the node's own
 //! demand, and its sequence changes with the transition only: a joint that still brakes when the command deadline is over has a fault.
 
 use super::field::{Field, SetPoint};
+use super::interpolation::Interpolation;
 use super::observed::Observed;
 use super::set_points::SetPoints;
 use super::shared::Shared;
@@ -32,6 +35,9 @@ pub struct JointImage<'a> {
     arrived: Arrived,
     sequence: u32,
     coupled_sequence: u32,
+    interpolation: [Interpolation; PROFILES as usize],
+    /// µs.
+    now: u32,
     /// The task has not been left a copy of the set-points in force.
     changed: bool,
 }
@@ -62,6 +68,8 @@ impl<'a> JointImage<'a> {
             arrived: Arrived::default(),
             sequence: 0,
             coupled_sequence: 0,
+            interpolation: [Interpolation::default(); PROFILES as usize],
+            now: 0,
             changed: false,
         }
     }
@@ -78,6 +86,9 @@ impl<'a> JointImage<'a> {
         if state != self.state {
             self.state_changed(state);
         }
+        for way in &mut self.interpolation {
+            way.settle(self.now, self.shared);
+        }
         if PROFILES && self.points.go_on(self.shared) {
             self.arriving = self.points;
             self.changed = true;
@@ -91,6 +102,11 @@ impl<'a> JointImage<'a> {
         }
     }
 
+    /// The time of what comes, µs, wrapping. Before [`Receiver::receive`](crate::canopen::Receiver::receive).
+    pub fn at(&mut self, now: u32) {
+        self.now = now;
+    }
+
     /// Leaves copies of the set-points in force for the task, and for TPDOs. At the end of every receive interrupt, once
     /// the demand is published.
     pub fn leave_copies(&mut self) {
@@ -99,18 +115,35 @@ impl<'a> JointImage<'a> {
         }
     }
 
-    /// What is asked of the joint now.
+    /// What is asked of the joint at the time that [`JointImage::at`] told.
     pub fn demand(&self) -> Demand {
         let coupled = Coupled { velocity: self.points.coupled_velocity(), sequence: self.coupled_sequence };
         if self.state != NmtState::Operational {
             let controlword = Controlword::QUICK_STOP;
             return Demand { controlword, command: Command::default(), sequence: self.sequence, coupled };
         }
+        let word = Controlword(self.points.controlword);
         Demand {
-            controlword: Controlword(self.points.controlword),
-            command: self.points.command(self.shared),
+            controlword: if self.shared.is_locked() { word.reset_alone() } else { word },
+            command: self.command(),
             sequence: self.sequence,
             coupled,
+        }
+    }
+
+    fn command(&self) -> Command {
+        let mut command = self.points.command(self.shared);
+        for way in &self.interpolation {
+            way.apply(&mut command, self.now, self.shared);
+        }
+        command
+    }
+
+    /// Others are in force from now on.
+    fn change(&mut self) {
+        self.changed = true;
+        for way in &mut self.interpolation {
+            way.follow(self.points.cyclic_target(), self.now, self.shared);
         }
     }
 
@@ -138,7 +171,7 @@ impl<'a> JointImage<'a> {
         let actual = if PROFILES { self.shared.position() } else { 0 };
         self.arriving.succeed(&self.points, position, actual);
         self.points = self.arriving;
-        self.changed = true;
+        self.change();
     }
 }
 
@@ -178,7 +211,7 @@ impl ProcessImage for JointImage<'_> {
         self.arriving = none;
         self.arrived = Arrived::default();
         self.points = none;
-        self.changed = true;
+        self.change();
         self.sequence = self.sequence.wrapping_add(1);
         self.coupled_sequence = self.coupled_sequence.wrapping_add(1);
     }

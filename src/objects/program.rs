@@ -36,10 +36,14 @@ pub trait Program {
     /// Makes a record outlast a loss of power. At start it goes to [`Stored::decode`](super::Stored::decode).
     fn store(&mut self, record: &[u8]) -> Result<(), SlotError>;
 
-    /// Which of what is stored was found damaged: bits as of EMCY [`LOST`](super::emergency::LOST).
+    /// Which of images and key was found damaged: bits as of EMCY [`LOST`](super::emergency::LOST). Whether a
+    /// configuration was, [`Start`](super::Start) says.
     fn damaged(&self) -> u8 {
         0
     }
+
+    /// So many times a record may still be written: to be kept over a reset that is no power-up.
+    fn note_stores_left(&mut self, left: u8);
 
     /// Keeps what guards the joint. The client is answered after that.
     fn keep(&mut self, guard: &Guard) -> Result<(), SlotError>;

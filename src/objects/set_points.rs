@@ -1,6 +1,7 @@
 //! From the numbers of the bus to a command; the receive interrupt.
 
 use super::field::{FIRST_OF_PROFILES, PROFILE_SET_POINTS, Range, SetPoint};
+use super::interpolation::Target;
 use super::operation::Operation;
 use super::profile_positions::Positions;
 use super::shared::Shared;
@@ -245,14 +246,8 @@ impl SetPoints {
             }
             _ if !self.follows() => Command { mode: Mode::Hold, torque: offset, ..Command::NOTHING },
             Operation::Torque | Operation::None => plain,
-            Operation::Velocity | Operation::ProfileVelocity => {
-                let offset = self.offset(Operation::Velocity, SetPoint::VelocityOffset);
-                Command { velocity: 1e-3 * self.velocity.saturating_add(offset) as f32, ..plain }
-            }
-            Operation::Position => {
-                let offset = self.offset(Operation::Position, SetPoint::PositionOffset);
-                Command { position: 1e-6 * self.position.saturating_add(offset) as f32, ..plain }
-            }
+            Operation::Velocity | Operation::ProfileVelocity => Command { velocity: self.velocity(), ..plain },
+            Operation::Position => Command { position: self.position(), ..plain },
             Operation::ProfilePosition => {
                 let target = self.positions.iter().find_map(Positions::target).map_or(0, |(target, _)| target);
                 Command { position: 1e-6 * target as f32, ..plain }
@@ -262,6 +257,27 @@ impl SetPoints {
                 Command { torque: framed.torque + offset, ..framed }
             }
         }
+    }
+
+    /// The target of the modes that 60C2h interpolates, where the joint follows it.
+    pub(super) fn cyclic_target(&self) -> Option<Target> {
+        match self.mode {
+            Operation::Velocity if self.follows() => Some((Mode::Velocity, self.velocity())),
+            Operation::Position if self.follows() => Some((Mode::Position, self.position())),
+            _ => None,
+        }
+    }
+
+    /// Target velocity, with what is added to it in cyclic synchronous velocity mode, rad/s.
+    fn velocity(&self) -> f32 {
+        let offset = self.offset(Operation::Velocity, SetPoint::VelocityOffset);
+        1e-3 * self.velocity.saturating_add(offset) as f32
+    }
+
+    /// Target position of cyclic synchronous position mode, with what is added to it, rad.
+    fn position(&self) -> f32 {
+        let offset = self.offset(Operation::Position, SetPoint::PositionOffset);
+        1e-6 * self.position.saturating_add(offset) as f32
     }
 
     /// What is added to the target of one mode, raw.

@@ -26,6 +26,7 @@ pub struct Shared {
     rated_torque: AtomicU32,
     rated_current: AtomicU32,
     follows: AtomicBool,
+    locked: AtomicBool,
     /// Where a program has them.
     profile: [ProfileModes; PROFILES as usize],
     image_version: AtomicU32,
@@ -112,6 +113,7 @@ impl Shared {
             rated_torque: AtomicU32::new(0),
             rated_current: AtomicU32::new(0),
             follows: AtomicBool::new(false),
+            locked: AtomicBool::new(false),
             profile: [const { ProfileModes::new() }; PROFILES as usize],
             image_version: AtomicU32::new(0),
             image_state: AtomicU8::new(0),
@@ -316,6 +318,16 @@ impl Shared {
     /// Interrupt.
     pub(super) fn set_follows(&self, follows: bool) {
         self.follows.store(follows, Ordering::Relaxed);
+    }
+
+    /// True where the joint is not to be enabled, because the configuration that was stored is lost.
+    pub(super) fn is_locked(&self) -> bool {
+        self.locked.load(Ordering::Relaxed)
+    }
+
+    /// Task.
+    pub(super) fn lock(&self, locked: bool) {
+        self.locked.store(locked, Ordering::Relaxed);
     }
 
     pub(super) fn image_version(&self) -> u32 {

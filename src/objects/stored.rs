@@ -2,7 +2,7 @@
 //!
 //! | offset | bytes | content |
 //! |---|---|---|
-//! | 0 | 1 | format, 1 |
+//! | 0 | 1 | format, 1; bit 7: a configuration that was stored before is lost, and none has been stored since |
 //! | 1 | 1 | node id that LSS stored, 255 for none |
 //! | 2 | 1 | node id that the communication parameters are for; 0 where there are none |
 //! | 3 | 7 each | index (2 bytes), sub-index (1), value (4), all little-endian, for every object that is stored |
@@ -10,19 +10,21 @@
 //! Objects that a program does not know are skipped, objects that are missing keep their defaults: a record survives a change of
 //! program both ways. A limit damping that is missing, in records of programs that had none, is the least that its limits permit. Length and damage are the business of the [slots](crate::parameters::slots) that it lies in.
 
-use super::communication;
+use super::communication::{self, VERIFICATION};
 use super::field::{Field, RANGES, Range};
 use super::shared::DEFAULT_RANGES;
 use super::table::OBJECTS;
-use crate::canopen::{CommunicationParameters, NO_NODE_ID};
+use crate::canopen::{COUNTER_AND_DATE, CommunicationParameters, NO_NODE_ID};
 use crate::joint::configuration::Configuration;
 use crate::joint::load_feedforward::LOADS;
 
-/// Longest record: what all objects take, 1,221 bytes, and three more; with a load's settings 6 items more. A page of
-/// flash would hold 2,016; the stack has to, too.
-pub const RECORD: usize = 1_224 + 6 * ITEM * LOADS as usize;
+/// Longest record: what all objects take, 1,221 bytes and those of the SYNC counter, of 1020h and of a load, and three
+/// more. A page of flash would hold 2,016; the stack has to, too.
+pub const RECORD: usize = 1_224 + if COUNTER_AND_DATE { 7 * ITEM } else { 0 } + 6 * ITEM * LOADS as usize;
 const _: () = assert!(RECORD <= crate::parameters::slots::PAGE - crate::parameters::slots::OVERHEAD);
 const FORMAT: u8 = 1;
+/// Flag of the format.
+const LOST: u8 = 1 << 7;
 const ITEM: usize = 7;
 
 /// A record's content but for the communication parameters, which are read from it when they are wanted (`communication_parameters`).
@@ -30,6 +32,8 @@ const ITEM: usize = 7;
 pub struct Stored {
     /// 1 to 127, or 255 for none: what LSS stored. Defaults are restored without it.
     pub node_id: u8,
+    /// A configuration was lost: what is here is not what was stored last.
+    pub lost: bool,
     /// 2101h to 2109h and 2200h to 2202h, and 2012h.
     pub application: Option<(Configuration, [f32; RANGES])>,
 }
@@ -58,7 +62,10 @@ pub struct Update<'a> {
 
 /// A record's two node ids and its items; none for another format.
 fn parse(record: &[u8]) -> Option<(u8, u8, impl Iterator<Item = (u16, u8, u32)>)> {
-    let (&[FORMAT, node_id, of], items) = record.split_first_chunk()? else { return None };
+    let (&[format, node_id, of], items) = record.split_first_chunk()?;
+    if format & !LOST != FORMAT {
+        return None;
+    }
     let items = items.chunks_exact(ITEM).filter_map(|item| {
         let &[low, high, sub_index, a, b, c, d] = item else { return None };
         Some((u16::from_le_bytes([low, high]), sub_index, u32::from_le_bytes([a, b, c, d])))
@@ -118,7 +125,7 @@ impl Writer<'_> {
 
 impl Stored {
     /// What there is without a record.
-    pub const NOTHING: Self = Self { node_id: NO_NODE_ID, application: None };
+    pub const NOTHING: Self = Self { node_id: NO_NODE_ID, lost: false, application: None };
 
     /// The configuration to start with, where `defaults` are the board's. It may hold values out of their ranges, if those have
     /// changed: [`Configuration::prepare`] decides.
@@ -156,13 +163,15 @@ impl Stored {
         if configuration.limits.damping == 0.0 {
             configuration.limits.damping = configuration.limits.least_damping();
         }
-        Some(Self { node_id, application: application.then_some((configuration, ranges)) })
+        let lost = record.first().is_some_and(|format| format & LOST != 0);
+        Some(Self { node_id, lost, application: application.then_some((configuration, ranges)) })
     }
 }
 
 impl Update<'_> {
-    /// Writes the new record; its length. None where it does not fit, which a test rules out.
-    pub fn encode(&self, before: Option<&[u8]>, record: &mut [u8; RECORD]) -> Option<usize> {
+    /// Writes the new record; its length. None where it does not fit, which a test rules out. `lost`: it says that a
+    /// configuration is.
+    pub fn encode(&self, before: Option<&[u8]>, lost: bool, record: &mut [u8; RECORD]) -> Option<usize> {
         let old = before.filter(|before| parse(before).is_some()).unwrap_or(&[FORMAT, NO_NODE_ID, 0]);
         let (node_id, old_of, _) = parse(old)?;
         let of = match self.communication {
@@ -171,7 +180,7 @@ impl Update<'_> {
             Part::New((of, _)) => of,
         };
         let mut writer = Writer { record, length: 0 };
-        writer.put(&[FORMAT, self.node_id.unwrap_or(node_id), of])?;
+        writer.put(&[FORMAT | u8::from(lost) << 7, self.node_id.unwrap_or(node_id), of])?;
         match &self.application {
             Part::Kept => writer.copy(old, |index, sub_index| super::table::find(index, sub_index).is_some())?,
             Part::Removed => {}
@@ -187,7 +196,10 @@ impl Update<'_> {
             }
         }
         match self.communication {
-            Part::Kept => writer.copy(old, |index, _| is_communication(index))?,
+            Part::Kept => {
+                let dated = !COUNTER_AND_DATE || matches!(self.application, Part::Kept);
+                writer.copy(old, |index, _| is_communication(index) && (dated || index != VERIFICATION))?;
+            }
             Part::Removed => {}
             Part::New((_, parameters)) => {
                 communication::store(parameters, |index, sub_index, value| writer.item(index, sub_index, value))?;

@@ -5,16 +5,15 @@ mod connection;
 mod load;
 
 use crate::board::watchdog::{self, Watchdog};
-use crate::board::{self, Led, Peripherals, StartError, control, faults, options};
+use crate::board::{self, Led, Peripherals, StartError, can, control, faults, options};
 use connection::Watching;
 use embassy_executor::{SendSpawner, Spawner};
 use embassy_stm32::gpio::Input;
 use embassy_time::{Duration, Instant, Ticker};
+use joint_firmware::joint::PROFILES;
 use joint_firmware::joint::active::SLOW_RATE;
 use joint_firmware::joint::configuration::ConfigurationError;
-use joint_firmware::joint::fault::Fault;
 use joint_firmware::joint::state_machine::State;
-use joint_firmware::motor::setting::SettingError;
 use joint_firmware::motor::thermal::{PLAUSIBLE_SENSOR, ThermalSettings, WindingTemperature};
 use joint_firmware::parameters::slots::WriteError;
 
@@ -31,7 +30,7 @@ pub enum NotStarted {
     /// The flash that holds parameters cannot be written.
     Flash(WriteError),
     /// The board's own configuration.
-    Configuration(ConfigurationError),
+    Configuration,
 }
 
 impl From<StartError> for NotStarted {
@@ -47,8 +46,8 @@ impl From<WriteError> for NotStarted {
 }
 
 impl From<ConfigurationError> for NotStarted {
-    fn from(error: ConfigurationError) -> Self {
-        Self::Configuration(error)
+    fn from(_: ConfigurationError) -> Self {
+        Self::Configuration
     }
 }
 
@@ -66,23 +65,13 @@ pub fn start(slow: Spawner, medium: impl FnOnce() -> SendSpawner, peripherals: P
     faults::report();
     options::report();
     match begin(slow, medium, peripherals) {
-        Ok(()) => defmt::info!("{}: control steps at {} Hz", board::NAME, board::CONTROL_HZ),
-        Err(NotStarted::Board(error)) => defmt::error!("{} does not start: {}", board::NAME, error),
+        Ok(()) => defmt::info!("control steps at {} Hz", board::CONTROL_HZ),
+        Err(NotStarted::Board(error)) => defmt::error!("no start: {}", error),
         Err(NotStarted::Flash(WriteError { word })) => {
-            defmt::error!("{} does not start: the flash refuses to write double word {}", board::NAME, word);
+            defmt::error!("no start: the flash refuses to write double word {}", word);
         }
-        Err(NotStarted::Configuration(error)) => {
-            // As object 2100h:3 would say.
-            let what = match error {
-                ConfigurationError::Setting(SettingError { name, .. }) => name.code(),
-                ConfigurationError::Compensation(_) => 0x2200_0000,
-                ConfigurationError::NodeId(_) => 0,
-                ConfigurationError::PolePairs(_) => 0x2101_0600,
-                ConfigurationError::EncoderCounts(_) => 0x2101_0A00,
-                ConfigurationError::StopOption => 0x605A_0000,
-            };
-            defmt::error!("{} does not start: setting {:#010x} out of range in its configuration", board::NAME, what);
-        }
+        // A test of the library's has the board's own configuration prepared, and tells which setting.
+        Err(NotStarted::Configuration) => defmt::error!("no start: the board's own configuration is refused"),
     }
 }
 
@@ -146,6 +135,10 @@ async fn supervise(button: Option<Input<'static>>, mut watching: Watching, watch
         let (bridge, winding) = board::temperatures();
         control::set_temperatures(bridge, winding);
         watching.look(bridge, winding);
+        if PROFILES {
+            // Set-points are interpolated in the receive interrupt.
+            can::attend();
+        }
         pressed_ms = match button.as_ref().is_some_and(Input::is_low) {
             true => pressed_ms.saturating_add(1),
             false => 0,
@@ -192,18 +185,17 @@ async fn log() {
         if let Some(report) = control::report() {
             let telemetry = report.telemetry;
             defmt::info!(
-                "joint: {}, statusword {:#06x}, supply {} V, position {} rad, currents {} {} {} A",
+                "joint: {}, statusword {:#06x}, faults {:#06x}, supply {} V, position {} rad, currents {} {} {} A",
                 state_name(telemetry.state),
                 telemetry.statusword(),
+                // Bits as in object 2021h:4.
+                report.latched.bits(),
                 telemetry.bus_voltage,
                 telemetry.motion.position,
                 report.phase_currents.a,
                 report.phase_currents.b,
                 report.phase_currents.c
             );
-            for fault in report.latched.iter() {
-                defmt::warn!("fault: {}", fault_name(fault));
-            }
         }
     }
 }
@@ -220,28 +212,6 @@ fn state_name(state: State) -> defmt::Str {
         State::FaultReactionActive => defmt::intern!("fault reaction active"),
         State::Fault => defmt::intern!("fault"),
         State::OpenLoop => defmt::intern!("open loop"),
-    }
-}
-
-/// As [`state_name`].
-fn fault_name(fault: Fault) -> defmt::Str {
-    match fault {
-        Fault::OverCurrent => defmt::intern!("over-current"),
-        Fault::CurrentSensor => defmt::intern!("phase currents do not add up to zero"),
-        Fault::CurrentNotFollowed => defmt::intern!("current does not follow its reference"),
-        Fault::OverVoltage => defmt::intern!("supply voltage too high"),
-        Fault::UnderVoltage => defmt::intern!("supply voltage too low"),
-        Fault::EncoderLost => defmt::intern!("encoder does not answer"),
-        Fault::EncoderJump => defmt::intern!("encoder jumped"),
-        Fault::EncoderImplausible => defmt::intern!("encoder contradicts the induced voltage"),
-        Fault::OverSpeed => defmt::intern!("joint too fast"),
-        Fault::PositionLimit => defmt::intern!("joint beyond a position limit"),
-        Fault::BridgeTemperature => defmt::intern!("bridge too hot"),
-        Fault::WindingTemperature => defmt::intern!("winding too hot"),
-        Fault::TemperatureSensor => defmt::intern!("temperature sensor open or shorted"),
-        Fault::StaleCommand => defmt::intern!("command deadline missed"),
-        Fault::Overrun => defmt::intern!("control step overran its period"),
-        Fault::BridgeDriver => defmt::intern!("gate driver fault"),
     }
 }
 

@@ -57,7 +57,7 @@ impl Kept<'_> {
             application: Part::New((self.configuration, DEFAULT_RANGES)),
             communication: Part::Removed,
         };
-        let length = update.encode(None, &mut record).ok_or("the record does not fit")?;
+        let length = update.encode(None, false, &mut record).ok_or("the record does not fit")?;
         store(2, 2, &record[..length])?;
 
         let start = program.symbol("__parameters_start").ok_or("the program names no parameters")?.address;

@@ -14,9 +14,11 @@ mod oscillator;
 mod outputs;
 mod ownership;
 mod power_cut;
+mod receive_interrupt;
 mod same_run;
 mod settings;
 mod settling;
+mod supported_modes;
 mod workbench;
 
 use host_tests::bare_metal::target_installed;
@@ -39,9 +41,11 @@ fn main() {
         oscillator::trials(),
         outputs::trials(),
         ownership::trials(),
+        receive_interrupt::trials(),
         same_run::trials(),
         settings::trials(),
         settling::trials(),
+        supported_modes::trials(),
         workbench::trials(),
     ];
     let trials = rooms.into_iter().flatten().map(|trial| trial.with_ignored_flag(ignored)).collect();

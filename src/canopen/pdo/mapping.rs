@@ -5,7 +5,7 @@
 use super::MappedObject;
 use crate::canopen::abort::Abort;
 use crate::canopen::dictionary::{Access, Entry, Length, ObjectDictionary};
-use crate::canopen::parameters::{INVALID, MAPPED, NO_REMOTE, is_free};
+use crate::canopen::parameters::{HIGHEST_COUNTER, INVALID, MAPPED, NO_REMOTE, is_free};
 use crate::canopen::shared::PdoRegisters;
 
 /// Which way a PDO goes.
@@ -55,6 +55,15 @@ pub(crate) fn set_inhibit(registers: &PdoRegisters, value: u16) -> Result<(), Ab
         return Err(Abort::VALUE);
     }
     registers.set_inhibit(value);
+    Ok(())
+}
+
+/// Writes sub-index 6; only while the PDO does not exist.
+pub(crate) fn set_sync_start(registers: &PdoRegisters, value: u8) -> Result<(), Abort> {
+    if registers.id().is_some() || value > HIGHEST_COUNTER {
+        return Err(Abort::VALUE);
+    }
+    registers.set_sync_start(value);
     Ok(())
 }
 

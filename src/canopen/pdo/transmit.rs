@@ -1,6 +1,7 @@
 //! TPDOs: assembling one, in either context, and when it is sent: with SYNC, on a change, by its timer.
 
 use super::MappedObject;
+use crate::canopen::COUNTER_AND_DATE;
 use crate::canopen::frame::Frame;
 use crate::canopen::shared::{PdoRegisters, Shared};
 use crate::canopen::time::{MILLISECOND, elapsed};
@@ -25,19 +26,26 @@ pub(crate) fn assemble(registers: &PdoRegisters, mut value: impl FnMut(MappedObj
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Synchronous {
     syncs: u8,
+    /// The SYNC that its start value names has come.
+    begun: bool,
+    generation: u8,
     /// Last frame of type 0.
     sent: Option<Frame>,
 }
 
 impl Synchronous {
-    /// The frame that TPDO `pdo` sends with this SYNC; `frame` assembles it.
+    /// The frame that TPDO `pdo` sends with this SYNC, whose `counter` is 0 where it has none; `frame` assembles it.
     pub(crate) fn next(
         &mut self,
         shared: &Shared,
         registers: &PdoRegisters,
         pdo: u8,
+        counter: u8,
         frame: impl FnOnce() -> Option<Frame>,
     ) -> Option<Frame> {
+        if COUNTER_AND_DATE && self.generation != registers.generation() {
+            *self = Self { generation: registers.generation(), ..Self::default() };
+        }
         match registers.transmission() {
             0 => {
                 let frame = frame()?;
@@ -46,6 +54,13 @@ impl Synchronous {
                 due.then_some(frame)
             }
             every @ 1..=240 => {
+                let start = if shared.sync_overflow() == 0 { 0 } else { registers.sync_start() };
+                if COUNTER_AND_DATE && start != 0 && !self.begun {
+                    if counter != start {
+                        return None;
+                    }
+                    (self.begun, self.syncs) = (true, 0);
+                }
                 self.syncs = self.syncs.saturating_add(1);
                 let due = self.syncs >= every;
                 if !due {

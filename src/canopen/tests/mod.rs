@@ -48,6 +48,8 @@ pub struct Dictionary {
     pub refuses_node_id: Option<Abort>,
     pub keeps_node_id: bool,
     pub parameters: Option<CommunicationParameters>,
+    /// An object that is stored has another value.
+    pub changed: bool,
     /// The interrupt takes another reset while the task tells of one.
     pub interrupted: Option<&'static Shared>,
 }
@@ -137,6 +139,10 @@ impl ObjectDictionary for Dictionary {
     fn store(&mut self, group: Group, communication: &CommunicationParameters) -> Result<(), Abort> {
         self.stored = Some((group, *communication));
         Ok(())
+    }
+
+    fn has_changed(&mut self) -> bool {
+        std::mem::take(&mut self.changed)
     }
 
     fn may_change_node_id(&self) -> bool {

@@ -195,6 +195,82 @@ fn a_sync_with_data_counts_and_is_reported_once() {
 }
 
 #[test]
+fn a_sync_with_a_counter_is_as_long_as_1019h_says_and_another_one_counts_and_is_reported() {
+    let mut node = Node::operational();
+    for (value, taken) in [(0, true), (1, false), (2, true), (240, true), (241, false), (255, false), (10, true)] {
+        let expected = if taken { Ok(()) } else { Err(Abort::VALUE.0) };
+        assert_eq!(node.write(0x1019, 0, &[value]), expected, "{value}");
+    }
+    let mut sync = |data: &[u8]| {
+        node.now += 1_000;
+        let sent = node.bus(0x80, data);
+        assert!(sent.iter().any(|frame| frame.id() == 0x185), "{data:?} counts");
+        sent.iter().filter(|frame| frame.id() == 0x85).map(|frame| frame.data()[..3].to_vec()).collect::<Vec<_>>()
+    };
+    assert_eq!((sync(&[1]), sync(&[2])), (vec![], vec![]));
+    assert_eq!(sync(&[]), [[0x40, 0x82, 0x11]]);
+    assert_eq!((sync(&[]), sync(&[3, 0]), sync(&[4])), (vec![], vec![], vec![]), "once");
+    // Whoever says what SYNC has has seen to it.
+    let told = |frames: Vec<Frame>| frames.iter().map(|frame| (frame.id(), frame.data()[0])).collect::<Vec<_>>();
+    assert_eq!(told(node.bus(0x605, &[0x2F, 0x19, 0x10, 0, 0, 0, 0, 0])), [(0x585, 0x60), (0x85, 0)]);
+    assert_eq!(node.read(0x1001, 0), Ok(0));
+    node.now += 1_000;
+    assert_eq!(told(node.bus(0x80, &[])), [(0x185, 0x10)]);
+    node.write(0x1019, 0, &[2]).unwrap();
+    node.now += 1_000;
+    assert_eq!(told(node.bus(0x80, &[1, 2])), [(0x185, 0x10), (0x85, 0x40)]);
+}
+
+#[test]
+fn a_synchronous_tpdo_counts_from_the_sync_with_its_start_value() {
+    // 1019h, type, start value, and the counters of the SYNCs that it follows out of twice 1, 2, 3, 4.
+    for (overflow, every, start, expected) in [
+        (4, 1, 0, vec![1, 2, 3, 4, 1, 2, 3, 4]),
+        (4, 1, 3, vec![3, 4, 1, 2, 3, 4]),
+        (4, 2, 3, vec![4, 2, 4]),
+        (4, 2, 4, vec![1, 3]),
+        (4, 3, 2, vec![4, 3]),
+        // It is never that high.
+        (4, 1, 5, vec![]),
+        // SYNC has a counter that nobody announced.
+        (0, 1, 3, vec![1, 2, 3, 4, 1, 2, 3, 4]),
+    ] {
+        let mut node = Node::booted();
+        node.write(0x1019, 0, &[overflow]).unwrap();
+        assert_eq!(node.write(0x1800, 6, &[start]), Err(Abort::VALUE.0), "while the PDO exists");
+        node.write(0x1800, 1, &0x8000_0185u32.to_le_bytes()).unwrap();
+        node.write(0x1800, 2, &[every]).unwrap();
+        node.write(0x1800, 6, &[start]).unwrap();
+        node.write(0x1800, 1, &0x185u32.to_le_bytes()).unwrap();
+        let counters = |node: &mut Node| {
+            let sent = [1, 2, 3, 4, 1, 2, 3, 4].into_iter().filter(|counter| {
+                node.now = node.now.wrapping_add(SHORTEST_SYNC);
+                !node.interrupt(&frame(0x80, &[*counter])).is_empty()
+            });
+            sent.collect::<Vec<u8>>()
+        };
+        // From the beginning whenever the node, or the PDO, begins.
+        for _ in 0..2 {
+            node.bus(0, &[1, NODE]);
+            assert_eq!(counters(&mut node), expected, "{overflow} {every} {start}");
+            node.bus(0, &[0x80, NODE]);
+        }
+        node.bus(0, &[1, NODE]);
+        node.sync();
+        counters(&mut node);
+        node.write(0x1800, 1, &0x8000_0185u32.to_le_bytes()).unwrap();
+        node.write(0x1800, 1, &0x185u32.to_le_bytes()).unwrap();
+        assert_eq!(counters(&mut node), expected, "set up anew: {overflow} {every} {start}");
+    }
+    let mut node = Node::booted();
+    for (start, expected) in [(240, Ok(())), (241, Err(Abort::VALUE.0))] {
+        assert_eq!(node.write(0x1801, 6, &[start]), expected);
+    }
+    assert_eq!(node.write(0x1400, 6, &[0]), Err(Abort::NO_SUB_INDEX.0));
+    assert_eq!((node.read(0x1400, 0), node.read(0x1800, 0)), (Ok(5), Ok(6)));
+}
+
+#[test]
 fn an_event_driven_tpdo_keeps_its_inhibit_time_and_its_event_timer() {
     let mut node = Node::booted();
     node.dictionary.values.insert((0x2000, 1), vec![0x77]);

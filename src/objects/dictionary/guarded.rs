@@ -15,6 +15,12 @@ impl<P: Program> Objects<'_, P> {
         if matches!(field, ImageField::Command) && number == Command::RollBack as u32 {
             self.authorise()?;
         }
+        // Both write a page of flash, and may write what guards the joint.
+        let writes = matches!(field, ImageField::Command)
+            && (number == Command::Commit as u32 || number == Command::RollBack as u32);
+        if writes && self.stores.left() == 0 {
+            return Err(Abort::DEVICE_STATE);
+        }
         let (floor, failures) = (self.images.life().floor(), self.images.life().failures());
         let result = match field {
             ImageField::Command => self.images.command(number as u8, self.circumstances()),
@@ -33,6 +39,9 @@ impl<P: Program> Objects<'_, P> {
         }
         self.publish();
         result.map_err(|refusal| self.refuse(refusal))?;
+        if writes {
+            self.take_store();
+        }
         kept.map_err(|error| self.refuse(error.into()))
     }
 

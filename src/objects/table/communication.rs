@@ -50,6 +50,15 @@ mod general {
             3, "revision number", U32, RO, UNMAPPED, S; "", 1.0, ANY; "Revision"
             4, "serial number", U32, RO, UNMAPPED, S; "", 1.0, ANY; "Serial number: what an image's target means"
         }
+        0x1019 "synchronous counter overflow value" {
+            0, "synchronous counter overflow value", U8, RW, UNMAPPED, S; "", 1.0, within(0.0, 240.0);
+                "Value behind which the counter that SYNC carries begins anew at 1; 0: SYNC carries none. SYNC of another length counts all the same, and is EMCY 8240h. 1 is reserved, and refused"
+        }
+        0x1020 "verify configuration" {
+            1, "configuration date", U32, RW, UNMAPPED, S; "", 1.0, ANY;
+                "Days since 1984-01-01 of the configuration, as its tool says. Stored by 1010h:1; 0 as soon as any other object that 1010h stores gets another value, and after 1010h:2, 1010h:3 and 1011h"
+            2, "configuration time", U32, RW, UNMAPPED, S; "", 1.0, ANY; "Milliseconds since midnight, likewise"
+        }
         0x1029 "error behaviour" {
             1, "communication error", U8, RW, UNMAPPED, S; "", 1.0, within(0.0, 2.0);
                 "0 leaves OPERATIONAL for PRE-OPERATIONAL, 1 changes nothing, 2 stops"
@@ -63,7 +72,7 @@ mod general {
 
 /// Communication and mapping parameters of one PDO.
 macro_rules! pdo {
-    ($module:ident, $communication:literal, $mapping:literal, $name:literal, $map:literal $(, $inhibit:literal)?) => {
+    ($module:ident, $communication:literal, $mapping:literal, $name:literal, $map:literal $(, $inhibit:literal, $start:literal)?) => {
         mod $module {
             use super::*;
             use Field::Server as S;
@@ -75,6 +84,8 @@ macro_rules! pdo {
                         $($inhibit, "inhibit time", U16, RW, UNMAPPED, S; "s", 1e-4, ANY; "Least distance of two transmissions of type 254 or 255")?
                         5, "event timer", U16, RW, UNMAPPED, S; "s", 1e-3, ANY;
                             "A TPDO is sent, an RPDO has to arrive so often; 0 never"
+                        $($start, "SYNC start value", U8, RW, UNMAPPED, S; "", 1.0, within(0.0, 240.0);
+                            "Of types 1 to 240, while 1019h is not 0: the SYNC with this counter is the first that counts; 0: any. Only while the PDO does not exist")?
                     }
                 }
                 ROOM
@@ -102,10 +113,10 @@ pdo!(receive_1, 0x1400, 0x1600, "RPDO 1 communication parameter", "RPDO 1 mappin
 pdo!(receive_2, 0x1401, 0x1601, "RPDO 2 communication parameter", "RPDO 2 mapping parameter");
 pdo!(receive_3, 0x1402, 0x1602, "RPDO 3 communication parameter", "RPDO 3 mapping parameter");
 pdo!(receive_4, 0x1403, 0x1603, "RPDO 4 communication parameter", "RPDO 4 mapping parameter");
-pdo!(transmit_1, 0x1800, 0x1A00, "TPDO 1 communication parameter", "TPDO 1 mapping parameter", 3);
-pdo!(transmit_2, 0x1801, 0x1A01, "TPDO 2 communication parameter", "TPDO 2 mapping parameter", 3);
-pdo!(transmit_3, 0x1802, 0x1A02, "TPDO 3 communication parameter", "TPDO 3 mapping parameter", 3);
-pdo!(transmit_4, 0x1803, 0x1A03, "TPDO 4 communication parameter", "TPDO 4 mapping parameter", 3);
+pdo!(transmit_1, 0x1800, 0x1A00, "TPDO 1 communication parameter", "TPDO 1 mapping parameter", 3, 6);
+pdo!(transmit_2, 0x1801, 0x1A01, "TPDO 2 communication parameter", "TPDO 2 mapping parameter", 3, 6);
+pdo!(transmit_3, 0x1802, 0x1A02, "TPDO 3 communication parameter", "TPDO 3 mapping parameter", 3, 6);
+pdo!(transmit_4, 0x1803, 0x1A03, "TPDO 4 communication parameter", "TPDO 4 mapping parameter", 3, 6);
 
 /// In the order of their indices.
 pub(super) const ROOMS: [Room; 17] = [

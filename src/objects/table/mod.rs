@@ -149,14 +149,17 @@ pub const fn is_of_the_load(object: &Object) -> bool {
     matches!(object.index, 0x2202)
 }
 
-/// Whether a program without profile modes goes without an object: it has no room for the load's model either.
-pub const fn needs_room(object: &Object) -> bool {
-    is_of_profiles(object) || is_of_the_load(object)
+/// Whether an object wants room that not every program has: those of the profile modes, of the load, the SYNC counter,
+/// date and time of the configuration. A program has all of these or none; 6502h tells which
+/// ([`Operation::has_profiles`](super::Operation::has_profiles)).
+pub const fn wants_room(object: &Object) -> bool {
+    let own = matches!((object.index, object.sub_index), (0x1019 | 0x1020, _) | (0x1800..=0x19FF, 6));
+    own || is_of_profiles(object) || is_of_the_load(object)
 }
 
 /// Whether this program has the row.
 const fn is_there(object: &Object) -> bool {
-    (crate::joint::PROFILES || !is_of_profiles(object))
+    (crate::joint::PROFILES || !wants_room(object))
         && (crate::joint::load_feedforward::LOADS || !is_of_the_load(object))
 }
 

@@ -134,10 +134,10 @@ room! {
             "Position that the joint has, from homing on, where its zero was found"
     }
     0x607D "software position limit" {
-        1, "min position limit", I32, RO, UNMAPPED, Micro(Setting::LowestPosition); "rad", 1e-6, ANY;
-            "2103h:3, where it is set"
-        2, "max position limit", I32, RO, UNMAPPED, Micro(Setting::HighestPosition); "rad", 1e-6, ANY;
-            "2103h:4, where it is set"
+        1, "min position limit", I32, RW, UNMAPPED, Micro(Setting::LowestPosition); "rad", 1e-6, within(-1_000.0, 1_000.0);
+            "2103h:3 in use. Taken at once where it is written, with the motor off and below the other limit: write first the one that widens the travel. Stored by 1010h"
+        2, "max position limit", I32, RW, UNMAPPED, Micro(Setting::HighestPosition); "rad", 1e-6, within(-1_000.0, 1_000.0);
+            "2103h:4 in use, likewise"
     }
     0x607F "max profile velocity" {
         0, "max profile velocity", U32, RO, UNMAPPED, Milli(Setting::VelocityLimit); "rad/s", 1e-3, ANY;
@@ -185,6 +185,12 @@ room! {
     0x60B2 "torque offset" {
         0, "torque offset", I16, RW, RECEIVE, Set(SetPoint::TorqueOffset); "of 6076h", 1e-3, ANY;
             "Added in every mode but the open loop: what holds the joint, gravity above all. In torque mode the energy guard takes the sign of 6071h alone for a push"
+    }
+    0x60C2 "interpolation time period" {
+        1, "interpolation time period value", U8, RW, UNMAPPED, Profile(P::InterpolationTime); "", 1.0, ANY;
+            "Time between two set-points of modes 8 and 9, over which the joint goes from one to the next in a straight line, a period late, in steps of 1 ms; 0: each counts at once. The first one of a mode counts at once. Lost with a reset"
+        2, "interpolation time index", I8, RW, UNMAPPED, Profile(P::InterpolationExponent); "", 1.0, within(-6.0, 0.0);
+            "Its unit: this power of ten in seconds"
     }
     0x60F4 "following error actual value" {
         0, "following error actual value", I32, RO, TRANSMIT, A(Actual::FollowingError); "rad", 1e-6, ANY;

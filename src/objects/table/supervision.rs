@@ -1,6 +1,6 @@
-//! 2300h to 2303h: what is left of a fault, and of what stopped the program; what the board tells of its hardware.
+//! 2300h to 2304h: what is left of a fault, and of what stopped the program; what the board tells of its hardware.
 
-use super::super::field::{HardwareField as H, ResetField};
+use super::super::field::{HardwareField as H, ResetField, StorageField};
 use super::*;
 
 room! {
@@ -45,5 +45,12 @@ room! {
             "Bits: 0 SRAM_PE (parity of the SRAM is not checked), 1 nSWBOOT0 (a pin can start the bootloader), 2 nBOOT0"
         4, "set chip options", U32, WO, UNMAPPED, Field::Hardware(H::SetOptions); "", 1.0, ANY;
             "4254504Fh (\"OPTB\") sets them as they are needed and resets the chip; the joint must be switched off"
+    }
+    0x2304 "stored parameters" {
+        1, "damaged", U8, RO, UNMAPPED, Field::Storage(StorageField::Damaged); "", 1.0, ANY;
+            "Bits: 0 a friction image: what was stored before it is in use, or none; 1 the configuration, which may also be of another program, or refused: what was stored before, or the defaults are in use, and the joint \
+             stays in switch on disabled until 1010h:1 or 3 has stored a configuration or 1011h:1 or 3 restored the defaults; 2 what guards the joint: nothing that needs its owner is taken. EMCY 6310h and bit 7 of 1001h say so"
+        2, "stores left", U8, RO, UNMAPPED, Field::Storage(StorageField::StoresLeft); "", 1.0, ANY;
+            "How often what 1010h, 1011h, LSS and 2212h:1 (commit, roll back) store may still be written, so that nobody wears the flash out: 32 after power-up, and one more each hour; no reset gives one back. A configuration that is stored already costs none, and is done at once"
     }
 }

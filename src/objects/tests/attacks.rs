@@ -37,6 +37,8 @@ const NODE: &str = "tools/node/tests/attacks.rs";
 const SCRIPT: &str = "tools/node/src/hostile/script.rs";
 const BOARDS: &str = "host-tests/tests/emulated/ownership.rs";
 const POWER: &str = "host-tests/tests/emulated/power_cut.rs";
+const STORES: &str = "src/objects/tests/stores.rs";
+const STORED: &str = "tools/node/tests/stored.rs";
 const REMOTE: &str = "tools/jointctl/tests/remote/owner.rs";
 
 const SECTIONS: [(&str, &[Attack]); 5] = [
@@ -262,7 +264,7 @@ const UPLOADS: [Attack; 11] = [
     ),
 ];
 
-const RECORDS: [Attack; 5] = [
+const RECORDS: [Attack; 8] = [
     row(
         "A bit flipped in what guards the joint (key, floor, count): each one",
         "The record before is used only locked: no image, setting or key is taken before the owner repairs it",
@@ -287,6 +289,43 @@ const RECORDS: [Attack; 5] = [
             "src/parameters/slots/tests/mod.rs",
             "every_rotten_bit_of_the_newest_is_reported_and_the_other_slot_is_used_from_then_on",
         )],
+    ),
+    row(
+        "A byte of the newest stored configuration damaged: each one",
+        "Told at every start (EMCY 6310h, 2304h:1); the joint stays in switch on disabled until a configuration is stored or the defaults are restored",
+        &[
+            (
+                STORES,
+                "a_configuration_that_is_damaged_at_any_byte_is_told_and_keeps_the_joint_off_at_every_start_until_one_is_stored",
+            ),
+            (
+                STORED,
+                "a_joint_whose_configuration_is_damaged_says_so_at_every_start_and_is_not_enabled_before_one_is_stored",
+            ),
+        ],
+    ),
+    row(
+        "A byte of the newest stored image damaged: each one",
+        "Told at every start; the image before is in use, or none",
+        &[
+            (
+                "tools/node/src/storage.rs",
+                "an_image_that_is_damaged_at_any_byte_gives_way_to_the_one_before_and_is_told_at_every_start",
+            ),
+            (STORED, "a_damaged_image_is_told_at_every_start_and_the_joint_goes_on_without_it"),
+        ],
+    ),
+    row(
+        "Configuration, node id or images stored, committed or rolled back in a loop, with resets between, to wear the flash out",
+        "32 writes after power-up and one more each hour, then refused (0800 0022h), the owner's too. No reset over the bus gives one back; a configuration that is stored already is not written",
+        &[
+            (STORES, "whoever_stores_in_a_loop_is_stopped_and_no_reset_over_the_bus_gives_anything_back"),
+            (IMAGES, "commits_and_roll_backs_are_counted_with_the_other_stores_and_stop_with_the_last"),
+            (
+                STORED,
+                "who_stores_in_a_loop_is_stopped_before_the_flash_is_worn_out_and_a_reset_of_the_node_gives_nothing_back",
+            ),
+        ],
     ),
     row(
         "A loss of power at each operation of the flash, while an image or a first key is stored",

@@ -158,6 +158,43 @@ fn a_commit_goes_through_flash_to_active_and_back() {
 }
 
 #[test]
+fn commits_and_roll_backs_are_counted_with_the_other_stores_and_stop_with_the_last() {
+    let bytes = image(4);
+    let mut node = verified(&bytes);
+    let both = StoredImages { previous: stored(&bytes).active, ..stored(&bytes) };
+    let mut left = STORES;
+    let mut again = |node: &mut Node, number: u8| {
+        if number == COMMIT {
+            node.download(0x2210, 0, &bytes).unwrap();
+            command(node, VERIFY).unwrap();
+        }
+        command(node, number)?;
+        left -= 1;
+        assert_eq!((node.number(0x2304, 2), node.objects.program().stores_left), (left.into(), Some(left)));
+        assert!(matches!(node.objects.take_action(), Action::Store { .. } | Action::RollBack));
+        for _ in 0..2 {
+            node.objects.finished(Ok(()), both);
+            node.objects.take_action();
+        }
+        Ok::<(), u32>(())
+    };
+    // A refused commit writes nothing, and costs nothing.
+    command(&mut node, DISCARD).unwrap();
+    assert!(command(&mut node, COMMIT).is_err());
+    assert_eq!(node.number(0x2304, 2), u64::from(STORES));
+    for _ in 0..STORES / 2 {
+        again(&mut node, COMMIT).unwrap();
+        again(&mut node, ROLL_BACK).unwrap();
+    }
+    for number in [COMMIT, ROLL_BACK] {
+        assert_eq!(again(&mut node, number), Err(0x0800_0022));
+        assert_eq!(node.objects.take_action(), Action::Nothing);
+    }
+    // Only tried, it is not written.
+    command(&mut node, TRIAL).unwrap();
+}
+
+#[test]
 fn a_refusal_is_an_abort_a_number_and_an_emcy() {
     let emcy = |sent: &[Frame]| sent.iter().find(|frame| frame.id() == 0x85).map(|frame| frame.data()[..5].to_vec());
     let write = |node: &mut Node, value: u8| node.receive(0x605, &[0x2F, 0x12, 0x22, 1, value, 0, 0, 0]);
@@ -264,7 +301,7 @@ fn what_is_stored_and_damaged_is_announced_and_stays_in_the_error_register() {
             0,
         ),
         StoredImages::default(),
-        &Start { configuration: BOARD.joint, ranges: DEFAULT_RANGES, single_bank: false },
+        &Start { single_bank: false, ..Start::new(None, false, &BOARD.joint, &BOARD.bridge) },
     );
     node.receive(0, &[0x82, NODE]);
     let sent = node.task();

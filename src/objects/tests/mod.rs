@@ -11,7 +11,9 @@ mod masters;
 mod open_loop;
 mod ownership;
 mod process_data;
+mod profile_values;
 mod settings;
+mod stores;
 mod table;
 
 use super::*;
@@ -62,6 +64,10 @@ pub struct Memory {
     pub hardware: Hardware,
     /// How often the chip's options were set.
     pub options_set: u32,
+    /// Number of records that may be written, as told last.
+    pub stores_left: Option<u8>,
+    /// Number of records that were.
+    pub stores: u32,
 }
 
 impl Default for Memory {
@@ -82,6 +88,8 @@ impl Default for Memory {
             reset: LastReset::POWER_UP,
             hardware: Hardware::default(),
             options_set: 0,
+            stores_left: None,
+            stores: 0,
         }
     }
 }
@@ -111,7 +119,12 @@ impl Program for Memory {
     fn store(&mut self, record: &[u8]) -> Result<(), SlotError> {
         self.fails.map_or(Ok(()), Err)?;
         self.record = Some(record.to_vec());
+        self.stores += 1;
         Ok(())
+    }
+
+    fn note_stores_left(&mut self, left: u8) {
+        self.stores_left = Some(left);
     }
 
     fn damaged(&self) -> u8 {
@@ -189,6 +202,13 @@ impl Node {
 
     /// With what guards the joint.
     pub fn guarded(record: Option<Vec<u8>>, single_bank: bool, reset: LastReset, guard: &Guard) -> Self {
+        let found = Start::new(record.as_deref(), false, &BOARD.joint, &BOARD.bridge);
+        let start = Start { single_bank, stores_left: STORES, ..found };
+        Self::starting(Memory { record, reset, ..Memory::default() }, &start, guard)
+    }
+
+    /// With a program that starts so.
+    pub fn starting(program: Memory, start: &Start, guard: &Guard) -> Self {
         let bus: &canopen::Shared = Box::leak(Box::new(canopen::Shared::new()));
         let shared: &Shared = Box::leak(Box::new(Shared::new()));
         let requirements = Requirements {
@@ -199,16 +219,13 @@ impl Node {
         let staging = Box::leak(Box::new([0; STAGING]));
         let life = LifeCycle::new(requirements, guard.floor, 0, guard.failures);
         let images = Images::new(staging, life, Ownership::new(guard), StoredImages::default());
-        let stored = record.as_deref().and_then(|record| Stored::decode(record, &BOARD.joint));
-        let stored = stored.unwrap_or(Stored::NOTHING);
-        let start = Start { configuration: stored.configuration(&BOARD.joint), ranges: stored.ranges(), single_bank };
         let mut node = Self {
             shared,
             bus,
             server: Server::new(bus, &IDENTITY, SdoSettings::default(), NODE),
             receiver: Receiver::new(bus),
             image: JointImage::new(shared),
-            objects: Objects::new(shared, Memory { record, reset, ..Memory::default() }, images, &start),
+            objects: Objects::new(shared, program, images, start),
             observed: Observed::default(),
             queue: VecDeque::new(),
             now: 0,
@@ -229,6 +246,7 @@ impl Node {
     /// The receive interrupt: the frames that it sends.
     fn interrupt(&mut self, frame: &Frame) -> Vec<Frame> {
         let mut sent = Vec::new();
+        self.image.at(self.now);
         self.image.observe(&self.observed);
         match self.receiver.receive(frame, self.now, &mut self.image, |frame| sent.push(frame)) {
             Route::Server => self.queue.push_back(*frame),

@@ -72,6 +72,7 @@ fn protected() -> Vec<(u16, u8, Vec<u8>)> {
         (0x1010, 1, b"save".to_vec()),
         (0x1011, 1, b"load".to_vec()),
         (0x605A, 0, vec![0, 0]),
+        (0x607D, 2, 400_000i32.to_le_bytes().to_vec()),
         (0x6007, 0, vec![3, 0]),
         (0x2212, 1, vec![ROLL_BACK]),
         (0x2303, 4, crate::hardware::chip_options::COMMAND.to_le_bytes().to_vec()),
@@ -409,7 +410,7 @@ fn a_session_ends_with_the_program() {
         effort: Effort::NewtonMetre,
         limits: Limits { output: u32::MAX, torque_gain: u32::MAX, velocity_slope: u32::MAX },
     };
-    let start = Start { configuration: BOARD.joint, ranges: DEFAULT_RANGES, single_bank: false };
+    let start = Start { single_bank: false, ..Start::new(None, false, &BOARD.joint, &BOARD.bridge) };
     node.objects.restart(LifeCycle::new(requirements, 3, 0, 0), StoredImages::default(), &start);
     assert_eq!((node.number(0x2215, 8), node.owner()), (0, key(1).id()));
 }

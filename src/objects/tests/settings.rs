@@ -1,6 +1,7 @@
 //! The configuration: staged, taken as a whole, stored, restored.
 
 use super::*;
+use crate::canopen::CommunicationParameters;
 use crate::joint::configuration::LoadFeedforwardRequest;
 use crate::joint::state_machine::State;
 use crate::motor::setting::Name;
@@ -192,20 +193,26 @@ fn whole() -> Vec<u8> {
         communication: Part::New((9, &communication)),
     };
     let mut record = [0; RECORD];
-    let length = update.encode(None, &mut record).unwrap();
+    let length = update.encode(None, false, &mut record).unwrap();
     record[..length].to_vec()
 }
 
 #[test]
 fn the_whole_record_comes_back_and_fits() {
     let record = whole();
-    assert_eq!(record.len(), 1_263);
+    assert_eq!(record.len(), 1_298);
     let configuration = Configuration { node_id: 17, ..crate::default_configuration::MOTEUS_R4.joint };
     let stored = Stored::decode(&record, &BOARD.joint).unwrap();
     assert_eq!((stored.configuration(&BOARD.joint), stored.ranges()), (configuration, [1.0, 2.0, 3.0, 4.0, 5.0]));
     assert_eq!(communication_parameters(Some(&record), 9).heartbeat, 50);
     assert_eq!(communication_parameters(Some(&record), 10), default_communication(10), "for another node id");
     assert_eq!(communication_parameters(None, 9), default_communication(9));
+    // Date and time of the configuration are stored where there are any, and fit too.
+    let communication = CommunicationParameters { verification: [1, 2], ..default_communication(9) };
+    let update = Update { node_id: None, application: Part::Kept, communication: Part::New((9, &communication)) };
+    let mut dated = [0; RECORD];
+    let length = update.encode(Some(&record), false, &mut dated).unwrap();
+    assert_eq!((length, communication_parameters(Some(&dated[..length]), 9)), (1_312, communication));
     assert_eq!(Stored::decode(&[2], &BOARD.joint), None);
     assert_eq!(Stored::decode(&[2, 255, 0], &BOARD.joint), None);
     assert_eq!(Stored::decode(&[1, 255, 0], &BOARD.joint), Some(Stored::NOTHING));
@@ -216,7 +223,7 @@ fn what_an_update_keeps_of_a_record_are_the_same_bytes_but_for_objects_that_nobo
     let before = whole();
     let update = |node_id, application, communication, before: &[u8]| {
         let mut record = [0; RECORD];
-        let length = Update { node_id, application, communication }.encode(Some(before), &mut record).unwrap();
+        let length = Update { node_id, application, communication }.encode(Some(before), false, &mut record).unwrap();
         record[..length].to_vec()
     };
     assert_eq!(update(None, Part::Kept, Part::Kept, &before), before);

@@ -41,9 +41,10 @@
 //!
 //! # Bit rot
 //!
-//! A settled slot whose checksum does not fit is reported as [`SlotState::Damaged`] and never used; where the other
-//! slot is whole, the damaged one is retired for good, so that it does not come back when it happens to read right.
-//! A slot whose erase was interrupted can look damaged, too.
+//! A settled slot whose checksum does not fit is reported as [`SlotState::Damaged`] and never used. Where the other
+//! slot is whole, the damaged one's header is zeroed, so that it does not come back when it happens to read right. Its
+//! confirmations stay: every start finds it damaged until a store takes its place. A loss of power leaves none: before
+//! an erase both confirmations are zeroed.
 
 mod flash;
 mod header;
@@ -125,7 +126,7 @@ pub enum SlotState {
     Interrupted,
     /// Was whole once and is not any more.
     Damaged,
-    /// Taken out of use: it was damaged, or was about to be erased.
+    /// Taken out of use before its erase.
     Retired,
 }
 
@@ -203,7 +204,7 @@ impl Slots {
         if let Some(active) = slots.active()
             && slots.state(active.other()) == SlotState::Damaged
         {
-            retire(flash, &layout, active.other())?;
+            give_up(flash, &layout, active.other())?;
         }
         Ok(slots)
     }
@@ -219,6 +220,13 @@ impl Slots {
     /// Whether a slot was whole once and is not any more, as it was found at start or since. What it held may have been newer than what the other one holds.
     pub const fn is_damaged(&self) -> bool {
         matches!(self.first, SlotState::Damaged) || matches!(self.second, SlotState::Damaged)
+    }
+
+    /// True where a payload was stored and is not there any more: a slot is damaged, or neither is whole and one is not
+    /// erased.
+    pub const fn is_lost(&self) -> bool {
+        let blank = matches!((self.first, self.second), (SlotState::Empty, SlotState::Empty));
+        self.is_damaged() || self.active().is_none() && !blank
     }
 
     /// The newest whole slot.
@@ -241,8 +249,8 @@ impl Slots {
 
     /// Copies the newest whole payload to the start of `buffer`; its length, or none where there is none.
     ///
-    /// What was copied is what the checksum is checked on. A payload that has been damaged since [`Slots::open`] is retired
-    /// and the other one is taken, if it is whole; [`Slots::state`] then says so.
+    /// The checksum is checked on the copy. A payload that has been damaged since [`Slots::open`] is
+    /// given up and the other one is taken, if it is whole; [`Slots::state`] then says so.
     pub fn load(&mut self, flash: &mut impl SlotFlash, buffer: &mut [u8]) -> Result<Option<usize>, SlotError> {
         let Some(active) = self.active() else { return Ok(None) };
         match self.copy(flash, active, buffer) {
@@ -261,15 +269,19 @@ impl Slots {
         if self.is_whole(flash, active) {
             return Ok(Some(active));
         }
-        let other = self.fall_back(flash, active)?;
-        Ok(other.filter(|other| self.is_whole(flash, *other)))
+        let Some(other) = self.fall_back(flash, active)? else { return Ok(None) };
+        if self.is_whole(flash, other) {
+            return Ok(Some(other));
+        }
+        self.set(other, SlotState::Damaged);
+        Ok(None)
     }
 
     /// Gives a damaged slot up for the other one, if that is whole.
     fn fall_back(&mut self, flash: &mut impl SlotFlash, damaged: Slot) -> Result<Option<Slot>, SlotError> {
         self.set(damaged, SlotState::Damaged);
         let Some(other) = self.active() else { return Ok(None) };
-        retire(flash, &self.layout, damaged)?;
+        give_up(flash, &self.layout, damaged)?;
         Ok(Some(other))
     }
 
@@ -386,14 +398,14 @@ fn settle(flash: &mut impl SlotFlash, layout: &Layout, slot: Slot) -> Result<Slo
         }
         return Ok(SlotState::Whole { sequence, length, checksum });
     }
-    let retiring = CONFIRMATIONS.iter().all(|confirmation| marks.is(*confirmation, ZERO));
+    let confirmed = CONFIRMATIONS.iter().any(|confirmation| marks.is(*confirmation, CONFIRMED));
     Ok(if marks.all(BLANK) {
         let payload = flash.read(start + HEADER_WORDS);
         if payload == Ok(BLANK) { SlotState::Empty } else { SlotState::Interrupted }
+    } else if confirmed && marks.is(SETTLED, ZERO) {
+        SlotState::Damaged
     } else if marks.is(HEADER, ZERO) {
         SlotState::Retired
-    } else if marks.is(SETTLED, ZERO) && !retiring && !marks.is(HEADER, BLANK) {
-        SlotState::Damaged
     } else {
         SlotState::Interrupted
     })
@@ -412,6 +424,12 @@ fn fits(flash: &mut impl SlotFlash, layout: &Layout, slot: Slot, header: Header)
         word += 1;
     }
     computed.value() == header.checksum
+}
+
+/// Takes a damaged slot out of use, and leaves the marks that tell it from one that was about to be erased.
+fn give_up(flash: &mut impl SlotFlash, layout: &Layout, slot: Slot) -> Result<(), WriteError> {
+    let header = layout.first_word(slot) + HEADER;
+    if flash.read(header) == Ok(ZERO) { Ok(()) } else { flash.program(header, ZERO) }
 }
 
 /// Takes a slot out of use, whatever it holds.

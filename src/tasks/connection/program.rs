@@ -12,7 +12,7 @@ use joint_firmware::joint::configuration::{BridgeConfiguration, Configuration, C
 use joint_firmware::joint::history::History;
 use joint_firmware::motor::open_loop::Window;
 use joint_firmware::motor::thermal::ThermalSettings;
-use joint_firmware::objects::{NotConfigured, Program, Start, Stored};
+use joint_firmware::objects::{NotConfigured, Program, Start};
 use joint_firmware::parameters::authentication::CHALLENGE;
 use joint_firmware::parameters::guard::Guard;
 use joint_firmware::parameters::image::Image;
@@ -46,19 +46,15 @@ impl BoardProgram {
         Self { active, window: RefCell::new(window), store, guard, restart: false, set_options: false }
     }
 
-    /// What the objects start with: the board's own configuration where none is stored, or where the stored one is refused.
+    /// Start of the objects.
     #[inline(never)]
     pub fn start(&mut self) -> Start {
         let BoardConfiguration { bridge, joint, .. } = &board::CONFIGURATION;
-        let record = self.store.usable_record();
-        let stored = record.and_then(|record| Stored::decode(record, joint)).unwrap_or(Stored::NOTHING);
-        let (ranges, single_bank) = (stored.ranges(), board::SINGLE_BANK);
-        let mut configuration = stored.configuration(joint);
-        if configuration.verify(bridge).is_err() {
-            defmt::error!("the stored configuration is refused: the board's own is in use");
-            configuration = Configuration { node_id: stored.node_id, ..*joint };
-        }
-        Start { configuration, ranges, single_bank }
+        // This falls back to what was stored before where the newest is damaged.
+        self.store.find_record();
+        let mut start = Start::new(self.store.record(), self.store.is_record_lost(), joint, bridge);
+        (start.single_bank, start.stores_left) = (board::SINGLE_BANK, board::faults::stores_left());
+        start
     }
 
     /// Offers the first configuration, with the friction model in flash. Returns what the thermal model needs.
@@ -154,7 +150,11 @@ impl Program for BoardProgram {
     }
 
     fn damaged(&self) -> u8 {
-        self.store.damaged() | u8::from(self.guard.locked) << 2
+        u8::from(self.store.has_damaged_image()) | u8::from(self.guard.locked) << 2
+    }
+
+    fn note_stores_left(&mut self, left: u8) {
+        board::faults::keep_stores_left(left);
     }
 
     fn keep(&mut self, guard: &Guard) -> Result<(), SlotError> {

@@ -76,10 +76,15 @@ impl Store {
         self.images.roll_back(&mut self.flash, buffer)
     }
 
-    /// The stored record; none where there is none. For the start: what is damaged falls back to what was stored before.
-    pub fn usable_record(&mut self) -> Option<&[u8]> {
-        let slot = self.records.usable(&mut self.flash).ok()??;
-        self.flash.bytes().get(self.records.range(slot)?)
+    /// True where a record was stored that is not there any more. After [`Store::find_record`].
+    pub fn is_record_lost(&self) -> bool {
+        self.records.is_lost()
+    }
+
+    /// For the start: a record that is damaged gives way to what was stored before.
+    pub fn find_record(&mut self) {
+        // Where the flash refuses the mark that it is damaged, it is found so again.
+        let _ = self.records.usable(&mut self.flash);
     }
 
     /// The stored record as it is since then; none where there is none.
@@ -108,9 +113,9 @@ impl Store {
         guard
     }
 
-    /// What is damaged: bits as of EMCY 6310h.
-    pub fn damaged(&self) -> u8 {
-        u8::from(self.images.is_damaged()) | u8::from(self.records.is_damaged()) << 1
+    /// True where an image is damaged.
+    pub fn has_damaged_image(&self) -> bool {
+        self.images.is_damaged()
     }
 
     /// Keeps what guards the joint.

@@ -6,7 +6,7 @@ use joint_firmware::joint::Active;
 use joint_firmware::joint::configuration::{BridgeConfiguration, Configuration};
 use joint_firmware::joint::history::History;
 use joint_firmware::motor::open_loop::Window;
-use joint_firmware::objects::{NotConfigured, Program, Stored};
+use joint_firmware::objects::{NotConfigured, Program, STORES, Start};
 use joint_firmware::parameters::authentication::CHALLENGE;
 use joint_firmware::parameters::guard::Guard;
 use joint_firmware::parameters::slots::SlotError;
@@ -42,16 +42,11 @@ impl VirtualProgram {
         }
     }
 
-    /// What is stored, and the configuration that a joint starts with: the board's where the stored one is refused.
-    pub fn power_on(&mut self, defaults: &Configuration) -> (Stored, Configuration) {
+    /// Start of the objects.
+    pub fn power_on(&mut self, defaults: &Configuration) -> Start {
         let record = self.storage.configuration();
-        let stored = record.and_then(|record| Stored::decode(&record, defaults)).unwrap_or(Stored::NOTHING);
-        let configuration = stored.configuration(defaults);
-        if configuration.prepare(&self.bridge).is_ok() {
-            (stored, configuration)
-        } else {
-            (stored, Configuration { node_id: stored.node_id, ..*defaults })
-        }
+        let lost = self.storage.is_configuration_lost();
+        Start { stores_left: STORES, ..Start::new(record.as_deref(), lost, defaults, &self.bridge) }
     }
 }
 
@@ -83,6 +78,9 @@ impl Program for VirtualProgram {
     fn damaged(&self) -> u8 {
         self.storage.damaged()
     }
+
+    /// The objects are not made anew with a reset over the bus.
+    fn note_stores_left(&mut self, _left: u8) {}
 
     fn keep(&mut self, guard: &Guard) -> Result<(), SlotError> {
         self.storage.store_guard(guard)

@@ -58,6 +58,10 @@ impl Record {
         self.slots.is_damaged()
     }
 
+    fn is_lost(&self) -> bool {
+        self.slots.is_lost()
+    }
+
     fn store(&mut self, bytes: &[u8]) -> Result<(), SlotError> {
         self.slots.store(&mut self.flash, bytes)
     }
@@ -116,6 +120,11 @@ impl Storage {
         self.configuration.load()
     }
 
+    /// True where one was stored that is not there any more.
+    pub(crate) fn is_configuration_lost(&self) -> bool {
+        self.configuration.is_lost()
+    }
+
     pub(crate) fn store_configuration(&mut self, record: &[u8]) -> Result<(), SlotError> {
         self.configuration.store(record)
     }
@@ -135,11 +144,10 @@ impl Storage {
         self.guard.store(&guard.encode())
     }
 
-    /// What of it is damaged: bits as of EMCY 6310h.
+    /// Which of images and guard is damaged: bits as of EMCY 6310h.
     pub(crate) fn damaged(&self) -> u8 {
         let locked = Guard::decode(self.guard.clone().load().as_deref()).locked;
-        let parts = [self.images.is_damaged(), self.configuration.is_damaged(), self.guard.is_damaged() || locked];
-        parts.into_iter().rev().fold(0, |bits, damaged| bits << 1 | u8::from(damaged))
+        u8::from(self.images.is_damaged()) | u8::from(self.guard.is_damaged() || locked) << 2
     }
 }
 
@@ -197,6 +205,35 @@ mod tests {
             std::fs::write(&path, &whole).unwrap();
             assert!(!Storage::open(folder.path()).unwrap().guard().locked);
         }
+    }
+
+    #[test]
+    fn an_image_that_is_damaged_at_any_byte_gives_way_to_the_one_before_and_is_told_at_every_start() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut storage = Storage::open(folder.path()).unwrap();
+        let [old, new] = [1, 2].map(|version| crate::SampleImage::constant(version, 0.25));
+        for image in [&old, &new] {
+            storage.store_image(image).unwrap();
+        }
+        let path = folder.path().join("images.bin");
+        let whole = std::fs::read(&path).unwrap();
+        let mut damaged = 0;
+        // Header, marks and image, which is the second.
+        for byte in 0..32 + new.len() {
+            let mut bytes = whole.clone();
+            bytes[PAGE + byte] ^= 0x10;
+            std::fs::write(&path, &bytes).unwrap();
+            for _ in 0..2 {
+                let mut storage = Storage::open(folder.path()).unwrap();
+                // The marks, of which there are several, may be.
+                let marks = (8..32).contains(&byte);
+                let expected = if marks { (Some(&new), 0) } else { (Some(&old), 1) };
+                let found = (storage.images.active(), storage.damaged());
+                assert_eq!((found.0.as_ref(), found.1), expected, "byte {byte}");
+            }
+            damaged += 1;
+        }
+        assert!(damaged > 100);
     }
 
     #[test]

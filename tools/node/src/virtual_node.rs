@@ -15,7 +15,7 @@ use joint_firmware::joint::shadow::Shadow;
 use joint_firmware::joint::state_machine::State;
 use joint_firmware::joint::{Joint, Telemetry};
 use joint_firmware::objects::{
-    FrictionStatistics, Images, JointImage, Objects, Observed, Ownership, Shared, Start, StoredImages,
+    FrictionStatistics, Images, JointImage, Objects, Observed, Ownership, Shared, StoredImages,
 };
 use joint_firmware::parameters::authentication::STAGING;
 use joint_firmware::parameters::certificate::Limits;
@@ -130,8 +130,8 @@ impl VirtualNode {
         }
         let (rate, motion_rate) = (setup.bridge.rate as u32, setup.bridge.motion_rate());
         let mut program = VirtualProgram::new(setup.bridge, storage);
-        let (stored, configuration) = program.power_on(&setup.configuration);
-        let started = Setup { configuration, ..*setup };
+        let start = program.power_on(&setup.configuration);
+        let started = Setup { configuration: start.configuration, ..*setup };
         let mut joint = VirtualJoint::new(parameters, &started, parameters.joint.thermal.ambient, options.seed)?;
         joint.set_friction(program.storage.images.model(motion_rate));
 
@@ -161,8 +161,8 @@ impl VirtualNode {
         let (life, stored_images) = life(requirements, &mut program.storage);
         let owner = Ownership::new(&program.storage.guard());
         let images = Images::new(Box::leak(Box::new([0; STAGING])), life, owner, stored_images);
-        let start = Start { configuration, ranges: stored.ranges(), single_bank: true };
-        let node_id = if stored.node_id == NO_NODE_ID { options.node_id } else { stored.node_id };
+        let stored = start.configuration.node_id;
+        let node_id = if stored == NO_NODE_ID { options.node_id } else { stored };
         Ok(Self {
             joint,
             setup: *setup,
@@ -265,6 +265,7 @@ impl VirtualNode {
         self.observed.telemetry = self.joint.joint().telemetry();
         self.image.observe(&self.observed);
         let now = self.now();
+        self.image.at(now);
         let sent = &mut self.sent;
         let send = |frame| {
             // Counted where there is no room.
@@ -287,6 +288,7 @@ impl VirtualNode {
 
     /// The task's work; at least once a millisecond of simulated time, and after frames that want an answer.
     pub fn work(&mut self) {
+        self.image.at(self.now());
         if self.steps < self.busy_until {
             return;
         }
@@ -343,12 +345,11 @@ impl VirtualNode {
         let defaults = self.setup.configuration;
         let program = self.objects.program();
         program.last_reset = LastReset::REQUESTED;
-        let (stored, configuration) = program.power_on(&defaults);
+        let start = program.power_on(&defaults);
         let (life, stored_images) = life(self.requirements, &mut program.storage);
         let model = program.storage.images.model(self.motion_rate);
         // Refused only where even the defaults are, with which the joint began.
-        program.next = configuration.prepare(&self.setup.bridge).ok();
-        let start = Start { configuration, ranges: stored.ranges(), single_bank: true };
+        program.next = start.configuration.prepare(&self.setup.bridge).ok();
         self.objects.restart(life, stored_images, &start);
         self.joint.set_friction(model);
         self.shadow = None;

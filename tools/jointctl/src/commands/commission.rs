@@ -103,6 +103,7 @@ impl Commission {
         plan.check()?;
         let joint = self.on.joint()?;
         let node = joint.id();
+        joint.require_configuration()?;
         catch_interrupts()?;
         let mut guide = Terminal { asks };
         if asks && !self.index_only {

@@ -10,7 +10,7 @@ use joint_firmware::canopen::{Access, CommunicationParameters, PDOS, PdoParamete
 use joint_firmware::objects::Operation;
 use joint_firmware::objects::default_communication;
 use joint_firmware::objects::field::{Constant, Field};
-use joint_firmware::objects::table::{DataType, needs_room};
+use joint_firmware::objects::table::{DataType, wants_room};
 use std::fmt::Write;
 use std::time::Duration;
 
@@ -39,10 +39,13 @@ pub struct Identity {
 }
 
 impl Identity {
-    /// Whether the joint has this object.
-    fn has(&self, entries: &[Entry], index: u16) -> bool {
-        let mut of_index = entries.iter().filter(|entry| entry.object.index == index);
-        self.modes.is_none_or(Operation::has_profiles) || !of_index.any(|entry| needs_room(entry.object))
+    /// The objects that the joint has. Of a record that it does not have sub-index 0 is not there either.
+    fn entries(&self) -> Vec<Entry> {
+        let all = Entry::all().collect::<Vec<_>>();
+        let has = |entry: &Entry| self.modes.is_none_or(Operation::has_profiles) || !wants_room(entry.object);
+        let contents = |index| all.iter().filter(move |entry| entry.object.index == index && entry.is_content());
+        let there = |entry: &&Entry| has(entry) && contents(entry.object.index).any(has);
+        all.iter().filter(there).copied().collect()
     }
 }
 
@@ -87,10 +90,9 @@ fn write(text: &mut String, name: &str, now: Duration, identity: Identity) -> st
     }
     writeln!(text)?;
 
-    let entries = Entry::all().collect::<Vec<_>>();
+    let entries = identity.entries();
     let mut indices = entries.iter().map(|entry| entry.object.index).collect::<Vec<_>>();
     indices.dedup();
-    indices.retain(|index| identity.has(&entries, *index));
     let is_mandatory = |index: &u16| matches!(*index, 0x1000 | 0x1001 | 0x1018);
     let is_manufacturers = |index: &u16| (0x2000..0x6000).contains(index);
     list(text, "MandatoryObjects", indices.iter().copied().filter(is_mandatory))?;
@@ -203,6 +205,7 @@ fn default(entry: &Entry, defaults: &CommunicationParameters, identity: Identity
         (Field::Server, 0x1018, 1) => number(identity.vendor),
         (Field::Server, 0x1018, 2) => number(identity.product),
         (Field::Server, 0x1018, 3) => number(identity.revision),
+        (Field::Server, 0x1019, 0) | (Field::Server, 0x1020, 1..) => number(0),
         (Field::Server, 0x1029, 1) => number(defaults.error_behaviour.into()),
         (Field::Server, 0x1200, 1) => by_node(0x600),
         (Field::Server, 0x1200, 2) => by_node(0x580),
@@ -212,6 +215,7 @@ fn default(entry: &Entry, defaults: &CommunicationParameters, identity: Identity
                 1 => by_node(parameters.cob_id),
                 2 => number(parameters.transmission.into()),
                 3 => number(parameters.inhibit.into()),
+                6 => number(parameters.sync_start.into()),
                 _ => number(parameters.event_timer.into()),
             }
         }
@@ -222,9 +226,8 @@ fn default(entry: &Entry, defaults: &CommunicationParameters, identity: Identity
         // The number of entries that CiA 301 calls highest sub-index supported; that of 1003h counts errors.
         (Field::Server, 0x1003, 0) => number(0),
         (Field::Server, index, 0) if entry.text.description.is_empty() => {
-            let highest =
-                Entry::all().filter(|other| other.object.index == index).map(|other| other.object.sub_index).max();
-            number(highest?.into())
+            let of_index = identity.entries().into_iter().filter(|other| other.object.index == index);
+            number(of_index.map(|other| other.object.sub_index).max()?.into())
         }
         _ => None,
     }
@@ -310,10 +313,12 @@ mod tests {
         let [with, without] =
             [Identity::default(), without].map(|identity| text("joint.eds", Duration::ZERO, identity));
         let sections = |text: &str| text.lines().filter(|line| line.starts_with('[')).count();
-        let absent = Entry::all().filter(|entry| needs_room(entry.object)).count();
-        // And two records with their number of entries, and the load's record.
-        assert_eq!(sections(&with) - sections(&without), absent + 5);
-        for index in ["2202sub5", "6081", "607Dsub0", "6099sub2", "60F4", "6072"] {
+        let room = Entry::all().filter(|entry| wants_room(entry.object)).count();
+        // Four records more, and sub-index 0 of three of them: that of 1020h is among those.
+        assert_eq!(sections(&with) - sections(&without), room + 4 + 3 + 1);
+        assert!(with.contains("[1801sub0]\nParameterName=highest sub-index supported\nObjectType=0x7\nDataType=0x0005\nAccessType=ro\nPDOMapping=0\nDefaultValue=0x6"));
+        assert!(without.contains("[1801sub0]\nParameterName=highest sub-index supported\nObjectType=0x7\nDataType=0x0005\nAccessType=ro\nPDOMapping=0\nDefaultValue=0x5"));
+        for index in ["2202sub5", "6081", "607Dsub0", "6099sub2", "60F4", "6072", "1019", "1020sub2", "1803sub6"] {
             assert!(
                 with.contains(&format!("\n[{index}]\n")) && !without.contains(&format!("\n[{index}]\n")),
                 "{index}"

@@ -5,7 +5,7 @@ use super::joint::RemoteJoint;
 use bus::client::{ClientError, Command, NmtState, Target};
 use joint_firmware::joint::fault::Fault;
 use joint_firmware::joint::state_machine::State;
-use joint_firmware::objects::field::{Actual, Field};
+use joint_firmware::objects::field::{Actual, Field, StorageField};
 use std::time::{Duration, Instant};
 
 /// How long a joint may take to brake: the longest braking time of a configuration.
@@ -72,6 +72,14 @@ impl RemoteJoint {
     /// Faults since the last acknowledgement.
     pub fn faults(&self) -> Result<Vec<Fault>, RemoteError> {
         Ok(faults_of(self.raw(Field::Actual(Actual::LatchedFaults))? as u16))
+    }
+
+    /// Refuses where the configuration in use is not the one that was stored last: the joint would not be enabled.
+    pub fn require_configuration(&self) -> Result<(), RemoteError> {
+        match self.raw(Field::Storage(StorageField::Damaged))? & 2 {
+            0 => Ok(()),
+            _ => Err(RemoteError::ConfigurationLost { node: self.id() }),
+        }
     }
 
     /// Refuses where the motor may be under current.

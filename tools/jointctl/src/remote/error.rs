@@ -154,6 +154,15 @@ pub enum RemoteError {
         /// How long it was waited for, ms.
         within_ms: u64,
     },
+    /// A joint that is not enabled because of what it has, or has not, stored.
+    #[error(
+        "node {node} is not enabled: the configuration that it had stored is damaged or refused, and another one is in use. Look at it \
+         (`jointctl info`) and set what is wrong; then `jointctl store` keeps it, or `jointctl restore` the defaults"
+    )]
+    ConfigurationLost {
+        /// Node id.
+        node: u8,
+    },
     /// The joint stopped by itself.
     #[error("node {node} stopped following its commands: it is {}{}", super::drive::name(*state), fault_list(faults))]
     Stopped {

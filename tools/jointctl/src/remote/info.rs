@@ -8,7 +8,7 @@ use super::joint::RemoteJoint;
 use super::motion;
 use super::value::Value;
 use joint_firmware::joint::adaptation::{Factors, Learning, Report};
-use joint_firmware::objects::field::{Actual, Field, ImageField, OwnerField, ResetField, SetPoint};
+use joint_firmware::objects::field::{Actual, Field, ImageField, OwnerField, ResetField, SetPoint, StorageField};
 use joint_firmware::objects::settings::Setting;
 use joint_firmware::parameters::life_cycle::State;
 use std::fmt::Write;
@@ -68,6 +68,7 @@ pub fn page(joint: &RemoteJoint) -> Result<String, RemoteError> {
     line("previous", stored(previous));
     line("life cycle", life(state, left));
     line("authentication", authentication(joint)?);
+    line("storage", storage(joint)?);
     let setting = |setting| show(joint, Field::Setting(setting));
     let compensation = |setting| show(joint, Field::AtOnce(setting));
     line(
@@ -274,6 +275,18 @@ fn authentication(joint: &RemoteJoint) -> Result<String, RemoteError> {
         let _ = write!(text, "; {failures} wrong tags so far");
     }
     Ok(text)
+}
+
+/// Object 2304h in words.
+fn storage(joint: &RemoteJoint) -> Result<String, RemoteError> {
+    const DAMAGED: [&str; 3] =
+        ["an image", "the configuration, so it is not enabled before `store` or `restore`", "the key"];
+    let raw = |part| joint.raw(Field::Storage(part));
+    let (damaged, left) = (raw(StorageField::Damaged)?, raw(StorageField::StoresLeft)?);
+    let damaged = DAMAGED.iter().enumerate().filter(|(bit, _)| damaged >> bit & 1 == 1).map(|(_, what)| *what);
+    let damaged = damaged.collect::<Vec<_>>().join(", ");
+    let found = if damaged.is_empty() { "whole".to_owned() } else { format!("damaged: {damaged}") };
+    Ok(format!("{found}; {left} stores left"))
 }
 
 fn model(number: u64) -> &'static str {

@@ -60,6 +60,8 @@ impl Pdo {
                 Direction::Transmit => short(communication, 3)?,
             },
             event_timer: short(communication, 5)?,
+            // Not every joint has it, and nothing here changes it: what `write` leaves alone stays.
+            sync_start: 0,
             count: byte(mapping, 0)?,
             mapping: [MappedObject(0); MAPPED],
         };

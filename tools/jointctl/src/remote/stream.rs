@@ -204,6 +204,7 @@ impl Stream {
     }
 
     fn enable(&self, acknowledge: bool) -> Result<(), RemoteError> {
+        self.joint.require_configuration()?;
         if acknowledge && self.joint.state()? == State::Fault {
             self.command_state(Controlword::FAULT_RESET, State::SwitchOnDisabled)?;
         }

@@ -80,6 +80,29 @@ pub fn what_is_stored_outlasts_a_reset_and_what_is_restored_does_not() {
     stream.end().unwrap();
 }
 
+pub fn a_joint_whose_configuration_is_damaged_says_what_to_do_and_is_enabled_once_that_is_done() {
+    let folder = tempfile::tempdir().unwrap();
+    // A slot that was settled, with a header that fits nothing.
+    let mut bytes = vec![0xFF; 4096];
+    bytes[..8].copy_from_slice(&[9; 8]);
+    bytes[8..24].copy_from_slice(b"\x5a\xc3confir\x5a\xc3confir");
+    bytes[24..32].fill(0);
+    std::fs::write(folder.path().join("configuration.bin"), bytes).unwrap();
+    let served = Served::stored(folder.path());
+    let joint = served.joint();
+    let page = info::page(&joint).unwrap();
+    assert!(page.contains("storage         damaged: the configuration, so it is not enabled"), "{page}");
+    let message = Stream::begin(&joint, Mode::Torque, 100.0, false).unwrap_err().to_string();
+    for expected in
+        ["node 5 is not enabled", "damaged or refused", "jointctl info", "jointctl store", "jointctl restore"]
+    {
+        assert!(message.contains(expected), "{expected} in {message}");
+    }
+    store(&joint, Group::All).unwrap();
+    assert!(info::page(&joint).unwrap().contains("storage         whole; 31 stores left"));
+    Stream::begin(&joint, Mode::Torque, 100.0, false).unwrap().end().unwrap();
+}
+
 pub fn new_joints_get_the_node_ids_that_are_free() {
     let served = Served::joints(&[NODE, NO_NODE_ID, NO_NODE_ID]);
     let network = Network::new(bus::open(served.bus()).unwrap());

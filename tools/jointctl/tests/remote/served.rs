@@ -9,7 +9,7 @@ use joint_firmware::friction::{FrictionModel, FrictionParameters, ParameterSet};
 use joint_firmware::parameters::certificate::Limits;
 use joint_firmware::parameters::image::{Effort, GoldenVector, Image, MAX_LENGTH, Target};
 use jointctl::remote::RemoteJoint;
-use node::{Options, SlotImages, VirtualNode, serve};
+use node::{Options, SlotImages, Storage, VirtualNode, serve};
 use plant::ActuatorParameters;
 use plant::virtual_joint::Setup;
 use std::process::Command;
@@ -66,6 +66,22 @@ impl Served {
         });
         let threads = threads.collect();
         Self { bus: bus.into(), stop, threads }
+    }
+
+    /// A joint that has this stored.
+    pub fn stored(folder: &std::path::Path) -> Self {
+        // One test alone has such a joint.
+        let bus = "virtual:remote-stored".to_owned();
+        let transport = bus::open(&bus).unwrap();
+        let stop = Arc::new(AtomicBool::new(false));
+        let parameters = ActuatorParameters::reference().aligned().without_payload();
+        let options = Options { node_id: NODE, serial: 12, seed: 1 };
+        let storage = Storage::open(folder).unwrap();
+        let mut joint = VirtualNode::with_storage(parameters, &Setup::of(&parameters), &options, storage).unwrap();
+        joint.advance(4_000);
+        let stopped = Arc::clone(&stop);
+        let thread = std::thread::spawn(move || drop(serve(&mut joint, &*transport, &stopped)));
+        Self { bus, stop, threads: vec![thread] }
     }
 
     pub fn bus(&self) -> &str {

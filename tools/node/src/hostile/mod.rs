@@ -26,7 +26,7 @@ use joint_firmware::default_configuration::B_G431B_ESC1;
 use joint_firmware::joint::configuration::Configuration;
 use joint_firmware::joint::state_machine::{Controlword, State};
 use joint_firmware::joint::{Command, Demand};
-use joint_firmware::objects::{DEFAULT_RANGES, Images, JointImage, Objects, Observed, Ownership, Shared, Start};
+use joint_firmware::objects::{Images, JointImage, Objects, Observed, Ownership, STORES, Shared, Start};
 use joint_firmware::parameters::Summary;
 use joint_firmware::parameters::authentication::{Key, STAGING, TAG};
 use joint_firmware::parameters::certificate::Limits;
@@ -162,7 +162,7 @@ impl<'a> HostileNode<'a> {
         let guard = Guard { floor: 3, key: key.cloned(), ..Guard::default() };
         storage.store_guard(&guard)?;
         let images = Images::new(staging, LifeCycle::new(requirements, 3, 0, 0), Ownership::new(&guard), stored_images);
-        let start = Start { configuration: board.joint, ranges: DEFAULT_RANGES, single_bank: true };
+        let start = Start { stores_left: STORES, ..Start::new(None, false, &board.joint, &board.bridge) };
         let mut node = Self {
             bus,
             receiver: Receiver::new(bus),

@@ -58,6 +58,8 @@ impl Program for Watched {
         self.storage.store_configuration(record)
     }
 
+    fn note_stores_left(&mut self, _left: u8) {}
+
     fn keep(&mut self, guard: &Guard) -> Result<(), SlotError> {
         let kept = self.storage.guard();
         if guard.floor < kept.floor {
