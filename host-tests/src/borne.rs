@@ -24,6 +24,7 @@ pub fn configured(parameters: &ActuatorParameters, factor: f64) -> LoadConfigura
         hanging: 0.0,
         payload_mass: (factor * load.mass) as f32,
         payload_arm: load.length as f32,
+        ..LoadConfiguration::NONE
     }
 }
 

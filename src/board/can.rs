@@ -30,6 +30,7 @@ use embassy_sync::channel::Channel;
 use embassy_time::Instant;
 use joint_firmware::canopen::{self, Buffers, Frame, PDOS, Receiver, Route, TransmitQueue, bit_timing};
 use joint_firmware::joint::Demand;
+use joint_firmware::joint::configuration::CollisionReaction;
 use joint_firmware::joint::load_feedforward::LOADS;
 use joint_firmware::objects::{JointImage, Observed};
 
@@ -57,6 +58,9 @@ const IGNORED: [(u16, u16); 2] = [(0x580, 0x780), (0x7E4, 0x7FF)];
 
 /// Feedforward of the load, bits of Nm: the task's, for the receive interrupt.
 static LOAD: AtomicU32 = AtomicU32::new(0);
+
+/// Reaction to a collision, by its number, that the receive interrupt has not seen yet: the task's. Zero is none.
+static COLLISION: AtomicU32 = AtomicU32::new(0);
 
 /// Everything that the receive interrupt owns.
 struct Bus {
@@ -172,6 +176,14 @@ pub fn attend() {
 pub fn bear(load: f32) {
     if LOADS && LOAD.load(Ordering::Relaxed) != load.to_bits() {
         LOAD.store(load.to_bits(), Ordering::Relaxed);
+        attend();
+    }
+}
+
+/// Has the joint react to a collision.
+pub fn collide(reaction: CollisionReaction) {
+    if LOADS {
+        COLLISION.store(reaction as u32, Ordering::Relaxed);
         attend();
     }
 }
@@ -346,6 +358,14 @@ extern "C" fn FDCAN1_IT0() {
     let now = now();
     bus.image.at(now);
     bus.image.follow(bus.shared.state());
+    if LOADS {
+        let collision = COLLISION.load(Ordering::Relaxed);
+        if collision != 0 {
+            // The task does not interrupt this handler.
+            COLLISION.store(0, Ordering::Relaxed);
+            bus.image.collide(CollisionReaction::at(collision).unwrap_or_default());
+        }
+    }
     let mut demand = bus.image.demand();
     if LOADS {
         demand.command.bear(f32::from_bits(LOAD.load(Ordering::Relaxed)));

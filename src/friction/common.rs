@@ -59,6 +59,11 @@ impl Common {
         self.present && !self.slip.is_none()
     }
 
+    /// Torque of all elements where they slip, Nm in Q16.16.
+    pub(super) fn pre_sliding_level(&self) -> i32 {
+        if self.present { self.slip.level() } else { 0 }
+    }
+
     /// One evaluation, which bends the elements.
     #[inline(always)]
     pub fn step(&self, bent: &mut Bent, state: &JointState) -> CommonTorques {

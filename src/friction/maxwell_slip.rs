@@ -69,6 +69,11 @@ impl MaxwellSlip {
         a | b | c | d == 0
     }
 
+    /// Torque of all elements where they slip, Nm in Q16.16.
+    pub(super) fn level(&self) -> i32 {
+        self.levels.iter().fold(0i32, |sum, level| sum.saturating_add(*level))
+    }
+
     /// One step at a velocity (rad/s in Q16.16); the torque of all elements, Nm in Q16.16.
     #[inline(always)]
     pub fn step(&self, bent: &mut Bent, velocity: i32) -> i32 {

@@ -200,6 +200,13 @@ impl FrictionModel {
         memory.fade(estimate, self.fade_decrement)
     }
 
+    /// Dry friction of the first parameter set at the reference temperature, without load: the larger direction's
+    /// breakaway, hysteresis and pre-sliding.
+    pub fn dry_friction(&self) -> Torque {
+        let (terms, _) = self.set(0);
+        Torque::from_bits(terms.breakaway().saturating_add(self.common.pre_sliding_level()))
+    }
+
     /// True where the model has pre-sliding elements: friction at a velocity of zero.
     #[inline(always)]
     pub fn pre_slides(&self) -> bool {

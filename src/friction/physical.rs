@@ -392,6 +392,16 @@ impl Physical {
 }
 
 impl PreparedTerms {
+    /// Largest Coulomb friction, with breakaway where that is above it, and hysteresis, Nm in Q16.16.
+    pub(super) fn breakaway(&self) -> i32 {
+        let of = |coulomb: i32, stribeck: i32| coulomb.saturating_add(stribeck.max(0));
+        let forward = of(self.coulomb.positive, self.stribeck.positive);
+        forward
+            .max(of(self.coulomb.negative, self.stribeck.negative))
+            .max(0)
+            .saturating_add(self.hysteresis.saturating_abs())
+    }
+
     /// Without any term.
     pub(super) const NONE: Self = Self {
         terms: Terms(0),

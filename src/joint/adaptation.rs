@@ -311,7 +311,7 @@ impl Adaptation {
         window.slope += (f32::from(window.looks) - MIDDLE) * motion.velocity;
         window.looks += 1;
         window.torque += telemetry.mean_torque;
-        window.friction += torque(telemetry) / settings.gain;
+        window.friction += image_torque(telemetry) / settings.gain;
         window.velocity += motion.velocity;
         window.sine += sine;
         window.cosine += cosine;
@@ -419,7 +419,7 @@ impl Adaptation {
 }
 
 /// The image's torque with gain, Nm.
-fn torque(telemetry: &Telemetry) -> f32 {
+pub(super) fn image_torque(telemetry: &Telemetry) -> f32 {
     telemetry.compensated.output.torque.to_bits() as f32 * (1.0 / 65_536.0)
 }
 

@@ -132,6 +132,11 @@ impl Command {
             self.torque += load;
         }
     }
+
+    /// The same torque, and the load's feedforward, without spring and damper: the joint gives way.
+    pub fn giving_way(self) -> Self {
+        Self { mode: Mode::Impedance, position: 0.0, velocity: 0.0, stiffness: 0.0, damping: 0.0, ..self }
+    }
 }
 
 impl Default for Command {

@@ -181,6 +181,36 @@ pub enum LoadFeedforwardRequest {
     Both = 3,
 }
 
+/// Reaction to a collision ([`super::external_torque`]). Until it is acknowledged the joint keeps to it, whatever the
+/// set-points say.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum CollisionReaction {
+    /// None: collisions are counted.
+    #[default]
+    Off = 0,
+    /// A message.
+    Warning = 1,
+    /// A message and a quick stop, as its option code has it.
+    QuickStop = 2,
+    /// A message and halt, as its option code has it: the joint stops, and holds where it came to a stop.
+    Hold = 3,
+    /// A message, and the joint gives way: neither spring nor damper, only the load is borne, as the feedforward is
+    /// configured.
+    Yield = 4,
+}
+
+impl CollisionReaction {
+    /// The reaction with this number.
+    pub fn at(number: u32) -> Option<Self> {
+        let all = [Self::Off, Self::Warning, Self::QuickStop, Self::Hold, Self::Yield];
+        all.into_iter().find(|reaction| *reaction as u32 == number)
+    }
+}
+
+/// Uncertainty of the load where nobody states it.
+pub const LOAD_UNCERTAINTY: f32 = 0.3;
+
 /// Inertia and gravity at the joint's output, as far as a single joint can know them: an axis that does not move
 /// against gravity.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -197,6 +227,12 @@ pub struct LoadConfiguration {
     pub payload_mass: f32,
     /// Distance of the payload's centre of mass from the axis, m; 0 to 10.
     pub payload_arm: f32,
+    /// Part of true inertia and gravity by which the configured ones may be wrong; 0 to 0.9.
+    pub uncertainty: f32,
+    /// External torque beyond its uncertainty that is a collision, Nm; 0 to 2000.
+    pub collision_threshold: f32,
+    /// Reaction to one.
+    pub collision_reaction: CollisionReaction,
 }
 
 impl LoadConfiguration {
@@ -208,6 +244,9 @@ impl LoadConfiguration {
         hanging: 0.0,
         payload_mass: 0.0,
         payload_arm: 0.0,
+        uncertainty: LOAD_UNCERTAINTY,
+        collision_threshold: 0.0,
+        collision_reaction: CollisionReaction::Off,
     };
 
     fn check(&self) -> Result<(), ConfigurationError> {
@@ -216,6 +255,8 @@ impl LoadConfiguration {
         in_range!("hanging position", "rad", self.hanging, -1000.0, 1000.0)?;
         in_range!("payload's mass", "kg", self.payload_mass, 0.0, 1000.0)?;
         in_range!("payload's arm", "m", self.payload_arm, 0.0, 10.0)?;
+        in_range!("uncertainty of the load", "", self.uncertainty, 0.0, 0.9)?;
+        in_range!("collision threshold", "Nm", self.collision_threshold, 0.0, 2000.0)?;
         Ok(())
     }
 }

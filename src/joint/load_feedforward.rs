@@ -21,7 +21,7 @@
 //! Source: inverse dynamics as a feedforward, B. Siciliano, L. Sciavicco, L. Villani, G. Oriolo, Robotics, section 8.5.
 
 use super::Telemetry;
-use super::configuration::{Configuration, LoadConfiguration, LoadFeedforwardRequest};
+use super::configuration::{CollisionReaction, Configuration, LoadConfiguration, LoadFeedforwardRequest};
 use super::state_machine::State;
 use crate::motor::number::{greater, limited, or_zero};
 use crate::sine::cos_sin_of;
@@ -78,6 +78,12 @@ pub struct LoadGains {
     pub acceleration: f32,
     /// Nm.
     pub torque_limit: f32,
+    /// Part of the load that may be lacking or too much: u / (1 - u) of the configured uncertainty u.
+    pub load_wrong: f32,
+    /// Part of a collision's torque beyond the uncertainty, Nm.
+    pub collision_threshold: f32,
+    /// Reaction to a collision.
+    pub collision_reaction: CollisionReaction,
 }
 
 impl LoadGains {
@@ -87,6 +93,9 @@ impl LoadGains {
         load: Load { inertia: 0.0, gravity: 0.0, hanging: 0.0 },
         acceleration: 0.0,
         torque_limit: 0.0,
+        load_wrong: 0.0,
+        collision_threshold: 0.0,
+        collision_reaction: CollisionReaction::Off,
     };
 
     /// Of a configuration.
@@ -97,6 +106,9 @@ impl LoadGains {
             load: Load::of(load),
             acceleration: greater(gains.acceleration, gains.quick_stop_deceleration),
             torque_limit: limits.torque,
+            load_wrong: load.uncertainty / (1.0 - load.uncertainty),
+            collision_threshold: load.collision_threshold,
+            collision_reaction: load.collision_reaction,
         }
     }
 }
@@ -118,7 +130,7 @@ impl LoadFeedforward {
     /// limit. Exactly zero where nothing is requested.
     pub fn look(&mut self, gains: &LoadGains, telemetry: &Telemetry) -> f32 {
         use LoadFeedforwardRequest::{Acceleration, Both, Gravity};
-        let acceleration = self.acceleration(gains, telemetry);
+        let acceleration = self.follow(gains, telemetry);
         let accelerating =
             if matches!(gains.request, Acceleration | Both) { gains.load.inertia * acceleration } else { 0.0 };
         let gravity = match gains.request {
@@ -130,7 +142,7 @@ impl LoadFeedforward {
     }
 
     /// The reference's acceleration, rad/s².
-    fn acceleration(&mut self, gains: &LoadGains, telemetry: &Telemetry) -> f32 {
+    fn follow(&mut self, gains: &LoadGains, telemetry: &Telemetry) -> f32 {
         let reference = telemetry.wanted.velocity.filter(|_| telemetry.state == State::OperationEnabled);
         let Some(velocity) = reference else {
             self.reference = None;
@@ -155,12 +167,14 @@ mod tests {
         hanging: 0.3,
         payload_mass: 2.0,
         payload_arm: 0.4,
+        ..LoadConfiguration::NONE
     };
     const GAINS: LoadGains = LoadGains {
         request: LoadFeedforwardRequest::Both,
         load: Load { inertia: 0.5, gravity: 4.0, hanging: 0.3 },
         acceleration: 20.0,
         torque_limit: 30.0,
+        ..LoadGains::NONE
     };
 
     fn seen(position: f32, reference: Option<f32>) -> Telemetry {

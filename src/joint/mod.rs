@@ -15,7 +15,7 @@
 //!
 //! In place of the motion loop and the current loop, for commissioning: [`open_loop`](crate::motor::open_loop).
 //!
-//! Beside it, outside the interrupt: [`adaptation`] how friction has changed, [`load_feedforward`] the torque of the configured load, [`configuration`] what the joint is, [`board_limits`] what it may be on its board, [`active`] the same prepared for
+//! Beside it, outside the interrupt: [`adaptation`] how friction has changed, [`load_feedforward`] the torque of the configured load, [`external_torque`] what acts on the link from outside, [`configuration`] what the joint is, [`board_limits`] what it may be on its board, [`active`] the same prepared for
 //! the step.
 
 pub mod active;
@@ -24,6 +24,7 @@ pub mod board_limits;
 pub mod chopper;
 pub mod command;
 pub mod configuration;
+pub mod external_torque;
 pub mod fault;
 pub mod friction_feedforward;
 pub mod history;

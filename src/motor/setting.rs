@@ -2,7 +2,7 @@
 
 /// Names of settings and units of their numbers, in the order of their numbers on the bus (object 2100h:3), and index and sub-index of the object that sets it or
 /// what it is computed from; zeros where that is nobody's to set over the bus. New ones come last.
-const NAMES: [(&str, &str, u16, u8); 75] = [
+const NAMES: [(&str, &str, u16, u8); 77] = [
     ("", "", 0x0000, 0),
     ("control rate", "Hz", 0x0000, 0),
     ("dead time", "s", 0x0000, 0),
@@ -78,6 +78,8 @@ const NAMES: [(&str, &str, u16, u8); 75] = [
     ("hanging position", "rad", 0x2202, 4),
     ("payload's mass", "kg", 0x2202, 5),
     ("payload's arm", "m", 0x2202, 6),
+    ("collision threshold", "Nm", 0x2203, 1),
+    ("uncertainty of the load", "", 0x2203, 3),
 ];
 
 /// The name of a setting. A board has its number only: texts and units are linked where somebody formats them, on a host.

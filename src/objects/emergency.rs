@@ -3,7 +3,9 @@
 use super::number::to_u16;
 use super::observed::{Observed, fault_bits, reason_number};
 use crate::hardware::GateDriver;
+use crate::joint::configuration::CollisionReaction;
 use crate::joint::fault::{Fault, Faults};
+use crate::joint::load_feedforward::LOADS;
 use crate::parameters::life_cycle::Refusal;
 
 /// The joint left the range that its friction was learned in. Information: [`reason`](super::table), number of departures (u16).
@@ -11,6 +13,8 @@ pub const ENVELOPE: u16 = 0xFF01;
 /// Friction is no more what the image says, as adaptation has found. Information: friction factor and its deviation in
 /// thousandths (u16 each).
 pub const MISFIT: u16 = 0xFF03;
+/// Collision: an external torque beyond uncertainty and threshold. Information: that torque, Nm (REAL32).
+pub const COLLISION: u16 = 0xFF04;
 /// An image with a wrong tag, or none, or for a joint whose key is damaged. Information: code of the refusal (u16).
 pub const AUTHENTICATION: u16 = 0xFF02;
 /// An image was refused for another reason. Information: code of the refusal (u16).
@@ -66,6 +70,7 @@ pub(super) struct Reports {
     violations: u16,
     quiet_until: u64,
     misfits: bool,
+    collisions: u16,
 }
 
 impl Reports {
@@ -105,6 +110,12 @@ impl Reports {
             return Some(Emergency { code: MISFIT, register: register(latched), information: [a, b, c, d, 0] });
         }
         self.misfits &= !observed.adaptation.fits();
+        let new = LOADS && observed.external.collisions != self.collisions;
+        self.collisions = observed.external.collisions;
+        if new && observed.external.reaction != CollisionReaction::Off {
+            let [a, b, c, d] = observed.external.collided.to_le_bytes();
+            return Some(Emergency { code: COLLISION, register: register(latched), information: [a, b, c, d, 0] });
+        }
         None
     }
 }

@@ -314,6 +314,12 @@ pub enum Actual {
     FactorDeviation,
     /// Added viscous friction.
     AdaptedViscous,
+    /// External torque on the link.
+    ExternalTorque,
+    /// Bound of its error.
+    ExternalUncertainty,
+    /// Collisions since the start.
+    Collisions,
     /// Version of the image in use.
     ImageVersion,
     /// Where a staged image stands.

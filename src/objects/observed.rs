@@ -7,6 +7,7 @@ use super::operation::Operation;
 use super::shared::Shared;
 use crate::compensation::Reason;
 use crate::joint::adaptation;
+use crate::joint::external_torque;
 use crate::joint::fault::Faults;
 use crate::joint::state_machine::State;
 use crate::joint::{PROFILES, Telemetry};
@@ -28,6 +29,8 @@ pub struct Observed {
     pub friction: FrictionStatistics,
     /// Of adaptation.
     pub adaptation: adaptation::Report,
+    /// Of the external torque.
+    pub external: external_torque::Report,
 }
 
 impl Default for Observed {
@@ -41,6 +44,7 @@ impl Default for Observed {
             bridge_temperature: f32::NAN,
             friction: FrictionStatistics::default(),
             adaptation: adaptation::Report::default(),
+            external: external_torque::Report::default(),
         }
     }
 }
@@ -108,6 +112,9 @@ impl Observed {
             Actual::FactorDeviation => self.adaptation.deviation.to_bits().into(),
             Actual::AdaptedViscous => self.adaptation.factors.viscous.to_bits().into(),
             Actual::Outputs => u64::from(!t.outputs.brake_open()) | u64::from(t.outputs.chopper()) << 16,
+            Actual::ExternalTorque => permille(self.external.torque),
+            Actual::ExternalUncertainty => permille(self.external.uncertainty),
+            Actual::Collisions => self.external.collisions.into(),
             Actual::ImageVersion => shared.image_version().into(),
             Actual::ImageState => shared.image_state().into(),
         }

@@ -19,8 +19,10 @@ use super::set_points::SetPoints;
 use super::shared::Shared;
 use super::table;
 use crate::canopen::{MappedObject, NmtState, ProcessImage};
+use crate::joint::configuration::CollisionReaction;
+use crate::joint::load_feedforward::LOADS;
 use crate::joint::state_machine::Controlword;
-use crate::joint::{Command, Coupled, Demand, PROFILES};
+use crate::joint::{Command, Coupled, Demand, Mode, PROFILES};
 
 /// The interrupt's part of the objects.
 #[derive(Debug)]
@@ -40,6 +42,8 @@ pub struct JointImage<'a> {
     now: u32,
     /// The task has not been left a copy of the set-points in force.
     changed: bool,
+    /// Reaction to a collision that nobody has acknowledged yet.
+    reaction: [Option<CollisionReaction>; LOADS as usize],
 }
 
 /// What has arrived of an RPDO.
@@ -71,6 +75,17 @@ impl<'a> JointImage<'a> {
             interpolation: [Interpolation::default(); PROFILES as usize],
             now: 0,
             changed: false,
+            reaction: [None; LOADS as usize],
+        }
+    }
+
+    /// Begins the reaction to a collision of a joint that is to be in operation. A controlword that does not enable
+    /// operation acknowledges it; but for the quick stop, so does one that begins to halt.
+    pub fn collide(&mut self, reaction: CollisionReaction) {
+        let acts = !matches!(reaction, CollisionReaction::Off | CollisionReaction::Warning);
+        if acts && Controlword(self.points.controlword).enables_operation() {
+            self.reaction.iter_mut().for_each(|place| *place = Some(reaction));
+            self.changed = true;
         }
     }
 
@@ -111,7 +126,7 @@ impl<'a> JointImage<'a> {
     /// the demand is published.
     pub fn leave_copies(&mut self) {
         if core::mem::take(&mut self.changed) {
-            self.points.publish(self.shared);
+            self.publish();
         }
     }
 
@@ -123,11 +138,29 @@ impl<'a> JointImage<'a> {
             return Demand { controlword, command: Command::default(), sequence: self.sequence, coupled };
         }
         let word = Controlword(self.points.controlword);
-        Demand {
-            controlword: if self.shared.is_locked() { word.reset_alone() } else { word },
-            command: self.command(),
-            sequence: self.sequence,
-            coupled,
+        let (word, command) = match self.reaction.first().copied().flatten() {
+            None => (word, self.command()),
+            Some(CollisionReaction::QuickStop) => (Controlword::QUICK_STOP, self.command()),
+            Some(reaction) => {
+                let halted = self.points.halted();
+                let command = halted.command(self.shared);
+                // Nobody renews the set-point of a joint that holds or follows a profile: as impedance it would be late.
+                let renewed = !matches!(self.points.command(self.shared).mode, Mode::Hold | Mode::Profile);
+                match reaction {
+                    CollisionReaction::Yield if renewed => (word, command.giving_way()),
+                    _ => (Controlword(halted.controlword), command),
+                }
+            }
+        };
+        let controlword = if self.shared.is_locked() { word.reset_alone() } else { word };
+        Demand { controlword, command, sequence: self.sequence, coupled }
+    }
+
+    /// Leaves copies for the task; a joint that reacts to a collision follows no target.
+    fn publish(&self) {
+        self.points.publish(self.shared);
+        if self.reaction.iter().any(Option::is_some) {
+            self.points.halted().publish_follows(self.shared);
         }
     }
 
@@ -170,8 +203,14 @@ impl<'a> JointImage<'a> {
         }
         let actual = if PROFILES { self.shared.position() } else { 0 };
         self.arriving.succeed(&self.points, position, actual);
+        let (word, last) = (Controlword(self.arriving.controlword), Controlword(self.points.controlword));
         self.points = self.arriving;
         self.change();
+        let halts_anew = word.halts() && !last.halts();
+        for reaction in &mut self.reaction {
+            let ends = !word.enables_operation() || halts_anew && *reaction != Some(CollisionReaction::QuickStop);
+            *reaction = reaction.filter(|_| !ends);
+        }
     }
 }
 
@@ -211,6 +250,7 @@ impl ProcessImage for JointImage<'_> {
         self.arriving = none;
         self.arrived = Arrived::default();
         self.points = none;
+        self.reaction = [None; LOADS as usize];
         self.change();
         self.sequence = self.sequence.wrapping_add(1);
         self.coupled_sequence = self.coupled_sequence.wrapping_add(1);

@@ -186,10 +186,20 @@ impl SetPoints {
         for positions in &self.positions {
             shared.set_profile_target(positions.target());
         }
+        self.publish_follows(shared);
+    }
+
+    /// Leaves for the task whether the joint follows its mode's target; in profile position mode the hand-shake.
+    pub(super) fn publish_follows(&self, shared: &Shared) {
         shared.set_follows(match self.mode {
             Operation::ProfilePosition => self.positions.iter().any(Positions::are_acknowledged),
             _ => self.follows(),
         });
+    }
+
+    /// The same with halt set.
+    pub(super) fn halted(&self) -> Self {
+        Self { controlword: self.controlword | Controlword::HALT.0, ..*self }
     }
 
     /// The command in SI units: to hold, where the mode's target has not come or halt is set.

@@ -4,7 +4,7 @@
 use crate::compensation::Request;
 use crate::joint::adaptation::ADAPTS;
 use crate::joint::configuration::{
-    AdaptationRequest, Configuration, LoadConfiguration, LoadFeedforwardRequest, VelocitySource,
+    AdaptationRequest, CollisionReaction, Configuration, LoadConfiguration, LoadFeedforwardRequest, VelocitySource,
 };
 use crate::joint::load_feedforward::LOADS;
 use crate::joint::stopping::StopConfiguration;
@@ -80,6 +80,8 @@ settings! {
     HangingPosition => load.hanging,
     PayloadMass => load.payload_mass,
     PayloadArm => load.payload_arm,
+    CollisionThreshold => load.collision_threshold,
+    LoadUncertainty => load.uncertainty,
     WindingCapacity => thermal.winding_capacity,
     HousingCapacity => thermal.housing_capacity,
     WindingToHousing => thermal.winding_to_housing,
@@ -95,6 +97,7 @@ settings! {
     OscillatorTrim,
     Adaptation,
     LoadFeedforward,
+    CollisionReaction,
     QuickStop,
     Shutdown,
     DisableOperation,
@@ -120,6 +123,7 @@ impl Setting {
             Self::OscillatorTrim => copy.oscillator_trim.into(),
             Self::Adaptation => copy.compensation.adaptation as u32,
             Self::LoadFeedforward => copy.load.request as u32,
+            Self::CollisionReaction => copy.load.collision_reaction as u32,
             Self::QuickStop => copy.stops.quick_stop.into(),
             Self::Shutdown => copy.stops.shutdown.into(),
             Self::DisableOperation => copy.stops.disable_operation.into(),
@@ -155,6 +159,7 @@ impl Setting {
             (Self::Adaptation, 1) if ADAPTS => configuration.compensation.adaptation = AdaptationRequest::Shadow,
             (Self::Adaptation, 2) if ADAPTS => configuration.compensation.adaptation = AdaptationRequest::On,
             (Self::LoadFeedforward, _) if LOADS => return set_feedforward(&mut configuration.load, number),
+            (Self::CollisionReaction, _) if LOADS => return set_reaction(&mut configuration.load, number),
             _ => return self.set_option(&mut configuration.stops, number),
         }
         true
@@ -186,4 +191,10 @@ fn set_feedforward(load: &mut LoadConfiguration, number: u32) -> bool {
     let request = [Off, Acceleration, Gravity, Both].into_iter().find(|request| *request as u32 == number);
     load.request = request.unwrap_or(load.request);
     request.is_some()
+}
+
+fn set_reaction(load: &mut LoadConfiguration, number: u32) -> bool {
+    let reaction = CollisionReaction::at(number);
+    load.collision_reaction = reaction.unwrap_or(load.collision_reaction);
+    reaction.is_some()
 }

@@ -20,7 +20,7 @@ use crate::joint::load_feedforward::LOADS;
 
 /// Longest record: what all objects take, 1,221 bytes and those of the SYNC counter, of 1020h and of a load, and three
 /// more. A page of flash would hold 2,016; the stack has to, too.
-pub const RECORD: usize = 1_224 + if COUNTER_AND_DATE { 7 * ITEM } else { 0 } + 6 * ITEM * LOADS as usize;
+pub const RECORD: usize = 1_224 + if COUNTER_AND_DATE { 7 * ITEM } else { 0 } + 9 * ITEM * LOADS as usize;
 const _: () = assert!(RECORD <= crate::parameters::slots::PAGE - crate::parameters::slots::OVERHEAD);
 const FORMAT: u8 = 1;
 /// Flag of the format.
@@ -34,7 +34,7 @@ pub struct Stored {
     pub node_id: u8,
     /// A configuration was lost: what is here is not what was stored last.
     pub lost: bool,
-    /// 2101h to 2109h and 2200h to 2202h, and 2012h.
+    /// 2101h to 2109h and 2200h to 2203h, and 2012h.
     pub application: Option<(Configuration, [f32; RANGES])>,
 }
 
@@ -54,7 +54,7 @@ pub enum Part<T> {
 pub struct Update<'a> {
     /// The node id that LSS stored, or none for the one before.
     pub node_id: Option<u8>,
-    /// 2101h to 2109h and 2200h to 2202h, and 2012h.
+    /// 2101h to 2109h and 2200h to 2203h, and 2012h.
     pub application: Part<(&'a Configuration, [f32; RANGES])>,
     /// 1000h to 1FFFh, and the node id that they are for: another node id gets the defaults.
     pub communication: Part<(u8, &'a CommunicationParameters)>,

@@ -4,7 +4,7 @@
 use crate::board::control;
 use core::cell::Cell;
 use critical_section::Mutex;
-use joint_firmware::joint::adaptation::{ADAPTS, Adaptation, Report, Settings};
+use joint_firmware::joint::adaptation::{ADAPTS, Adaptation, Factors, Report, Settings};
 use joint_firmware::joint::{Active, Telemetry};
 
 /// What was prepared last, and how many friction models came before it.
@@ -26,11 +26,13 @@ pub fn prepared(active: &Active, new_model: bool) {
 pub struct Adapting {
     estimate: [Adaptation; ADAPTS as usize],
     model: u32,
+    acting: Factors,
 }
 
 impl Adapting {
     /// Nothing learned.
-    pub const NOTHING: Self = Self { estimate: [Adaptation::NOTHING; ADAPTS as usize], model: 0 };
+    pub const NOTHING: Self =
+        Self { estimate: [Adaptation::NOTHING; ADAPTS as usize], model: 0, acting: Factors::IMAGE };
 
     /// Every millisecond: learns from a control step, and has the next ones use what was learned.
     pub fn look(&mut self, telemetry: &Telemetry) -> Report {
@@ -39,7 +41,13 @@ impl Adapting {
         if self.model != model {
             (self.model, *estimate) = (model, Adaptation::NOTHING);
         }
-        control::set_factors(&estimate.look(&settings, telemetry));
+        self.acting = estimate.look(&settings, telemetry);
+        control::set_factors(&self.acting);
         estimate.report(&settings)
+    }
+
+    /// Factors that act.
+    pub fn acting(&self) -> Factors {
+        self.acting
     }
 }

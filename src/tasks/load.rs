@@ -1,35 +1,45 @@
-//! Feedforward of the load, between the task of the bus, which knows the configuration, and the receive interrupt,
-//! which makes the control step's commands.
+//! Feedforward of the load and external torque, between the task of the bus, which knows the configuration, and the
+//! receive interrupt, which makes the control step's commands.
 
 use crate::board::can;
 use core::cell::Cell;
 use critical_section::Mutex;
+use joint_firmware::joint::adaptation::Factors;
+use joint_firmware::joint::external_torque::{self, ExternalTorque, Report};
 use joint_firmware::joint::load_feedforward::{LOADS, LoadFeedforward, LoadGains};
 use joint_firmware::joint::{Active, Telemetry};
 
 /// What was prepared last.
-static GAINS: Mutex<Cell<LoadGains>> = Mutex::new(Cell::new(LoadGains::NONE));
+static PREPARED: Mutex<Cell<(LoadGains, external_torque::Settings)>> =
+    Mutex::new(Cell::new((LoadGains::NONE, external_torque::Settings::NONE)));
 
-/// What is prepared counts for the feedforward from now on.
+/// What is prepared counts from now on.
 pub fn prepared(active: &Active) {
     if LOADS {
-        critical_section::with(|section| GAINS.borrow(section).set(*active.load()));
+        let settings = external_torque::Settings::of(active);
+        critical_section::with(|section| PREPARED.borrow(section).set((*active.load(), settings)));
     }
 }
 
-/// The feedforward; no byte of it where a program has no room for it.
+/// Feedforward and observer; no byte of them where a program has no room.
 pub struct Bearing {
-    feedforward: [LoadFeedforward; LOADS as usize],
+    parts: [(LoadFeedforward, ExternalTorque); LOADS as usize],
 }
 
 impl Bearing {
     /// Before the first look.
-    pub const NOTHING: Self = Self { feedforward: [LoadFeedforward::NOTHING; LOADS as usize] };
+    pub const NOTHING: Self = Self { parts: [(LoadFeedforward::NOTHING, ExternalTorque::NOTHING); LOADS as usize] };
 
-    /// Every millisecond: from a control step to what the next commands carry.
-    pub fn look(&mut self, telemetry: &Telemetry) {
-        let Some(feedforward) = self.feedforward.first_mut() else { return };
-        let gains = critical_section::with(|section| GAINS.borrow(section).get());
+    /// Every millisecond: from a control step to what the next commands carry; `factors` of the image's friction act.
+    pub fn look(&mut self, telemetry: &Telemetry, factors: &Factors) -> Report {
+        let Some((feedforward, external)) = self.parts.first_mut() else { return Report::NOTHING };
+        let (gains, settings) = critical_section::with(|section| PREPARED.borrow(section).get());
         can::bear(feedforward.look(&gains, telemetry));
+        let before = external.report().collisions;
+        let report = external.look(&settings, telemetry, factors);
+        if report.collisions != before {
+            can::collide(report.reaction);
+        }
+        report
     }
 }

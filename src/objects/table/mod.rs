@@ -146,7 +146,7 @@ pub const fn is_of_profiles(object: &Object) -> bool {
 /// Whether an object is there for the model of the load: not every program has it
 /// ([`LOADS`](crate::joint::load_feedforward::LOADS)).
 pub const fn is_of_the_load(object: &Object) -> bool {
-    matches!(object.index, 0x2202)
+    matches!(object.index, 0x2202 | 0x2203)
 }
 
 /// Whether an object wants room that not every program has: those of the profile modes, of the load, the SYNC counter,

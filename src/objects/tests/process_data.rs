@@ -1,6 +1,7 @@
 //! RPDOs to demands, observations to TPDOs, and what a transition does.
 
 use super::*;
+use crate::joint::configuration::CollisionReaction;
 use crate::joint::fault::Fault;
 use crate::joint::state_machine::{Controlword, State};
 use crate::joint::{Command, Demand, Mode};
@@ -377,6 +378,93 @@ fn telemetry_is_scaled_as_the_table_says_and_held_at_the_ends() {
         assert_eq!(node.number(0x6064, 0) as i32, position);
         assert_eq!(node.number(0x2020, 1) as i16, torque);
     }
+}
+
+#[test]
+fn a_reaction_to_a_collision_takes_the_place_of_the_set_points_until_it_is_acknowledged() {
+    use CollisionReaction::{Hold, Off, QuickStop, Warning, Yield};
+    let follows = Demand { controlword: Controlword(0x0F), ..Demand::default() };
+    for (reaction, word, mode) in [
+        (Off, 0x0F, Mode::Velocity),
+        (Warning, 0x0F, Mode::Velocity),
+        (QuickStop, 0x02, Mode::Velocity),
+        (Hold, 0x10F, Mode::Hold),
+        (Yield, 0x0F, Mode::Impedance),
+    ] {
+        let reacts = !matches!(reaction, Off | Warning);
+        let mut node = Node::operational();
+        node.receive(0x305, &rpdo2(0x0F, 9, 0));
+        node.receive(0x305, &rpdo2(0x0F, 9, 500));
+        node.image.collide(reaction);
+        node.receive(0x305, &rpdo2(0x0F, 9, 600));
+        let Demand { controlword, command, .. } = node.image.demand();
+        assert_eq!((controlword, command.mode), (Controlword(word), mode), "{reaction:?}");
+        assert_eq!((command.stiffness, command.damping), (0.0, 0.0));
+        assert_eq!(node.shared.follows(), !reacts, "{reaction:?}");
+        // Halt acknowledges it where it is no quick stop; to go on without it does.
+        node.receive(0x305, &rpdo2(0x10F, 9, 600));
+        node.receive(0x305, &rpdo2(0x0F, 9, 600));
+        let word = if reaction == QuickStop { 0x02 } else { 0x0F };
+        assert_eq!(node.image.demand().controlword, Controlword(word), "{reaction:?}");
+        node.receive(0x305, &rpdo2(0x07, 9, 600));
+        node.receive(0x305, &rpdo2(0x0F, 9, 600));
+        node.receive(0x305, &rpdo2(0x0F, 9, 601));
+        let Demand { controlword, command, .. } = node.image.demand();
+        assert_eq!((controlword, command.mode), (follows.controlword, Mode::Velocity), "{reaction:?}");
+        assert!(node.shared.follows());
+    }
+}
+
+#[test]
+fn a_joint_that_is_not_asked_to_operate_or_that_leaves_operational_reacts_to_nothing() {
+    let mut node = Node::operational();
+    node.receive(0x305, &rpdo2(0x07, 9, 0));
+    node.image.collide(CollisionReaction::QuickStop);
+    node.receive(0x305, &rpdo2(0x0F, 9, 0));
+    assert_eq!(node.image.demand().controlword, Controlword(0x0F));
+    node.image.collide(CollisionReaction::QuickStop);
+    assert_eq!(node.image.demand().controlword, Controlword::QUICK_STOP);
+    for command in [0x80, 0x01] {
+        node.receive(0, &[command, NODE]);
+    }
+    node.receive(0x305, &rpdo2(0x0F, 9, 0));
+    assert_eq!(node.image.demand().controlword, Controlword(0x0F));
+}
+
+#[test]
+fn a_joint_whose_set_point_nobody_renews_holds_instead_of_giving_way() {
+    for mode in [1, 9] {
+        let mut node = Node::operational();
+        set_mode(&mut node, mode);
+        node.receive(0x305, &rpdo2(0x0F, mode, 0));
+        if mode == 9 {
+            // A target has come, and the joint is to halt.
+            node.receive(0x305, &rpdo2(0x10F, mode, 100));
+        }
+        node.image.collide(CollisionReaction::Yield);
+        assert_eq!(node.image.demand().command.mode, Mode::Hold, "mode {mode}");
+    }
+}
+
+#[test]
+fn a_collision_is_told_with_its_torque_where_something_is_done_about_it() {
+    use crate::joint::external_torque::Report;
+    let mut node = Node::operational();
+    let mut collisions = 0;
+    let mut emergency = |node: &mut Node, reaction| {
+        collisions += 1;
+        node.observed.external = Report { collisions, collided: -12.5, reaction, ..Report::NOTHING };
+        node.task().iter().find(|frame| frame.id() == 0x85).map(|frame| *frame.eight().unwrap())
+    };
+    assert_eq!(emergency(&mut node, CollisionReaction::Off), None);
+    let told = [0x04, 0xFF, 0, 0, 0, 0x48, 0xC1, 0];
+    assert_eq!(emergency(&mut node, CollisionReaction::Warning), Some(told));
+    assert_eq!(node.task(), vec![], "once");
+    assert_eq!(emergency(&mut node, CollisionReaction::Yield), Some(told));
+    node.observed.external.torque = -0.25 * BOARD.joint.limits.torque;
+    node.observed.external.uncertainty = 0.125 * BOARD.joint.limits.torque;
+    let read = [4, 5, 6].map(|sub_index| node.number(0x2203, sub_index));
+    assert_eq!(read, [u64::from(-250i16 as u16), 125, 3]);
 }
 
 #[test]

@@ -110,6 +110,22 @@ fn a_payload_acts_at_once_also_under_way_and_leaves_what_is_staged() {
         assert_eq!(node.number(0x2100, 3) >> 8, 0x22_0200 | u64::from(sub_index), "index and sub-index of the setting");
     }
     assert_eq!(node.download(0x2202, 1, &[4]), Err(0x0609_0030));
+    for (sub_index, least, most) in [(1, 0.0, 2_000.0), (3, 0.0, 0.9f32)] {
+        for value in [least, most] {
+            node.set_real(0x2203, sub_index, value).unwrap();
+        }
+        for value in [-1e-3, most.next_up(), f32::NAN] {
+            assert_eq!(node.set_real(0x2203, sub_index, value), Err(0x0609_0030), "{value}");
+            let named = node.number(0x2100, 3) >> 8;
+            assert_eq!(named, 0x22_0300 | u64::from(sub_index), "index and sub-index of the setting");
+        }
+    }
+    for reaction in 0..=4 {
+        node.download(0x2203, 2, &[reaction]).unwrap();
+        let load = node.objects.program().configured.last().unwrap().load;
+        assert_eq!((load.collision_reaction as u8, node.number(0x2203, 2)), (reaction, reaction.into()));
+    }
+    assert_eq!(node.download(0x2203, 2, &[5]), Err(0x0609_0030));
     assert_eq!((node.real(0x2202, 5), node.number(0x2202, 1), node.real(0x2104, 3)), (2.5, 3, 0.5));
     node.observed.telemetry.state = State::SwitchOnDisabled;
     take(&mut node).unwrap();
@@ -200,7 +216,7 @@ fn whole() -> Vec<u8> {
 #[test]
 fn the_whole_record_comes_back_and_fits() {
     let record = whole();
-    assert_eq!(record.len(), 1_298);
+    assert_eq!(record.len(), 1_319);
     let configuration = Configuration { node_id: 17, ..crate::default_configuration::MOTEUS_R4.joint };
     let stored = Stored::decode(&record, &BOARD.joint).unwrap();
     assert_eq!((stored.configuration(&BOARD.joint), stored.ranges()), (configuration, [1.0, 2.0, 3.0, 4.0, 5.0]));

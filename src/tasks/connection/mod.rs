@@ -80,7 +80,8 @@ impl Watching {
             seen.compensated.output.shadow = torque;
         }
         self.statistics.note(&seen);
-        self.bearing.look(&telemetry);
+        let external = self.bearing.look(&telemetry, &self.adapting.acting());
+        let adaptation = self.adapting.look(&telemetry);
         can::observe(&Observed {
             telemetry,
             latched,
@@ -88,7 +89,8 @@ impl Watching {
             winding_temperature,
             bridge_temperature,
             friction: self.statistics,
-            adaptation: self.adapting.look(&telemetry),
+            adaptation,
+            external,
         });
     }
 }

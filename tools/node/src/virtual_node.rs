@@ -94,6 +94,8 @@ pub struct VirtualNode {
     steps: u64,
     /// Control step until which the task has no time.
     busy_until: u64,
+    /// External torque on the link, Nm.
+    external_torque: f64,
 }
 
 fn text(parameters: &ActuatorParameters) -> String {
@@ -183,6 +185,7 @@ impl VirtualNode {
             dropped: 0,
             steps: 0,
             busy_until: 0,
+            external_torque: 0.0,
         })
     }
 
@@ -215,6 +218,11 @@ impl VirtualNode {
     #[must_use]
     pub fn configuration(&self) -> &Configuration {
         self.objects.configuration()
+    }
+
+    /// External torque on the link from now on, Nm.
+    pub fn push(&mut self, torque: f64) {
+        self.external_torque = torque;
     }
 
     /// The joint behind the node.
@@ -383,7 +391,12 @@ impl VirtualNode {
         for _ in 0..steps {
             let demand = self.image.demand();
             let feedforward = self.joint.bearing(&demand).command.torque;
-            let telemetry = self.joint.step(&demand, 0.0);
+            let before = self.joint.external_torque().collisions;
+            let telemetry = self.joint.step(&demand, self.external_torque);
+            let found = self.joint.external_torque();
+            if found.collisions != before {
+                self.image.collide(found.reaction);
+            }
             self.steps += 1;
             if self.steps.is_multiple_of(per_work) {
                 self.observe(&telemetry, feedforward);
@@ -410,6 +423,7 @@ impl VirtualNode {
             bridge_temperature: measured.bridge_temperature,
             friction: self.statistics,
             adaptation: self.joint.adaptation(),
+            external: *self.joint.external_torque(),
         };
         let history = if latched.is_empty() { None } else { Some(*joint.history()) };
         let window = *joint.window();

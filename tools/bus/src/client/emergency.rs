@@ -62,6 +62,7 @@ impl Emergency {
             0x8200..=0x82FF => "protocol error",
             0x9000..=0x90FF => "external error",
             0xF000..=0xF0FF => "additional functions",
+            0xFF04 => "collision: external torque beyond its uncertainty and the threshold",
             0xFF00.. => "device specific",
             0x0000..=0x00FF => "error reset or no error",
             _ => "a code that CiA 301 does not list: see the device's manual",
@@ -126,6 +127,7 @@ mod tests {
             0x6320,
             0xFF01,
             0xFF03,
+            0xFF04,
         ] {
             let emergency = Emergency { node: 1, code, register: 0, information: [0; 5] };
             assert!(!emergency.meaning().contains("not list"), "{code:04X}");

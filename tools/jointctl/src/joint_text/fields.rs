@@ -42,7 +42,7 @@ const fn field(
 }
 
 /// All keys.
-pub const FIELDS: [Field; 65] = [
+pub const FIELDS: [Field; 68] = [
     field("", "node_id", "", None, "Node on the CAN bus, 1 to 127; 255 where none is assigned yet"),
     field("", "oscillator_trim", "", Some((54.0, 74.0)), "Trim of the board's oscillator, steps of some 0.3 %"),
     field("motor", "resistance", "Ohm", Some((1e-3, 100.0)), "Resistance of a phase at 25 °C"),
@@ -277,6 +277,27 @@ pub const FIELDS: [Field; 65] = [
     field("load", "hanging", "rad", Some((-1000.0, 1000.0)), "Position in which the lever hangs straight down"),
     field("load", "payload_mass", "kg", Some((0.0, 1000.0)), "Payload"),
     field("load", "payload_arm", "m", Some((0.0, 10.0)), "Distance of the payload's centre of mass from the axis"),
+    field(
+        "load",
+        "uncertainty",
+        "",
+        Some((0.0, 0.9)),
+        "Part of true inertia and gravity by which those of this section may be wrong",
+    ),
+    field(
+        "load",
+        "collision_threshold",
+        "Nm",
+        Some((0.0, 2000.0)),
+        "External torque beyond its uncertainty that is a collision",
+    ),
+    field(
+        "load",
+        "collision_reaction",
+        "",
+        None,
+        "Reaction to a collision: \"off\" (it counts), \"warning\" (EMCY), \"quick-stop\", \"hold\" or \"yield\"",
+    ),
     field("thermal", "winding_capacity", "J/K", None, "Heat capacity of the winding; to 10000"),
     field("thermal", "housing_capacity", "J/K", None, "Heat capacity of the housing; to 100000"),
     field("thermal", "winding_to_housing", "K/W", Some((0.01, 100.0)), "Thermal resistance from winding to housing"),

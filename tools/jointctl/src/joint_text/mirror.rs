@@ -5,9 +5,9 @@
 
 use joint_firmware::compensation::Request;
 use joint_firmware::joint::configuration::{
-    AdaptationRequest, CompensationConfiguration, Configuration, FACTORY_TRIM, FRICTION_UNCERTAINTY, Gains,
-    GearConfiguration, Limits, LoadConfiguration, LoadFeedforwardRequest, MotorConfiguration, ThermalConfiguration,
-    VelocitySource,
+    AdaptationRequest, CollisionReaction, CompensationConfiguration, Configuration, FACTORY_TRIM, FRICTION_UNCERTAINTY,
+    Gains, GearConfiguration, LOAD_UNCERTAINTY, Limits, LoadConfiguration, LoadFeedforwardRequest, MotorConfiguration,
+    ThermalConfiguration, VelocitySource,
 };
 use joint_firmware::joint::stopping::StopConfiguration;
 use joint_firmware::motor::angle::{Direction, ElectricalAngle, EncoderAlignment};
@@ -189,6 +189,26 @@ struct LoadText {
     hanging: f32,
     payload_mass: f32,
     payload_arm: f32,
+    #[serde(default = "load_uncertainty")]
+    uncertainty: f32,
+    #[serde(default)]
+    collision_threshold: f32,
+    #[serde(default, with = "CollisionText")]
+    collision_reaction: CollisionReaction,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "CollisionReaction", rename_all = "kebab-case")]
+enum CollisionText {
+    Off,
+    Warning,
+    QuickStop,
+    Hold,
+    Yield,
+}
+
+const fn load_uncertainty() -> f32 {
+    LOAD_UNCERTAINTY
 }
 
 #[derive(Serialize, Deserialize)]

@@ -1,7 +1,7 @@
 use super::*;
 use joint_firmware::compensation::Request;
 use joint_firmware::joint::configuration::{
-    AdaptationRequest, LoadConfiguration, LoadFeedforwardRequest, VelocitySource,
+    AdaptationRequest, CollisionReaction, LoadConfiguration, LoadFeedforwardRequest, VelocitySource,
 };
 use joint_firmware::motor::angle::{Direction, ElectricalAngle};
 use plant::ActuatorParameters;
@@ -36,6 +36,15 @@ fn a_configuration_comes_back_from_its_text_bit_by_bit() {
             ][seed as usize % 4],
             payload_mass: 0.1 * seed as f32,
             payload_arm: 0.3,
+            uncertainty: 0.01 * seed as f32,
+            collision_threshold: 0.2 * seed as f32,
+            collision_reaction: [
+                CollisionReaction::Off,
+                CollisionReaction::Warning,
+                CollisionReaction::QuickStop,
+                CollisionReaction::Hold,
+                CollisionReaction::Yield,
+            ][seed as usize % 5],
             ..configuration.load
         };
         configuration.gear.ratio *= if seed % 5 == 0 { -1.0 } else { 1.0 };

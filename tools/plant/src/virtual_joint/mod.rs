@@ -12,6 +12,7 @@ use joint_firmware::friction::FrictionModel;
 use joint_firmware::joint::active::SLOW_RATE;
 use joint_firmware::joint::adaptation::{self, Adaptation, LOOK_RATE};
 use joint_firmware::joint::configuration::ConfigurationError;
+use joint_firmware::joint::external_torque::{self, ExternalTorque};
 use joint_firmware::joint::load_feedforward::LoadFeedforward;
 use joint_firmware::joint::state_machine::{Controlword, State};
 use joint_firmware::joint::{Active, Bridge, BridgeState, Demand, Joint, Measurements, Slow, Telemetry};
@@ -75,6 +76,8 @@ pub struct VirtualJoint {
     load: LoadFeedforward,
     /// What the feedforward of the load adds, Nm.
     load_torque: f32,
+    /// Observer of the external torque.
+    external: ExternalTorque,
     look_divider: u64,
     build: Build,
     period: f64,
@@ -110,6 +113,7 @@ impl VirtualJoint {
             adaptation: Adaptation::NOTHING,
             load: LoadFeedforward::NOTHING,
             load_torque: 0.0,
+            external: ExternalTorque::NOTHING,
             look_divider: (rate / f64::from(LOOK_RATE)).round() as u64,
             build: Build::Whole,
             period: 1.0 / rate,
@@ -145,6 +149,12 @@ impl VirtualJoint {
         &self.active
     }
 
+    /// External torque on the link as the firmware finds it.
+    #[must_use]
+    pub fn external_torque(&self) -> &external_torque::Report {
+        self.external.report()
+    }
+
     /// A demand as the control step gets it: with the feedforward of the load.
     #[must_use]
     pub fn bearing(&self, demand: &Demand) -> Demand {
@@ -176,6 +186,8 @@ impl VirtualJoint {
         }
         let telemetry = self.joint.telemetry();
         if self.steps.is_multiple_of(self.look_divider) {
+            let settings = external_torque::Settings::of(&self.active);
+            self.external.look(&settings, &telemetry, &self.slow.factors);
             self.slow.factors = self.adaptation.look(&adaptation::Settings::of(&self.active), &telemetry);
             self.load_torque = self.load.look(self.active.load(), &telemetry);
         }
