@@ -20,5 +20,6 @@ pub mod peer_networks;
 pub mod recordings;
 pub mod samples;
 pub mod states;
+pub mod touched;
 pub mod variant;
 pub mod wide;
