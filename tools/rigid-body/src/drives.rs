@@ -4,11 +4,15 @@
 //! urdf = "arm.urdf"                   # beside this file
 //! gravity = [0.0, 0.0, -9.81]         # m/s^2 in the frame of the base: how the robot is mounted; this is the default
 //! locked = ["gripper_joint"]          # joints that did not move, at position 0
+//! floor = 0.05                        # least height of moving links' frames above the base's origin, m
 //!
 //! [joint.shoulder]
 //! gain = 0.12                         # torque of the motor per unit of effort, Nm/A; 1 where the effort is a torque
 //! ratio = 100.0                       # turns of the motor per turn of the joint (1); negative: opposite direction
 //! rotor_inertia = 2e-5                # kg m^2 on the motor's side; absent: identified
+//! position = [-1.5, 1.5]              # travel, rad or m; absent: the URDF's <limit>
+//! velocity = 2.0                      # rad/s or m/s; absent: the URDF's <limit>
+//! acceleration = 10.0                 # rad/s^2 or m/s^2; URDF has none
 //!
 //! [coupling]                          # belts and differentials; absent: each motor drives its joint alone
 //! joints = ["wrist_1", "wrist_2"]
@@ -30,6 +34,8 @@ pub struct RobotDescription {
     /// Joints that are held at position 0.
     #[serde(default)]
     pub locked: Vec<String>,
+    /// Least height of moving links' frames above the base's origin, against gravity, m; None: no floor.
+    pub floor: Option<f64>,
     /// Drives by the name of their joint.
     pub joint: BTreeMap<String, Drive>,
     /// Motors that move several joints.
@@ -48,6 +54,19 @@ pub struct Drive {
     pub ratio: f64,
     /// Inertia of the rotor on the motor's side, kg m^2; None: identified.
     pub rotor_inertia: Option<f64>,
+    /// Lowest and highest position, rad or m; None: that of the URDF.
+    pub position: Option<[f64; 2]>,
+    /// Largest velocity, rad/s or m/s; None: that of the URDF.
+    pub velocity: Option<f64>,
+    /// Largest acceleration, rad/s^2 or m/s^2.
+    pub acceleration: Option<f64>,
+}
+
+impl Default for Drive {
+    /// A motor without gear, whose effort is its torque.
+    fn default() -> Self {
+        Self { gain: 1.0, ratio: 1.0, rotor_inertia: None, position: None, velocity: None, acceleration: None }
+    }
 }
 
 /// Motors that move several joints.

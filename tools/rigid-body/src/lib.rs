@@ -6,7 +6,7 @@
 //!
 //! | module | content |
 //! |---|---|
-//! | [`urdf`], [`drives`], [`robot`] | the files, their checks, and the robot that they describe |
+//! | [`urdf`], [`drives`], [`limits`], [`robot`] | the files, their checks, and the robot that they describe |
 //! | [`tree`], [`placement`], [`inertia`] | joints and links, frames, inertial parameters and their physical consistency |
 //! | [`newton_euler`] | tau from q, v, a |
 //! | [`regressor`], [`base_parameters`] | tau as a linear function of phi, and which combinations of phi it shows |
@@ -21,6 +21,7 @@ pub mod articulated_body;
 pub mod base_parameters;
 pub mod drives;
 pub mod inertia;
+pub mod limits;
 pub mod mass_matrix;
 pub mod newton_euler;
 pub mod placement;
@@ -31,6 +32,7 @@ pub mod tree;
 pub mod urdf;
 
 pub use inertia::LinkInertia;
+pub use limits::Limits;
 pub use placement::Placement;
 pub use robot::{Robot, RobotError};
 pub use tree::{Joint, JointKind, Tree};

@@ -7,6 +7,7 @@ use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 use rand::{Rng, RngExt};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
+use std::fmt::Write;
 
 /// Shape of a random robot.
 #[derive(Clone, Copy, Debug)]
@@ -48,6 +49,47 @@ pub fn tree(shape: Shape, seed: u64) -> Tree {
 pub fn state(joints: usize, seed: u64) -> [Vec<f64>; 3] {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     [2.0, 2.0, 5.0].map(|limit: f64| (0..joints).map(|_| random.random_range(-limit..limit)).collect())
+}
+
+/// The tree as a URDF, with `<limit>` elements of these ends of travel (rad or m) and this velocity (rad/s or m/s); its
+/// links are `link_0`, `link_1` and so on, behind `base`.
+pub fn urdf(tree: &Tree, (low, high): (f64, f64), velocity: f64) -> String {
+    let mut text = "<robot name='random'><link name='base'/>\n".to_owned();
+    for (i, joint) in tree.joints.iter().enumerate() {
+        let parent = joint.parent.map_or("base".to_owned(), |parent| format!("link_{parent}"));
+        let (roll, pitch, yaw) = joint.placement.rotation.euler_angles();
+        let (at, axis) = (joint.placement.translation, joint.axis);
+        let kind = if joint.kind == JointKind::Revolute { "revolute" } else { "prismatic" };
+        let (centre, inertia) = (joint.link.centre(), joint.link.about_centre());
+        let entry = |row: usize, column: usize| inertia[(row, column)];
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            text,
+            "<joint name='{}' type='{kind}'><parent link='{parent}'/><child link='link_{i}'/>\
+             <origin xyz='{:e} {:e} {:e}' rpy='{roll:e} {pitch:e} {yaw:e}'/><axis xyz='{:e} {:e} {:e}'/>\
+             <limit lower='{low}' upper='{high}' effort='1' velocity='{velocity}'/></joint>\n\
+             <link name='link_{i}'><inertial><origin xyz='{:e} {:e} {:e}'/><mass value='{:e}'/>\
+             <inertia ixx='{:e}' ixy='{:e}' ixz='{:e}' iyy='{:e}' iyz='{:e}' izz='{:e}'/></inertial></link>",
+            joint.name,
+            at.x,
+            at.y,
+            at.z,
+            axis.x,
+            axis.y,
+            axis.z,
+            centre.x,
+            centre.y,
+            centre.z,
+            joint.link.mass,
+            entry(0, 0),
+            entry(0, 1),
+            entry(0, 2),
+            entry(1, 1),
+            entry(1, 2),
+            entry(2, 2)
+        );
+    }
+    text + "</robot>"
 }
 
 /// A body of four to eight points and a ball: always physical.

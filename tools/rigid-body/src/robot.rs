@@ -3,6 +3,7 @@
 use crate::articulated_body::forward_dynamics;
 use crate::drives::{Drive, RobotDescription};
 use crate::inertia::LinkInertia;
+use crate::limits::{Frame, Limits};
 use crate::mass_matrix::mass_matrix;
 use crate::newton_euler::inverse_dynamics;
 use crate::placement::Placement;
@@ -206,6 +207,12 @@ pub struct Robot {
     pub drives: Vec<Drive>,
     /// Motor velocities = coupling * joint velocities.
     pub coupling: DMatrix<f64>,
+    /// Limits of each joint's motion.
+    pub limits: Vec<Limits>,
+    /// Frames of all moving links, those that are fixed to another included.
+    pub frames: Vec<Frame>,
+    /// Least height of these frames above the base's origin, m; None: no floor.
+    pub floor: Option<f64>,
 }
 
 impl Robot {
@@ -219,13 +226,26 @@ impl Robot {
         let in_toml = |defect| RobotError { file: toml_file.to_owned(), line: None, defect };
         let in_urdf = |defect| RobotError { file: urdf_file.to_owned(), line: None, defect };
         consistent(&description, &urdf).map_err(in_toml)?;
-        let (tree, links) = tree(&description, &urdf).map_err(|(in_drives, defect)| match in_drives {
-            true => in_toml(defect),
-            false => in_urdf(defect),
-        })?;
+        let Moving { tree, links, limits, frames } =
+            moving(&description, &urdf).map_err(|(in_drives, defect)| match in_drives {
+                true => in_toml(defect),
+                false => in_urdf(defect),
+            })?;
         let drives: Vec<Drive> = tree.joints.iter().map(|joint| description.joint[&joint.name]).collect();
         let coupling = coupling(&description, &tree, &drives).map_err(in_toml)?;
-        Ok(Self { name: urdf.name, tree, links, drives, coupling })
+        Ok(Self { name: urdf.name, tree, links, drives, coupling, limits, frames, floor: description.floor })
+    }
+
+    /// Height of each of [`Self::frames`] above the base's origin at positions `q`, against gravity (along z without
+    /// gravity), m.
+    pub fn heights(&self, q: &[f64]) -> Vec<f64> {
+        let up = (-self.tree.gravity).try_normalize(1e-9).unwrap_or_else(Vector3::z);
+        let placements = self.tree.placements(q);
+        let height = |frame: &Frame| {
+            let placement = &placements[frame.carrier];
+            up.dot(&(placement.translation + placement.rotation * frame.origin))
+        };
+        self.frames.iter().map(height).collect()
     }
 
     /// Joint torques per unit of each motor's effort: joint torques = this * efforts.
@@ -282,19 +302,27 @@ pub fn describe(text: &str, file: &str) -> Result<RobotDescription, RobotError> 
     for (joint, drive) in &description.joint {
         let not_zero = "a finite number other than 0";
         let rotor = drive.rotor_inertia.unwrap_or_default();
+        let [low, high] = drive.position.unwrap_or([0.0, 1.0]);
+        let (velocity, acceleration) = (drive.velocity.unwrap_or(1.0), drive.acceleration.unwrap_or(1.0));
         for (key, value, fits, expected) in [
             ("gain", drive.gain, drive.gain.is_finite() && drive.gain != 0.0, not_zero),
             ("ratio", drive.ratio, drive.ratio.is_finite() && drive.ratio != 0.0, not_zero),
             ("rotor_inertia", rotor, rotor.is_finite() && rotor >= 0.0, "a finite number, 0 or greater"),
+            ("lowest position", low, low.is_finite(), "a finite number"),
+            ("highest position", high, high.is_finite() && high > low, "a finite number above the lowest position"),
+            ("velocity", velocity, velocity.is_finite() && velocity > 0.0, "a finite number above 0"),
+            ("acceleration", acceleration, acceleration.is_finite() && acceleration > 0.0, "a finite number above 0"),
         ] {
             if !fits {
                 return Err(error(Defect::Range { joint: joint.clone(), key, value, expected }));
             }
         }
     }
-    if let Some(value) = description.gravity.into_iter().find(|component| !component.is_finite()) {
-        let joint = "base".to_owned();
-        return Err(error(Defect::Range { joint, key: "gravity", value, expected: "finite numbers" }));
+    for (key, values) in [("gravity", &description.gravity[..]), ("floor", description.floor.as_slice())] {
+        if let Some(value) = values.iter().copied().find(|component| !component.is_finite()) {
+            let joint = "base".to_owned();
+            return Err(error(Defect::Range { joint, key, value, expected: "finite numbers" }));
+        }
     }
     Ok(description)
 }
@@ -331,9 +359,17 @@ fn consistent(description: &RobotDescription, urdf: &Urdf) -> Result<(), Defect>
     }
 }
 
+/// Everything of a robot that moves.
+struct Moving {
+    tree: Tree,
+    links: Vec<String>,
+    limits: Vec<Limits>,
+    frames: Vec<Frame>,
+}
+
 /// Joints and links, parents first, with what is fixed to a link joined to it. An error with `true` belongs to
 /// robot.toml.
-fn tree(description: &RobotDescription, urdf: &Urdf) -> Result<(Tree, Vec<String>), (bool, Defect)> {
+fn moving(description: &RobotDescription, urdf: &Urdf) -> Result<Moving, (bool, Defect)> {
     let in_urdf = |defect| (false, defect);
     let exists = |name: &String| urdf.links.iter().any(|link| link.name == *name);
     for joint in &urdf.joints {
@@ -356,7 +392,8 @@ fn tree(description: &RobotDescription, urdf: &Urdf) -> Result<(Tree, Vec<String
         [_] => {}
         _ => return Err(in_urdf(Defect::Roots { roots })),
     }
-    let mut walk = Walk { description, urdf, joints: vec![], links: vec![], reached: vec![] };
+    let (joints, links, limits, frames) = (vec![], vec![], vec![], vec![]);
+    let mut walk = Walk { description, urdf, joints, links, limits, frames, reached: vec![] };
     walk.behind(&roots[0], None, Placement::identity())?;
     if let Some(joint) = urdf.joints.iter().find(|joint| !walk.reached.contains(&joint.name)) {
         return Err(in_urdf(Defect::Ring { joint: joint.name.clone() }));
@@ -369,7 +406,8 @@ fn tree(description: &RobotDescription, urdf: &Urdf) -> Result<(Tree, Vec<String
             return Err(in_urdf(Defect::Massless { link: link.clone(), joint: joint.name.clone() }));
         }
     }
-    Ok((Tree { joints: walk.joints, gravity: Vector3::from(description.gravity) }, walk.links))
+    let Walk { joints, links, limits, frames, .. } = walk;
+    Ok(Moving { tree: Tree { joints, gravity: Vector3::from(description.gravity) }, links, limits, frames })
 }
 
 struct Walk<'a> {
@@ -377,6 +415,8 @@ struct Walk<'a> {
     urdf: &'a Urdf,
     joints: Vec<Joint>,
     links: Vec<String>,
+    limits: Vec<Limits>,
+    frames: Vec<Frame>,
     reached: Vec<String>,
 }
 
@@ -384,6 +424,9 @@ impl Walk<'_> {
     /// Adds a link, which `placement` places in the link of the moving joint `carrier`, and all behind it.
     fn behind(&mut self, link: &str, carrier: Option<usize>, placement: Placement) -> Result<(), (bool, Defect)> {
         let own = self.urdf.links.iter().find(|own| own.name == link).and_then(|own| own.inertia);
+        if let Some(carrier) = carrier {
+            self.frames.push(Frame { link: link.to_owned(), carrier, origin: placement.translation });
+        }
         if let (Some(carrier), Some(own)) = (carrier, own) {
             let joint = &mut self.joints[carrier];
             joint.link = joint.link.joined(&own.in_parent(&placement));
@@ -403,9 +446,10 @@ impl Walk<'_> {
                 self.behind(&joint.child, carrier, frame)?;
                 continue;
             }
-            if !self.description.joint.contains_key(&joint.name) {
+            let Some(drive) = self.description.joint.get(&joint.name) else {
                 return Err((true, Defect::NoDrive { joint: joint.name.clone() }));
-            }
+            };
+            self.limits.push(Limits::of(drive, joint));
             self.joints.push(Joint {
                 name: joint.name.clone(),
                 parent: carrier,
@@ -428,13 +472,27 @@ fn coupling(description: &RobotDescription, tree: &Tree, drives: &[Drive]) -> Re
     let Some(coupled) = &description.coupling else { return Ok(matrix) };
     let n = coupled.joints.len();
     let wrong = |reason: &str| Defect::Coupling { joints: coupled.joints.clone(), reason: reason.to_owned() };
+    if n == 0 {
+        return Err(wrong("it has no joints; name them, or remove [coupling]"));
+    }
     if coupled.matrix.len() != n || coupled.matrix.iter().any(|row| row.len() != n) {
         return Err(wrong(&format!("matrix is not {n} x {n}; it has a row per motor and a column per joint")));
     }
     let place = |name: &String| tree.joints.iter().position(|joint| joint.name == *name);
     let mut places = Vec::new();
     for name in &coupled.joints {
-        let at = place(name).ok_or_else(|| Defect::Unknown { joint: name.clone(), near: None })?;
+        let at = match place(name) {
+            Some(at) => at,
+            None if description.locked.contains(name) => {
+                return Err(wrong(&format!(
+                    "{name} is listed under `locked` and does not move; remove one of the two"
+                )));
+            }
+            None => return Err(Defect::Unknown { joint: name.clone(), near: None }),
+        };
+        if places.contains(&at) {
+            return Err(wrong(&format!("{name} is there twice; each joint has one row and one column")));
+        }
         if drives[at].ratio != 1.0 {
             return Err(wrong(&format!("{name} has a ratio of {} as well; leave it out", drives[at].ratio)));
         }
@@ -446,8 +504,11 @@ fn coupling(description: &RobotDescription, tree: &Tree, drives: &[Drive]) -> Re
         }
     }
     let part = DMatrix::from_fn(n, n, |i, j| coupled.matrix[i][j]);
+    if let Some(value) = part.iter().find(|value| !value.is_finite()) {
+        return Err(wrong(&format!("matrix has {value}, expected finite numbers")));
+    }
     let largest = part.amax();
-    if !largest.is_finite() || part.svd(false, false).singular_values.min() <= 1e-9 * largest {
+    if part.svd(false, false).singular_values.min() <= 1e-9 * largest {
         return Err(wrong("matrix is singular: the motors could not hold every motion of the joints; correct it"));
     }
     Ok(matrix)

@@ -75,6 +75,16 @@ impl Tree {
         self.joints.is_empty()
     }
 
+    /// Placement of every link in the base at positions `q`.
+    pub fn placements(&self, q: &[f64]) -> Vec<Placement> {
+        let mut all: Vec<Placement> = Vec::with_capacity(self.len());
+        for (joint, q) in self.joints.iter().zip(q) {
+            let own = joint.at(*q);
+            all.push(joint.parent.map_or(own, |parent| all[parent].then(&own)));
+        }
+        all
+    }
+
     /// Inertial parameters of all links, ten after ten.
     pub fn parameters(&self) -> Vec<f64> {
         self.joints.iter().flat_map(|joint| joint.link.parameters()).collect()

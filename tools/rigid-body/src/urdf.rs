@@ -6,6 +6,7 @@
 //! values are written back into the text as it was.
 
 use crate::inertia::LinkInertia;
+use crate::limits::Limits;
 use crate::placement::Placement;
 use crate::robot::{Defect, RobotError};
 use nalgebra::{Matrix3, Unit, Vector3};
@@ -49,6 +50,8 @@ pub struct UrdfJoint {
     pub axis: Unit<Vector3<f64>>,
     /// Reduction of its transmission; None where none is written.
     pub reduction: Option<f64>,
+    /// Travel and velocity; a limit that leaves no room to move is a placeholder of generators and not stated.
+    pub limits: Limits,
 }
 
 /// A whole URDF.
@@ -131,7 +134,7 @@ impl Reader<'_> {
     /// `count` numbers of an attribute; None where it is not there.
     fn numbers<const N: usize>(&self, node: Node, attribute: &str) -> Result<Option<[f64; N]>, RobotError> {
         let Some(text) = node.attribute(attribute) else { return Ok(None) };
-        let found: Vec<f64> = text.split_whitespace().map_while(|word| word.parse().ok()).collect();
+        let found: Vec<f64> = text.split_whitespace().map(|word| word.parse().unwrap_or(f64::NAN)).collect();
         let numbers = <[f64; N]>::try_from(found).ok().filter(|all| all.iter().all(|x| x.is_finite()));
         let wrong = Defect::NotANumber { attribute: attribute.to_owned(), text: text.to_owned(), count: N };
         numbers.map(Some).ok_or_else(|| self.error(node, wrong))
@@ -200,6 +203,7 @@ impl Reader<'_> {
         let Some(axis) = Unit::try_new(axis, 1e-9) else {
             return Err(self.error(node, Defect::Missing { of: name, value: "axis of a length".to_owned() }));
         };
+        let limits = self.limits(node, kind)?;
         Ok(UrdfJoint {
             name,
             allowed,
@@ -208,6 +212,21 @@ impl Reader<'_> {
             placement: self.origin(node)?,
             axis,
             reduction: None,
+            limits,
+        })
+    }
+
+    /// Limits of a joint of this type; a continuous joint has no ends of travel.
+    fn limits(&self, node: Node, kind: &str) -> Result<Limits, RobotError> {
+        let Some(limit) = node.children().find(|child| child.has_tag_name("limit")) else {
+            return Ok(Limits::default());
+        };
+        let number = |attribute: &str| Ok(self.numbers(limit, attribute)?.map(|[value]: [f64; 1]| value));
+        let (low, high) = (number("lower")?.unwrap_or(0.0), number("upper")?.unwrap_or(0.0));
+        Ok(Limits {
+            position: (kind != "continuous" && low < high).then_some((low, high)),
+            velocity: number("velocity")?.filter(|velocity| *velocity > 0.0),
+            acceleration: None,
         })
     }
 }

@@ -46,6 +46,27 @@ fn each_defect_names_its_file_its_joint_and_a_remedy() {
     let coupled = |rest: &str| (format!("{}[coupling]\n{rest}", TOML.replace("ratio = 50.0\n", "")), good.clone());
     let cases = [
         (with("</robot>", ""), "two.urdf", "no URDF"),
+        (with("<origin xyz=\"0 0 0.1\"/>", "<origin xyz=\"0 0 0.1 m\"/>"), "two.urdf:", "xyz is \"0 0 0.1 m\""),
+        (with("<parent link=\"upper\"/>", "<parent link=\"lower\"/>"), "two.urdf", "joint elbow is part of a ring"),
+        (
+            with("<link name=\"base\"/>\n", ""),
+            "two.urdf",
+            "joint shoulder: there is no link base; check parent and child",
+        ),
+        (
+            with(
+                "</robot>",
+                "<joint name='back' type='fixed'><parent link='tool'/><child link='base'/></joint></robot>",
+            ),
+            "two.urdf",
+            "joint shoulder is part of a ring of joints that no base leads to",
+        ),
+        (with("<mass value=\"2\"/>", "<mass value=\"0\"/>"), "two.urdf:", "link upper: no body has a mass of 0 kg"),
+        (
+            with("<child link=\"upper\"/>", "<child link=\"upper\"/><limit lower=\"low\" upper=\"1\"/>"),
+            "two.urdf:",
+            "lower is \"low\", expected 1 finite numbers",
+        ),
         (with("mass value=\"2\"", "mass value=\"$(arg m)\""), "two.urdf:", "xacro"),
         (with("<child link=\"lower\"/>", "<child link=\"lowre\"/>"), "two.urdf", "joint elbow: there is no link lowre"),
         (
@@ -115,11 +136,80 @@ fn each_defect_names_its_file_its_joint_and_a_remedy() {
             "matrix is singular",
         ),
         (coupled("joints = ['wrist']\nmatrix = [[1.0]]"), "robot.toml", "joint wrist is not in the URDF"),
+        (coupled("joints = []\nmatrix = []"), "robot.toml", "it has no joints; name them, or remove [coupling]"),
+        (
+            coupled("joints = ['shoulder', 'shoulder']\nmatrix = [[1.0, 0.0], [0.0, 2.0]]"),
+            "robot.toml",
+            "coupling of shoulder, shoulder: shoulder is there twice",
+        ),
+        (
+            coupled("joints = ['shoulder', 'elbow']\nmatrix = [[1.0, 1.0], [1.0]]"),
+            "robot.toml",
+            "coupling of shoulder, elbow: matrix is not 2 x 2",
+        ),
+        (coupled("joints = ['elbow']\nmatrix = [[inf]]"), "robot.toml", "coupling of elbow: matrix has inf"),
+        (
+            toml(
+                "urdf = 'two.urdf'\nlocked = ['elbow']\n[joint.shoulder]\n[coupling]\njoints = ['elbow']\nmatrix = [[2.0]]",
+            ),
+            "robot.toml",
+            "elbow is listed under `locked` and does not move; remove one of the two",
+        ),
+        (
+            toml(&format!("{TOML}[coupling]\njoints = ['elbow']\nmatrix = [[2.0]]\n")),
+            "robot.toml",
+            "coupling of elbow: elbow has a ratio of 50 as well; leave it out",
+        ),
+        (toml(&TOML.replace("gain = 2.0", "gain = 0.0")), "robot.toml", "joint shoulder: gain is 0, expected"),
+        (toml(&TOML.replace("1e-4", "-1e-9")), "robot.toml", "joint elbow: rotor_inertia is -0.000000001, expected"),
+        (toml(&TOML.replace("gain = 2.0", "velocity = 0.0")), "robot.toml", "joint shoulder: velocity is 0, expected"),
+        (
+            toml(&TOML.replace("gain = 2.0", "position = [1.0, 1.0]")),
+            "robot.toml",
+            "joint shoulder: highest position is 1, expected a finite number above the lowest position",
+        ),
+        (toml(&format!("floor = nan\n{TOML}")), "robot.toml", "floor is NaN, expected finite numbers"),
+        (
+            toml("locked = ['shoulder', 'elbow']\nurdf = 'two.urdf'\n[joint]\n"),
+            "robot.toml",
+            "no joint moves; describe at least one drive",
+        ),
     ];
     for ((toml, urdf), file, text) in cases {
         let error = robot(&toml, &urdf).expect_err(text);
         assert!(error.starts_with(file) && error.contains(text), "{error:?}, expected {file}: {text}");
     }
+}
+
+#[test]
+fn limits_are_those_of_robot_toml_else_of_the_urdf_and_a_placeholder_is_none() {
+    let limit = |text: &str| urdf().replacen("<child link=\"upper\"/>", &format!("<child link=\"upper\"/>{text}"), 1);
+    let limits = |toml: &str, text: &str| robot(toml, &limit(text)).unwrap().limits[0];
+    let urdf = limits(TOML, "<limit lower=\"-1\" upper=\"2\" effort=\"1\" velocity=\"3\"/>");
+    assert_eq!((urdf.position, urdf.velocity, urdf.acceleration), (Some((-1.0, 2.0)), Some(3.0), None));
+    let own = TOML.replace("gain = 2.0", "position = [-0.5, 0.5]\nacceleration = 7.0");
+    let own = limits(&own, "<limit lower=\"-1\" upper=\"2\" effort=\"1\" velocity=\"3\"/>");
+    assert_eq!((own.position, own.velocity, own.acceleration), (Some((-0.5, 0.5)), Some(3.0), Some(7.0)));
+    assert_eq!(
+        limits(TOML, "<limit lower=\"0\" upper=\"0\" effort=\"0\" velocity=\"0\"/>"),
+        rigid_body::Limits::default()
+    );
+}
+
+#[test]
+fn the_heights_are_those_of_all_moving_frames_against_gravity() {
+    // Shoulder and elbow turn about y: at q = (pi/2, 0) the arm lies along x.
+    let arm = robot(TOML, &urdf()).unwrap();
+    let names: Vec<&str> = arm.frames.iter().map(|frame| frame.link.as_str()).collect();
+    assert_eq!(names, ["upper", "lower", "tool"]);
+    let close = |found: Vec<f64>, expected: [f64; 3]| {
+        assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}");
+    };
+    close(arm.heights(&[0.0, 0.0]), [0.0, 0.4, 0.7]);
+    close(arm.heights(&[std::f64::consts::FRAC_PI_2, 0.0]), [0.0, 0.0, 0.0]);
+    close(arm.heights(&[0.0, std::f64::consts::PI]), [0.0, 0.4, 0.1]);
+    let hanging = robot(&format!("gravity = [0.0, 0.0, 9.81]\n{TOML}"), &urdf()).unwrap();
+    close(hanging.heights(&[0.0, 0.0]), [0.0, -0.4, -0.7]);
 }
 
 #[test]

@@ -6,14 +6,12 @@
 use libtest_mimic::{Arguments, Failed, Trial};
 use nalgebra::DVector;
 use python::Packages;
-use rigid_body::inertia::LinkInertia;
+use rigid_body::Robot;
 use rigid_body::mass_matrix::mass_matrix;
 use rigid_body::newton_euler::inverse_dynamics;
-use rigid_body::random_tree::{Shape, state, tree};
+use rigid_body::random_tree::{Shape, state, tree, urdf};
 use rigid_body::regressor::regressor;
-use rigid_body::{JointKind, Robot, Tree};
 use serde_json::{Value, json};
-use std::fmt::Write;
 use std::path::Path;
 use std::process::Command;
 
@@ -40,7 +38,7 @@ fn as_pinocchio(python: Option<&Path>) -> Result<(), Failed> {
     let mut robots = Vec::new();
     for seed in 0..24u64 {
         let shape = Shape { joints: 1 + seed as usize % 12, branches: seed % 2 == 1, prismatic: 0.25, armature: false };
-        let urdf = urdf(&tree(shape, seed));
+        let urdf = urdf(&tree(shape, seed), (-9.0, 9.0), 1.0);
         let drives: String = (0..shape.joints).map(|i| format!("[joint.joint_{i}]\n")).collect();
         let robot = Robot::new(&format!("urdf = ''\n{drives}"), "robot.toml", &urdf, "random.urdf")?;
         let [q, v, a] = state(shape.joints, 100 + seed);
@@ -80,48 +78,4 @@ fn as_pinocchio(python: Option<&Path>) -> Result<(), Failed> {
         }
     }
     Ok(())
-}
-
-/// The tree as a URDF.
-fn urdf(tree: &Tree) -> String {
-    let mut text = "<robot name='random'><link name='base'/>\n".to_owned();
-    for (i, joint) in tree.joints.iter().enumerate() {
-        let parent = joint.parent.map_or("base".to_owned(), |parent| format!("link_{parent}"));
-        let (roll, pitch, yaw) = joint.placement.rotation.euler_angles();
-        let (at, axis) = (joint.placement.translation, joint.axis);
-        let kind = if joint.kind == JointKind::Revolute { "revolute" } else { "prismatic" };
-        let _ = writeln!(
-            text,
-            "<joint name='{}' type='{kind}'><parent link='{parent}'/><child link='link_{i}'/>\
-             <origin xyz='{:e} {:e} {:e}' rpy='{roll:e} {pitch:e} {yaw:e}'/><axis xyz='{:e} {:e} {:e}'/>\
-             <limit lower='-9' upper='9' effort='1' velocity='1'/></joint>{}",
-            joint.name,
-            at.x,
-            at.y,
-            at.z,
-            axis.x,
-            axis.y,
-            axis.z,
-            link(i, &joint.link)
-        );
-    }
-    text + "</robot>"
-}
-
-fn link(i: usize, link: &LinkInertia) -> String {
-    let (centre, inertia) = (link.centre(), link.about_centre());
-    format!(
-        "<link name='link_{i}'><inertial><origin xyz='{:e} {:e} {:e}'/><mass value='{:e}'/><inertia ixx='{:e}' ixy='{:e}' \
-         ixz='{:e}' iyy='{:e}' iyz='{:e}' izz='{:e}'/></inertial></link>",
-        centre.x,
-        centre.y,
-        centre.z,
-        link.mass,
-        inertia[(0, 0)],
-        inertia[(0, 1)],
-        inertia[(0, 2)],
-        inertia[(1, 1)],
-        inertia[(1, 2)],
-        inertia[(2, 2)]
-    )
 }
