@@ -143,6 +143,16 @@ pub enum PositionUnit {
     Metre,
 }
 
+impl PositionUnit {
+    /// The unit's symbol.
+    pub fn symbol(self) -> &'static str {
+        match self {
+            PositionUnit::Radian => "rad",
+            PositionUnit::Metre => "m",
+        }
+    }
+}
+
 /// The column, or the product of columns, of the effort.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -41,10 +41,11 @@ pub struct Bodies {
 /// # Errors
 /// Too few samples.
 pub fn bodies(recording: &Recording) -> Result<Bodies, RobotFitError> {
+    let undetermined = |reason| RobotFitError::Undetermined { path: recording.path.clone(), reason };
     let first = Rows::of(recording, Friction::Simple, None);
     let used = first.group.iter().flatten().count();
     if used < LEAST {
-        return Err(RobotFitError::Undetermined(format!(
+        return Err(undetermined(format!(
             "{used} samples for training and validation; at least {LEAST} are needed: record longer, or trim less"
         )));
     }
@@ -80,7 +81,7 @@ pub fn bodies(recording: &Recording) -> Result<Bodies, RobotFitError> {
     let gamma = tried.iter().min_by(|a, b| mean(&a.1).total_cmp(&mean(&b.1))).map_or(MIDDLE, |best| best.0);
     notes.push(format!("weight of the prior {gamma:e}, of {} that were tried", GAMMAS.len()));
     let unknowns = convex::solve(&sum(&groups, None), rows.layout, &prior, gamma)
-        .ok_or_else(|| RobotFitError::Undetermined("the convex fit finds no minimum; check units and gains".into()))?;
+        .ok_or_else(|| undetermined("the convex fit finds no minimum; check units and gains".into()))?;
     Ok(Bodies { rows, unknowns, simplest: (simplest, first), base: solution, friction, gamma, notes })
 }
 

@@ -7,9 +7,6 @@ use super::recording::{Recording, RobotFitError};
 use crate::fit::{Fitted, Options, fit};
 use crate::progress::Progress;
 
-/// Findings about a joint that only hold for one that moves alone.
-const OF_ONE_JOINT: [&str; 3] = ["excitation", "drift", "inertia"];
-
 /// The joints' images. `rigid` is the effort of the rigid bodies for every joint and sample.
 ///
 /// # Errors
@@ -30,8 +27,8 @@ pub fn images(
         prepared.samples.extra.insert("rigid".to_owned(), rigid);
         prepared.description.rigid.given = true;
         prepared.description.rigid.gravity = crate::dataset::Gravity::None;
-        prepared.warnings.retain(|warning| !OF_ONE_JOINT.contains(&warning.check));
-        let fitted = fit(prepared, options, progress).map_err(|source| RobotFitError::Fit { joint, source })?;
+        let path = recording.path.clone();
+        let fitted = fit(prepared, options, progress).map_err(|source| RobotFitError::Fit { path, joint, source })?;
         images.push(fitted);
     }
     Ok(images)

@@ -24,4 +24,7 @@ pub mod least_squares;
 pub mod recording;
 
 pub use fit::{FittedRobot, Options, fit};
-pub use recording::{Recording, RobotFitError, record};
+pub use recording::{Recording, RobotFitError, read_robot, record};
+
+#[cfg(test)]
+mod tests;

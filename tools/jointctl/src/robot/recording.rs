@@ -20,14 +20,22 @@
 //! delay of the effort is not identified, but can be given (`filter.effort_lag`).
 
 use crate::choice::Folds;
+use crate::dataset::description::{PositionColumn, PositionUnit};
 use crate::dataset::load::Environment;
 use crate::dataset::{DatasetError, Prepared, prepare_text};
 use crate::samples::Part;
-use rigid_body::{Robot, RobotError};
+use rigid_body::{JointKind, Robot, RobotError};
+use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
 /// Speed below which a joint stood still, RMS in rad/s or m/s.
 const STILL: f64 = 1e-3;
+/// Part of the travel by which positions may lie beyond its ends: limits of a URDF are rounded, and joints overshoot.
+const BEYOND: f64 = 0.05;
+/// Findings about a joint that only hold for one that moves alone.
+const OF_ONE_JOINT: [&str; 3] = ["excitation", "drift", "inertia"];
+/// Degrees in rad.
+const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
 /// Why a robot was not identified.
 #[derive(Debug, thiserror::Error)]
@@ -52,8 +60,10 @@ pub enum RobotFitError {
     #[error(transparent)]
     Robot(#[from] RobotError),
     /// The samples of one joint.
-    #[error("joint {joint}: {source}")]
+    #[error("{}: joint {joint}: {source}", path.display())]
     Dataset {
+        /// The recording's description.
+        path: PathBuf,
         /// The joint.
         joint: String,
         /// What is wrong.
@@ -72,6 +82,24 @@ pub enum RobotFitError {
         /// Its speed, rad/s or m/s.
         speed: f64,
     },
+    /// A motion that the joint cannot have made.
+    #[error(
+        "{}: joint {joint}: {quantity} {found}, the limit of URDF or robot's file is {limit}; {remedy}", path.display()
+    )]
+    BeyondLimits {
+        /// The recording's description.
+        path: PathBuf,
+        /// The joint.
+        joint: String,
+        /// Position or speed, with a verb.
+        quantity: &'static str,
+        /// Its values, with unit.
+        found: String,
+        /// The limit, with unit.
+        limit: String,
+        /// The remedy.
+        remedy: String,
+    },
     /// The samples of two joints are not the same rows.
     #[error(
         "{}: after cleaning joint {joint} has {found} samples, the first joint {expected}; rows that are missing for one joint only have to be \
@@ -88,11 +116,18 @@ pub enum RobotFitError {
         expected: usize,
     },
     /// Too few samples, or a motion that determines nothing.
-    #[error("{0}")]
-    Undetermined(String),
+    #[error("{}: {reason}", path.display())]
+    Undetermined {
+        /// The recording's description.
+        path: PathBuf,
+        /// What is wrong and what to do.
+        reason: String,
+    },
     /// The friction of one joint.
-    #[error("joint {joint}: {source}")]
+    #[error("{}: joint {joint}: {source}", path.display())]
     Fit {
+        /// The recording's description.
+        path: PathBuf,
         /// The joint.
         joint: String,
         /// What is wrong.
@@ -111,6 +146,8 @@ pub struct Recording {
     pub joints: Vec<Prepared>,
     /// Name in the description.
     pub name: String,
+    /// File of the description.
+    pub path: PathBuf,
 }
 
 impl Recording {
@@ -175,13 +212,7 @@ pub fn record(path: &Path, environment: Environment) -> Result<Recording, RobotF
     };
     let folder = path.parent().unwrap_or(Path::new(""));
     let robot_file = folder.join(expanded(&robot, environment).map_err(wrong)?);
-    let robot_text = read(&robot_file)?;
-    let described = rigid_body::robot::describe(&robot_text, &robot_file.to_string_lossy())?;
-    let in_robot = |reason| RobotFitError::Description { path: robot_file.clone(), reason };
-    let urdf_file = expanded(&described.urdf, environment).map_err(in_robot)?;
-    let urdf_file = robot_file.parent().unwrap_or(Path::new("")).join(urdf_file);
-    let urdf = read(&urdf_file)?;
-    let robot = Robot::new(&robot_text, &robot_file.to_string_lossy(), &urdf, &urdf_file.to_string_lossy())?;
+    let (robot, urdf) = read_robot(&robot_file, environment)?;
     let name = common.get("name").and_then(toml::Value::as_str).unwrap_or("robot").to_owned();
     let mut prepared = Vec::new();
     for joint in &robot.tree.joints {
@@ -193,8 +224,14 @@ pub fn record(path: &Path, environment: Environment) -> Result<Recording, RobotF
             )));
         };
         let text = of_one_joint(&common, &columns, &joint.name).map_err(wrong)?;
-        let one = prepare_text(&text, path, environment, |_| ())
-            .map_err(|source| RobotFitError::Dataset { joint: joint.name.clone(), source })?;
+        let (path, joint) = (path.to_owned(), joint.name.clone());
+        let mut one = prepare_text(&text, &path, environment, |_| ()).map_err(|source| match source {
+            DatasetError::Constant { signal: "position", .. } => {
+                RobotFitError::Still { path: path.clone(), joint, speed: 0.0 }
+            }
+            source => RobotFitError::Dataset { path: path.clone(), joint, source },
+        })?;
+        one.warnings.retain(|warning| !OF_ONE_JOINT.contains(&warning.check));
         prepared.push(one);
     }
     if let Some(name) = joints.keys().next() {
@@ -203,16 +240,31 @@ pub fn record(path: &Path, environment: Environment) -> Result<Recording, RobotF
             robot_file.display()
         )));
     }
-    let recording = Recording { robot, urdf, joints: prepared, name };
+    let recording = Recording { robot, urdf, joints: prepared, name, path: path.to_owned() };
     check(&recording, path)?;
     Ok(recording)
+}
+
+/// Reads the robot that the TOML file at `path` describes, and the text of its URDF; `environment` gives the variables in
+/// its path.
+///
+/// # Errors
+/// [`RobotFitError`], with file, joint and what to do.
+pub fn read_robot(path: &Path, environment: Environment) -> Result<(Robot, String), RobotFitError> {
+    let text = read(path)?;
+    let described = rigid_body::robot::describe(&text, &path.to_string_lossy())?;
+    let wrong = |reason| RobotFitError::Description { path: path.to_owned(), reason };
+    let urdf_file = expanded(&described.urdf, environment).map_err(wrong)?;
+    let urdf_file = path.parent().unwrap_or(Path::new("")).join(urdf_file);
+    let urdf = read(&urdf_file)?;
+    Ok((Robot::new(&text, &path.to_string_lossy(), &urdf, &urdf_file.to_string_lossy())?, urdf))
 }
 
 fn check(recording: &Recording, path: &Path) -> Result<(), RobotFitError> {
     let path = || path.to_owned();
     let first = &recording.joints[0].samples;
-    for (joint, prepared) in recording.robot.tree.joints.iter().zip(&recording.joints) {
-        let (joint, samples) = (joint.name.clone(), &prepared.samples);
+    for (j, prepared) in recording.joints.iter().enumerate() {
+        let (joint, samples) = (recording.robot.tree.joints[j].name.clone(), &prepared.samples);
         if samples.time != first.time || samples.run != first.run {
             return Err(RobotFitError::Rows { path: path(), joint, found: samples.len(), expected: first.len() });
         }
@@ -221,8 +273,60 @@ fn check(recording: &Recording, path: &Path) -> Result<(), RobotFitError> {
         if speed < STILL {
             return Err(RobotFitError::Still { path: path(), joint, speed });
         }
+        let (kind, unit) = (recording.robot.tree.joints[j].kind, prepared.description.columns.position.unit);
+        if (kind == JointKind::Prismatic) != (unit == PositionUnit::Metre) {
+            let right = if kind == JointKind::Prismatic { "m" } else { "rad" };
+            let reason = format!(
+                "joint {joint} is {kind:?} in the URDF, and its position is in {}; write unit = \"{right}\" in [joints.{joint}] position",
+                unit.symbol()
+            );
+            return Err(RobotFitError::Description { path: path(), reason });
+        }
+        let beyond = beyond_limits(&recording.robot, j, prepared, speed);
+        if let Some((quantity, found, limit)) = beyond {
+            let remedy = remedy(&recording.robot.tree.joints[j], &prepared.description.columns.position);
+            return Err(RobotFitError::BeyondLimits { path: path(), joint, quantity, found, limit, remedy });
+        }
     }
     Ok(())
+}
+
+/// Positions or an RMS speed that joint `j` cannot have: quantity, value and limit. Whole turns of a rotation make no
+/// difference.
+fn beyond_limits(robot: &Robot, j: usize, prepared: &Prepared, speed: f64) -> Option<(&'static str, String, String)> {
+    let (limits, joint) = (&robot.limits[j], &robot.tree.joints[j]);
+    let unit = prepared.description.columns.position.unit.symbol();
+    if let Some((least, most)) = limits.position {
+        let positions = &prepared.samples.position;
+        let low = positions.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = positions.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let turns = match joint.kind {
+            JointKind::Revolute => (0.5 * (low + high - least - most) / TAU).round() * TAU,
+            JointKind::Prismatic => 0.0,
+        };
+        let room = BEYOND * (most - least);
+        if low - turns < least - room || high - turns > most + room {
+            let found = format!("{low:.4} to {high:.4} {unit}");
+            return Some(("positions are", found, format!("{least:.4} to {most:.4} {unit}")));
+        }
+    }
+    let most = limits.velocity.filter(|most| speed > *most)?;
+    Some(("the RMS speed is", format!("{speed:.4} {unit}/s"), format!("{most:.4} {unit}/s")))
+}
+
+/// The remedy where a motion is beyond its limits.
+fn remedy(joint: &rigid_body::Joint, column: &PositionColumn) -> String {
+    let name = &joint.name;
+    let (unit, factor) = match joint.kind {
+        JointKind::Revolute => ("degrees", DEGREE),
+        JointKind::Prismatic => ("mm", 1e-3),
+    };
+    format!(
+        "if column {:?} is in {unit}, write `scale = {}` beside it in [joints.{name}] position; if its zero is another one, correct \
+         the column; if the joint can do this, give its limits in [joint.{name}] of the robot's file",
+        column.column,
+        factor * column.scale
+    )
 }
 
 fn read(path: &Path) -> Result<String, RobotFitError> {

@@ -1,0 +1,3 @@
+//! Recordings and robots that do not fit each other.
+
+mod refused;
