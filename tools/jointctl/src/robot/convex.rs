@@ -7,7 +7,7 @@
 //! has gamma (J / J0 - log J) likewise. Friction is free.
 
 use super::equations::{Layout, Normal};
-use nalgebra::{DMatrix, DVector, Matrix4};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix4};
 use rigid_body::Robot;
 use rigid_body::inertia::{LinkInertia, PARAMETERS, pseudo_inertia_basis};
 use rigid_body::mass_matrix::motion_subspace;
@@ -16,6 +16,8 @@ use rigid_body::mass_matrix::motion_subspace;
 const SPREAD: f64 = 0.01;
 /// A rotor's prior where none is stated, part of its link's inertia about the axis.
 const ROTOR: f64 = 0.1;
+/// Parts of its own curvature that are added in turn: friction columns may depend on each other.
+const DAMPING: [f64; 4] = [1e-12, 1e-10, 1e-8, 1e-6];
 /// Newton steps at the most.
 const STEPS: usize = 80;
 /// Decrement below which the minimum is reached.
@@ -70,13 +72,11 @@ pub fn solve(normal: &Normal, layout: Layout, prior: &Prior, gamma: f64) -> Opti
     let mut cost = task.cost(&x)?;
     for _ in 0..STEPS {
         let (gradient, hessian) = task.derivatives(&x)?;
-        // A millionth of a millionth of its own curvature: friction columns may depend on each other.
         let scale: Vec<f64> = hessian.diagonal().iter().map(|d| 1.0 / d.max(1e-30).sqrt()).collect();
         let n = scale.len();
-        let mut scaled = DMatrix::from_fn(n, n, |a, b| hessian[(a, b)] * scale[a] * scale[b]);
-        (0..n).for_each(|i| scaled[(i, i)] += 1e-12);
+        let scaled = DMatrix::from_fn(n, n, |a, b| hessian[(a, b)] * scale[a] * scale[b]);
         let right = DVector::from_fn(n, |i, _| -gradient[i] * scale[i]);
-        let step = scaled.cholesky()?.solve(&right);
+        let step = factor(&scaled)?.solve(&right);
         let step = DVector::from_fn(n, |i, _| step[i] * scale[i]);
         let decrement = -gradient.dot(&step);
         if decrement < DECREMENT * (1.0 + cost.abs()) {
@@ -96,6 +96,16 @@ pub fn solve(normal: &Normal, layout: Layout, prior: &Prior, gamma: f64) -> Opti
         }
     }
     Some(x)
+}
+
+/// Factor of a scaled Hessian. More is added where rounding hides the prior behind a large sum of squares: the step is
+/// still one of descent.
+fn factor(scaled: &DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
+    DAMPING.into_iter().find_map(|damping| {
+        let mut damped = scaled.clone();
+        (0..scaled.nrows()).for_each(|i| damped[(i, i)] += damping);
+        damped.cholesky()
+    })
 }
 
 /// The links that the unknowns stand for.

@@ -13,6 +13,7 @@ use rayon::prelude::*;
 use rigid_body::Robot;
 use rigid_body::inertia::PARAMETERS;
 use rigid_body::regressor::regressor;
+use std::ops::Range;
 
 /// Groups of samples that are left out in turn.
 pub const GROUPS: usize = 4;
@@ -69,6 +70,8 @@ pub struct Rows {
     pub effort: Vec<Vec<f64>>,
     /// Group of each sample for training and validation; None: not used.
     pub group: Vec<Option<usize>>,
+    /// Continuous recording that each sample belongs to.
+    pub run: Vec<u32>,
 }
 
 impl Rows {
@@ -88,7 +91,9 @@ impl Rows {
 
     /// The same samples with other friction columns.
     pub fn again(self, recording: &Recording, friction: Friction, load: Option<&[Vec<f64>]>) -> Self {
-        Self::with(recording, Layout { friction, ..self.layout }, self.rigid, load)
+        // Rotors that are known are off the effort already, and their columns are gone.
+        let layout = Layout { friction, ..self.layout };
+        Self { layout, friction: friction_columns(recording, friction, load), ..self }
     }
 
     fn with(recording: &Recording, layout: Layout, mut rigid: Vec<DMatrix<f64>>, load: Option<&[Vec<f64>]>) -> Self {
@@ -104,10 +109,31 @@ impl Rows {
         for (k, _) in recording.robot.drives.iter().enumerate().filter(|(_, drive)| drive.rotor_inertia.is_some()) {
             rigid.iter_mut().for_each(|columns| columns.column_mut(layout.inertial() + k).fill(0.0));
         }
-        let joints = recording.joints.iter().enumerate();
-        let friction =
-            joints.map(|(j, one)| layout.friction.columns(&one.samples, load.map(|load| &load[j][..]))).collect();
-        Self { layout, rigid, friction, effort, group: groups(recording) }
+        let friction = friction_columns(recording, layout.friction, load);
+        let run = recording.joints[0].samples.run.clone();
+        Self { layout, rigid, friction, effort, group: groups(recording), run }
+    }
+
+    /// Samples for training and validation in stretches without a gap.
+    pub fn stretches(&self) -> Vec<Range<usize>> {
+        let mut stretches: Vec<Range<usize>> = Vec::new();
+        for i in (0..self.group.len()).filter(|&i| self.group[i].is_some()) {
+            match stretches.last_mut() {
+                Some(last) if last.end == i && self.run[i - 1] == self.run[i] => last.end += 1,
+                _ => stretches.push(i..i + 1),
+            }
+        }
+        stretches
+    }
+
+    /// Columns of joint `j` over these samples.
+    pub fn columns(&self, j: usize, samples: &[usize], columns: &[usize]) -> DMatrix<f64> {
+        let mut matrix = DMatrix::zeros(samples.len(), columns.len());
+        for (line, &i) in samples.iter().enumerate() {
+            let row = self.row(j, i);
+            columns.iter().enumerate().for_each(|(at, &column)| matrix[(line, at)] = row[column]);
+        }
+        matrix
     }
 
     /// The values of all unknowns' columns that joint `j` has at a sample.
@@ -148,11 +174,11 @@ impl Rows {
                 let used: Vec<usize> = samples.iter().copied().filter(|&i| self.group[i] == Some(group)).collect();
                 // As matrices: a product of blocks is faster than sums of rows.
                 let active: Vec<usize> = self.active(j);
-                let mut matrix = DMatrix::zeros(used.len(), active.len());
+                let mut matrix = self.columns(j, &used, &active);
                 let mut effort = DVector::zeros(used.len());
                 for (line, &i) in used.iter().enumerate() {
-                    let (row, root) = (self.row(j, i), weight(i).max(0.0).sqrt());
-                    active.iter().enumerate().for_each(|(at, &column)| matrix[(line, at)] = root * row[column]);
+                    let root = weight(i).max(0.0).sqrt();
+                    matrix.row_mut(line).scale_mut(root);
                     effort[line] = root * self.effort[j][i];
                 }
                 let (part, right) = (matrix.tr_mul(&matrix), matrix.tr_mul(&effort));
@@ -169,13 +195,19 @@ impl Rows {
     }
 
     /// Unknowns that the effort of joint `j` can depend on.
-    fn active(&self, j: usize) -> Vec<usize> {
+    pub fn active(&self, j: usize) -> Vec<usize> {
         let (rigid, width) = (self.layout.rigid(), self.layout.friction.width());
         let mut active: Vec<usize> =
             (0..rigid).filter(|&k| self.rigid.iter().step_by(7).any(|columns| columns[(j, k)] != 0.0)).collect();
         active.extend(rigid + width * j..rigid + width * (j + 1));
         active
     }
+}
+
+/// Friction columns of every joint.
+fn friction_columns(recording: &Recording, friction: Friction, load: Option<&[Vec<f64>]>) -> Vec<Vec<f64>> {
+    let joints = recording.joints.iter().enumerate();
+    joints.map(|(j, one)| friction.columns(&one.samples, load.map(|load| &load[j][..]))).collect()
 }
 
 /// Groups of the samples for training and validation: runs, or parts of them where there are fewer than [`GROUPS`].

@@ -2,11 +2,12 @@
 //!
 //! A. Janot, P.-O. Vandanjon, M. Gautier, A Generic Instrumental Variable Approach for Industrial Robot
 //! Identification, 2014, section II: ordinary least squares, weighted by the noise of each joint; and with Huber's
-//! weights over samples (P. Huber, Robust Statistics, 1981). Standard errors hold for noise without correlation, as
-//! they state them; filtered samples are correlated: [`Solution::standard_errors`] are widened by the root of samples
-//! over independent samples, which the correlation of neighbouring residuals tells (AR(1)).
+//! weights over samples (P. Huber, Robust Statistics, 1981). Their standard errors hold for noise without correlation;
+//! [`Solution::standard_errors`] count the correlation of filtered samples ([`super::noise`]). Model errors that depend
+//! on the motion are no noise, and are not counted.
 
 use super::equations::{GROUPS, Normal, Rows, rigid_columns};
+use super::noise::Noise;
 use nalgebra::{DMatrix, DVector};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -20,6 +21,8 @@ const STATES: usize = 150;
 /// Eigenvalues of the scaled normal equations below this part of the largest are not inverted: 1e-6 of the singular
 /// values.
 const LEAST: f64 = 1e-12;
+/// Part of a direction that is not inverted, from which an unknown is left open.
+const OPEN: f64 = 1e-3;
 /// Standard deviations from which Huber's weight falls.
 const HUBER: f64 = 1.345;
 /// Rounds of reweighting.
@@ -43,7 +46,7 @@ pub struct Solution {
     pub unknowns: DVector<f64>,
     /// Places of the unknowns that are solved for: base parameters, then friction.
     pub solved: Vec<usize>,
-    /// Standard error of each of them.
+    /// Standard error of each of them; infinite where the motion does not determine it.
     pub standard_errors: Vec<f64>,
     /// RMS of what is left of each joint's effort.
     pub noise: Vec<f64>,
@@ -76,44 +79,52 @@ pub fn solve(rows: &Rows, base: &BaseParameters, weighting: Weighting) -> Soluti
         base.independent.iter().copied().chain(rows.layout.rigid()..rows.layout.unknowns()).collect();
     let plain: Vec<Normal> = (0..joints).into_par_iter().map(|j| total(&rows.normal(j, |_| 1.0))).collect();
     let mut weights = vec![1.0; joints];
-    let (mut unknowns, mut inverse, mut condition) = combined(&plain, &weights, &solved);
+    let mut found = combined(&plain, &weights, &solved);
     let noise = |unknowns: &DVector<f64>| -> Vec<f64> {
         plain.iter().map(|normal| (normal.residual(unknowns) / normal.count.max(1) as f64).sqrt().max(1e-12)).collect()
     };
     if weighting != Weighting::Ordinary {
         for _ in 0..3 {
-            weights = noise(&unknowns).iter().map(|noise| 1.0 / (noise * noise)).collect();
-            (unknowns, inverse, condition) = combined(&plain, &weights, &solved);
+            weights = noise(&found.unknowns).iter().map(|noise| 1.0 / (noise * noise)).collect();
+            found = combined(&plain, &weights, &solved);
         }
     }
     if weighting == Weighting::Reweighted {
         for _ in 0..ROUNDS {
-            let sigma: Vec<f64> = (0..joints).map(|j| spread(rows, &unknowns, j)).collect();
+            let unknowns = &found.unknowns;
+            let sigma: Vec<f64> = (0..joints).map(|j| spread(rows, unknowns, j)).collect();
             let normals: Vec<Normal> = (0..joints)
                 .into_par_iter()
                 .map(|j| {
                     let weight = |i: usize| {
-                        let departs = rows.residual(&unknowns, j, i).abs() / sigma[j];
+                        let departs = rows.residual(unknowns, j, i).abs() / sigma[j];
                         if departs > HUBER { HUBER / departs } else { 1.0 }
                     };
                     total(&rows.normal(j, weight))
                 })
                 .collect();
             weights = sigma.iter().map(|sigma| 1.0 / (sigma * sigma)).collect();
-            (unknowns, inverse, condition) = combined(&normals, &weights, &solved);
+            found = combined(&normals, &weights, &solved);
         }
     }
+    let Combined { unknowns, inverse, condition, open } = found;
     let noise = noise(&unknowns);
-    let widened: Vec<f64> = (0..joints).map(|j| correlation(rows, &unknowns, j)).collect();
-    // The covariance of a weighted solution: inverse * (sum of w^2 s^2 H) * inverse.
-    let mut middle = Normal::zero(rows.layout.unknowns());
-    for ((normal, weight), (noise, widened)) in plain.iter().zip(&weights).zip(noise.iter().zip(&widened)) {
-        middle.add(normal, (weight * noise).powi(2) * widened);
-    }
-    let middle = middle.matrix.select_columns(&solved).select_rows(&solved);
-    let covariance = &inverse * middle * &inverse;
-    let standard_errors = covariance.diagonal().iter().map(|variance| variance.max(0.0).sqrt()).collect();
+    let correlated: Vec<Noise> = (0..joints).into_par_iter().map(|j| Noise::of(rows, &unknowns, j, &solved)).collect();
+    let standard_errors = standard_errors(&correlated, &weights, &inverse, &open);
     Solution { unknowns, solved, standard_errors, noise, condition }
+}
+
+/// Standard errors from the covariance of a weighted solution, inverse * (sum of w^2 s^2 X^T T X) * inverse.
+fn standard_errors(joints: &[Noise], weights: &[f64], inverse: &DMatrix<f64>, open: &[bool]) -> Vec<f64> {
+    let mut middle = DMatrix::zeros(open.len(), open.len());
+    for (noise, weight) in joints.iter().zip(weights) {
+        // A joint without samples to spare leaves the noise of all unknowns open.
+        let Some(variance) = noise.variance(inverse, *weight) else { return vec![f64::INFINITY; open.len()] };
+        middle += weight * weight * variance * &noise.rows;
+    }
+    let covariance = inverse * middle * inverse;
+    let of = |(variance, open): (&f64, &bool)| if *open { f64::INFINITY } else { variance.max(0.0).sqrt() };
+    covariance.diagonal().iter().zip(open).map(of).collect()
 }
 
 /// The sum over all groups.
@@ -123,9 +134,18 @@ pub fn total(groups: &[Normal]) -> Normal {
     sum
 }
 
-/// Solves the weighted sum of the joints' equations: unknowns, inverse over those solved for, condition of the
-/// regressor.
-fn combined(joints: &[Normal], weights: &[f64], solved: &[usize]) -> (DVector<f64>, DMatrix<f64>, f64) {
+/// The weighted sum of the joints' equations, solved.
+struct Combined {
+    unknowns: DVector<f64>,
+    /// Inverse over the unknowns that are solved for.
+    inverse: DMatrix<f64>,
+    /// Condition number of the regressor.
+    condition: f64,
+    /// Those of them that the motion leaves open.
+    open: Vec<bool>,
+}
+
+fn combined(joints: &[Normal], weights: &[f64], solved: &[usize]) -> Combined {
     let mut sum = Normal::zero(joints[0].right.len());
     joints.iter().zip(weights).for_each(|(normal, weight)| sum.add(normal, *weight));
     let part = sum.matrix.select_columns(solved).select_rows(solved);
@@ -139,10 +159,12 @@ fn combined(joints: &[Normal], weights: &[f64], solved: &[usize]) -> (DVector<f6
     let inverted = eigen.eigenvalues.map(|value| if kept(&value) { 1.0 / value } else { 0.0 });
     let inverse = &eigen.eigenvectors * DMatrix::from_diagonal(&inverted) * eigen.eigenvectors.transpose();
     let inverse = DMatrix::from_fn(n, n, |a, b| inverse[(a, b)] * scale[a] * scale[b]);
+    let dropped: Vec<usize> = (0..n).filter(|&k| !kept(&eigen.eigenvalues[k])).collect();
+    let open = (0..n).map(|a| dropped.iter().any(|&k| eigen.eigenvectors[(a, k)].abs() > OPEN)).collect();
     let found = &inverse * sum.right.select_rows(solved);
     let mut unknowns = DVector::zeros(sum.right.len());
     solved.iter().zip(found.iter()).for_each(|(&at, value)| unknowns[at] = *value);
-    (unknowns, inverse, (most / least).sqrt())
+    Combined { unknowns, inverse, condition: (most / least).sqrt(), open }
 }
 
 fn residuals(rows: &Rows, unknowns: &DVector<f64>, j: usize) -> Vec<f64> {
@@ -155,13 +177,4 @@ fn spread(rows: &Rows, unknowns: &DVector<f64>, j: usize) -> f64 {
     let mut all: Vec<f64> = residuals(rows, unknowns, j).into_iter().map(f64::abs).collect();
     all.sort_by(f64::total_cmp);
     (1.4826 * all.get(all.len() / 2).copied().unwrap_or(0.0)).max(1e-12)
-}
-
-/// Samples over independent samples, from the correlation of neighbours.
-fn correlation(rows: &Rows, unknowns: &DVector<f64>, j: usize) -> f64 {
-    let all = residuals(rows, unknowns, j);
-    let square: f64 = all.iter().map(|r| r * r).sum();
-    let product: f64 = all.windows(2).map(|pair| pair[0] * pair[1]).sum();
-    let r = (product / square.max(f64::MIN_POSITIVE)).clamp(0.0, 0.999);
-    (1.0 + r) / (1.0 - r)
 }

@@ -4,8 +4,8 @@
 //!    and split as a data set of one joint is.
 //! 2. [`friction_columns`], [`equations`]: efforts as linear functions of inertial parameters, rotor inertias and a
 //!    simple friction.
-//! 3. [`least_squares`]: base parameters with standard errors (IDIM-LS: ordinary, weighted, iteratively reweighted);
-//!    [`convex`]: all inertial parameters, each link physical; [`choose`]: the friction beside them and the
+//! 3. [`least_squares`]: base parameters (IDIM-LS: ordinary, weighted, iteratively reweighted) with standard errors by
+//!    [`noise`]; [`convex`]: all inertial parameters, each link physical; [`choose`]: the friction beside them and the
 //!    regularisation, by motions that were left out.
 //! 4. [`joints`]: the torque of the rigid bodies is the theoretical torque of each joint, and the pipeline of one
 //!    joint does the rest: terms, pre-sliding, network, certificate, fixed point.
@@ -21,6 +21,7 @@ pub mod fit;
 pub mod friction_columns;
 pub mod joints;
 pub mod least_squares;
+pub mod noise;
 pub mod recording;
 
 pub use fit::{FittedRobot, Options, fit};

@@ -1,3 +1,5 @@
-//! Recordings and robots that do not fit each other.
+//! Synthetic robots, where the truth is known; and recordings and robots that do not fit each other.
 
+mod recovered;
 mod refused;
+mod synthetic;
