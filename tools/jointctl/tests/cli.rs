@@ -271,6 +271,50 @@ fn an_excitation_is_found_within_the_limits_passes_its_check_and_fails_that_of_a
     }
 }
 
+/// A robot of two joints.
+const ARM: &str = "<robot name='arm'><link name='base'/>
+<joint name='one' type='revolute'><parent link='base'/><child link='a'/><axis xyz='0 1 0'/><limit lower='-1' upper='1' velocity='2'/></joint>
+<link name='a'><inertial><mass value='2'/><inertia ixx='.02' ixy='0' ixz='0' iyy='.02' iyz='0' izz='.01'/></inertial></link>
+<joint name='two' type='revolute'><parent link='a'/><child link='b'/><origin xyz='0 0 .3'/><axis xyz='1 0 0'/>
+<limit lower='-1' upper='1' velocity='2'/></joint>
+<link name='b'><inertial><origin xyz='0 .1 .1'/><mass value='1'/><inertia ixx='.01' ixy='0' ixz='0' iyy='.01' iyz='0' izz='.01'/></inertial>
+</link></robot>";
+
+#[test]
+fn a_robot_is_excited_within_its_limits_the_same_way_by_the_same_seed_and_each_table_is_one_of_a_joint() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("arm.urdf"), ARM).unwrap();
+    std::fs::write(folder.path().join("robot.toml"), "urdf = 'arm.urdf'\n[joint.one]\n[joint.two]\n").unwrap();
+    let run = |arguments: &[&str]| jointctl(folder.path(), arguments);
+    let excite = |out: &str, more: &[&str]| {
+        let search = ["--draws", "4", "--rounds", "1", "--duration", "8"];
+        run(&[&["robot", "excite", "robot.toml", "--out", out], &search[..], more].concat())
+    };
+    let refused = excite("motion", &[]);
+    let shown = stderr(&refused);
+    assert!(
+        !refused.status.success() && shown.contains("robot.toml: joint one has no limit of its acceleration"),
+        "{shown}"
+    );
+    assert!(!folder.path().join("motion").exists());
+    let output = excite("motion", &["--acceleration", "5", "--floor", "-0.1", "--json"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let found: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(found["condition_number"].as_f64() <= found["random"]["condition_number"].as_f64(), "{found}");
+    assert!(found["lowest"]["height"].as_f64().unwrap() >= -0.1, "{found}");
+    assert!(excite("again", &["--acceleration", "5", "--floor", "-0.1"]).status.success());
+    for file in ["one.csv", "two.csv", "excitation.toml"] {
+        let read = |out: &str| std::fs::read(folder.path().join(out).join(file)).unwrap();
+        assert!(read("motion") == read("again"), "{file}");
+    }
+    // 90 % of travel and velocity.
+    let limits = ["--low", "-0.9", "--high", "0.9", "--velocity", "1.8", "--acceleration", "5"];
+    for file in ["motion/one.csv", "motion/two.csv"] {
+        let checked = run(&[&["excite", "--check", file], &limits[..]].concat());
+        assert!(checked.status.success(), "{}", stderr(&checked));
+    }
+}
+
 #[test]
 fn wrong_arguments_are_refused_with_their_limits() {
     let folder = tempfile::tempdir().unwrap();
@@ -286,6 +330,7 @@ fn wrong_arguments_are_refused_with_their_limits() {
         (&["excite", "--velocity", "0"], "velocity is 0, must lie in 0.001 to 200 rad/s"),
         (&["excite", "--out", "motion.toml"], "--out is motion.toml"),
         (&["excite", "--check", "nowhere.csv"], "nowhere.csv: cannot be read"),
+        (&["robot", "excite", "nowhere.toml", "--out", "motion"], "cannot read nowhere.toml"),
     ] {
         let output = jointctl(folder.path(), arguments);
         assert!(!output.status.success());

@@ -4,13 +4,20 @@ use clap::Command;
 
 /// What a command is called below `jointctl`, and lines as one types them. `JOINTCTL_BUS` and `JOINTCTL_NODE` stand for `--bus` and
 /// `--node`.
-const EXAMPLES: [(&str, &[&str]); 36] = [
+const EXAMPLES: [(&str, &[&str]); 37] = [
     ("demo", &["jointctl demo", "jointctl demo --seed 7 --out demo-7"]),
     ("fit", &["jointctl fit elbow.toml", "jointctl fit elbow.toml --all"]),
     ("evaluate", &["jointctl evaluate elbow/friction.img other.toml"]),
     (
         "robot fit",
         &["jointctl robot fit recording.toml", "jointctl robot fit recording.toml --network never --out arm"],
+    ),
+    (
+        "robot excite",
+        &[
+            "jointctl robot excite robot.toml --out motion",
+            "jointctl robot excite robot.toml --acceleration 5 --floor 0.1 --seed 3 --out motion",
+        ],
     ),
     ("image inspect", &["jointctl image inspect elbow/friction.img"]),
     ("image verify", &["jointctl image verify elbow/friction.signed --key joint.key"]),

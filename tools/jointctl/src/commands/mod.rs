@@ -49,7 +49,7 @@ pub enum Command {
     Fit(fit::Fit),
     /// Judge an image on a recorded joint
     Evaluate(evaluate::Evaluate),
-    /// Identify all joints of a robot from one recording of all of them
+    /// All joints of a robot: excite, identify from one recording
     #[command(subcommand)]
     Robot(robot::RobotCommand),
     /// Inspect, verify or convert a parameter image
@@ -126,6 +126,9 @@ pub enum CommandError {
     /// A robot.
     #[error(transparent)]
     Robot(#[from] crate::robot::RobotFitError),
+    /// The search for a robot's excitation.
+    #[error(transparent)]
+    RobotExcite(#[from] crate::robot::excite::RobotExciteError),
     /// Writing of results.
     #[error(transparent)]
     Output(#[from] crate::output::OutputError),

@@ -79,7 +79,13 @@ pub fn coefficients(found: &Found) -> Result<String, toml::ser::Error> {
 /// The samples as a table.
 #[must_use]
 pub fn table(excitation: &Excitation) -> String {
-    let mut text = COLUMNS.join(",") + "\n";
+    table_in(excitation, "rad")
+}
+
+/// As [`table`], with positions in `unit` (rad or m).
+#[must_use]
+pub fn table_in(excitation: &Excitation, unit: &str) -> String {
+    let mut text = COLUMNS.join(",").replace("rad", unit) + "\n";
     for (time, motion) in excitation.samples(SAMPLE_PERIOD) {
         // Writing to a string cannot fail.
         let _ = writeln!(text, "{time:.4},{:.7},{:.6},{:.5}", motion.position, motion.velocity, motion.acceleration);

@@ -5,10 +5,11 @@
 //! fades in and out, so that it begins and ends at rest. It is about the middle of the position limits.
 //!
 //! - [`regressor`]: what the samples tell apart, as a condition number
-//! - `optimise`: the search for a series
+//! - [`basis`]: series as sums over their coefficients; `optimise`: the search for a series
 //! - [`mod@file`]: a series as coefficients and as a table of samples
 //! - [`check`]: whether a table keeps the limits, and its condition number
 
+pub mod basis;
 pub mod check;
 pub mod file;
 mod optimise;

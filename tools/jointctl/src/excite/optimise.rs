@@ -5,14 +5,13 @@
 //! search", J. ACM 8(2), 1961, its exploratory moves). After every change the series is scaled to touch its tightest
 //! bound. There is no claim that the minimum is global.
 
+use super::basis::Basis;
 use super::{Bounds, Excitation, ExciteError, regressor::Regressor, within};
 use plant::excitation::Reference;
-use plant::fourier::FourierSeries;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
-use std::f64::consts::TAU;
 
 /// Samples of a motion while searching. The fastest harmonic has at least 25.
 const SAMPLES: usize = 500;
@@ -91,49 +90,25 @@ struct Point {
     cost: f64,
 }
 
-/// The motions of all coefficients one by one: a series is their sum.
 struct Search {
     bounds: Bounds,
     duration: f64,
-    /// For each coefficient its motion at every sample.
-    basis: Vec<Vec<Reference>>,
+    basis: Basis,
 }
 
 impl Search {
     fn new(bounds: &Bounds, effort: &Effort) -> Self {
-        let mut search = Self { bounds: *bounds, duration: effort.duration, basis: Vec::new() };
-        for index in 0..2 * effort.harmonics {
-            let mut coefficients = vec![0.0; 2 * effort.harmonics];
-            coefficients[index] = 1.0;
-            let series = search.excitation(&coefficients).series;
-            let time = |n: usize| effort.duration * n as f64 / (SAMPLES - 1) as f64;
-            search.basis.push((0..SAMPLES).map(|n| series.faded(time(n), effort.duration)).collect());
-        }
-        search
+        let basis = Basis::new(effort.duration, effort.harmonics, SAMPLES);
+        Self { bounds: *bounds, duration: effort.duration, basis }
     }
 
     fn excitation(&self, coefficients: &[f64]) -> Excitation {
-        let (cosine, sine) = coefficients.split_at(coefficients.len() / 2);
-        let series = FourierSeries { fundamental: TAU / self.duration, cosine: cosine.to_vec(), sine: sine.to_vec() };
-        Excitation { series, centre: self.bounds.centre(), duration: self.duration }
-    }
-
-    /// The series about position zero at every sample.
-    fn motion(&self, coefficients: &[f64]) -> Vec<Reference> {
-        let mut motion = vec![Reference::default(); SAMPLES];
-        for (coefficient, basis) in coefficients.iter().zip(&self.basis) {
-            for (sum, part) in motion.iter_mut().zip(basis) {
-                sum.position += coefficient * part.position;
-                sum.velocity += coefficient * part.velocity;
-                sum.acceleration += coefficient * part.acceleration;
-            }
-        }
-        motion
+        Excitation { series: self.basis.series(coefficients), centre: self.bounds.centre(), duration: self.duration }
     }
 
     /// Scales coefficients to the tightest bound and judges them.
     fn point(&self, mut coefficients: Vec<f64>) -> Point {
-        let mut motion = self.motion(&coefficients);
+        let mut motion = self.basis.motion(&coefficients);
         let centre = self.bounds.centre();
         let about = |m: &Reference| Reference { position: m.position + centre, ..*m };
         let used = motion.iter().map(|m| self.bounds.use_of(&about(m))).fold(0.0, f64::max);

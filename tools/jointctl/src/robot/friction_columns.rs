@@ -7,7 +7,7 @@ use crate::pre_sliding;
 use crate::samples::Samples;
 
 /// Slope of the Coulomb friction at standstill, s/rad.
-const SLOPE: f64 = 100.0;
+pub(super) const SLOPE: f64 = 100.0;
 /// Velocities of the Stribeck columns, parts of the largest speed.
 const STRIBECK: [f64; 3] = [0.02, 0.1, 0.3];
 /// Distances of the pre-sliding columns, parts of the position range.

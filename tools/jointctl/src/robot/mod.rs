@@ -11,11 +11,14 @@
 //!    joint does the rest: terms, pre-sliding, network, certificate, fixed point.
 //! 5. [`mod@fit`] is the whole way, [`files`] its output.
 //!
+//! [`excite`] finds the motion of all joints that such a recording should be of.
+//!
 //! The dynamics are those of the crate `rigid-body`.
 
 pub mod choose;
 pub mod convex;
 pub mod equations;
+pub mod excite;
 pub mod files;
 pub mod fit;
 pub mod friction_columns;

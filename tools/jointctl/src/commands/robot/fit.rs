@@ -1,18 +1,11 @@
-//! `jointctl robot`: all joints of a robot from one recording of all of them.
+//! `jointctl robot fit`: all joints of a robot from one recording of all of them.
 
-use super::CommandError;
-use super::fit::{Choices, print_warnings};
+use crate::commands::CommandError;
+use crate::commands::fit::{Choices, print_warnings};
 use crate::progress::{Progress, Terminal};
 use crate::robot::{FittedRobot, Options, files, fit, record};
-use clap::{Args, Subcommand};
+use clap::Args;
 use std::path::PathBuf;
-
-/// Commands for all joints of a robot.
-#[derive(Debug, Subcommand)]
-pub enum RobotCommand {
-    /// Identify rigid bodies and the friction image of every joint from one recording
-    Fit(Box<RobotFit>),
-}
 
 /// Arguments of `robot fit`.
 #[derive(Debug, Args)]
@@ -33,16 +26,9 @@ pub struct RobotFit {
     json: bool,
 }
 
-impl RobotCommand {
+impl RobotFit {
     /// Runs the command.
     pub fn run(&self) -> Result<(), CommandError> {
-        let Self::Fit(fit) = self;
-        fit.run()
-    }
-}
-
-impl RobotFit {
-    fn run(&self) -> Result<(), CommandError> {
         let progress = Terminal::new();
         progress.stage("load and clean");
         let mut recording = record(&self.recording, &|name| std::env::var(name).ok())?;

@@ -1,0 +1,26 @@
+//! `jointctl robot`: all joints of a robot, a file for each command.
+
+pub mod excite;
+pub mod fit;
+
+use super::CommandError;
+use clap::Subcommand;
+
+/// Commands for all joints of a robot.
+#[derive(Debug, Subcommand)]
+pub enum RobotCommand {
+    /// Identify rigid bodies and the friction image of every joint from one recording
+    Fit(Box<fit::RobotFit>),
+    /// Write a motion of all joints at once that identifies a robot within its limits
+    Excite(excite::RobotExcite),
+}
+
+impl RobotCommand {
+    /// Runs the command.
+    pub fn run(&self) -> Result<(), CommandError> {
+        match self {
+            Self::Fit(fit) => fit.run(),
+            Self::Excite(excite) => excite.run(),
+        }
+    }
+}
