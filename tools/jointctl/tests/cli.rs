@@ -331,6 +331,7 @@ fn wrong_arguments_are_refused_with_their_limits() {
         (&["excite", "--out", "motion.toml"], "--out is motion.toml"),
         (&["excite", "--check", "nowhere.csv"], "nowhere.csv: cannot be read"),
         (&["robot", "excite", "nowhere.toml", "--out", "motion"], "cannot read nowhere.toml"),
+        (&["robot", "evaluate", "arm", "nowhere.toml"], "cannot read nowhere.toml"),
     ] {
         let output = jointctl(folder.path(), arguments);
         assert!(!output.status.success());

@@ -4,7 +4,7 @@ use clap::Command;
 
 /// What a command is called below `jointctl`, and lines as one types them. `JOINTCTL_BUS` and `JOINTCTL_NODE` stand for `--bus` and
 /// `--node`.
-const EXAMPLES: [(&str, &[&str]); 37] = [
+const EXAMPLES: [(&str, &[&str]); 38] = [
     ("demo", &["jointctl demo", "jointctl demo --seed 7 --out demo-7"]),
     ("fit", &["jointctl fit elbow.toml", "jointctl fit elbow.toml --all"]),
     ("evaluate", &["jointctl evaluate elbow/friction.img other.toml"]),
@@ -18,6 +18,10 @@ const EXAMPLES: [(&str, &[&str]); 37] = [
             "jointctl robot excite robot.toml --out motion",
             "jointctl robot excite robot.toml --acceleration 5 --floor 0.1 --seed 3 --out motion",
         ],
+    ),
+    (
+        "robot evaluate",
+        &["jointctl robot evaluate arm second.toml", "jointctl robot evaluate arm recording.toml --test"],
     ),
     ("image inspect", &["jointctl image inspect elbow/friction.img"]),
     ("image verify", &["jointctl image verify elbow/friction.signed --key joint.key"]),

@@ -49,7 +49,7 @@ pub enum Command {
     Fit(fit::Fit),
     /// Judge an image on a recorded joint
     Evaluate(evaluate::Evaluate),
-    /// All joints of a robot: excite, identify from one recording
+    /// All joints of a robot: excite, identify from one recording, judge on another
     #[command(subcommand)]
     Robot(robot::RobotCommand),
     /// Inspect, verify or convert a parameter image
@@ -129,6 +129,14 @@ pub enum CommandError {
     /// The search for a robot's excitation.
     #[error(transparent)]
     RobotExcite(#[from] crate::robot::excite::RobotExciteError),
+    /// A fitted robot that cannot be used.
+    #[error("{}: {reason}", path.display())]
+    FittedRobot {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
     /// Writing of results.
     #[error(transparent)]
     Output(#[from] crate::output::OutputError),

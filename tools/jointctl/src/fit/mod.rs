@@ -23,7 +23,7 @@ use crate::choice::{Decision, TermRule, rank};
 use crate::dataset::Prepared;
 use crate::dataset::checks::slope;
 use crate::dataset::choice_keys::Choice;
-use crate::dataset::description::{Gravity as DescribedGravity, PositionUnit, RigidDescription};
+use crate::dataset::description::{Gravity as DescribedGravity, RigidDescription};
 use crate::evaluate::{Prediction, error_tables, fixed_point_difference};
 use crate::friction_parameter::Units;
 use crate::identify::{self, Identified, identify};
@@ -156,6 +156,10 @@ pub struct Fitted {
     pub image: Image,
     /// What is proved of it.
     pub certificate: Certificate,
+    /// Rigid part that was identified beside the friction.
+    pub rigid: RigidParameters,
+    /// Rigid part whose effort is the theoretical torque that the image's terms depend on.
+    pub theoretical: RigidParameters,
     /// Everything worth knowing, for people.
     pub report: Report,
     /// The effort of every sample as the image and every model beside it predict it, rigid part included.
@@ -251,7 +255,8 @@ pub fn fit(prepared: &mut Prepared, options: &Options, progress: &dyn Progress) 
         test: summary::test_samples(prepared, &rigid, physical, &learned, &fixed),
     };
     progress.stage("done");
-    Ok(Fitted { image: built.image, certificate: built.certificate, report, predictions })
+    let (rigid, theoretical) = (physical.rigid, physical.theoretical);
+    Ok(Fitted { image: built.image, certificate: built.certificate, rigid, theoretical, report, predictions })
 }
 
 /// The image on another view of the same motion: the difference to its own row is what observer, sampling and noise
@@ -348,9 +353,6 @@ pub fn rigid_model(description: &RigidDescription) -> RigidModel {
 
 /// Units of the data set.
 pub fn units(prepared: &Prepared) -> Units {
-    let position = match prepared.description.columns.position.unit {
-        PositionUnit::Radian => "rad",
-        PositionUnit::Metre => "m",
-    };
-    Units { position: position.to_owned(), effort: prepared.description.columns.effort.unit.symbol().to_owned() }
+    let columns = &prepared.description.columns;
+    Units { position: columns.position.unit.symbol().to_owned(), effort: columns.effort.unit.symbol().to_owned() }
 }

@@ -1,5 +1,6 @@
 //! Files of an identified robot: for each joint image and report, for the controller URDF and parameters; host.
 
+use super::evaluate;
 use super::fit::FittedRobot;
 use super::recording::Recording;
 use crate::commands::CommandError;
@@ -114,6 +115,7 @@ pub fn summary(recording: &Recording, fitted: &FittedRobot) -> Value {
         "errors": fitted.errors,
         "mean_relative_percent": { "simplest": simplest, "bodies": rigid_bodies, "images": images },
         "base_parameters": base,
+        "bodies": evaluate::bodies(recording, fitted),
         "condition": bodies.base.condition,
         "choice": bodies.notes,
     })

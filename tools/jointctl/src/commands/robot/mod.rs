@@ -1,5 +1,6 @@
 //! `jointctl robot`: all joints of a robot, a file for each command.
 
+pub mod evaluate;
 pub mod excite;
 pub mod fit;
 
@@ -13,6 +14,8 @@ pub enum RobotCommand {
     Fit(Box<fit::RobotFit>),
     /// Write a motion of all joints at once that identifies a robot within its limits
     Excite(excite::RobotExcite),
+    /// Judge a fitted robot, links and images, on another recording
+    Evaluate(evaluate::RobotEvaluate),
 }
 
 impl RobotCommand {
@@ -21,6 +24,7 @@ impl RobotCommand {
         match self {
             Self::Fit(fit) => fit.run(),
             Self::Excite(excite) => excite.run(),
+            Self::Evaluate(evaluate) => evaluate.run(),
         }
     }
 }

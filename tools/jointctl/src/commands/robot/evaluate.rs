@@ -1,0 +1,51 @@
+//! `jointctl robot evaluate`: a fitted robot judged on another recording.
+
+use crate::commands::CommandError;
+use crate::commands::fit::print_warnings;
+use crate::progress::{Progress, Terminal};
+use crate::robot::evaluate::{Judged, evaluate, mean_percent, table};
+use crate::robot::record;
+use clap::Args;
+use std::path::PathBuf;
+
+/// Arguments of `robot evaluate`.
+#[derive(Debug, Args)]
+pub struct RobotEvaluate {
+    /// Folder that `robot fit` wrote: robot.json and the images
+    fitted: PathBuf,
+    /// Description of the recording, which names the robot (docs/robot.md)
+    recording: PathBuf,
+    /// Judge the recording's test sets only, as for the one that the robot was fitted to
+    #[arg(long)]
+    test: bool,
+    /// Print the errors as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+impl RobotEvaluate {
+    /// Runs the command.
+    pub fn run(&self) -> Result<(), CommandError> {
+        let progress = Terminal::new();
+        progress.stage("load and clean");
+        let mut recording = record(&self.recording, &|name| std::env::var(name).ok())?;
+        for (joint, prepared) in recording.robot.tree.joints.iter().zip(&recording.joints) {
+            if !prepared.warnings.is_empty() {
+                eprintln!("{}:", joint.name);
+                print_warnings(&prepared.warnings);
+            }
+        }
+        progress.stage("judge");
+        let judged = if self.test { Judged::Test } else { Judged::All };
+        let errors = evaluate(&self.fitted, &mut recording, judged)?;
+        progress.finish();
+        match self.json {
+            true => {
+                let mean = mean_percent(&errors);
+                println!("{}", serde_json::json!({ "errors": errors, "mean_relative_percent": mean }));
+            }
+            false => println!("{}", table(&errors)),
+        }
+        Ok(())
+    }
+}
