@@ -14,6 +14,9 @@ use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::Path;
 
+/// Files of a fit, but for those of its joints.
+pub const FILES: [&str; 3] = ["robot.urdf", "parameters.toml", "robot.json"];
+
 /// Writes everything into `out`, all or nothing.
 pub fn write(out: &Path, recording: &Recording, fitted: &FittedRobot) -> Result<(), CommandError> {
     let mut files = Vec::new();

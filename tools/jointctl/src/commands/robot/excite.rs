@@ -1,9 +1,10 @@
 //! `jointctl robot excite`: a motion of all joints at once that identifies a robot.
 
 use crate::commands::CommandError;
+use crate::commands::force::Force;
 use crate::output::write_directory;
 use crate::progress::{Progress, Terminal};
-use crate::robot::excite::files::{files, summary, table};
+use crate::robot::excite::files::{COEFFICIENTS, files, summary, table};
 use crate::robot::excite::search::search;
 use crate::robot::excite::{Effort, Task};
 use crate::robot::read_robot;
@@ -18,6 +19,9 @@ pub struct RobotExcite {
     /// Folder for the table of every joint, JOINT.csv, and for excitation.toml
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    /// Permission to replace.
+    #[command(flatten)]
+    force: Force,
     /// Largest acceleration of joints without one in the robot's file, rad/s^2 (m/s^2)
     #[arg(long, value_name = "A")]
     acceleration: Option<f64>,
@@ -49,6 +53,8 @@ impl RobotExcite {
     pub fn run(&self) -> Result<(), CommandError> {
         let progress = Terminal::new();
         let (robot, _) = read_robot(&self.robot, &|name| std::env::var(name).ok())?;
+        let tables = robot.tree.joints.iter().map(|joint| self.out.join(format!("{}.csv", joint.name)));
+        self.force.permits(tables.chain([self.out.join(COEFFICIENTS)]))?;
         let mut task = Task::of(&robot, &self.robot, self.acceleration)?;
         task.floor = self.floor.or(task.floor);
         let effort = Effort {

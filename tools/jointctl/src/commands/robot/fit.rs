@@ -2,6 +2,7 @@
 
 use crate::commands::CommandError;
 use crate::commands::fit::{Choices, print_warnings};
+use crate::commands::force::Force;
 use crate::progress::{Progress, Terminal};
 use crate::robot::{FittedRobot, Options, files, fit, record};
 use clap::Args;
@@ -12,9 +13,12 @@ use std::path::PathBuf;
 pub struct RobotFit {
     /// Description of the recording, which names the robot (docs/robot.md)
     recording: PathBuf,
-    /// Folder for images, URDF, parameters and reports; files of the same names are replaced, others are left alone
+    /// Folder for images, URDF, parameters and reports; other files in it are left alone [default: the description's name]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Permission to replace.
+    #[command(flatten)]
+    force: Force,
     /// Use only the first seconds of the samples for training and validation
     #[arg(long, value_name = "S")]
     seconds: Option<f64>,
@@ -29,6 +33,8 @@ pub struct RobotFit {
 impl RobotFit {
     /// Runs the command.
     pub fn run(&self) -> Result<(), CommandError> {
+        let out = self.out.clone().unwrap_or_else(|| PathBuf::from(self.recording.file_stem().unwrap_or_default()));
+        self.force.permits_in(&out, &files::FILES)?;
         let progress = Terminal::new();
         progress.stage("load and clean");
         let mut recording = record(&self.recording, &|name| std::env::var(name).ok())?;
@@ -41,7 +47,6 @@ impl RobotFit {
                 print_warnings(&prepared.warnings);
             }
         }
-        let out = self.out.clone().unwrap_or_else(|| PathBuf::from(self.recording.file_stem().unwrap_or_default()));
         files::write(&out, &recording, &fitted)?;
         match self.json {
             true => println!("{}", files::summary(&recording, &fitted)),

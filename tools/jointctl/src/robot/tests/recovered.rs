@@ -35,10 +35,9 @@ fn coverage(departures: &[f64]) -> (f64, f64) {
 #[test]
 fn unknowns_lie_within_their_95_percent_intervals_in_93_percent_of_cases_and_intervals_are_no_wider_than_they_must_be()
 {
-    for (name, friction, seconds, harmonics) in [
-        ("short, rich motion", Friction::None, 10.0, 8),
-        ("long motion", Friction::None, 20.0, 5),
-    ] {
+    for (name, friction, seconds, harmonics) in
+        [("short, rich motion", Friction::None, 10.0, 8), ("long motion", Friction::None, 20.0, 5)]
+    {
         let part = if friction == Friction::None { 0.0 } else { 1.0 };
         let all: Vec<f64> = (0..ROBOTS)
             .into_par_iter()
