@@ -1,7 +1,8 @@
 //! Injected conversions: set up at start, read in the control interrupt.
 //!
-//! All converters run on the same clock, the bus clock divided by four (42.5 MHz), start from the same trigger, and sample the currents for the same time:
-//! conversions that run at the same time but not in step disturb each other (ES0430 2.7.11). RM0440, 21.4.
+//! All converters run on the same clock, the bus clock divided by four (42.5 MHz), start from the same trigger, and
+//! sample the currents for the same time: conversions that run at the same time but not in step disturb each other
+//! (ES0430 2.7.11). RM0440, 21.4.
 
 use super::StartError;
 use embassy_stm32::pac::adc::Adc;

@@ -1,8 +1,8 @@
 //! ST B-G431B-ESC1 (MB1419, STM32G431CBU6): pins, timers, gains and limits.
 //!
-//! Sources: S = stm32duino variant and pin table; N = apache/nuttx board; F = SimpleFOC's current sense for this board; O = oxifoc
-//! hardware notes; R = Recoil .ioc; K = FOC-Stim board package. The pin functions agree with the chip database that embassy is
-//! generated from. **Nothing here has run on a board.** Marked facts:
+//! Sources: S = stm32duino variant and pin table; N = apache/nuttx board; F = SimpleFOC's current sense for this board;
+//! O = oxifoc hardware notes; R = Recoil .ioc; K = FOC-Stim board package. The pin functions agree with the chip
+//! database that embassy is generated from. **Nothing here has run on a board.** Marked facts:
 //! - *derived*: computed from parts that a source names;
 //! - *unconfirmed*: one source, or sources that contradict each other. Measure before relying on it.
 //!
@@ -24,8 +24,8 @@
 //! | holding brake | PB3 (on the programmer's part the receiver of its serial port); high opens it. For the input of a driver with a pull-down: it floats until the program starts | S N |
 //! | LED | PC6, lit when high (polarity unconfirmed) | S O R |
 //!
-//! The board has no usable over-current comparator (the comparators see 1.71 mV/A), so over-current is the joint's software
-//! check in every control step. TIM1's break input takes the chip's own alarms: core lock-up and SRAM parity.
+//! The board has no usable over-current comparator (the comparators see 1.71 mV/A), so over-current is the joint's
+//! software check in every control step. TIM1's break input takes the chip's own alarms: core lock-up and SRAM parity.
 
 use super::adc::{self, FULL_SCALE, Sequence};
 use super::pwm::{self, TIMER_HZ};
@@ -71,8 +71,9 @@ pub const FLASH_BANK: u32 = 128 * 1024;
 
 /// Top of TIM1's counter.
 const TOP: u16 = pwm::top(CONTROL_HZ);
-/// Dead time, ns. Other firmware for this board uses 300 (K), 500 (N) and 800 to 847 (O, ST's kit). The longest is taken: too long a
-/// dead time distorts the voltage, which the joint compensates; too short a one shorts the supply. 1.6 % of a half period.
+/// Dead time, ns. Other firmware for this board uses 300 (K), 500 (N) and 800 to 847 (O, ST's kit). The longest is
+/// taken: too long a dead time distorts the voltage, which the joint compensates; too short a one shorts the supply.
+/// 1.6 % of a half period.
 const DEAD_TIME_NS: u32 = (CONFIGURATION.bridge.dead_time * 1e9 + 0.5) as u32;
 /// Greatest duty at which the amplifiers have settled when they are sampled; their settling time is derived.
 const LARGEST_DUTY: f32 = CONFIGURATION.bridge.duty.1;
@@ -93,11 +94,13 @@ pub fn chip_configuration() -> Config {
     config
 }
 
-/// 170 MHz from the internal oscillator: whether a crystal is fitted, sources do not agree. All buses, the timers and FDCAN get them.
+/// 170 MHz from the internal oscillator: whether a crystal is fitted, sources do not agree. All buses, the timers and
+/// FDCAN get them.
 ///
-/// Written here, because embassy's set-up of clocks, which is not a constant where it is called twice, takes 2 KB of flash. **embassy goes on believing in
-/// 16 MHz.** Of this board's drivers three ask for a frequency: that of time, whose prescaler is set anew here; that of the PWM, whose prescaler is none at
-/// either frequency and whose period this file sets ([`set_up_bridge`]); that of FDCAN, which needs it for nothing but bit timings that it computes, and
+/// Written here, because embassy's set-up of clocks, which is not a constant where it is called twice, takes 2 KB of
+/// flash. **embassy goes on believing in 16 MHz.** Of this board's drivers three ask for a frequency: that of time,
+/// whose prescaler is set anew here; that of the PWM, whose prescaler is none at either frequency and whose period this
+/// file sets ([`set_up_bridge`]); that of FDCAN, which needs it for nothing but bit timings that it computes, and
 /// ours is said (`can::BIT_TIMING`).
 pub fn start_clocks(_peripherals: &mut Peripherals) {
     use pac::flash::vals::Latency;
@@ -185,8 +188,8 @@ pub fn start(p: Peripherals) -> Result<Parts, StartError> {
 
 type Pair<'a, H, L> = (embassy_stm32::Peri<'a, H>, embassy_stm32::Peri<'a, L>);
 
-/// Pins, time base, dead time and the instant of sampling. Outputs stay off: the driver enables them for an instant, with every
-/// channel still disabled.
+/// Pins, time base, dead time and the instant of sampling. Outputs stay off: the driver enables them for an instant,
+/// with every channel still disabled.
 fn set_up_bridge(
     tim1: embassy_stm32::Peri<'static, embassy_stm32::peripherals::TIM1>,
     u: Pair<'static, embassy_stm32::peripherals::PA8, embassy_stm32::peripherals::PC13>,
@@ -242,8 +245,8 @@ fn set_up_bridge(
     core::mem::forget(driver);
 }
 
-/// Currents U on ADC1, V and W on ADC2, at the same instant but for W, one conversion (0.6 µs) later. ADC1 goes on with the
-/// supply and the thermistor; the control interrupt comes after W and so finds theirs of the period before.
+/// Currents U on ADC1, V and W on ADC2, at the same instant but for W, one conversion (0.6 µs) later. ADC1 goes on with
+/// the supply and the thermistor; the control interrupt comes after W and so finds theirs of the period before.
 fn convert() -> Result<(), StartError> {
     pac::RCC.ahb2enr().modify(|w| w.set_adc12en(true));
     pac::GPIOA.moder().modify(|w| w.set_moder(0, pac::gpio::vals::Moder::ANALOG));

@@ -1,12 +1,12 @@
 //! FDCAN1 at 1 Mbit/s with classic frames: the receive interrupt, and the queues between it and the task below.
 //!
-//! What has to be quick happens in the interrupt, second in priority to the control interrupt alone: NMT, SYNC, RPDOs, and the
-//! synchronous TPDOs. For the task it leaves what is addressed to this node's SDO server, and LSS.
+//! What has to be quick happens in the interrupt, second in priority to the control interrupt alone: NMT, SYNC, RPDOs,
+//! and the synchronous TPDOs. For the task it leaves what is addressed to this node's SDO server, and LSS.
 //!
-//! embassy's driver sets the controller up: clock, pins, bit timing, message RAM, filters. Its interrupt handler is not used, because
-//! frames would wait in its channel until a task runs; this one reads the controller's FIFO itself, in order. What is sent waits in a
-//! [`TransmitQueue`]; the controller's three buffers are a FIFO, not a queue: segments of one SDO block have one identifier, and a
-//! queue would send those by place.
+//! embassy's driver sets the controller up: clock, pins, bit timing, message RAM, filters. Its interrupt handler is not
+//! used, because frames would wait in its channel until a task runs; this one reads the controller's FIFO itself, in
+//! order. What is sent waits in a [`TransmitQueue`]; the controller's three buffers are a FIFO, not a queue: segments
+//! of one SDO block have one identifier, and a queue would send those by place.
 //!
 //! Filters are masks: embassy 0.6.0 has the bounds of its range filter swapped.
 
@@ -34,8 +34,8 @@ use joint_firmware::joint::configuration::CollisionReaction;
 use joint_firmware::joint::load_feedforward::LOADS;
 use joint_firmware::objects::{JointImage, Observed};
 
-/// The bus's timing ([`bit_timing`]) as the driver takes it. Said here, because embassy would compute it while the program runs, from ten quanta at
-/// most, and bring the text of an error that cannot happen.
+/// The bus's timing ([`bit_timing`]) as the driver takes it. Said here, because embassy would compute it while the
+/// program runs, from ten quanta at most, and bring the text of an error that cannot happen.
 const BIT_TIMING: NominalBitTiming = NominalBitTiming {
     prescaler: NonZeroU16::MIN,
     seg1: NonZeroU8::new(bit_timing::BUS.before_sample()).unwrap(),
@@ -52,8 +52,8 @@ const TO_BUS: usize = 16;
 const RESERVED: usize = PDOS;
 /// Elements of a receive FIFO, and of the transmit FIFO (RM0440, message RAM).
 const FIFO: u8 = 3;
-/// Ranges of identifiers with which nobody addresses a joint, as value and mask: answers of SDO servers and LSS slaves. PDOs may not have them
-/// (CiA 301, restricted CAN-IDs).
+/// Ranges of identifiers with which nobody addresses a joint, as value and mask: answers of SDO servers and LSS slaves.
+/// PDOs may not have them (CiA 301, restricted CAN-IDs).
 const IGNORED: [(u16, u16); 2] = [(0x580, 0x780), (0x7E4, 0x7FF)];
 
 /// Feedforward of the load, bits of Nm: the task's, for the receive interrupt.
@@ -112,7 +112,8 @@ pub enum Condition {
     Off,
 }
 
-/// Says that the interrupts are handled. The first by this module; the second is never raised, as everything is on line 0.
+/// Says that the interrupts are handled. The first by this module; the second is never raised, as everything is on line
+/// 0.
 #[derive(Clone, Copy)]
 struct Handled;
 // SAFETY: the handler below serves the interrupt.
@@ -257,8 +258,8 @@ fn count(counter: &AtomicU32) {
     counter.store(counter.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
 }
 
-/// First word of the message RAM, and words from there to the first element of receive FIFO 0 and of the transmit FIFO; an
-/// element has 18 words (RM0440, message RAM).
+/// First word of the message RAM, and words from there to the first element of receive FIFO 0 and of the transmit FIFO;
+/// an element has 18 words (RM0440, message RAM).
 const RECEIVE: usize = 0xB0 / 4;
 const TRANSMIT: usize = 0x278 / 4;
 const ELEMENT: usize = 18;

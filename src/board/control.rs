@@ -1,7 +1,7 @@
 //! The control interrupt: measure, one control step, set the bridge; the highest priority, every PWM period.
 //!
-//! It runs from CCM SRAM, uses no critical section, no log and no waker, and nothing else of the program touches its state
-//! after [`start`]. What tasks have to know, or to tell it, goes through the exchanges and atomics below.
+//! It runs from CCM SRAM, uses no critical section, no log and no waker, and nothing else of the program touches its
+//! state after [`start`]. What tasks have to know, or to tell it, goes through the exchanges and atomics below.
 
 use super::shared::{InUse, Newest, Offering, Publisher, Replaced, Subscriber};
 use super::{Sensors, adc};
@@ -32,7 +32,8 @@ struct Control {
 
 /// What tasks command the joint with; each of the two has one owner.
 pub struct Commands {
-    /// Set-points and the controlword: the newest counts, from the next control step on; a set-point in the next round of the motion loop.
+    /// Set-points and the controlword: the newest counts, from the next control step on; a set-point in the next round
+    /// of the motion loop.
     pub demand: Publisher<Demand>,
     /// Configuration and friction model, prepared: swapped between two control steps.
     pub active: Offering<Active>,
@@ -53,7 +54,8 @@ struct Owned(UnsafeCell<MaybeUninit<Control>>);
 unsafe impl Sync for Owned {}
 static CONTROL: Owned = Owned(UnsafeCell::new(MaybeUninit::uninit()));
 
-/// What control interrupt and tasks tell each other in single words; in one place, so that the interrupt needs one address.
+/// What control interrupt and tasks tell each other in single words; in one place, so that the interrupt needs one
+/// address.
 struct Words {
     steps: AtomicU32,
     last_cycles: AtomicU32,
@@ -185,10 +187,12 @@ pub fn stop() {
     WORDS.stopped.store(true, Ordering::Relaxed);
 }
 
-/// Before flash is written where it holds the program, too: the joint is off, and stays so until [`release`]. False where it is under current; then
-/// nothing may be written. For the task that writes, and before the control interrupt starts.
+/// Before flash is written where it holds the program, too: the joint is off, and stays so until [`release`]. False
+/// where it is under current; then nothing may be written. For the task that writes, and before the control interrupt
+/// starts.
 ///
-/// What the control interrupt runs only while operation is enabled may lie in flash on such a board: with this it never waits for a write.
+/// What the control interrupt runs only while operation is enabled may lie in flash on such a board: with this it never
+/// waits for a write.
 pub fn hold_off() -> bool {
     if !super::SINGLE_BANK || WORDS.held_off.load(Ordering::Relaxed) {
         return true;
@@ -197,7 +201,8 @@ pub fn hold_off() -> bool {
         return false;
     }
     WORDS.held_off.store(true, Ordering::Release);
-    // Where the joint was enabled in the last step, the next one disables it. Without control steps the watchdog ends this.
+    // Where the joint was enabled in the last step, the next one disables it. Without control steps the watchdog ends
+    // this.
     let (runs, before) = (is_enabled(), WORDS.steps.load(Ordering::Relaxed));
     while runs && WORDS.steps.load(Ordering::Acquire) == before {
         core::hint::spin_loop();
@@ -245,7 +250,8 @@ pub fn report() -> Option<Report> {
     critical_section::with(|section| Some(*READER.borrow_ref_mut(section).as_mut()?.newest()))
 }
 
-/// Reads the steps before a fault; none while no fault is latched. A control step that is due meanwhile waits: the bridge is off then.
+/// Reads the steps before a fault; none while no fault is latched. A control step that is due meanwhile waits: the
+/// bridge is off then.
 pub fn history<R>(read: impl FnOnce(&History) -> R) -> Option<R> {
     report().filter(|report| !report.latched.is_empty())?;
     cortex_m::interrupt::free(|_| {
@@ -267,8 +273,8 @@ pub fn exchange() -> Option<(Commands, Ends)> {
     Some((commands, ends))
 }
 
-/// Makes the joint, hands it and the sensors to the control interrupt and enables that. Until a configuration is offered to
-/// [`Commands::active`] there is no control step, and the bridge stays off.
+/// Makes the joint, hands it and the sensors to the control interrupt and enables that. Until a configuration is
+/// offered to [`Commands::active`] there is no control step, and the bridge stays off.
 #[inline(never)]
 pub fn start(sensors: Sensors, ends: Ends) {
     let control = Control { sensors, joint: Joint::new(), ends, overrun: false, off: NOBODY };

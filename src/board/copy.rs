@@ -1,9 +1,9 @@
 //! Copying and clearing whole words, from CCM SRAM; any context, the control interrupt among them.
 //!
-//! The compiler calls these by their names of the ARM run-time ABI (RTABI, 4.3.4) wherever it moves a struct. The library's own
-//! are made for speed at any size and take 2.6 KiB, a quarter of the smaller chip's CCM SRAM; its symbols are weak, so these
-//! take their place in the whole program. Where the name has a 4 or an 8, source and destination are aligned to words, as it promises; the others,
-//! which move bytes of frames and images in tasks, go byte by byte.
+//! The compiler calls these by their names of the ARM run-time ABI (RTABI, 4.3.4) wherever it moves a struct. The
+//! library's own are made for speed at any size and take 2.6 KiB, a quarter of the smaller chip's CCM SRAM; its symbols
+//! are weak, so these take their place in the whole program. Where the name has a 4 or an 8, source and destination are
+//! aligned to words, as it promises; the others, which move bytes of frames and images in tasks, go byte by byte.
 
 use core::arch::naked_asm;
 

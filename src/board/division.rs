@@ -1,10 +1,11 @@
 //! The division of 64-bit numbers, bit by bit; any context.
 //!
-//! The compiler's own takes 1 KB of flash and a tenth of the time. On the board whose flash is nearly full, a few are divided for each configuration and
-//! image, and the time in milliseconds; the control interrupt divides none.
+//! The compiler's own takes 1 KB of flash and a tenth of the time. On the board whose flash is nearly full, a few are
+//! divided for each configuration and image, and the time in milliseconds; the control interrupt divides none.
 
-/// The quotient of two unsigned numbers in r0 and r1, and what is left in r2 and r3: the run-time ABI's name (RTABI32, 5.3.2), which the linker prefers to the
-/// compiler's own. By zero the quotient is all ones; the language checks before. Some 700 cycles.
+/// The quotient of two unsigned numbers in r0 and r1, and what is left in r2 and r3: the run-time ABI's name (RTABI32,
+/// 5.3.2), which the linker prefers to the compiler's own. By zero the quotient is all ones; the language checks
+/// before. Some 700 cycles.
 #[unsafe(no_mangle)]
 #[unsafe(naked)]
 unsafe extern "C" fn __aeabi_uldivmod() {
@@ -13,7 +14,8 @@ unsafe extern "C" fn __aeabi_uldivmod() {
         "movs r4, #0",
         "movs r5, #0",
         "mov.w r8, #64",
-        // The dividend's highest bit goes into what is left, and the quotient's next one takes its place at the other end.
+        // The dividend's highest bit goes into what is left, and the quotient's next one takes its place at the other
+        // end.
         "2:",
         "adds r0, r0, r0",
         "adcs r1, r1",

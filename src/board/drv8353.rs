@@ -1,5 +1,5 @@
-//! DRV8353S gate driver on its bus: configuration with read-back, fault status, clearing; thread mode and the interrupt executor, never the control
-//! interrupt. What the registers mean: [`drv8353`].
+//! DRV8353S gate driver on its bus: configuration with read-back, fault status, clearing; thread mode and the interrupt
+//! executor, never the control interrupt. What the registers mean: [`drv8353`].
 
 use embassy_stm32::gpio::Output;
 use embassy_stm32::mode::Blocking;
@@ -66,8 +66,8 @@ impl Drv8353 {
         }
     }
 
-    /// Writes every register, lets the amplifiers find their zero, reads every register back. The driver must have been enabled for 1 ms, and the
-    /// bridge be off.
+    /// Writes every register, lets the amplifiers find their zero, reads every register back. The driver must have been
+    /// enabled for 1 ms, and the bridge be off.
     ///
     /// # Errors
     /// As [`Drv8353::verify`].

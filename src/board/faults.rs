@@ -1,7 +1,9 @@
-//! Panic, HardFault, NMI and unexpected interrupts: bridge off first, then the reason into RAM that survives, then reset.
+//! Panic, HardFault, NMI and unexpected interrupts: bridge off first, then the reason into RAM that survives, then
+//! reset.
 //!
-//! None of this needs anything to be initialised: a fault may come before the first line of the program. On boards with TIM1 a
-//! lock-up of the core (a fault within these handlers) clears the timer's outputs in hardware; elsewhere the watchdog ends it.
+//! None of this needs anything to be initialised: a fault may come before the first line of the program. On boards with
+//! TIM1 a lock-up of the core (a fault within these handlers) clears the timer's outputs in hardware; elsewhere the
+//! watchdog ends it.
 
 use core::mem::MaybeUninit;
 use core::panic::PanicInfo;
@@ -43,7 +45,8 @@ unsafe extern "C" {
 }
 
 fn words() -> [u32; WORDS] {
-    // SAFETY: plain words, any value of which is valid; nothing but this module's functions uses them, and they do not nest.
+    // SAFETY: plain words, any value of which is valid; nothing but this module's functions uses them, and they do not
+    // nest.
     unsafe { addr_of!(RECORD).cast::<[u32; WORDS]>().read_volatile() }
 }
 
@@ -135,8 +138,8 @@ pub fn torn_words() -> u32 {
     TORN_WORDS.load(Ordering::Relaxed)
 }
 
-/// Inlined into what all panics end in: where the compiler sees the whole program, it finds that nobody reads their messages, and leaves out what would
-/// format them, 1.7 KB.
+/// Inlined into what all panics end in: where the compiler sees the whole program, it finds that nobody reads their
+/// messages, and leaves out what would format them, 1.7 KB.
 #[panic_handler]
 #[allow(
     unused_attributes,
@@ -186,10 +189,11 @@ extern "C" fn hard_fault(frame: *const u32) -> ! {
 
 /// Flash ECC, clock security or SRAM parity.
 ///
-/// Reading a parameter word that a loss of power tore gives a double ECC error and so this interrupt. That is no reason to
-/// stop: the bridge goes off until the next control step, the flag is cleared, and the reader of the double word finds [`torn_words`]
-/// risen. What is that and what is fatal: [`ecc`]. The gate driver stays enabled: the slots are read after it was configured, and
-/// disabled it would be of no use until the next start, which reads the same torn word.
+/// Reading a parameter word that a loss of power tore gives a double ECC error and so this interrupt. That is no reason
+/// to stop: the bridge goes off until the next control step, the flag is cleared, and the reader of the double word
+/// finds [`torn_words`] risen. What is that and what is fatal: [`ecc`]. The gate driver stays enabled: the slots are
+/// read after it was configured, and disabled it would be of no use until the next start, which reads the same torn
+/// word.
 #[unsafe(no_mangle)]
 extern "C" fn NonMaskableInt() {
     super::let_go();

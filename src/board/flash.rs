@@ -1,8 +1,8 @@
 //! The pages of the flash that hold parameters; thread mode.
 //!
-//! embassy's driver erases and writes, with interrupts enabled. Where code and parameters share a bank, whatever fetches from flash
-//! stands still meanwhile, some 20 ms for a page (from memory, not measured): such a board writes with the motor off, and holds it off until it has
-//! written ([`control::hold_off`]).
+//! embassy's driver erases and writes, with interrupts enabled. Where code and parameters share a bank, whatever
+//! fetches from flash stands still meanwhile, some 20 ms for a page (from memory, not measured): such a board writes
+//! with the motor off, and holds it off until it has written ([`control::hold_off`]).
 
 use super::{FLASH_START, control, faults};
 use core::ptr::addr_of;
@@ -27,11 +27,12 @@ impl Parameters {
         Self { flash: Flash::new_blocking(flash) }
     }
 
-    /// All bytes of the region. What reads them knows by a checksum, read word by word, that they are whole: reading a torn word raises the
-    /// non-maskable interrupt and gives anything.
+    /// All bytes of the region. What reads them knows by a checksum, read word by word, that they are whole: reading a
+    /// torn word raises the non-maskable interrupt and gives anything.
     pub fn bytes(&self) -> &[u8] {
         let (start, end) = (addr_of!(__parameters_start), addr_of!(__parameters_end));
-        // SAFETY: the region is flash; it changes through `erase_page` and `program` alone, which need this value for themselves.
+        // SAFETY: the region is flash; it changes through `erase_page` and `program` alone, which need this value for
+        // themselves.
         unsafe { core::slice::from_raw_parts(start, end as usize - start as usize) }
     }
 
@@ -66,8 +67,8 @@ impl SlotFlash for Parameters {
         let offset = Self::offset(word.saturating_mul(DOUBLE_WORD), DOUBLE_WORD).ok_or(ReadError)?;
         let address = (FLASH_START + offset) as *const u32;
         let torn = faults::torn_words();
-        // SAFETY: two words of the region, which is flash and aligned to pages. Reading a torn one raises the non-maskable
-        // interrupt, which counts it and returns.
+        // SAFETY: two words of the region, which is flash and aligned to pages. Reading a torn one raises the
+        // non-maskable interrupt, which counts it and returns.
         let [low, high] = unsafe { [address.read_volatile(), address.add(1).read_volatile()] };
         // The interrupt has been taken before anything behind this.
         cortex_m::asm::dsb();

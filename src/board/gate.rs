@@ -1,9 +1,10 @@
-//! The moteus r4's gate driver, looked after by a task: set up as often as it takes, its faults read, counted and named, cleared where the joint's
-//! fault is reset.
+//! The moteus r4's gate driver, looked after by a task: set up as often as it takes, its faults read, counted and
+//! named, cleared where the joint's fault is reset.
 //!
-//! The control interrupt knows of it what its fault line and one byte say ([`State`]): the bridge is off unless the driver is ready, and only the task makes it
-//! ready, once every register has been read back and the fault line is high. Before it is ready for the first time there is no control step: the joint is "not
-//! ready to switch on", because its current amplifiers are in the driver.
+//! The control interrupt knows of it what its fault line and one byte say ([`State`]): the bridge is off unless the
+//! driver is ready, and only the task makes it ready, once every register has been read back and the fault line is
+//! high. Before it is ready for the first time there is no control step: the joint is "not ready to switch on", because
+//! its current amplifiers are in the driver.
 
 use super::control;
 use super::drv8353::Drv8353;
@@ -15,8 +16,9 @@ use joint_firmware::hardware::drv8353::name;
 use joint_firmware::hardware::moteus_revision::SUPPORTED;
 use joint_firmware::hardware::{GateDriver, Setup};
 
-/// Between two attempts to set the driver up, and from its enable to the first: twice the time that it needs (SLVSDY6, t_WAKE). Also how long the enable is low where
-/// the driver is to forget: longer than its reset pulse of 40 µs and than the 1 ms after which it sleeps.
+/// Between two attempts to set the driver up, and from its enable to the first: twice the time that it needs (SLVSDY6,
+/// t_WAKE). Also how long the enable is low where the driver is to forget: longer than its reset pulse of 40 µs and
+/// than the 1 ms after which it sleeps.
 const ATTEMPT: Duration = Duration::from_millis(2);
 /// Between two looks at the fault line.
 const LOOK: Duration = Duration::from_millis(1);
@@ -201,8 +203,8 @@ impl Gate {
         self.driver.verify()
     }
 
-    /// While the bridge is off: a driver that has lost its configuration, or its bus, is found before the bridge switches. Noise may spoil a frame: twice
-    /// wrong is wrong.
+    /// While the bridge is off: a driver that has lost its configuration, or its bus, is found before the bridge
+    /// switches. Noise may spoil a frame: twice wrong is wrong.
     async fn check(&mut self) {
         if self.driver.verify().is_err() {
             Timer::after(LOOK).await;

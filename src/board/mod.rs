@@ -1,13 +1,15 @@
 //! The boards: everything that knows a pin or a register, and all unsafe code of the program.
 //!
-//! One file a board, all with the same items (`NAME`, `CONTROL_HZ`, `chip_configuration`, `start_clocks`, `start`, `Sensors`, `apply`, ...); the
-//! others are shared. Nothing of this has run on a board; facts that nobody confirmed are marked in the boards' files.
+//! One file a board, all with the same items (`NAME`, `CONTROL_HZ`, `chip_configuration`, `start_clocks`, `start`,
+//! `Sensors`, `apply`, ...); the others are shared. Nothing of this has run on a board; facts that nobody confirmed are
+//! marked in the boards' files.
 //!
-//! embassy's drivers do the clocks, the pins, the timers' time bases, the operational amplifiers, the encoder counter, SPI
-//! outside the control interrupt, the independent watchdog and time. Registers are written directly where they are no choice:
+//! embassy's drivers do the clocks, the pins, the timers' time bases, the operational amplifiers, the encoder counter,
+//! SPI outside the control interrupt, the independent watchdog and time. Registers are written directly where they are
+//! no choice:
 //! - in the control interrupt, because the drivers check their arguments and panic;
-//! - for injected conversions, because `Adc::new` knows only the asynchronous clock and enables the converter before another
-//!   can be chosen, and because its triggers do not take a timer's compare channel as the instant of sampling;
+//! - for injected conversions, because `Adc::new` knows only the asynchronous clock and enables the converter before
+//!   another can be chosen, and because its triggers do not take a timer's compare channel as the instant of sampling;
 //! - to switch off in a fault handler, which owns no driver.
 
 pub mod adc;
@@ -51,7 +53,8 @@ pub use shared::{Offering, Prepared, Publisher, Subscriber};
 
 /// What a started board hands to the program.
 pub struct Parts {
-    /// What the control interrupt measures with. None where it may not start; the bridge then stays off, and the watchdog does not wait for it.
+    /// What the control interrupt measures with. None where it may not start; the bridge then stays off, and the
+    /// watchdog does not wait for it.
     pub sensors: Option<Sensors>,
     /// The gate driver, for its task.
     #[cfg(feature = "moteus-r4")]

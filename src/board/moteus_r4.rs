@@ -1,8 +1,8 @@
 //! mjbots moteus r4.11 (STM32G474CEU6): pins, timers, gains and limits.
 //!
-//! Sources: netlist of the controller r4.11 and the vendor's firmware (moteus_hw, moteus_controller, bldc_servo, drv8323), read not
-//! copied. The pin functions agree with the chip database that embassy is generated from. **Nothing here has run on a board.**
-//! Marked facts: *derived* from parts that a source names, *unconfirmed* by a second source.
+//! Sources: netlist of the controller r4.11 and the vendor's firmware (moteus_hw, moteus_controller, bldc_servo,
+//! drv8323), read not copied. The pin functions agree with the chip database that embassy is generated from. **Nothing
+//! here has run on a board.** Marked facts: *derived* from parts that a source names, *unconfirmed* by a second source.
 //!
 //! | function | pin, peripheral |
 //! |---|---|
@@ -16,8 +16,8 @@
 //! | holding brake, brake chopper | PC15, PC14: the pads DBG2, DBG1; high opens the brake, high conducts. For the input of a driver with a pull-down: they float until the program starts, and give no current |
 //! | LEDs | PF0 debug, PF1 power (lit when low: unconfirmed) |
 //!
-//! The vendor drives the same pins with TIM5, which cannot trigger the converters; TIM2 can trigger all of them at once. Neither has
-//! a break input: HIZ and enable switch off.
+//! The vendor drives the same pins with TIM5, which cannot trigger the converters; TIM2 can trigger all of them at
+//! once. Neither has a break input: HIZ and enable switch off.
 
 use super::adc::{self, FULL_SCALE, Sequence};
 use super::drv8353::Drv8353;
@@ -77,7 +77,8 @@ const WINDING_NTC: Thermistor = BRIDGE_NTC;
 
 /// TIM2_TRGO as the trigger of injected conversions, the same number for all converters (RM0440, tables 166 and 167).
 const TRIGGER: u8 = 2;
-/// Polls of the encoder's answer before it counts as lost. A frame takes 3 µs at 5.3 MHz, 510 cycles; a poll takes more than four.
+/// Polls of the encoder's answer before it counts as lost. A frame takes 3 µs at 5.3 MHz, 510 cycles; a poll takes more
+/// than four.
 const ENCODER_POLLS: u32 = 200;
 
 /// Core cycles in 350 ns.
@@ -140,8 +141,9 @@ fn identify(p: &mut Peripherals) -> u8 {
     pins.code()
 }
 
-/// Sets the peripherals up; everything but the PWM counter and the gate driver, which its task sets up, runs afterwards. The bridge stays off. On a board that
-/// the program is not for nothing is driven but the CAN bus, which says so.
+/// Sets the peripherals up; everything but the PWM counter and the gate driver, which its task sets up, runs
+/// afterwards. The bridge stays off. On a board that the program is not for nothing is driven but the CAN bus, which
+/// says so.
 #[inline(never)]
 pub fn start(mut p: Peripherals) -> Result<Parts, StartError> {
     let revision = identify(&mut p);
@@ -175,13 +177,15 @@ pub fn start(mut p: Peripherals) -> Result<Parts, StartError> {
     };
     parts.gate = gate::Parts::Gate(Gate { driver, enable: Output::new(p.PA3, Level::Low, Speed::Low) });
 
-    // Set up by embassy, used by register in the control interrupt. 5.3 MHz: the next faster is over the encoder's 10 MHz.
+    // Set up by embassy, used by register in the control interrupt. 5.3 MHz: the next faster is over the encoder's 10
+    // MHz.
     let mut bus = spi::Config::default();
     bus.mode = spi::MODE_1;
     bus.frequency = Hertz(6_000_000);
     let mut encoder = Spi::new_blocking(p.SPI2, p.PB13, p.PB15, p.PB14, bus);
     core::mem::forget(Output::new(p.PB11, Level::High, Speed::VeryHigh));
-    // The first transfer leaves the bus enabled, with frames of 16 bits; its answer is thrown away. An encoder that does not answer is the joint's to find.
+    // The first transfer leaves the bus enabled, with frames of 16 bits; its answer is thrown away. An encoder that
+    // does not answer is the joint's to find.
     let _ = encoder.blocking_transfer_in_place(&mut [as5047p::READ_ANGLE]);
     core::mem::forget(encoder);
     pac::SPI2.cr1().modify(|w| w.set_spe(true));
@@ -235,8 +239,9 @@ fn set_up_pwm(
     tim.egr().write(|w| w.set_ug(true));
 }
 
-/// The three currents at the same instant on three converters. The supply follows: the control interrupt comes at the end of the currents and finds the supply's
-/// code of the period before. ADC5 begins with the others and samples until their first conversions are over, so none of its steps disturbs them.
+/// The three currents at the same instant on three converters. The supply follows: the control interrupt comes at the
+/// end of the currents and finds the supply's code of the period before. ADC5 begins with the others and samples until
+/// their first conversions are over, so none of its steps disturbs them.
 fn convert() -> Result<(), StartError> {
     pac::RCC.ahb2enr().modify(|w| {
         w.set_adc12en(true);
@@ -273,8 +278,9 @@ fn select() -> u32 {
     DWT::cycle_count()
 }
 
-/// Begins a frame with the encoder, which has been selected: the first edge of the clock may come 350 ns after that (AS5047P datasheet, t_L). What was
-/// done meanwhile has mostly taken longer; what is left is waited for, a bounded number of times.
+/// Begins a frame with the encoder, which has been selected: the first edge of the clock may come 350 ns after that
+/// (AS5047P datasheet, t_L). What was done meanwhile has mostly taken longer; what is left is waited for, a bounded
+/// number of times.
 #[inline(always)]
 fn begin_frame(selected: u32) {
     for _ in 0..SELECT_CYCLES {
@@ -285,8 +291,8 @@ fn begin_frame(selected: u32) {
     pac::SPI2.dr16().write_value(as5047p::READ_ANGLE);
 }
 
-/// Ends the frame, which has long been over unless the step was very short; its wait is bounded. The answer, or none where it takes
-/// too long.
+/// Ends the frame, which has long been over unless the step was very short; its wait is bounded. The answer, or none
+/// where it takes too long.
 #[inline(always)]
 fn end_frame() -> Option<u16> {
     let spi = pac::SPI2;
@@ -307,8 +313,9 @@ impl Sensors {
 
     /// What is known now; temperatures and overrun are filled in by the caller.
     ///
-    /// The encoder's angle is the one that the frame of the period before brought, which runs while the control step does: two periods old, because an
-    /// answer is to the command of the frame before. Waiting for a frame of this period would take 600 of the period's 4,250 cycles.
+    /// The encoder's angle is the one that the frame of the period before brought, which runs while the control step
+    /// does: two periods old, because an answer is to the command of the frame before. Waiting for a frame of this
+    /// period would take 600 of the period's 4,250 cycles.
     #[inline(always)]
     pub fn measure(&mut self) -> Measurements {
         let selected = select();
@@ -395,8 +402,8 @@ pub fn let_go() {
     pac::GPIOB.bsrr().write(|w| w.set_br(7, true));
 }
 
-/// Switches all transistors off, now, and disables the gate driver. For fault handlers: needs nothing initialised, takes no
-/// lock, cannot fail. The driver has lost its configuration afterwards.
+/// Switches all transistors off, now, and disables the gate driver. For fault handlers: needs nothing initialised,
+/// takes no lock, cannot fail. The driver has lost its configuration afterwards.
 #[inline(always)]
 pub fn bridge_off() {
     // Without their clocks the ports ignore this, but then these pins have never been outputs.

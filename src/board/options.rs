@@ -19,8 +19,8 @@ pub fn report() {
 /// Keys of the flash and of the option bytes (RM0440, 3.4.2: FLASH_KEYR, FLASH_OPTKEYR).
 const KEYS: ([u32; 2], [u32; 2]) = ([0x4567_0123, 0xcdef_89ab], [0x0819_2a3b, 0x4c5d_6e7f]);
 
-/// Sets what is wrong and has the chip load it, which resets it (RM0440, 3.4.2, "Modifying user options", and 3.4.3); where nothing is wrong or the flash is
-/// not free, restarts. The joint is off.
+/// Sets what is wrong and has the chip load it, which resets it (RM0440, 3.4.2, "Modifying user options", and 3.4.3);
+/// where nothing is wrong or the flash is not free, restarts. The joint is off.
 pub fn set() -> ! {
     super::bridge_off();
     let options = found();

@@ -1,4 +1,5 @@
-//! True random numbers, for challenges: the chip's generator (RM0440, chapter 26) on the 48 MHz oscillator; thread mode.
+//! True random numbers, for challenges: the chip's generator (RM0440, chapter 26) on the 48 MHz oscillator; thread
+//! mode.
 
 use embassy_stm32::pac;
 use joint_firmware::parameters::authentication::CHALLENGE;

@@ -1,4 +1,5 @@
-//! Values that the control interrupt and a task hand to each other; who owns which place is `joint_firmware::exchange`'s to say.
+//! Values that the control interrupt and a task hand to each other; who owns which place is
+//! `joint_firmware::exchange`'s to say.
 
 use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;
@@ -116,28 +117,30 @@ pub struct Prepared<'a, T: 'static> {
 }
 
 impl<T> Offering<T> {
-    /// The place for the next value, which is of no use to anybody until one is prepared; none while the one before has not been taken.
+    /// The place for the next value, which is of no use to anybody until one is prepared; none while the one before has
+    /// not been taken.
     pub fn spare(&mut self) -> Option<&mut MaybeUninit<T>> {
         let place = self.preparer.place()?;
         // SAFETY: the place is the preparer's until it is offered, and it is one of the two.
         Some(unsafe { &mut *self.places.get().cast::<MaybeUninit<T>>().add(place) })
     }
 
-    /// Has a value made in its place, and finished there, looking at the one in use; none, and nothing happens, while the one before has not been
-    /// taken.
+    /// Has a value made in its place, and finished there, looking at the one in use; none, and nothing happens, while
+    /// the one before has not been taken.
     pub fn prepare<E>(
         &mut self,
         make: impl for<'a> FnOnce(&'a mut MaybeUninit<T>) -> Result<&'a mut T, E>,
         finish: impl FnOnce(&mut T, Option<&T>),
     ) -> Option<Result<Prepared<'_, T>, E>> {
         let place = self.preparer.place()?;
-        // SAFETY: the place in use was written before it was offered, its user only reads it, and it changes hands no earlier than
-        // another value is offered, which needs the borrow that this one is part of.
+        // SAFETY: the place in use was written before it was offered, its user only reads it, and it changes hands no
+        // earlier than another value is offered, which needs the borrow that this one is part of.
         let in_use = self
             .preparer
             .in_use()
             .map(|place| unsafe { (*self.places.get().cast::<MaybeUninit<T>>().add(place)).assume_init_ref() });
-        // SAFETY: the place is the preparer's until it is offered, which needs the borrow that this one becomes; it is one of the two.
+        // SAFETY: the place is the preparer's until it is offered, which needs the borrow that this one becomes; it is
+        // one of the two.
         let place = unsafe { &mut *self.places.get().cast::<MaybeUninit<T>>().add(place) };
         let address = place.as_ptr();
         Some(match make(place) {
@@ -170,8 +173,8 @@ impl<T> InUse<T> {
     pub fn current(&mut self) -> Option<&T> {
         self.user.take();
         let place = self.user.place()?;
-        // SAFETY: the place is the user's until the next call, which this borrow rules out; it is one of the two, and written
-        // before it was offered.
+        // SAFETY: the place is the user's until the next call, which this borrow rules out; it is one of the two, and
+        // written before it was offered.
         Some(unsafe { (*self.places.get().cast::<MaybeUninit<T>>().add(place)).assume_init_ref() })
     }
 }

@@ -1,7 +1,8 @@
-//! The independent watchdog: fed only while the control interrupt and both executors are alive. The slow executor may be busy for a
-//! while, with the proof of an image or with the flash; the control interrupt never is.
+//! The independent watchdog: fed only while the control interrupt and both executors are alive. The slow executor may
+//! be busy for a while, with the proof of an image or with the flash; the control interrupt never is.
 //!
-//! After 100 ms without food the chip resets; its pins then float and the gate drivers' own resistors keep the bridge off.
+//! After 100 ms without food the chip resets; its pins then float and the gate drivers' own resistors keep the bridge
+//! off.
 
 use super::control;
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -16,8 +17,8 @@ use static_cell::StaticCell;
 const TIMEOUT_US: u32 = 100_000;
 /// How often it is to be fed, ms; by the medium executor, whose life the feeding itself proves.
 pub const FEED_MS: u32 = 20;
-/// Longest time that the slow executor may be busy: the proof of an image takes 0.1 s alone, and some ten times as long beside control steps
-/// that leave it a tenth of the core.
+/// Longest time that the slow executor may be busy: the proof of an image takes 0.1 s alone, and some ten times as long
+/// beside control steps that leave it a tenth of the core.
 const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Counts up whenever the slow executor runs its task.
@@ -56,7 +57,8 @@ impl Watchdog {
         self.hardware.unleash();
     }
 
-    /// Feeds it, if the control interrupt, where it has been started, has run since the last call and the slow executor not too long ago; the caller is the medium one.
+    /// Feeds it, if the control interrupt, where it has been started, has run since the last call and the slow executor
+    /// not too long ago; the caller is the medium one.
     pub fn feed(&mut self) {
         let (steps, slow) = (control::statistics().steps, SLOW.load(Ordering::Relaxed));
         if slow != self.slow {

@@ -1,4 +1,5 @@
-//! Communication parameters of the joint: which PDOs there are at first, and each parameter as a number at its index; the task.
+//! Communication parameters of the joint: which PDOs there are at first, and each parameter as a number at its index;
+//! the task.
 
 use crate::canopen::{COUNTER_AND_DATE, CommunicationParameters, MappedObject, PDOS, PdoParameters};
 
@@ -11,8 +12,8 @@ const SLOW: u16 = 100;
 
 /// Parameters of a joint that nobody has set up.
 ///
-/// RPDO 4 does not exist; its mapping takes the velocity out of another joint's TPDO 2, so that only its COB-ID is to be set. TPDOs 1
-/// and 2 follow every SYNC, TPDOs 3 and 4 come ten times a second.
+/// RPDO 4 does not exist; its mapping takes the velocity out of another joint's TPDO 2, so that only its COB-ID is to
+/// be set. TPDOs 1 and 2 follow every SYNC, TPDOs 3 and 4 come ten times a second.
 pub fn default_communication(node_id: u8) -> CommunicationParameters {
     let map = MappedObject::new;
     let mut parameters = CommunicationParameters::predefined(node_id);
@@ -44,8 +45,8 @@ pub fn default_communication(node_id: u8) -> CommunicationParameters {
     parameters
 }
 
-/// Hands over what is stored of the communication parameters, as numbers at their indices and sub-indices, in ascending order; none as soon as one is
-/// not taken.
+/// Hands over what is stored of the communication parameters, as numbers at their indices and sub-indices, in ascending
+/// order; none as soon as one is not taken.
 pub(super) fn store(
     parameters: &CommunicationParameters,
     mut item: impl FnMut(u16, u8, u32) -> Option<()>,

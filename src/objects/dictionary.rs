@@ -230,8 +230,8 @@ impl<'a, P: Program> Objects<'a, P> {
         !matches!(state, State::NotReadyToSwitchOn | State::SwitchOnDisabled | State::Fault)
     }
 
-    /// Whether the joint cannot do without its control steps for as long as the erasing of a page takes them on one bank: it is armed, or turns so fast
-    /// that the encoder would lose count of the turns.
+    /// Whether the joint cannot do without its control steps for as long as the erasing of a page takes them on one
+    /// bank: it is armed, or turns so fast that the encoder would lose count of the turns.
     fn needs_control(&self) -> bool {
         let rotor = self.observed.telemetry.motion.velocity * self.configuration.gear.ratio;
         self.armed() || exceeds(rotor, QUARTER_TURN / ERASING)
@@ -254,7 +254,8 @@ impl<'a, P: Program> Objects<'a, P> {
         }
     }
 
-    /// Whether what is staged differs in any object: a loop over the table is a tenth of the code of comparing the records.
+    /// Whether what is staged differs in any object: a loop over the table is a tenth of the code of comparing the
+    /// records.
     fn is_changed(&self) -> bool {
         table::OBJECTS.iter().any(|object| match object.field {
             Field::Setting(setting) | Field::AtOnce(setting) => {

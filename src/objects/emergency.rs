@@ -5,10 +5,10 @@ use super::observed::{Observed, fault_bits, reason_number};
 use crate::hardware::GateDriver;
 use crate::joint::configuration::CollisionReaction;
 use crate::joint::fault::{Fault, Faults};
-use crate::joint::load_feedforward::LOADS;
 use crate::parameters::life_cycle::Refusal;
 
-/// The joint left the range that its friction was learned in. Information: [`reason`](super::table), number of departures (u16).
+/// The joint left the range that its friction was learned in. Information: [`reason`](super::table), number of
+/// departures (u16).
 pub const ENVELOPE: u16 = 0xFF01;
 /// Friction is no more what the image says, as adaptation has found. Information: friction factor and its deviation in
 /// thousandths (u16 each).
@@ -76,7 +76,8 @@ pub(super) struct Reports {
 impl Reports {
     /// The next thing to report: a fault that is new, the end of all, a departure from the trained range, an image that
     /// no more fits. Information of a fault: its
-    /// number, and the bits of object 2021h:4 (u16); of the gate driver's: its number, and both its status words (u16 each), for which it waits.
+    /// number, and the bits of object 2021h:4 (u16); of the gate driver's: its number, and both its status words (u16
+    /// each), for which it waits.
     pub(super) fn next(&mut self, observed: &Observed, driver: &GateDriver, now: u64) -> Option<Emergency> {
         let latched = observed.latched;
         if latched.is_empty() && !self.faults.is_empty() {
@@ -110,13 +111,14 @@ impl Reports {
             return Some(Emergency { code: MISFIT, register: register(latched), information: [a, b, c, d, 0] });
         }
         self.misfits &= !observed.adaptation.fits();
-        let new = LOADS && observed.external.collisions != self.collisions;
-        self.collisions = observed.external.collisions;
-        if new && observed.external.reaction != CollisionReaction::Off {
-            let [a, b, c, d] = observed.external.collided.to_le_bytes();
-            return Some(Emergency { code: COLLISION, register: register(latched), information: [a, b, c, d, 0] });
+        let external = observed.external.first()?;
+        if core::mem::replace(&mut self.collisions, external.collisions) == external.collisions
+            || external.reaction == CollisionReaction::Off
+        {
+            return None;
         }
-        None
+        let [a, b, c, d] = external.collided.to_le_bytes();
+        Some(Emergency { code: COLLISION, register: register(latched), information: [a, b, c, d, 0] })
     }
 }
 

@@ -1,4 +1,5 @@
-//! What an object of this joint is about; any context. The [table](super::table) says which index means which field, nothing else does.
+//! What an object of this joint is about; any context. The [table](super::table) says which index means which field,
+//! nothing else does.
 
 use super::operation::Operation;
 use super::settings::Setting;
@@ -79,7 +80,8 @@ pub enum HardwareField {
     SetOptions,
 }
 
-/// A number that never changes. Without the number itself, which is wider than all other fields, an entry of the table takes six bytes less.
+/// A number that never changes. Without the number itself, which is wider than all other fields, an entry of the table
+/// takes six bytes less.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Constant {
     /// Modes of operation, a bit each.

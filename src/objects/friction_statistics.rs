@@ -1,5 +1,5 @@
-//! How well compensation does over time: departures from the range that friction was learned in, and how far the full model is from
-//! what acts; a task that looks at telemetry at an even rate.
+//! How well compensation does over time: departures from the range that friction was learned in, and how far the full
+//! model is from what acts; a task that looks at telemetry at an even rate.
 
 use crate::compensation::{Output, Reason};
 use crate::joint::Telemetry;

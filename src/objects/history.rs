@@ -1,7 +1,8 @@
 //! The control steps before a fault as bytes, object 2300h; the task.
 //!
-//! Oldest first, [`STEP`] bytes each, little-endian: state (1 byte), three reserved, faults (a bit each as in object 2021h:4, 4 bytes),
-//! position, velocity, torque before compensation, compensation torque, current d, current q, bus voltage (4 bytes each, SI).
+//! Oldest first, [`STEP`] bytes each, little-endian: state (1 byte), three reserved, faults (a bit each as in object
+//! 2021h:4, 4 bytes), position, velocity, torque before compensation, compensation torque, current d, current q, bus
+//! voltage (4 bytes each, SI).
 
 use super::observed::fault_bits;
 use crate::joint::history::{History, LENGTH, Snapshot};

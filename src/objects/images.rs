@@ -1,7 +1,7 @@
 //! Objects 2210h to 2214h: the image life cycle as a client sees it; the task.
 //!
-//! A command that is accepted is answered at once; flash and control step are for the program to do afterwards ([`Images::take_action`],
-//! [`Images::finished`]), and the client polls the state.
+//! A command that is accepted is answered at once; flash and control step are for the program to do afterwards
+//! ([`Images::take_action`], [`Images::finished`]), and the client polls the state.
 
 use super::emergency::{Emergency, of_refusal};
 use super::field::{ImageField, StoredField, Which};
@@ -170,8 +170,8 @@ impl<'a> Images<'a> {
         if self.uploads { Ok(self.life.receive(self.staging, bytes)?) } else { Err(Failure::Abort(Abort::GENERAL)) }
     }
 
-    /// The upload is over. What has arrived of an image stays where it is, also where it is not whole: its length tells that, and verification
-    /// would say so.
+    /// The upload is over. What has arrived of an image stays where it is, also where it is not whole: its length tells
+    /// that, and verification would say so.
     pub(super) fn end(&mut self) {
         self.uploads = false;
     }

@@ -6,11 +6,11 @@
 //!  - [`Objects`], in the task below: every object by SDO, storing, the image life cycle, EMCYs.
 //!  - [`Shared`], a static, which both borrow.
 //!
-//! [`table`] declares every object once; the server's entries, `docs/objects.md` and the texts that a host makes (EDS, DBC) come
-//! from it. [`field`] is what an object can be about. The rest has one idea a file: [`Observed`] and its scaling, [`settings`] of the
-//! configuration, [`Operation`] for the modes, `profile_positions` and `profile_modes` for those in which positions have
-//! a hand-shake and an end, [`Images`] for the life cycle, [`Ownership`] for key and sessions, [`Stored`] for what
-//! 1010h keeps, [`Start`] for what a joint begins with, [`emergency`] for codes.
+//! [`table`] declares every object once; the server's entries, `docs/objects.md` and the texts that a host makes (EDS,
+//! DBC) come from it. [`field`] is what an object can be about. The rest has one idea a file: [`Observed`] and its
+//! scaling, [`settings`] of the configuration, [`Operation`] for the modes, `profile_positions` and `profile_modes` for
+//! those in which positions have a hand-shake and an end, [`Images`] for the life cycle, [`Ownership`] for key and
+//! sessions, [`Stored`] for what 1010h keeps, [`Start`] for what a joint begins with, [`emergency`] for codes.
 //!
 //! ```text
 //!  receive interrupt   image.at(now); image.observe(&observed)

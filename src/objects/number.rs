@@ -1,5 +1,5 @@
-//! Real numbers as the integers of process data: rounded to nearest, held at the ends of the type, 0 for what is not a number; any
-//! context.
+//! Real numbers as the integers of process data: rounded to nearest, held at the ends of the type, 0 for what is not a
+//! number; any context.
 
 /// The nearest integer, as a real number.
 fn rounded(value: f32) -> f32 {

@@ -1,4 +1,5 @@
-//! What is known of the joint at one instant, and the actual values that objects show of it; receive interrupt and task.
+//! What is known of the joint at one instant, and the actual values that objects show of it; receive interrupt and
+//! task.
 
 use super::field::{Actual, SetPoint};
 use super::friction_statistics::FrictionStatistics;
@@ -9,6 +10,7 @@ use crate::compensation::Reason;
 use crate::joint::adaptation;
 use crate::joint::external_torque;
 use crate::joint::fault::Faults;
+use crate::joint::load_feedforward::LOADS;
 use crate::joint::state_machine::State;
 use crate::joint::{PROFILES, Telemetry};
 
@@ -29,8 +31,8 @@ pub struct Observed {
     pub friction: FrictionStatistics,
     /// Of adaptation.
     pub adaptation: adaptation::Report,
-    /// Of the external torque.
-    pub external: external_torque::Report,
+    /// Of the external torque; no byte of it where a program has no room.
+    pub external: [external_torque::Report; LOADS as usize],
 }
 
 impl Default for Observed {
@@ -44,14 +46,14 @@ impl Default for Observed {
             bridge_temperature: f32::NAN,
             friction: FrictionStatistics::default(),
             adaptation: adaptation::Report::default(),
-            external: external_torque::Report::default(),
+            external: [external_torque::Report::NOTHING; LOADS as usize],
         }
     }
 }
 
 impl Observed {
-    /// Torque that neither the command's feed-forward nor compensation explain, Nm: in position, velocity and impedance mode what is
-    /// left for the controller, which is what a better friction model would take over.
+    /// Torque that neither the command's feed-forward nor compensation explain, Nm: in position, velocity and impedance
+    /// mode what is left for the controller, which is what a better friction model would take over.
     pub fn residual(&self) -> f32 {
         self.telemetry.torque() - self.feedforward_torque - self.telemetry.compensated.torque
     }
@@ -112,9 +114,9 @@ impl Observed {
             Actual::FactorDeviation => self.adaptation.deviation.to_bits().into(),
             Actual::AdaptedViscous => self.adaptation.factors.viscous.to_bits().into(),
             Actual::Outputs => u64::from(!t.outputs.brake_open()) | u64::from(t.outputs.chopper()) << 16,
-            Actual::ExternalTorque => permille(self.external.torque),
-            Actual::ExternalUncertainty => permille(self.external.uncertainty),
-            Actual::Collisions => self.external.collisions.into(),
+            Actual::ExternalTorque => self.external.first().map_or(0, |external| permille(external.torque)),
+            Actual::ExternalUncertainty => self.external.first().map_or(0, |external| permille(external.uncertainty)),
+            Actual::Collisions => self.external.first().map_or(0, |external| external.collisions.into()),
             Actual::ImageVersion => shared.image_version().into(),
             Actual::ImageState => shared.image_state().into(),
         }

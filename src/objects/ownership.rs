@@ -1,8 +1,9 @@
 //! Object 2215h: who owns the joint, and what its owner may do; the task.
 //!
-//! A joint without a key belongs to nobody and takes everything. With one, whatever changes what it can do to its surroundings wants
-//! a session, which the key opens ([`authentication`](crate::parameters::authentication)). The first key, and the end of a key that is lost, want somebody
-//! at the joint: its button is pressed, or, where it has none, its supply has just come and no master has started it since.
+//! A joint without a key belongs to nobody and takes everything. With one, whatever changes what it can do to its
+//! surroundings wants a session, which the key opens ([`authentication`](crate::parameters::authentication)). The first
+//! key, and the end of a key that is lost, want somebody at the joint: its button is pressed, or, where it has none,
+//! its supply has just come and no master has started it since.
 
 use super::field::OwnerField;
 use super::settings::Setting;
@@ -24,7 +25,8 @@ pub const FORGET: u32 = u32::from_le_bytes(*b"back");
 /// Longest upload: a masked key and its response.
 pub(super) const UPLOAD: usize = if SESSIONS { KEY + TAG } else { KEY };
 
-/// Settings that anybody may lower below what the owner set, as far as off; where there is a button, it is for that, too.
+/// Settings that anybody may lower below what the owner set, as far as off; where there is a button, it is for that,
+/// too.
 const BOXED: [Setting; 5] =
     [Setting::Request, Setting::CompensationGain, Setting::Clamp, Setting::Slew, Setting::Adaptation];
 /// Number of settings that are remembered as the owner set them.
@@ -119,8 +121,9 @@ impl Ownership {
         open
     }
 
-    /// Whether a setting that acts at once asks for no more compensation than the owner set, which is open to all. The numbers
-    /// compare as the settings do: each is a choice that rises, or a REAL32, whose bits rise from 0 on and are larger for what is negative.
+    /// Whether a setting that acts at once asks for no more compensation than the owner set, which is open to all. The
+    /// numbers compare as the settings do: each is a choice that rises, or a REAL32, whose bits rise from 0 on and
+    /// are larger for what is negative.
     pub(super) fn is_lowered(&self, setting: Setting, number: u32) -> bool {
         BOXED.iter().zip(&self.owned).any(|(one, owned)| *one == setting && number <= *owned)
     }

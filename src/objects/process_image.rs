@@ -1,16 +1,17 @@
 //! Process data of the joint: RPDOs to one [`Demand`], actual values to TPDOs; the receive interrupt.
 //!
-//! An RPDO counts as a whole, once all of its objects are there. That it arrives renews the command deadline ([`Demand::sequence`]), whatever its
-//! mapping. Where a master maps object 2010h:1 beside its set-points, one that repeats itself without thinking is not alive: the PDO with the
-//! number of the one before renews nothing.
+//! An RPDO counts as a whole, once all of its objects are there. That it arrives renews the command deadline
+//! ([`Demand::sequence`]), whatever its mapping. Where a master maps object 2010h:1 beside its set-points, one that
+//! repeats itself without thinking is not alive: the PDO with the number of the one before renews nothing.
 //!
 //! A demand comes before everything that can wait: copies of the set-points for the task are left behind it, by
 //! [`JointImage::leave_copies`].
 //!
 //! A joint whose configuration is lost is asked for nothing but a fault reset: it stays in "switch on disabled".
 //!
-//! Outside OPERATIONAL, and in it until a controlword comes, the joint is asked for a quick stop and no torque. It is the node's own
-//! demand, and its sequence changes with the transition only: a joint that still brakes when the command deadline is over has a fault.
+//! Outside OPERATIONAL, and in it until a controlword comes, the joint is asked for a quick stop and no torque. It is
+//! the node's own demand, and its sequence changes with the transition only: a joint that still brakes when the command
+//! deadline is over has a fault.
 
 use super::field::{Field, SetPoint};
 use super::interpolation::Interpolation;
@@ -89,7 +90,8 @@ impl<'a> JointImage<'a> {
         }
     }
 
-    /// What TPDOs carry from now on. Before [`Receiver::receive`](crate::canopen::Receiver::receive), at least where the frame is SYNC.
+    /// What TPDOs carry from now on. Before [`Receiver::receive`](crate::canopen::Receiver::receive), at least where
+    /// the frame is SYNC.
     pub fn observe(&mut self, observed: &Observed) {
         self.observed = *observed;
     }
@@ -122,8 +124,8 @@ impl<'a> JointImage<'a> {
         self.now = now;
     }
 
-    /// Leaves copies of the set-points in force for the task, and for TPDOs. At the end of every receive interrupt, once
-    /// the demand is published.
+    /// Leaves copies of the set-points in force for the task, and for TPDOs. At the end of every receive interrupt,
+    /// once the demand is published.
     pub fn leave_copies(&mut self) {
         if core::mem::take(&mut self.changed) {
             self.publish();
@@ -144,7 +146,8 @@ impl<'a> JointImage<'a> {
             Some(reaction) => {
                 let halted = self.points.halted();
                 let command = halted.command(self.shared);
-                // Nobody renews the set-point of a joint that holds or follows a profile: as impedance it would be late.
+                // Nobody renews the set-point of a joint that holds or follows a profile: as impedance it would be
+                // late.
                 let renewed = !matches!(self.points.command(self.shared).mode, Mode::Hold | Mode::Profile);
                 match reaction {
                     CollisionReaction::Yield if renewed => (word, command.giving_way()),

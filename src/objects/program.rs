@@ -59,8 +59,8 @@ pub trait Program {
     /// Fills `out` with bytes of the stored image in use, from `offset` on; false where they cannot be read.
     fn read_image(&mut self, offset: u32, out: &mut [u8]) -> bool;
 
-    /// Reads the steps before a fault, while one is latched; none otherwise. `read` is short: it may hold the control step up, which
-    /// then keeps the bridge off.
+    /// Reads the steps before a fault, while one is latched; none otherwise. `read` is short: it may hold the control
+    /// step up, which then keeps the bridge off.
     fn history<R>(&self, read: impl FnOnce(&History) -> R) -> Option<R>;
 
     /// Why the program started; the same until the next start, but for the stops in a row.
@@ -71,8 +71,8 @@ pub trait Program {
         Hardware::default()
     }
 
-    /// Sets the chip's option bytes as they are needed, once the client has been answered, and resets the chip; the joint is off. False where there
-    /// are none.
+    /// Sets the chip's option bytes as they are needed, once the client has been answered, and resets the chip; the
+    /// joint is off. False where there are none.
     fn set_options(&mut self) -> bool {
         false
     }

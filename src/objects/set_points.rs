@@ -30,7 +30,8 @@ pub(super) struct SetPoints {
     open_loop: Frame,
 }
 
-/// Which targets there are. A joint must not run to zero, or to where it was to go an hour ago, because nobody said where to.
+/// Which targets there are. A joint must not run to zero, or to where it was to go an hour ago, because nobody said
+/// where to.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Targets {
     torque: bool,
@@ -303,9 +304,10 @@ impl SetPoints {
 
 /// The command of an impedance frame.
 ///
-/// Bits as in the mini-cheetah actuator's frame, most significant first on the bus: position 16, velocity 12, stiffness 12, damping 12,
-/// torque 12. Position, velocity and torque count from minus their range to plus it, the gains from 0. As the number of steps is odd, no
-/// number stands for exactly zero: of velocity and torque the nearest are half a step, range / 4095, off.
+/// Bits as in the mini-cheetah actuator's frame, most significant first on the bus: position 16, velocity 12, stiffness
+/// 12, damping 12, torque 12. Position, velocity and torque count from minus their range to plus it, the gains from 0.
+/// As the number of steps is odd, no number stands for exactly zero: of velocity and torque the nearest are half a
+/// step, range / 4095, off.
 fn impedance(frame: u64, range: impl Fn(Range) -> f32) -> Command {
     let bits = frame.swap_bytes();
     let part = |shift: u32, mask: u16| (bits >> shift) as u16 & mask;

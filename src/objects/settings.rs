@@ -1,5 +1,5 @@
-//! Settings of the [`Configuration`], each as the number that an object carries; the task. Which setting is which member stands here
-//! and nowhere else.
+//! Settings of the [`Configuration`], each as the number that an object carries; the task. Which setting is which
+//! member stands here and nowhere else.
 
 use crate::compensation::Request;
 use crate::joint::adaptation::ADAPTS;

@@ -1,8 +1,9 @@
 //! What the receive interrupt and the task both need of the objects; atomics, any context. A static that both borrow.
 //!
-//! The set-points belong to the interrupt: RPDOs set them, and an RPDO counts as a whole. A set-point that the task is written by SDO
-//! goes through a place for one value, which the interrupt empties; what the task reads of set-points is a copy that the interrupt
-//! leaves here. Ranges, scale and state of the image belong to the task, and the interrupt only reads them.
+//! The set-points belong to the interrupt: RPDOs set them, and an RPDO counts as a whole. A set-point that the task is
+//! written by SDO goes through a place for one value, which the interrupt empties; what the task reads of set-points is
+//! a copy that the interrupt leaves here. Ranges, scale and state of the image belong to the task, and the interrupt
+//! only reads them.
 
 use super::field::{PROFILE_PARAMETERS, ProfileParameter, RANGES, Range, SET_POINTS, SetPoint};
 use super::operation::Operation;
@@ -11,7 +12,8 @@ use crate::joint::configuration::Configuration;
 use crate::joint::state_machine::Controlword;
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU16, AtomicU32, Ordering};
 
-/// Ranges of the mini-cheetah actuator's firmware, the first to use such a frame: 12.5 rad, 65 rad/s, 500 Nm/rad, 5 Nm s/rad, 18 Nm.
+/// Ranges of the mini-cheetah actuator's firmware, the first to use such a frame: 12.5 rad, 65 rad/s, 500 Nm/rad, 5 Nm
+/// s/rad, 18 Nm.
 pub const DEFAULT_RANGES: [f32; RANGES] = [12.5, 65.0, 500.0, 5.0, 18.0];
 
 /// The shared part of the objects.
@@ -120,8 +122,8 @@ impl Shared {
         }
     }
 
-    /// Whether a set-point that came by SDO waits for [`JointImage::follow`](super::JointImage::follow). The task looks here after each SDO
-    /// request and then has the interrupt run.
+    /// Whether a set-point that came by SDO waits for [`JointImage::follow`](super::JointImage::follow). The task looks
+    /// here after each SDO request and then has the interrupt run.
     pub fn has_written(&self) -> bool {
         self.written.load(Ordering::Acquire)
     }

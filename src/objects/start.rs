@@ -11,8 +11,8 @@ pub struct Start {
     pub configuration: Configuration,
     /// Ranges of the impedance frame, by number.
     pub ranges: [f32; RANGES],
-    /// The configuration that was stored last is not the one in use: it is damaged, unreadable or refused. The joint is
-    /// not enabled before one has been stored (1010h) or the defaults restored (1011h).
+    /// The configuration that was stored last is not the one in use: it is damaged, unreadable or refused. The joint
+    /// is not enabled before one has been stored (1010h) or the defaults restored (1011h).
     pub lost: bool,
     /// Code and parameters lie in one bank of flash: writing stops the program, so the motor has to be off, and nearly
     /// at rest.

@@ -1,4 +1,5 @@
-//! What object 1010h stores: configuration, impedance ranges and communication parameters as one record of bytes; the task, host.
+//! What object 1010h stores: configuration, impedance ranges and communication parameters as one record of bytes; the
+//! task, host.
 //!
 //! | offset | bytes | content |
 //! |---|---|---|
@@ -7,8 +8,9 @@
 //! | 2 | 1 | node id that the communication parameters are for; 0 where there are none |
 //! | 3 | 7 each | index (2 bytes), sub-index (1), value (4), all little-endian, for every object that is stored |
 //!
-//! Objects that a program does not know are skipped, objects that are missing keep their defaults: a record survives a change of
-//! program both ways. A limit damping that is missing, in records of programs that had none, is the least that its limits permit. Length and damage are the business of the [slots](crate::parameters::slots) that it lies in.
+//! Objects that a program does not know are skipped, objects that are missing keep their defaults: a record survives a
+//! change of program both ways. A limit damping that is missing, in records of programs that had none, is the least
+//! that its limits permit. Length and damage are the business of the [slots](crate::parameters::slots) that it lies in.
 
 use super::communication::{self, VERIFICATION};
 use super::field::{Field, RANGES, Range};
@@ -27,7 +29,8 @@ const FORMAT: u8 = 1;
 const LOST: u8 = 1 << 7;
 const ITEM: usize = 7;
 
-/// A record's content but for the communication parameters, which are read from it when they are wanted (`communication_parameters`).
+/// A record's content but for the communication parameters, which are read from it when they are wanted
+/// (`communication_parameters`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stored {
     /// 1 to 127, or 255 for none: what LSS stored. Defaults are restored without it.
@@ -49,7 +52,8 @@ pub enum Part<T> {
     New(T),
 }
 
-/// A new record in place of one before. What both hold is copied item by item, so that nobody has to hold a whole record's values.
+/// A new record in place of one before. What both hold is copied item by item, so that nobody has to hold a whole
+/// record's values.
 #[derive(Clone, Copy, Debug)]
 pub struct Update<'a> {
     /// The node id that LSS stored, or none for the one before.
@@ -127,8 +131,8 @@ impl Stored {
     /// What there is without a record.
     pub const NOTHING: Self = Self { node_id: NO_NODE_ID, lost: false, application: None };
 
-    /// The configuration to start with, where `defaults` are the board's. It may hold values out of their ranges, if those have
-    /// changed: [`Configuration::prepare`] decides.
+    /// The configuration to start with, where `defaults` are the board's. It may hold values out of their ranges, if
+    /// those have changed: [`Configuration::prepare`] decides.
     pub fn configuration(&self, defaults: &Configuration) -> Configuration {
         let (configuration, _) = self.application.unwrap_or((*defaults, DEFAULT_RANGES));
         Configuration { node_id: self.node_id, ..configuration }

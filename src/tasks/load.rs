@@ -31,15 +31,16 @@ impl Bearing {
     pub const NOTHING: Self = Self { parts: [(LoadFeedforward::NOTHING, ExternalTorque::NOTHING); LOADS as usize] };
 
     /// Every millisecond: from a control step to what the next commands carry; `factors` of the image's friction act.
-    pub fn look(&mut self, telemetry: &Telemetry, factors: &Factors) -> Report {
-        let Some((feedforward, external)) = self.parts.first_mut() else { return Report::NOTHING };
-        let (gains, settings) = critical_section::with(|section| PREPARED.borrow(section).get());
-        can::bear(feedforward.look(&gains, telemetry));
-        let before = external.report().collisions;
-        let report = external.look(&settings, telemetry, factors);
-        if report.collisions != before {
-            can::collide(report.reaction);
-        }
-        report
+    pub fn look(&mut self, telemetry: &Telemetry, factors: &Factors) -> [Report; LOADS as usize] {
+        self.parts.each_mut().map(|(feedforward, external)| {
+            let (gains, settings) = critical_section::with(|section| PREPARED.borrow(section).get());
+            can::bear(feedforward.look(&gains, telemetry));
+            let before = external.report().collisions;
+            let report = external.look(&settings, telemetry, factors);
+            if report.collisions != before {
+                can::collide(report.reaction);
+            }
+            report
+        })
     }
 }

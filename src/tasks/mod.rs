@@ -22,8 +22,8 @@ const HEALTHY: Duration = Duration::from_secs(10);
 /// A button counts as pressed after so many milliseconds: contacts bounce.
 const DEBOUNCE_MS: u32 = 20;
 
-/// Why the joint does not start. Without the control interrupt the bridge stays off. The watchdog is not started: a board that stands
-/// still is easier to look into than one that resets for ever.
+/// Why the joint does not start. Without the control interrupt the bridge stays off. The watchdog is not started: a
+/// board that stands still is easier to look into than one that resets for ever.
 pub enum NotStarted {
     /// The board.
     Board(StartError),
@@ -59,7 +59,8 @@ pub struct Started {
     encoder_counts: u32,
 }
 
-/// Starts everything; called once in thread mode. `medium` starts the interrupt executor. A function of its own: its stack is free again for the tasks.
+/// Starts everything; called once in thread mode. `medium` starts the interrupt executor. A function of its own: its
+/// stack is free again for the tasks.
 #[inline(never)]
 pub fn start(slow: Spawner, medium: impl FnOnce() -> SendSpawner, peripherals: Peripherals) {
     faults::report();
@@ -98,7 +99,8 @@ fn begin(slow: Spawner, medium: impl FnOnce() -> SendSpawner, peripherals: Perip
     Ok(())
 }
 
-/// The thermal model, at the sensor's temperature or, as nobody knows how hot the motor was when the power went, where derating begins.
+/// The thermal model, at the sensor's temperature or, as nobody knows how hot the motor was when the power went, where
+/// derating begins.
 fn winding(thermal: &ThermalSettings) -> Result<WindingTemperature, ConfigurationError> {
     let (_, sensor) = board::temperatures();
     let plausible = sensor >= PLAUSIBLE_SENSOR.0 && sensor <= PLAUSIBLE_SENSOR.1;
@@ -110,7 +112,8 @@ fn winding(thermal: &ThermalSettings) -> Result<WindingTemperature, Configuratio
 async fn keep_cool(mut winding: WindingTemperature) {
     let mut ticker = Ticker::every(Duration::from_hz(SLOW_RATE as u64));
     ticker.next().await;
-    // The winding is as hot as it may be, the gear as warm as it probably is: as the electronics beside it when the power came.
+    // The winding is as hot as it may be, the gear as warm as it probably is: as the electronics beside it when the
+    // power came.
     let mut gear = winding.starting_at(board::temperatures().0);
     loop {
         ticker.next().await;
@@ -123,8 +126,8 @@ async fn keep_cool(mut winding: WindingTemperature) {
     }
 }
 
-/// Every millisecond: temperatures for the control step; the model in shadow; what the bus shows of the joint; the button, which stops
-/// the bridge until the next reset; the watchdog.
+/// Every millisecond: temperatures for the control step; the model in shadow; what the bus shows of the joint; the
+/// button, which stops the bridge until the next reset; the watchdog.
 #[embassy_executor::task]
 async fn supervise(button: Option<Input<'static>>, mut watching: Watching, watchdog: &'static mut Watchdog) {
     watchdog.start();
@@ -215,7 +218,8 @@ fn state_name(state: State) -> defmt::Str {
     }
 }
 
-/// The LED: a short blink a second while the bridge is off, lit while it switches, fast blinking after a fault or a stop.
+/// The LED: a short blink a second while the bridge is off, lit while it switches, fast blinking after a fault or a
+/// stop.
 #[embassy_executor::task]
 async fn show(mut led: Led) {
     let mut ticker = Ticker::every(Duration::from_millis(100));

@@ -1,8 +1,9 @@
-//! The table of all objects: index, type, access, mapping, field, and for people name, unit, scale, limits and a line of description.
+//! The table of all objects: index, type, access, mapping, field, and for people name, unit, scale, limits and a line
+//! of description.
 //!
-//! Declared once, in the rooms below, and kept in two statics of the same length: [`OBJECTS`], which the joint itself needs, and
-//! [`TEXTS`], which only what runs on a host refers to, so that a board's program does not carry it. Sub-index 0 of a record
-//! is made from the record.
+//! Declared once, in the rooms below, and kept in two statics of the same length: [`OBJECTS`], which the joint itself
+//! needs, and [`TEXTS`], which only what runs on a host refers to, so that a board's program does not carry it.
+//! Sub-index 0 of a record is made from the record.
 
 mod communication;
 mod configuration;

@@ -453,7 +453,7 @@ fn a_collision_is_told_with_its_torque_where_something_is_done_about_it() {
     let mut collisions = 0;
     let mut emergency = |node: &mut Node, reaction| {
         collisions += 1;
-        node.observed.external = Report { collisions, collided: -12.5, reaction, ..Report::NOTHING };
+        node.observed.external[0] = Report { collisions, collided: -12.5, reaction, ..Report::NOTHING };
         node.task().iter().find(|frame| frame.id() == 0x85).map(|frame| *frame.eight().unwrap())
     };
     assert_eq!(emergency(&mut node, CollisionReaction::Off), None);
@@ -461,8 +461,8 @@ fn a_collision_is_told_with_its_torque_where_something_is_done_about_it() {
     assert_eq!(emergency(&mut node, CollisionReaction::Warning), Some(told));
     assert_eq!(node.task(), vec![], "once");
     assert_eq!(emergency(&mut node, CollisionReaction::Yield), Some(told));
-    node.observed.external.torque = -0.25 * BOARD.joint.limits.torque;
-    node.observed.external.uncertainty = 0.125 * BOARD.joint.limits.torque;
+    node.observed.external[0].torque = -0.25 * BOARD.joint.limits.torque;
+    node.observed.external[0].uncertainty = 0.125 * BOARD.joint.limits.torque;
     let read = [4, 5, 6].map(|sub_index| node.number(0x2203, sub_index));
     assert_eq!(read, [u64::from(-250i16 as u16), 125, 3]);
 }

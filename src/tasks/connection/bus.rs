@@ -1,7 +1,9 @@
-//! The joint on the bus: what the receive interrupt leaves, SDO, LSS, heartbeats, EMCYs, the life of images; thread mode.
+//! The joint on the bus: what the receive interrupt leaves, SDO, LSS, heartbeats, EMCYs, the life of images; thread
+//! mode.
 //!
-//! The proof of an image may take up to 21 million instructions (0.12 s at one a cycle), and writing one stalls for the flash. Neither has been
-//! measured on a board. Meanwhile this task sends no heartbeat; NMT, SYNC and RPDOs act in the interrupt all the same.
+//! The proof of an image may take up to 21 million instructions (0.12 s at one a cycle), and writing one stalls for the
+//! flash. Neither has been measured on a board. Meanwhile this task sends no heartbeat; NMT, SYNC and RPDOs act in the
+//! interrupt all the same.
 
 use super::program::BoardProgram;
 use crate::board::can::{self, Condition};

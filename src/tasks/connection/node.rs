@@ -21,8 +21,8 @@ const CRC: crc::Crc<u32, crc::NoTable> = crc::Crc::<u32, crc::NoTable>::new(&crc
 static BUS: canopen::Shared = canopen::Shared::new();
 static OBJECTS: Shared = Shared::new();
 
-/// Starts the receive interrupt; the rest is the task's. A function of its own, as all steps of the start: what each takes of the stack is free again
-/// for the next.
+/// Starts the receive interrupt; the rest is the task's. A function of its own, as all steps of the start: what each
+/// takes of the stack is free again for the next.
 #[inline(never)]
 pub fn start(
     mut program: BoardProgram,

@@ -1,4 +1,5 @@
-//! What the board does for the objects: configurations and friction models to the control step, records to flash. Thread mode.
+//! What the board does for the objects: configurations and friction models to the control step, records to flash.
+//! Thread mode.
 
 use super::super::{adaptation, load};
 use super::store::Store;
@@ -68,8 +69,8 @@ impl BoardProgram {
         Ok(thermal)
     }
 
-    /// Has the control step take the friction model of an image with the configuration in use; false while it has not taken what it was
-    /// offered before.
+    /// Has the control step take the friction model of an image with the configuration in use; false while it has not
+    /// taken what it was offered before.
     pub fn run(&mut self, configuration: &Configuration, image: &[u8]) -> bool {
         offer(&mut self.active, configuration, image)
     }

@@ -1,4 +1,5 @@
-//! What the board keeps in flash: friction images, the stored record of objects, the key with what guards it. Thread mode.
+//! What the board keeps in flash: friction images, the stored record of objects, the key with what guards it. Thread
+//! mode.
 //!
 //! | pages | kind | content |
 //! |---|---|---|
@@ -60,7 +61,8 @@ impl Store {
         self.flash.bytes().get(self.images.range(slot)?)
     }
 
-    /// `length` bytes of the image in use from `offset` on; none where there are not so many. The image carries its own checksum.
+    /// `length` bytes of the image in use from `offset` on; none where there are not so many. The image carries its own
+    /// checksum.
     pub fn piece_of_image(&self, offset: usize, length: usize) -> Option<&[u8]> {
         let image = self.flash.bytes().get(self.images.range(self.images.active()?)?)?;
         image.get(offset..offset.checked_add(length)?)
@@ -97,8 +99,8 @@ impl Store {
         self.records.store(&mut self.flash, record)
     }
 
-    /// What guards the joint. Where it is damaged the joint is locked, and that is kept with the key that is left: the slot that is damaged is given
-    /// up, and may have held a higher floor, or a key.
+    /// What guards the joint. Where it is damaged the joint is locked, and that is kept with the key that is left: the
+    /// slot that is damaged is given up, and may have held a higher floor, or a key.
     pub fn guard(&mut self) -> Guard {
         let mut bytes = [0; GUARD];
         let mut guard = match self.guards.load(&mut self.flash, &mut bytes) {

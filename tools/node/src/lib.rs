@@ -1,5 +1,5 @@
-//! The virtual joint as a CANopen node on a bus: the firmware's control step, object dictionary, CANopen server, image life cycle and slots around
-//! the simulated actuator; host.
+//! The virtual joint as a CANopen node on a bus: the firmware's control step, object dictionary, CANopen server, image
+//! life cycle and slots around the simulated actuator; host.
 //!
 //! ```text
 //! frame -> Receiver -> JointImage -> Demand -> VirtualJoint::step        as the board's two interrupts

@@ -1,8 +1,9 @@
-//! Several nodes on one modelled wire, in simulated time: bits, arbitration and control steps to the nanosecond, as fast as the machine can.
+//! Several nodes on one modelled wire, in simulated time: bits, arbitration and control steps to the nanosecond, as
+//! fast as the machine can.
 //!
-//! What is assumed about the board, because no board has been measured: the receive interrupt has done its work [`REACTION`] after a frame's last
-//! bit, the task gets to a request [`TASK`] later, and the controller has three transmit buffers that it empties by identifier (the
-//! STM32G4's FDCAN).
+//! What is assumed about the board, because no board has been measured: the receive interrupt has done its work
+//! [`REACTION`] after a frame's last bit, the task gets to a request [`TASK`] later, and the controller has three
+//! transmit buffers that it empties by identifier (the STM32G4's FDCAN).
 
 use crate::virtual_node::VirtualNode;
 use bus::Frame;

@@ -7,10 +7,12 @@ use std::time::{Duration, Instant};
 
 /// Time that is waited for a frame, and simulated at once.
 const TICK: Duration = Duration::from_millis(1);
-/// Time that is simulated at most before the bus is looked at again: a machine that is behind still answers, and a client
-/// that reads a dozen objects one behind the other does not meet the joint's command deadline of 100 ms meanwhile.
+/// Time that is simulated at most before the bus is looked at again: a machine that is behind still answers, and a
+/// client that reads a dozen objects one behind the other does not meet the joint's command deadline of 100 ms
+/// meanwhile.
 const LONGEST: Duration = Duration::from_millis(2);
-/// Frames that are taken at most before the node lives on: as many of the shortest, 47 bits, as a bus of 1 Mbit/s carries in that time.
+/// Frames that are taken at most before the node lives on: as many of the shortest, 47 bits, as a bus of 1 Mbit/s
+/// carries in that time.
 const MOST: u32 = 42;
 /// A machine that is so much behind gives the time up.
 const LOST: Duration = Duration::from_millis(100);
@@ -120,7 +122,8 @@ mod tests {
     use joint_firmware::default_configuration::{B_G431B_ESC1, MOTEUS_R4};
     use std::cell::Cell;
 
-    /// Takes twice as long as what it simulates, by a clock that only it moves on, while others on the bus do something.
+    /// Takes twice as long as what it simulates, by a clock that only it moves on, while others on the bus do
+    /// something.
     struct Slow<'a, F> {
         now: Duration,
         clock: &'a Cell<Duration>,
@@ -180,7 +183,8 @@ mod tests {
         assert!(given_up > 0.0 && node.received + MOST > 4_000);
     }
 
-    /// A client that asks one thing after the other between two of its set-points, each as soon as the one before has been answered.
+    /// A client that asks one thing after the other between two of its set-points, each as soon as the one before has
+    /// been answered.
     #[test]
     fn a_dozen_reads_of_a_node_that_is_behind_take_less_than_half_of_the_command_deadline() {
         let [own, other] = ["virtual:reads", "virtual:reads"].map(|bus| bus::open(bus).unwrap());

@@ -1,5 +1,5 @@
-//! Everything that outlasts a loss of power: images, the record of object 1010h, what guards the joint. Each lies in two
-//! slots of its own, as on a board, so that a loss of power in any store leaves the old content or the new one.
+//! Everything that outlasts a loss of power: images, the record of object 1010h, what guards the joint. Each lies in
+//! two slots of its own, as on a board, so that a loss of power in any store leaves the old content or the new one.
 
 use crate::flash::Flash;
 use crate::images::SlotImages;
@@ -93,7 +93,8 @@ impl Storage {
         Ok(Self { images, configuration: configuration?, guard: guard? })
     }
 
-    /// What a folder holds, one file for each content; all that is stored is in the files at once. The folder is made where there is none.
+    /// What a folder holds, one file for each content; all that is stored is in the files at once. The folder is made
+    /// where there is none.
     ///
     /// # Errors
     /// Files that cannot be used.

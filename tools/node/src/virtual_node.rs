@@ -1,6 +1,7 @@
 //! The whole node, with frames and time passed in.
 //!
-//! Control steps run as simulated time passes. After each millisecond of them the task's work is done, as on a board that has time to spare.
+//! Control steps run as simulated time passes. After each millisecond of them the task's work is done, as on a board
+//! that has time to spare.
 
 use crate::flash::Flash;
 use crate::images::{SlotImages, model};
@@ -103,8 +104,8 @@ fn text(parameters: &ActuatorParameters) -> String {
 }
 
 impl VirtualNode {
-    /// A joint at rest, in PRE-OPERATIONAL once time passes, with nothing but images stored. It stays in memory for as long as the program
-    /// runs.
+    /// A joint at rest, in PRE-OPERATIONAL once time passes, with nothing but images stored. It stays in memory for as
+    /// long as the program runs.
     ///
     /// # Errors
     /// What plant or firmware refuse.
@@ -117,7 +118,8 @@ impl VirtualNode {
         Self::with_storage(parameters, setup, options, Storage::with(images).map_err(NodeError::Slots)?)
     }
 
-    /// The same joint with everything that it has stored, as after a loss of power. Where a configuration is stored it acts instead of `setup`'s.
+    /// The same joint with everything that it has stored, as after a loss of power. Where a configuration is stored it
+    /// acts instead of `setup`'s.
     ///
     /// # Errors
     /// What plant or firmware refuse.
@@ -288,8 +290,8 @@ impl VirtualNode {
         self.image.leave_copies();
     }
 
-    /// The task is busy for `time` from now on: what it does in no simulated time, as verifying an image, takes it time on a board. Control
-    /// steps and the receive interrupt go on.
+    /// The task is busy for `time` from now on: what it does in no simulated time, as verifying an image, takes it time
+    /// on a board. Control steps and the receive interrupt go on.
     pub fn occupy(&mut self, time: Duration) {
         self.busy_until = self.steps + (time.as_secs_f64() * f64::from(self.rate)) as u64;
     }
@@ -343,7 +345,8 @@ impl VirtualNode {
         }
     }
 
-    /// A reset of the node reaches the application as soon as nothing is under current: the stored configuration and image act.
+    /// A reset of the node reaches the application as soon as nothing is under current: the stored configuration and
+    /// image act.
     fn restart(&mut self) {
         let state = self.joint.joint().telemetry().state;
         let off = matches!(state, State::NotReadyToSwitchOn | State::SwitchOnDisabled | State::Fault);
@@ -423,7 +426,7 @@ impl VirtualNode {
             bridge_temperature: measured.bridge_temperature,
             friction: self.statistics,
             adaptation: self.joint.adaptation(),
-            external: *self.joint.external_torque(),
+            external: [*self.joint.external_torque()],
         };
         let history = if latched.is_empty() { None } else { Some(*joint.history()) };
         let window = *joint.window();

@@ -1,7 +1,8 @@
 //! The parameter pages of an emulated board in a file.
 //!
-//! [`FlashFile::keep`] writes them whenever the flash has worked, as a loss of power at that moment would leave them: an operation under way is torn. Whoever
-//! calls it after every part of a run loses no more than that part when the process is killed. A file is replaced as a whole.
+//! [`FlashFile::keep`] writes them whenever the flash has worked, as a loss of power at that moment would leave them:
+//! an operation under way is torn. Whoever calls it after every part of a run loses no more than that part when the
+//! process is killed. A file is replaced as a whole.
 
 use emulator::board::Wired;
 use emulator::chip::flash::KeptError;
@@ -46,7 +47,8 @@ pub struct FlashFile {
 }
 
 impl FlashFile {
-    /// Below a folder, which is made where it is missing, by the name of the board. What the file holds is in the board's flash from now on.
+    /// Below a folder, which is made where it is missing, by the name of the board. What the file holds is in the
+    /// board's flash from now on.
     ///
     /// # Errors
     /// A program without parameters, a file that cannot be used.

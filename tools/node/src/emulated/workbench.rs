@@ -1,4 +1,5 @@
-//! Somebody at the bench of an emulated board: obeys [commands](Command) in the board's own time, and answers each in one line.
+//! Somebody at the bench of an emulated board: obeys [commands](Command) in the board's own time, and answers each in
+//! one line.
 
 use super::command::{Command, DriverFault, HELP};
 use emulator::board::Wired;
@@ -65,7 +66,8 @@ impl Workbench {
         emulation.now().0 + self.dark
     }
 
-    /// Runs the board up to an instant of its time, as [`Emulation::run_until`] does, and obeys what is due. Without power time passes all the same.
+    /// Runs the board up to an instant of its time, as [`Emulation::run_until`] does, and obeys what is due. Without
+    /// power time passes all the same.
     pub fn run_until<W: Wired>(&mut self, emulation: &mut Emulation<W>, until: Instant) -> Option<End> {
         let target = self.time(emulation) + until.0.saturating_sub(emulation.now().0);
         loop {

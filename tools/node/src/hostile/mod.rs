@@ -1,14 +1,15 @@
-//! Server and object table without the joint, on a hostile bus: after each frame a judgement whether anything happened that the protocol
-//! does not allow. For `examples/hostile_bus.rs` and the fuzz target; host.
+//! Server and object table without the joint, on a hostile bus: after each frame a judgement whether anything happened
+//! that the protocol does not allow. For `examples/hostile_bus.rs` and the fuzz target; host.
 //!
 //! What is judged:
 //!
-//! - the NMT state changes with an NMT command to this node, and as that command says, or by the server's own two ways (boot-up, object 1029h)
-//! - outside OPERATIONAL the joint is asked for a quick stop and nothing else; SDO, LSS, heartbeats and NMT commands that change no state
-//!   set no set-point in the receive interrupt; every number of a command is finite
+//! - the NMT state changes with an NMT command to this node, and as that command says, or by the server's own two ways
+//!   (boot-up, object 1029h)
+//! - outside OPERATIONAL the joint is asked for a quick stop and nothing else; SDO, LSS, heartbeats and NMT commands
+//!   that change no state set no set-point in the receive interrupt; every number of a command is finite
 //! - what is configured is always something that the joint can be
-//! - with a key, nothing is run or stored without a tag of that key, or older than what was stored before; the previous image comes back by a
-//!   roll back only; the key stays
+//! - with a key, nothing is run or stored without a tag of that key, or older than what was stored before; the previous
+//!   image comes back by a roll back only; the key stays
 //! - nothing is written to flash under current
 //! - the node sends with its own identifiers only, or with one that PDOs and EMCY may have
 

@@ -1,4 +1,5 @@
-//! Frames of a hostile bus from a seed: random ones, ones that might mean something, and whole transfers with faults in them.
+//! Frames of a hostile bus from a seed: random ones, ones that might mean something, and whole transfers with faults in
+//! them.
 
 use super::script::{self, Transfer};
 use super::{HostileNode, Violation};

@@ -1,4 +1,5 @@
-//! Well-formed transfers as frames, images of all kinds, and bytes read as a course of events: the parts that hostile buses are made of.
+//! Well-formed transfers as frames, images of all kinds, and bytes read as a course of events: the parts that hostile
+//! buses are made of.
 
 use super::{HostileNode, NODE, Violation};
 use crate::SampleImage;
@@ -13,8 +14,8 @@ pub(super) enum Transfer {
     Block,
 }
 
-/// Images that an attacker may have: any without a tag, signed ones that were heard on the bus (one of an old version), one with the tag of
-/// another key, one with another image's tag, one for another joint, one that is cut off.
+/// Images that an attacker may have: any without a tag, signed ones that were heard on the bus (one of an old version),
+/// one with the tag of another key, one with another image's tag, one for another joint, one that is cut off.
 #[must_use]
 pub fn images(key: &Key) -> Vec<Vec<u8>> {
     let constant = SampleImage::constant;
@@ -219,7 +220,8 @@ mod tests {
         let images = images(&key);
         let mut node = HostileNode::new(&mut statics, Some(&key)).unwrap();
         interpret(&write(0x2212, 7, 60_000), &mut node, &images).unwrap();
-        // NMT start, image 3 (signed, version 3) by block, verify, trial, discard, commit, the newer one segmented, roll back.
+        // NMT start, image 3 (signed, version 3) by block, verify, trial, discard, commit, the newer one segmented,
+        // roll back.
         let script = [0x12, 1, 5, 0xB3, 0xC1, 0xC2, 0xC5, 0xB3, 0xC1, 0xC3, 0xA4, 0xC1, 0xC3, 0xC4];
         interpret(&script, &mut node, &images).unwrap();
         let counts = *node.counts();
