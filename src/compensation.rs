@@ -1,8 +1,9 @@
 //! How a friction estimate becomes a torque that is safe to add to the command; control step.
 //!
-//! In this order: the estimate's parts fade outside the box that they were identified in, gain, clamp, slew limit. What is
-//! asked for falls back by itself (network, then physical, then nothing) and every step says what it did and why. Switched off,
-//! or without a model, the torque is exactly zero: the loop computes the same bits as one without compensation.
+//! In this order: the estimate's parts fade outside the box that they were identified in, gain, clamp, slew limit. What
+//! is asked for falls back by itself (network, then physical, then nothing) and every step says what it did and why.
+//! Switched off, or without a model, the torque is exactly zero: the loop computes the same bits as one without
+//! compensation.
 
 use crate::friction::common::CommonTorques;
 use crate::friction::regime::Memory;
@@ -109,8 +110,8 @@ impl core::fmt::Display for SettingsError {
 
 impl core::error::Error for SettingsError {}
 
-/// How much compensation is permitted. New settings take effect with the next evaluation; a torque beyond a new, lower clamp comes down
-/// to it at the slew rate.
+/// How much compensation is permitted. New settings take effect with the next evaluation; a torque beyond a new, lower
+/// clamp comes down to it at the slew rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
     request: Request,
@@ -123,8 +124,9 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// Checks and prepares settings for `rate` evaluations a second: `gain` in Q16.16 (0 to 1), `clamp` the largest magnitude
-    /// of the torque, `slew` its largest change in a second, at least one step of Q16.16 an evaluation (0.06 Nm/s at 4 kHz).
+    /// Checks and prepares settings for `rate` evaluations a second: `gain` in Q16.16 (0 to 1), `clamp` the largest
+    /// magnitude of the torque, `slew` its largest change in a second, at least one step of Q16.16 an evaluation
+    /// (0.06 Nm/s at 4 kHz).
     pub fn new(request: Request, gain: u32, clamp: Torque, slew: Torque, rate: u32) -> Result<Self, SettingsError> {
         let Some(rate) = core::num::NonZeroU32::new(rate) else { return Err(SettingsError::Rate(rate)) };
         if gain > 1 << 16 {
@@ -151,7 +153,8 @@ impl Settings {
 pub struct Output {
     /// Torque to add to the command.
     pub torque: Torque,
-    /// What the full model would have added in this step, whatever was requested: gain and clamp applied, no slew limit.
+    /// What the full model would have added in this step, whatever was requested: gain and clamp applied, no slew
+    /// limit.
     pub shadow: Torque,
     /// Which model acted.
     pub acting: Acting,
@@ -180,8 +183,8 @@ impl Default for Output {
 
 /// Compensation of one joint, from one evaluation to the next.
 ///
-/// An evaluation has four stages, none of them longer than the physical model, so that a control loop can do one in a step:
-/// [`begin`](Self::begin) with a state (its regime, the ripple), [`network`](Self::network) (and pre-sliding),
+/// An evaluation has four stages, none of them longer than the physical model, so that a control loop can do one in a
+/// step: [`begin`](Self::begin) with a state (its regime, the ripple), [`network`](Self::network) (and pre-sliding),
 /// [`physical_model`](Self::physical_model),
 /// [`finish`](Self::finish) (the torque).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -199,8 +202,8 @@ struct Begun {
     estimate: Estimate,
 }
 
-/// Weights come in Q31 and a torque in Q16.16: `i32::MAX` counts as one, so that a full weight changes no bit. Never larger in
-/// magnitude than the torque.
+/// Weights come in Q31 and a torque in Q16.16: `i32::MAX` counts as one, so that a full weight changes no bit. Never
+/// larger in magnitude than the torque.
 #[inline(always)]
 fn weigh(torque: i32, weight: i32) -> i32 {
     if weight == i32::MAX { torque } else { ((torque as i64 * weight as i64) >> 31) as i32 }
@@ -237,8 +240,8 @@ impl Compensation {
         };
     }
 
-    /// Second stage: the torque of the regime's network, and pre-sliding. A model that came after the first stage goes on
-    /// with what another one has begun, within clamp and slew limit.
+    /// Second stage: the torque of the regime's network, and pre-sliding. A model that came after the first stage goes
+    /// on with what another one has begun, within clamp and slew limit.
     #[inline]
     pub fn network(&mut self, model: Option<&FrictionModel>) {
         if let (Some(Begun { signals, common, estimate }), Some(model)) = (&mut self.begun, model) {
@@ -255,8 +258,8 @@ impl Compensation {
         }
     }
 
-    /// Last stage: how much of the model counts, and the torque. Without a model, or switched off, it goes to zero at the slew rate, stays there
-    /// exactly, and the past is forgotten.
+    /// Last stage: how much of the model counts, and the torque. Without a model, or switched off, it goes to zero at
+    /// the slew rate, stays there exactly, and the past is forgotten.
     #[inline]
     pub fn finish(&mut self, model: Option<&FrictionModel>, settings: &Settings) -> Output {
         let (Some(Begun { signals, estimate, .. }), Some(model)) = (&self.begun, model) else {

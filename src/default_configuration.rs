@@ -1,9 +1,9 @@
 //! What a board's joint is until somebody has commissioned it: values with which nothing can go far; task, host.
 //!
-//! **No motor is known here.** Everything about motor, gear and heat is a placeholder that commissioning has to replace: resistance and
-//! inductance are low, which makes the current loop slow on any real motor; limits are low; compensation is off. What a board
-//! itself brings, [`BridgeConfiguration`] and the limits of its parts, is data of the board; its sources stand in
-//! `src/board/`.
+//! **No motor is known here.** Everything about motor, gear and heat is a placeholder that commissioning has to
+//! replace: resistance and inductance are low, which makes the current loop slow on any real motor; limits are low;
+//! compensation is off. What a board itself brings, [`BridgeConfiguration`] and the limits of its parts, is data of the
+//! board; its sources stand in `src/board/`.
 
 use crate::compensation::Request;
 use crate::friction::regime::MOST_SETS;
@@ -50,8 +50,9 @@ const MOTEUS_R4_ANALOG: Analog = Analog {
     volts_per_code: 0.017_947,
 };
 
-/// What holds for both boards. No source states how hot their bridges may be: the chip beside it bears a junction of 105 °C (temperature class 6), and
-/// the moteus' own firmware stops at 75 °C unless told otherwise. A joint that nobody commands for longer is not under control.
+/// What holds for both boards. No source states how hot their bridges may be: the chip beside it bears a junction of
+/// 105 °C (temperature class 6), and the moteus' own firmware stops at 75 °C unless told otherwise. A joint that nobody
+/// commands for longer is not under control.
 const HOT_OR_SILENT: BoardLimits = BoardLimits {
     supply: 0.0,
     over_current: 0.0,
@@ -62,7 +63,8 @@ const HOT_OR_SILENT: BoardLimits = BoardLimits {
     supply_end: 0.0,
 };
 
-/// ST B-G431B-ESC1. Supply: the board's limit is 25 V. The encoder's counter is read after the currents' conversions: no age.
+/// ST B-G431B-ESC1. Supply: the board's limit is 25 V. The encoder's counter is read after the currents' conversions:
+/// no age.
 pub const B_G431B_ESC1: BoardConfiguration = BoardConfiguration {
     bridge: settled(
         B_G431B_ESC1_SETTLING,
@@ -91,8 +93,8 @@ pub const B_G431B_ESC1: BoardConfiguration = BoardConfiguration {
     parameter_sets: 1,
 };
 
-/// mjbots moteus r4.11. Supply: a bench supply of 12 to 24 V. The encoder's answer is two control periods old. The motor's
-/// thermistor is the user's to fit, so none is expected.
+/// mjbots moteus r4.11. Supply: a bench supply of 12 to 24 V. The encoder's answer is two control periods old. The
+/// motor's thermistor is the user's to fit, so none is expected.
 pub const MOTEUS_R4: BoardConfiguration = BoardConfiguration {
     bridge: settled(
         MOTEUS_R4_SETTLING,
@@ -107,7 +109,8 @@ pub const MOTEUS_R4: BoardConfiguration = BoardConfiguration {
             counts_an_encoder: false,
             has_chopper_output: true,
             limits: BoardLimits {
-                // The vendor's range is 10 to 44 V (specifications in the README of mjbots/moteus); its converter ends at 73 V.
+                // The vendor's range is 10 to 44 V (specifications in the README of mjbots/moteus); its converter ends
+                // at 73 V.
                 supply: 44.0,
                 // The vendor's peak of a phase (there, too); the converters' range is +-165 A.
                 over_current: 100.0,
@@ -125,26 +128,28 @@ pub const MOTEUS_R4: BoardConfiguration = BoardConfiguration {
 /// Control steps a second, Hz.
 const MOTEUS_R4_RATE: f32 = 40_000.0;
 
-/// From the edge of a low side until its current can be sampled, s: by the vendor's measurement at gain 20, which is the settling time of the gate driver's
-/// data sheet and 500 ns.
+/// From the edge of a low side until its current can be sampled, s: by the vendor's measurement at gain 20, which is
+/// the settling time of the gate driver's data sheet and 500 ns.
 const MOTEUS_R4_SETTLING: f32 = 1.5e-6;
 
-/// The same on the B-G431B-ESC1, *derived*: the gate driver's 110 ns, and 4.6 time constants (1 %) of an amplifier with a gain-bandwidth product of 7 MHz, the
-/// least of the chip's data sheet, at a gain of 16: 364 ns each. The typical amplifier takes half of that.
+/// The same on the B-G431B-ESC1, *derived*: the gate driver's 110 ns, and 4.6 time constants (1 %) of an amplifier with
+/// a gain-bandwidth product of 7 MHz, the least of the chip's data sheet, at a gain of 16: 364 ns each. The typical
+/// amplifier takes half of that.
 const B_G431B_ESC1_SETTLING: f32 = 1.8e-6;
 
 /// The conversions start so long before the top of the PWM counter, s: a count of the timer.
 const TRIGGER: f32 = 1.0 / 170e6;
 
-/// A bridge with the greatest duty at which a low side's dead time is over and its amplifier has settled (s after that) when the conversions start. From there on
-/// the low side conducts for as long again, which is longer than the currents are sampled: 0.4 µs, on the B-G431B-ESC1, where the second current
-/// follows the first on the same converter, 1 µs.
+/// A bridge with the greatest duty at which a low side's dead time is over and its amplifier has settled (s after that)
+/// when the conversions start. From there on the low side conducts for as long again, which is longer than the currents
+/// are sampled: 0.4 µs, on the B-G431B-ESC1, where the second current follows the first on the same converter, 1 µs.
 const fn settled(settling: f32, bridge: BridgeConfiguration) -> BridgeConfiguration {
     let greatest = 1.0 - 2.0 * bridge.rate * (bridge.dead_time + settling + TRIGGER);
     BridgeConfiguration { duty: (bridge.duty.0, greatest), ..bridge }
 }
 
-/// A joint that nobody has described, at a lowest and highest supply, V, that fades braking from two thirds of the way from 24 V on, with an encoder whose samples are so old, s.
+/// A joint that nobody has described, at a lowest and highest supply, V, that fades braking from two thirds of the way
+/// from 24 V on, with an encoder whose samples are so old, s.
 const fn uncommissioned(bus_voltage: (f32, f32), regeneration_band: f32, encoder_latency: f32) -> Configuration {
     Configuration {
         node_id: 255,
@@ -174,8 +179,8 @@ const fn uncommissioned(bus_voltage: (f32, f32), regeneration_band: f32, encoder
             position_margin: 0.1,
             // Stops up to 1e-3 kg m² within the margin: half the torque is for the quick stop's deceleration then.
             damping: 0.03,
-            // A quarter of it is the largest offset that a current sensor may start with: 2.5 A are 85 codes of the one board and 31
-            // of the other.
+            // A quarter of it is the largest offset that a current sensor may start with: 2.5 A are 85 codes of the one
+            // board and 31 of the other.
             over_current: 10.0,
             bus_voltage,
             regeneration_band,

@@ -1,8 +1,9 @@
 //! The few DSP operations the control path is made of, each with the same result on every machine; any context.
 //!
-//! Names are those of the ARMv7E-M instructions (ARM DDI 0403, A4.4.3): on the microcontroller each function is that one
-//! instruction, elsewhere it is a portable twin. The compiler finds most of them in the portable form by itself (checked in the
-//! disassembly). Written in assembly are those that it does not find, or finds only with more around them. This is the only file of the arithmetic that contains `unsafe`.
+//! Names are those of the ARMv7E-M instructions (ARM DDI 0403, A4.4.3): on the microcontroller each function is that
+//! one instruction, elsewhere it is a portable twin. The compiler finds most of them in the portable form by itself
+//! (checked in the disassembly). Written in assembly are those that it does not find, or finds only with more around
+//! them. This is the only file of the arithmetic that contains `unsafe`.
 
 /// `accumulator + a[low] b[low] + a[high] b[high]` over two signed 16-bit halves; wraps.
 ///
@@ -136,10 +137,11 @@ pub fn movt<const HIGH: u16>(word: u32) -> u32 {
     word & 0xffff | u32::from(HIGH) << 16
 }
 
-/// Five values, all of them computed before anything that is written behind: no instruction, a barrier for the compiler.
+/// Five values, all of them computed before anything that is written behind: no instruction, a barrier for the
+/// compiler.
 ///
-/// Optimised for nothing but size, the compiler has no scheduler that would keep few values waiting: it would finish one sum after another, with every
-/// factor of all of them on the stack until then.
+/// Optimised for nothing but size, the compiler has no scheduler that would keep few values waiting: it would finish
+/// one sum after another, with every factor of all of them on the stack until then.
 #[cfg(target_arch = "arm")]
 #[inline(always)]
 pub fn in_turn([a, b, c, d, e]: [i32; 5]) -> [i32; 5] {
@@ -155,7 +157,8 @@ pub fn in_turn([a, b, c, d, e]: [i32; 5]) -> [i32; 5] {
     [a, b, c, d, e]
 }
 
-/// Five values, all of them computed before anything that is written behind: no instruction, a barrier for the compiler.
+/// Five values, all of them computed before anything that is written behind: no instruction, a barrier for the
+/// compiler.
 #[cfg(not(target_arch = "arm"))]
 #[inline(always)]
 pub fn in_turn(values: [i32; 5]) -> [i32; 5] {
@@ -195,9 +198,9 @@ pub const TABLE_LEN: usize = 512;
 
 /// Looks `x` up in a table that covers 512 steps of 2^20 around zero; result in Q31.
 ///
-/// A word holds the value at its step's left end (upper half, Q15) and the slope over the step (lower half), so that one
-/// load and one SMLABB interpolate: `word + slope * fraction`, with a fraction of 12 bits. Beyond the ends the first or
-/// last word is used, whose slope must be zero. Reads no memory outside the table for any `x`.
+/// A word holds the value at its step's left end (upper half, Q15) and the slope over the step (lower half), so that
+/// one load and one SMLABB interpolate: `word + slope * fraction`, with a fraction of 12 bits. Beyond the ends the
+/// first or last word is used, whose slope must be zero. Reads no memory outside the table for any `x`.
 #[inline(always)]
 pub fn interpolate(table: &[i32; TABLE_LEN], x: i32) -> i32 {
     let word = at_step(table, x >> 20);
@@ -208,23 +211,26 @@ pub fn interpolate(table: &[i32; TABLE_LEN], x: i32) -> i32 {
 /// Knots of half a table, of an odd function: both ends of 256 steps.
 pub const HALF_TABLE_LEN: usize = TABLE_LEN / 2 + 1;
 
-/// [`interpolate`] between the knots (Q15) of an odd function right of zero; the same bits as in a whole table of words. It takes a load and an addition more
-/// than a word that holds its slope, and a quarter of the memory.
+/// [`interpolate`] between the knots (Q15) of an odd function right of zero; the same bits as in a whole table of
+/// words. It takes a load and an addition more than a word that holds its slope, and a quarter of the memory.
 #[inline(always)]
 pub fn interpolate_odd(knots: &[i16; HALF_TABLE_LEN], x: i32) -> i32 {
     let sign = x >> 31;
-    // Left of zero the complement: its step and fraction count from the step's right end, which is the mirrored one's left.
+    // Left of zero the complement: its step and fraction count from the step's right end, which is the mirrored one's
+    // left.
     let magnitude = (x ^ sign) as u32;
     between_knots(knots, magnitude >> 20, (magnitude >> 8 & 0xfff) as i32, sign)
 }
 
-/// What [`interpolate_odd`] gives at a step (held at the last) and a fraction of it right of zero, with the function's sign: 0, or -1 left of zero.
+/// What [`interpolate_odd`] gives at a step (held at the last) and a fraction of it right of zero, with the function's
+/// sign: 0, or -1 left of zero.
 #[inline(always)]
 fn between_knots(knots: &[i16; HALF_TABLE_LEN], step: u32, fraction: i32, sign: i32) -> i32 {
     let step = step.min(HALF_TABLE_LEN as u32 - 2) as usize;
     let (here, next) = (knots[step] as i32, knots[step + 1] as i32);
     let slope = (next - here) << 4;
-    // A word of a whole table has its slope in its lower half, which counts as one step of the fraction, but not on the way back.
+    // A word of a whole table has its slope in its lower half, which counts as one step of the fraction, but not on the
+    // way back.
     let value = (here << 16).wrapping_add(slope * (fraction + 1 + sign));
     (value ^ sign).wrapping_sub(sign)
 }
@@ -259,7 +265,8 @@ pub fn narrow(sum: i64) -> i32 {
 pub fn narrow_product(a: i32, b: i32) -> i32 {
     let rounded = smlal(1 << 30, a, b);
     let high = (rounded >> 32) as i32;
-    // Twice the upper word, and the lower one's highest bit. Only the largest product saturates, and then upwards, where all bits are set.
+    // Twice the upper word, and the lower one's highest bit. Only the largest product saturates, and then upwards,
+    // where all bits are set.
     high.saturating_add(high) | (rounded as u32 >> 31) as i32
 }
 

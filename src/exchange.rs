@@ -1,9 +1,9 @@
-//! Who may touch which place, so that the control interrupt and a task hand values to each other and neither ever waits; any
-//! context.
+//! Who may touch which place, so that the control interrupt and a task hand values to each other and neither ever
+//! waits; any context.
 //!
-//! Nothing here holds a value. A value that two contexts share lies in a few places of equal kind, and these types say, by one
-//! atomic exchange each, which context owns which place at every instant. Whoever stores the values (`board::shared`) may
-//! therefore write and read them without a lock; the tests walk through every order of events.
+//! Nothing here holds a value. A value that two contexts share lies in a few places of equal kind, and these types say,
+//! by one atomic exchange each, which context owns which place at every instant. Whoever stores the values
+//! (`board::shared`) may therefore write and read them without a lock; the tests walk through every order of events.
 //!
 //!  - [`Newest`]: three places; the newest value arrives, older ones are overwritten. Commands to the control step,
 //!    telemetry from it.
@@ -133,7 +133,8 @@ impl Preparer<'_> {
         (!self.shared.offered.load(Ordering::Acquire)).then_some(self.own.into())
     }
 
-    /// Offers what was written to [`Preparer::place`]; false, and nothing happens, while the value before has not been taken.
+    /// Offers what was written to [`Preparer::place`]; false, and nothing happens, while the value before has not been
+    /// taken.
     pub fn offer(&mut self) -> bool {
         if self.place().is_none() {
             return false;
@@ -170,8 +171,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// A giver that writes into its place and gives, and a taker that reads: each event is indivisible where the real ones are one atomic
-    /// exchange, so the orders of events are all that can happen.
+    /// A giver that writes into its place and gives, and a taker that reads: each event is indivisible where the real
+    /// ones are one atomic exchange, so the orders of events are all that can happen.
     #[derive(Clone, Copy, Debug)]
     enum Event {
         /// Half of a value.

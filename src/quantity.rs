@@ -1,10 +1,10 @@
 //! Physical quantities at every interface: SI units in Q16.16; any context.
 //!
-//! One newtype a unit, so that a velocity cannot be passed for a torque. The range is [-32768, 32768) with a resolution of
-//! 1/65536 (0.000015) of the unit. The same types serve a linear axis, with m for rad and N for Nm.
+//! One newtype a unit, so that a velocity cannot be passed for a torque. The range is [-32768, 32768) with a resolution
+//! of 1/65536 (0.000015) of the unit. The same types serve a linear axis, with m for rad and N for Nm.
 //!
-//! What the control step calls is always inlined: optimised for size, the compiler would rather call a function that does nothing, 25 times
-//! a step.
+//! What the control step calls is always inlined: optimised for size, the compiler would rather call a function that
+//! does nothing, 25 times a step.
 
 use fixed::types::I16F16;
 

@@ -1,7 +1,8 @@
 //! Why the program stopped, kept over the reset; written by the fault handlers, read once at start.
 //!
-//! Pure code: a record becomes sixteen words and words become a record again. Where the words lie is the board's business. RAM
-//! that nobody initialises holds noise after power-on, so a record counts only with its magic word and its CRC-32.
+//! Pure code: a record becomes sixteen words and words become a record again. Where the words lie is the board's
+//! business. RAM that nobody initialises holds noise after power-on, so a record counts only with its magic word and
+//! its CRC-32.
 
 /// Words that a record takes.
 pub const WORDS: usize = 16;
@@ -41,7 +42,8 @@ impl Cause {
 /// Why the program started: what the chip says, and what stopped the program before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LastReset {
-    /// Bits of what has reset the chip since they were cleared at the start before, as in bits 25 to 31 of its register RCC_CSR (RM0440, section 7.4.30).
+    /// Bits of what has reset the chip since they were cleared at the start before, as in bits 25 to 31 of its
+    /// register RCC_CSR (RM0440, section 7.4.30).
     pub causes: u8,
     /// None where the program did not stop by itself.
     pub stop: Option<Record>,

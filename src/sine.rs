@@ -1,16 +1,18 @@
 //! Sine and cosine of an angle in integers; any context, the control step among them.
 //!
-//! The algorithm, the table and therefore the bits are those of `idsp::cossin` 0.23 (quartiq/idsp, from the core `cossin` of m-labs/misoc;
-//! MIT or Apache-2.0), which the tests compare with: error at most 9e-6. It is written out here for two reasons. Its table is a constant without a
-//! name in the crate, so the linker cannot be told to place it in SRAM, and the control interrupt must not wait for the flash. And a
-//! function that is not called but inlined computes the sine alone, where no cosine is asked for.
+//! The algorithm, the table and therefore the bits are those of `idsp::cossin` 0.23 (quartiq/idsp, from the core
+//! `cossin` of m-labs/misoc; MIT or Apache-2.0), which the tests compare with: error at most 9e-6. It is written out
+//! here for two reasons. Its table is a constant without a name in the crate, so the linker cannot be told to place it
+//! in SRAM, and the control interrupt must not wait for the flash. And a function that is not called but inlined
+//! computes the sine alone, where no cosine is asked for.
 
 /// log2 of the table's length.
 const DEPTH: u32 = 7;
 /// Bits of an angle in an octant that are interpolated.
 const FRACTION: u32 = 15;
 
-/// Sine (upper half, Q16) and twice the cosine less one (lower half, Q16) in the middle of each step of the first octant.
+/// Sine (upper half, Q16) and twice the cosine less one (lower half, Q16) in the middle of each step of the first
+/// octant.
 static SINES: [u32; 1 << DEPTH] = table();
 
 /// Cosine and sine of `angle`, 2^32 a turn; amplitude 2^31 - 0.85 * 2^15.

@@ -1,5 +1,5 @@
-//! Bytes as what happens to a joint's server and objects on a bus (`node::hostile::interpret` has the table): no panic, and nothing that the
-//! judge of `node::hostile` does not allow. The first byte says whether the joint has a key.
+//! Bytes as what happens to a joint's server and objects on a bus (`node::hostile::interpret` has the table): no panic,
+//! and nothing that the judge of `node::hostile` does not allow. The first byte says whether the joint has a key.
 
 #![no_main]
 

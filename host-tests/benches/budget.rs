@@ -1,5 +1,5 @@
-//! Writes docs/budget.md: what the control step and its parts take on the board's core, beside their targets; the same network in other libraries;
-//! and what both boards' programs take of their memories.
+//! Writes docs/budget.md: what the control step and its parts take on the board's core, beside their targets; the same
+//! network in other libraries; and what both boards' programs take of their memories.
 //!
 //! `cargo bench -p host-tests --bench budget > docs/budget.md`; needs the board's target.
 
@@ -36,7 +36,8 @@ type Outcome<T> = Result<T, Box<dyn Error>>;
 const TEMPORARY: &str = env!("CARGO_TARGET_TMPDIR");
 /// Inputs that each network evaluates; as many as the program `networks` has room for.
 const INPUTS: usize = 200;
-/// Control interrupts of a board's program that are taken apart: more than come between two that do what a task asks for.
+/// Control interrupts of a board's program that are taken apart: more than come between two that do what a task asks
+/// for.
 const INTERRUPTS: usize = 1000;
 /// How long the boards' programs run, s.
 const RUN: f64 = 1.2;
@@ -317,8 +318,9 @@ fn run<W: Wired>(board: &'static Board, wired: impl FnOnce(Drivetrain) -> W) -> 
     Ok(Flashed { name: board.name, flash, ram, ccm, stack, around: around(&mut emulation, &path)? })
 }
 
-/// Cycles of control interrupts that are not the joint's control step, least, median and most: entry, return, and what the board does before and behind it.
-/// Line tables tell the step's instructions, inlined into the handler or not, and what they call counts with them.
+/// Cycles of control interrupts that are not the joint's control step, least, median and most: entry, return, and what
+/// the board does before and behind it. Line tables tell the step's instructions, inlined into the handler or not, and
+/// what they call counts with them.
 fn around<W: Wired>(emulation: &mut Emulation<W>, path: &Path) -> Outcome<[u64; 3]> {
     let loader = addr2line::Loader::new(path).map_err(|error| error.to_string())?;
     let mut known: HashMap<u32, Option<bool>> = HashMap::new();

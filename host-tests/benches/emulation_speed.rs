@@ -1,5 +1,5 @@
-//! Prints how fast the emulated boards are on this machine, in multiples of real time on one core: `cargo bench -p host-tests --bench emulation_speed`.
-//! Needs the board's target.
+//! Prints how fast the emulated boards are on this machine, in multiples of real time on one core: `cargo bench -p
+//! host-tests --bench emulation_speed`. Needs the board's target.
 //!
 //! A joint of each board, switched off and then in motion with all of compensation: their control steps differ by half.
 //! Each run is repeated from the same snapshot, because the machine's speed is not the same at any time.

@@ -1,4 +1,5 @@
-//! Writes docs/in-the-loop.md: the random joints, every joint's result, and what each layer of compensation costs and prevents.
+//! Writes docs/in-the-loop.md: the random joints, every joint's result, and what each layer of compensation costs and
+//! prevents.
 //!
 //! `cargo bench -p host-tests --bench in_the_loop > docs/in-the-loop.md`; some minutes.
 

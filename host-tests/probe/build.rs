@@ -1,4 +1,5 @@
-//! Gives the linker the memory of the programs: here and not among the flags, so that what they link is compiled with the same flags as for the boards.
+//! Gives the linker the memory of the programs: here and not among the flags, so that what they link is compiled with
+//! the same flags as for the boards.
 
 fn main() {
     println!("cargo:rerun-if-changed=link.x");

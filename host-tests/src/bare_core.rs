@@ -1,4 +1,5 @@
-//! A program of the probe on the emulator's core, without a chip: it hands over at breakpoints, and what it exchanges lies in memory at its symbols.
+//! A program of the probe on the emulator's core, without a chip: it hands over at breakpoints, and what it exchanges
+//! lies in memory at its symbols.
 
 use emulator::cpu::{Cpu, End, Watch};
 use emulator::memory::Memory;
@@ -125,7 +126,8 @@ impl Core {
         Ok(calls.iter().map(|call| Cost { instructions: call.instructions, cycles: call.cycles }).collect())
     }
 
-    /// At a breakpoint that a trace has met: the word that the program prints there by semihosting, after which it goes on; none where it ends.
+    /// At a breakpoint that a trace has met: the word that the program prints there by semihosting, after which it goes
+    /// on; none where it ends.
     ///
     /// # Errors
     /// What it prints is no word.
@@ -140,8 +142,8 @@ impl Core {
         Ok(Some(word))
     }
 
-    /// Goes on to the end of the next call of `function`, and tells of each of its instructions: where it lies, and the cycles that it took. None
-    /// where a breakpoint comes before.
+    /// Goes on to the end of the next call of `function`, and tells of each of its instructions: where it lies, and the
+    /// cycles that it took. None where a breakpoint comes before.
     ///
     /// # Errors
     /// The run ended otherwise.

@@ -1,4 +1,5 @@
-//! The boards' programs, built as they are flashed, those of the probe, built in the same way, and whether that is possible on this machine.
+//! The boards' programs, built as they are flashed, those of the probe, built in the same way, and whether that is
+//! possible on this machine.
 
 use joint_firmware::default_configuration::{B_G431B_ESC1, MOTEUS_R4};
 use std::fs::File;
@@ -17,7 +18,8 @@ pub fn target_installed() -> bool {
     })
 }
 
-/// A board, and how its program is compiled: as `.cargo/config.toml` says, and the board's own file beside it where it has one.
+/// A board, and how its program is compiled: as `.cargo/config.toml` says, and the board's own file beside it where it
+/// has one.
 pub struct Board {
     /// Its feature.
     pub name: &'static str,
@@ -37,8 +39,8 @@ impl Board {
         if self.parameter_sets == 1 { &["little-room"] } else { &[] }
     }
 
-    /// Builds a program of `probe/src/bin` as this board's is, below a test's temporary folder; its path. `input` is a variable of the program's
-    /// build, and the file that it names; `features` are the
+    /// Builds a program of `probe/src/bin` as this board's is, below a test's temporary folder; its path. `input` is a
+    /// variable of the program's build, and the file that it names; `features` are the
     /// probe's.
     ///
     /// # Errors
@@ -83,16 +85,16 @@ fn cargo(program: &str) -> Command {
 /// Cargo as somebody calls it in a terminal.
 fn plain() -> Command {
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    // The cargo that runs the tests has set some of these as for the default program, and what is set cargo leaves; flags for the
-    // host would take the place of the target's.
+    // The cargo that runs the tests has set some of these as for the default program, and what is set cargo leaves;
+    // flags for the host would take the place of the target's.
     for variable in ["DEFMT_LOG", "DEFMT_RTT_BUFFER_SIZE", "RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS"] {
         command.env_remove(variable);
     }
     command
 }
 
-/// Has cargo build a program in the folder that all programs share, so that none compiles what another has, and keeps it at `place`. One at a time: programs of
-/// one name replace each other.
+/// Has cargo build a program in the folder that all programs share, so that none compiles what another has, and keeps
+/// it at `place`. One at a time: programs of one name replace each other.
 fn built(mut command: Command, program: &str, temporary: &str, place: PathBuf) -> Result<PathBuf, String> {
     let shared = Path::new(temporary).join("programs");
     let mut build = || -> std::io::Result<Result<(), String>> {

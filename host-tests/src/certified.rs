@@ -14,8 +14,8 @@ pub fn random(seed: u64, stream: u64) -> ChaCha8Rng {
     random
 }
 
-/// The image of a seed: like a trained one, or, in every third, of any numbers that an image can hold. Its limits lie around what can be proved
-/// of it.
+/// The image of a seed: like a trained one, or, in every third, of any numbers that an image can hold. Its limits lie
+/// around what can be proved of it.
 ///
 /// # Errors
 /// Why the certificate refuses it.

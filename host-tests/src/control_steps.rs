@@ -1,5 +1,5 @@
-//! Recorded runs of the whole joint, for the board's core to replay: a model with every term, runs in closed loop with the virtual joint, and what
-//! they lead to on this machine.
+//! Recorded runs of the whole joint, for the board's core to replay: a model with every term, runs in closed loop with
+//! the virtual joint, and what they lead to on this machine.
 
 #[path = "../probe/src/replay.rs"]
 #[allow(missing_docs, reason = "its first lines are for those that include it")]
@@ -24,7 +24,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use replay::{SCENARIOS, SEED, START, STEPS, Scenario, WORDS};
 
-/// Every term, a network in every set, and two criteria that the runs cross where there is room for `most_sets` > 1; friction like the reference joint's.
+/// Every term, a network in every set, and two criteria that the runs cross where there is room for `most_sets` > 1;
+/// friction like the reference joint's.
 pub fn friction(most_sets: usize) -> FrictionParameters {
     let domain = Domain {
         ranges: [

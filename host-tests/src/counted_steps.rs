@@ -1,9 +1,9 @@
-//! What the parts of a control step cost on the board's core: the program `step` of the probe on the emulator's core, every instruction told
-//! apart by the compiler's line tables.
+//! What the parts of a control step cost on the board's core: the program `step` of the probe on the emulator's core,
+//! every instruction told apart by the compiler's line tables.
 //!
-//! An instruction counts for the innermost of the functions below that it was inlined into, and what they call out of line counts
-//! for the caller. Instructions are exact; cycles are the emulator's model (`tools/emulator/src/cpu/timing.rs`) without wait states: the control
-//! interrupt runs from CCM SRAM.
+//! An instruction counts for the innermost of the functions below that it was inlined into, and what they call out of
+//! line counts for the caller. Instructions are exact; cycles are the emulator's model
+//! (`tools/emulator/src/cpu/timing.rs`) without wait states: the control interrupt runs from CCM SRAM.
 
 use crate::bare_core::{Core, Cost};
 use crate::control_steps::replay::{SCENARIOS, START, STEPS};

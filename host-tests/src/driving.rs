@@ -10,8 +10,8 @@ use plant::virtual_joint::{Setup, VirtualJointError};
 /// Control steps between two commands: a bus at 1 kHz.
 pub const COMMAND_STEPS: u64 = 20;
 
-/// The demand of control step `n` along a trajectory: its position and velocity in impedance mode, with the joint's own stiffness and
-/// damping.
+/// The demand of control step `n` along a trajectory: its position and velocity in impedance mode, with the joint's own
+/// stiffness and damping.
 pub fn demand(joint: &VirtualJoint, trajectory: &Trajectory, n: u64) -> Demand {
     let gains = joint.active().motion;
     let command = n / COMMAND_STEPS;

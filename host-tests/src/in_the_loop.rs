@@ -1,5 +1,5 @@
-//! Compensation in the loop on a random joint that is not our model: excited without compensation, recorded and fitted as a user would,
-//! then moved with and without the image that came out.
+//! Compensation in the loop on a random joint that is not our model: excited without compensation, recorded and fitted
+//! as a user would, then moved with and without the image that came out.
 
 use crate::commission::{Commissioned, commission};
 use crate::driving::{self, COMMAND_STEPS, follow};
@@ -20,7 +20,8 @@ use std::thread;
 /// Errors along one trajectory.
 #[derive(Clone, Copy, Debug)]
 pub struct Errors {
-    /// Mean of |friction - compensation| / |motor torque|, %, where the motor torque is at least a tenth of its RMS (001 eq. 11).
+    /// Mean of |friction - compensation| / |motor torque|, %, where the motor torque is at least a tenth of its RMS
+    /// (001 eq. 11).
     pub torque: f64,
     /// RMS of the position error, rad.
     pub tracking: f64,
@@ -208,7 +209,8 @@ impl RandomJoint {
         Ok(InTorqueMode { guided: left(true, true)?, moved: left(false, true)?, moved_untold: left(false, false)? })
     }
 
-    /// Friction that is left, % of its RMS, while a hand or the command leads the joint; the command tells its push or not.
+    /// Friction that is left, % of its RMS, while a hand or the command leads the joint; the command tells its push or
+    /// not.
     fn led(&self, variant: &Variant, by_hand: bool, told: bool) -> Result<f64, String> {
         let failed = |error: String| format!("joint {}, {}, torque mode: {error}", self.seed, variant.name);
         let setup = self.off.compensating(Request::PhysicalAndNetwork);

@@ -1,4 +1,5 @@
-//! A friction model that knows the plant's parameters, or nearly: what compensation is with a model that is wrong by a known amount.
+//! A friction model that knows the plant's parameters, or nearly: what compensation is with a model that is wrong by a
+//! known amount.
 
 use crate::parameters::{coefficients, q16, range};
 use joint_firmware::friction::common::CommonTerms;
@@ -11,12 +12,12 @@ use plant::friction::{FrictionParameters as Plant, REFERENCE_TEMPERATURE};
 
 /// Width of the model's Coulomb edge, as a part of the plant's Stribeck velocity.
 const EDGE: f64 = 0.5;
-/// Stribeck velocity of the model, as a part of the plant's: the model's bump rises from zero and falls later than the plant's, which
-/// starts at its peak; with this they meet at one and a third of the plant's.
+/// Stribeck velocity of the model, as a part of the plant's: the model's bump rises from zero and falls later than the
+/// plant's, which starts at its peak; with this they meet at one and a third of the plant's.
 const STRIBECK: f64 = 0.75;
 
-/// The model whose Coulomb, breakaway, viscous, Stribeck, load and temperature terms are those of `friction`; it has no bristle, and no
-/// ripple over position.
+/// The model whose Coulomb, breakaway, viscous, Stribeck, load and temperature terms are those of `friction`; it has no
+/// bristle, and no ripple over position.
 pub fn informed(actuator: &ActuatorParameters, friction: &Plant) -> FrictionParameters {
     let joint = &actuator.joint;
     let torque = 1.2 * joint.motor.torque_limit();

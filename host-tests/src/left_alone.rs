@@ -1,5 +1,5 @@
-//! A joint that nobody commands, with a model that is wrong in every parameter and sensors up to two periods late: what it does by itself.
-//! Judged by energy.
+//! A joint that nobody commands, with a model that is wrong in every parameter and sensors up to two periods late: what
+//! it does by itself. Judged by energy.
 
 use crate::borne::configured;
 use crate::driving::{COMMAND_STEPS, follow, moves};
@@ -149,8 +149,9 @@ fn go_away(parameters: &ActuatorParameters) -> Result<Trajectory, String> {
 /// Part of the mode's damping beside the spring that holds the position.
 const DAMPING: f32 = 0.2;
 
-/// Leaves joint `seed` alone, pushes it once, and leaves it alone again; with a compensation that differs from the default in `variant`, or none.
-/// Friction is computed for the measured velocity, the source that feeds back; the command's has nothing to add while nothing is commanded.
+/// Leaves joint `seed` alone, pushes it once, and leaves it alone again; with a compensation that differs from the
+/// default in `variant`, or none. Friction is computed for the measured velocity, the source that feeds back; the
+/// command's has nothing to add while nothing is commanded.
 ///
 /// # Errors
 /// A joint that does not stay enabled.

@@ -1,8 +1,9 @@
-//! How many instructions each part of a control step may take: one file a board below `.ci/instructions`, kept with the code.
+//! How many instructions each part of a control step may take: one file a board below `.ci/instructions`, kept with the
+//! code.
 //!
-//! Counts are exact and the same in every run, so a limit is what the code takes now, by the compiler that the file names; by another one a
-//! twentieth more is permitted. Where more is intended, `JOINT_LIMITS=accept cargo test -p host-tests --test on_the_core` writes
-//! the files anew; what has changed is then part of the commit.
+//! Counts are exact and the same in every run, so a limit is what the code takes now, by the compiler that the file
+//! names; by another one a twentieth more is permitted. Where more is intended, `JOINT_LIMITS=accept cargo test -p
+//! host-tests --test on_the_core` writes the files anew; what has changed is then part of the commit.
 
 use std::path::PathBuf;
 use std::process::Command;

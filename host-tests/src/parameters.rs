@@ -1,5 +1,5 @@
-//! Friction parameters drawn from a seed: [`tame`] ones look like those of identified joints and trained networks, [`extreme`]
-//! ones use every bit that an image may hold.
+//! Friction parameters drawn from a seed: [`tame`] ones look like those of identified joints and trained networks,
+//! [`extreme`] ones use every bit that an image may hold.
 
 use joint_firmware::friction::common::CommonTerms;
 use joint_firmware::friction::domain::{Domain, Range};

@@ -1,5 +1,5 @@
-//! A friction network for the other libraries of the probe's program `networks`: in floats, and quantized to 8 bits; with what each of them gives
-//! held against the exact one.
+//! A friction network for the other libraries of the probe's program `networks`: in floats, and quantized to 8 bits;
+//! with what each of them gives held against the exact one.
 
 use joint_firmware::friction::domain::Domain;
 use joint_firmware::friction::network::{INPUTS, NEURONS, NetworkParameters, Neuron};
@@ -67,8 +67,8 @@ impl Exact {
         self.hidden.iter().chain([&self.output]).flat_map(layer as fn(&Layer) -> Vec<u8>).collect()
     }
 
-    /// In the memory layout of the probe's `Bytes`, quantized for what occurs over `samples`, and the value of a step of its output. Sums beyond
-    /// +-4, where tanh is flat in 8 bits, are cut.
+    /// In the memory layout of the probe's `Bytes`, quantized for what occurs over `samples`, and the value of a step
+    /// of its output. Sums beyond +-4, where tanh is flat in 8 bits, are cut.
     pub fn bytes(&self, samples: &[[f64; INPUTS]]) -> (Vec<u8>, f64) {
         let evaluated: Vec<_> = samples.iter().map(|x| self.evaluate(*x)).collect();
         let step = |largest: f64| largest / 127.0;
@@ -87,7 +87,8 @@ impl Exact {
     }
 }
 
-/// A layer whose inputs are in steps of 1/127 and whose outputs are in steps of `output`: weights, to whole words; factor; biases.
+/// A layer whose inputs are in steps of 1/127 and whose outputs are in steps of `output`: weights, to whole words;
+/// factor; biases.
 fn byte_layer(layer: &Layer, output: f64) -> Vec<u8> {
     let largest = layer.iter().flat_map(|(weights, _)| weights).fold(0.0f64, |most, weight| most.max(weight.abs()));
     let step = (largest / 127.0).max(f64::MIN_POSITIVE);

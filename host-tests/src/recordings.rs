@@ -1,7 +1,8 @@
 //! Recorded joints of others, which are no part of this repository.
 //!
-//! The environment variable `JOINT_DATA` names the folder that holds them, one folder for each data set. Where it is unset the tests that
-//! need them report themselves as ignored, by name. Where it is set they fail if something is missing.
+//! The environment variable `JOINT_DATA` names the folder that holds them, one folder for each data set. Where it is
+//! unset the tests that need them report themselves as ignored, by name. Where it is set they fail if something is
+//! missing.
 
 use std::path::{Path, PathBuf};
 

@@ -1,4 +1,5 @@
-//! Joint states drawn from a seed: inside a model's box, on its corners and edges, where a table's step begins, and anywhere.
+//! Joint states drawn from a seed: inside a model's box, on its corners and edges, where a table's step begins, and
+//! anywhere.
 
 use joint_firmware::friction::FrictionParameters;
 use joint_firmware::friction::domain::Range;
@@ -8,9 +9,9 @@ use joint_firmware::friction::state::{SIGNALS, Signal};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-/// Signals of a state: each of them random in its range, at an end of the trained or of the widened range or one step beside it, or
-/// anywhere; in one state of four the first layer of a network or an edge of the physical model is at the start of a
-/// table step.
+/// Signals of a state: each of them random in its range, at an end of the trained or of the widened range or one step
+/// beside it, or anywhere; in one state of four the first layer of a network or an edge of the physical model is at the
+/// start of a table step.
 pub fn signals(random: &mut ChaCha8Rng, parameters: &FrictionParameters) -> [i32; SIGNALS] {
     let domain = &parameters.domain;
     let corner = random.random_bool(0.15);
@@ -33,8 +34,9 @@ pub fn signals(random: &mut ChaCha8Rng, parameters: &FrictionParameters) -> [i32
     signals
 }
 
-/// [`signals`] and the velocity of a coupled joint. In one state of eight the joint stands; in one of four a criterion's measure is at one of its
-/// thresholds, or one step beside it; in one of sixteen a signal is two margins outside of its range, or one step beside that.
+/// [`signals`] and the velocity of a coupled joint. In one state of eight the joint stands; in one of four a
+/// criterion's measure is at one of its thresholds, or one step beside it; in one of sixteen a signal is two margins
+/// outside of its range, or one step beside that.
 pub fn coupled(random: &mut ChaCha8Rng, parameters: &FrictionParameters) -> ([i32; SIGNALS], i32) {
     let mut signals = signals(random, parameters);
     let mut other = match random.random_range(0..4) {
@@ -109,7 +111,8 @@ fn to_network_knot(random: &mut ChaCha8Rng, parameters: &FrictionParameters, sig
     }
 }
 
-/// Moves the velocity so that the argument of the Coulomb edge or the Stribeck bump is at the start of a step, or beside it.
+/// Moves the velocity so that the argument of the Coulomb edge or the Stribeck bump is at the start of a step, or
+/// beside it.
 fn to_physical_knot(random: &mut ChaCha8Rng, parameters: &FrictionParameters, signals: &mut [i32; SIGNALS]) {
     let set = random.random_range(0..parameters.selector.sets());
     let coefficients = &parameters.sets[set].physical.coefficients;

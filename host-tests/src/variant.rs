@@ -1,4 +1,5 @@
-//! The layers between a friction estimate and the torque that is added, each of which can be taken away to see what it does.
+//! The layers between a friction estimate and the torque that is added, each of which can be taken away to see what it
+//! does.
 
 use crate::driving::enabled;
 use joint_firmware::compensation::Request;

@@ -1,5 +1,5 @@
-//! The friction model once more, in 128-bit integers: the same roundings and tables as the control step, but no sum can wrap and
-//! no shift can lose a bit. Where the control step gives the same, nothing in it overflowed.
+//! The friction model once more, in 128-bit integers: the same roundings and tables as the control step, but no sum can
+//! wrap and no shift can lose a bit. Where the control step gives the same, nothing in it overflowed.
 
 use joint_firmware::friction::FrictionParameters;
 use joint_firmware::friction::common::CommonTorques;

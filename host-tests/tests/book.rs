@@ -1,5 +1,5 @@
-//! README and the book below `docs/`: every link leads somewhere, every page has a place in the book, and figures in prose
-//! are those of their source.
+//! README and the book below `docs/`: every link leads somewhere, every page has a place in the book, and figures in
+//! prose are those of their source.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};

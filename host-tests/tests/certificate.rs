@@ -1,5 +1,5 @@
-//! The certificate is sound and says something: what it proves of an image holds for every state that random draws and a search
-//! against it come up with, and is not far above the worst of them.
+//! The certificate is sound and says something: what it proves of an image holds for every state that random draws and
+//! a search against it come up with, and is not far above the worst of them.
 
 use host_tests::parameters::{extreme, frictionless, range, tame};
 use host_tests::states::signals;
@@ -77,8 +77,8 @@ impl<'a> Subject<'a> {
         (total, network)
     }
 
-    /// Between two states that differ in one signal, torque moves by at most slope times distance and twice the resolution. By how
-    /// much it rises towards the higher value of the signal.
+    /// Between two states that differ in one signal, torque moves by at most slope times distance and twice the
+    /// resolution. By how much it rises towards the higher value of the signal.
     fn check_slope(&mut self, set: usize, signals: &[i32; SIGNALS], signal: Signal, step: i32) -> i64 {
         let index = signal as usize;
         let mut other = *signals;
@@ -130,8 +130,8 @@ impl<'a> Subject<'a> {
         }
     }
 
-    /// Searches a set for the state that comes nearest to a bound: from the best of 100 random ones by changes of one signal that
-    /// are kept when they take nothing away. Every state on the way is checked.
+    /// Searches a set for the state that comes nearest to a bound: from the best of 100 random ones by changes of one
+    /// signal that are kept when they take nothing away. Every state on the way is checked.
     fn climb(&mut self, random: &mut ChaCha8Rng, set: usize, quest: Quest) {
         self.bent = random.random();
         let domain = self.parameters.domain;
@@ -163,7 +163,8 @@ impl<'a> Subject<'a> {
     }
 }
 
-/// Draws parameters until `images` of them are proved, checks each with `inputs` random states and a climb to every bound.
+/// Draws parameters until `images` of them are proved, checks each with `inputs` random states and a climb to every
+/// bound.
 fn survey(
     name: &str,
     seed: u64,

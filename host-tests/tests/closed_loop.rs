@@ -1,10 +1,10 @@
-//! Compensation in the loop, on random joints that are not our model: each is excited without compensation, recorded as a user would,
-//! fitted, and moved with the image that came out. The torque that friction would have taken arrives, slow reversals
-//! track, what is left in torque mode and in the cold is as published, and adaptation makes up for friction that has
-//! changed.
+//! Compensation in the loop, on random joints that are not our model: each is excited without compensation, recorded as
+//! a user would, fitted, and moved with the image that came out. The torque that friction would have taken arrives,
+//! slow reversals track, what is left in torque mode and in the cold is as published, and adaptation makes up for
+//! friction that has changed.
 //!
-//! Ten joints are judged, three of them in service, where the worst counts; with `JOINT_SAMPLES=all` all twenty, and the median in
-//! service, too.
+//! Ten joints are judged, three of them in service, where the worst counts; with `JOINT_SAMPLES=all` all twenty, and
+//! the median in service, too.
 
 use host_tests::in_the_loop::{InTorqueMode, Moved, RandomJoint, for_seeds, median};
 use host_tests::samples::{count, every};

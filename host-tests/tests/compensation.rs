@@ -36,7 +36,8 @@ fn any_state(random: &mut ChaCha8Rng, parameters: &FrictionParameters) -> JointS
     JointState { coupled_velocity: Velocity::from_bits(bits(random)), ..state(signals(random, parameters)) }
 }
 
-/// Torques of a loop around a joint of random load: a proportional and derivative law plus whatever `compensation` adds in each state.
+/// Torques of a loop around a joint of random load: a proportional and derivative law plus whatever `compensation` adds
+/// in each state.
 fn closed_loop(seed: u64, mut compensation: impl FnMut(&JointState) -> Torque) -> Vec<i32> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let (mut position, mut velocity) = (0i32, 0i32);

@@ -1,5 +1,5 @@
-//! Every effect of the plant that the firmware compensates: the error is small with its compensation and several times as large with
-//! that compensation alone switched off.
+//! Every effect of the plant that the firmware compensates: the error is small with its compensation and several times
+//! as large with that compensation alone switched off.
 
 use host_tests::driving::{enabled, follow};
 use host_tests::informed::informed;
@@ -73,7 +73,8 @@ fn coulomb_friction_needs_its_term() {
 
 #[test]
 fn the_stribeck_effect_needs_its_term() {
-    // 1.49 with a round of the motion loop in five control steps; 1.54 with the motion law in each and friction in three.
+    // 1.49 with a round of the motion loop in five control steps; 1.54 with the motion law in each and friction in
+    // three.
     assert_needed("Stribeck", with_and_without(Effect::Stribeck, 0.0, no(&[Terms::STRIBECK])), 1.4);
 }
 
@@ -111,8 +112,8 @@ fn gear_loss_needs_the_load_term() {
     assert_needed("load", (friction_left(&loaded, &whole, 0.0), friction_left(&loaded, &without, 0.0)), 1.2);
 }
 
-/// RMS of the torque that the motor gives less the one that was asked for, Nm, at a share of the speed limit, without friction
-/// compensation.
+/// RMS of the torque that the motor gives less the one that was asked for, Nm, at a share of the speed limit, without
+/// friction compensation.
 fn torque_error(parameters: &ActuatorParameters, setup: &Setup, share: f64) -> f64 {
     let limits = &parameters.joint.limits;
     let trajectory = Trajectory::new(back_and_forth(share * limits.speed, 0.9 * limits.travel, 20.0)).unwrap();

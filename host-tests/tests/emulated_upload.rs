@@ -1,8 +1,9 @@
-//! Another friction image for a joint in service: python-canopen uploads it by block into the moteus r4's program, as it is flashed, while the joint turns to and fro
-//! with compensation, has it verified and commits it. No control step is missed meanwhile, and the torque does not jump.
+//! Another friction image for a joint in service: python-canopen uploads it by block into the moteus r4's program, as
+//! it is flashed, while the joint turns to and fro with compensation, has it verified and commits it. No control step
+//! is missed meanwhile, and the torque does not jump.
 //!
-//! Needs the target, and Python with python-canopen; where something is missing the test is reported as ignored, by name; with `CI` set it runs and
-//! fails.
+//! Needs the target, and Python with python-canopen; where something is missing the test is reported as ignored, by
+//! name; with `CI` set it runs and fails.
 
 use emulator::board::{Drivetrain, MoteusR4, Wired};
 use emulator::chip::time::Instant;

@@ -1,5 +1,5 @@
-//! The physical model is the design's equation, term by term, within 0.05 % of each term's full scale; a term that is switched off
-//! contributes nothing.
+//! The physical model is the design's equation, term by term, within 0.05 % of each term's full scale; a term that is
+//! switched off contributes nothing.
 
 use host_tests::parameters::{bits, full_scale, tame_domain, tame_physical};
 use host_tests::states::within;
@@ -108,7 +108,8 @@ fn each_term_alone_and_all_together_follow_their_formula() {
         for _ in 0..60 {
             let domain = tame_domain(&mut random);
             let mut parameters = PhysicalParameters { terms, ..tame_physical(&mut random, &domain) };
-            // Torques of a large joint: a small joint's are met by the steps of Q16.16 before the formula's error shows.
+            // Torques of a large joint: a small joint's are met by the steps of Q16.16 before the formula's error
+            // shows.
             let mut array = parameters.coefficients.to_array();
             for (stored, Dimension { torque, .. }) in array.iter_mut().zip(Coefficients::DIMENSIONS) {
                 *stored = if torque { stored.saturating_mul(100) } else { *stored };

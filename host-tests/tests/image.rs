@@ -1,5 +1,5 @@
-//! A parameter image arrives whole or not at all: every damage is refused and named, everything else decodes and encodes to the
-//! same bytes.
+//! A parameter image arrives whole or not at all: every damage is refused and named, everything else decodes and
+//! encodes to the same bytes.
 
 use host_tests::image_bytes::{encoded, sealed};
 use host_tests::parameters::{extreme, frictionless, image, tame, tame_common, to_format_1};

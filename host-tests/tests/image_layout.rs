@@ -1,4 +1,5 @@
-//! The bytes of a parameter image are those of the documented layout: an image that a device stores today is read the same tomorrow.
+//! The bytes of a parameter image are those of the documented layout: an image that a device stores today is read the
+//! same tomorrow.
 
 use host_tests::image_bytes::{crc32, encoded, sealed};
 use host_tests::parameters::frictionless;

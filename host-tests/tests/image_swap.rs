@@ -1,4 +1,5 @@
-//! Friction in motion, step by step: it changes once a round of the motion loop, and where the model is replaced meanwhile the torque stays within its slew limit.
+//! Friction in motion, step by step: it changes once a round of the motion loop, and where the model is replaced
+//! meanwhile the torque stays within its slew limit.
 
 use host_tests::driving::{demand, enabled};
 use host_tests::informed::informed;

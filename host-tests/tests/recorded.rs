@@ -13,8 +13,8 @@ use libtest_mimic::{Arguments, Failed, Trial};
 use nalgebra::{DMatrix, DVector};
 use std::path::{Path, PathBuf};
 
-/// Data set, and for each test set the best test RMSE of three SciPy baselines (Coulomb and viscous friction; with Stribeck,
-/// asymmetric, quadratic and load-dependent terms; with a network on top) and that of the image, both of
+/// Data set, and for each test set the best test RMSE of three SciPy baselines (Coulomb and viscous friction; with
+/// Stribeck, asymmetric, quadratic and load-dependent terms; with a network on top) and that of the image, both of
 /// docs/results-recordings.md, in the effort's unit.
 const PUBLISHED: [(&str, &[(f64, f64)]); 10] = [
     ("emps", &[(3.161, 1.701)]),
@@ -132,11 +132,11 @@ fn as_published(name: &str, published: &[(f64, f64)], root: &Path) -> Result<(),
     }
 }
 
-/// The EMPS benchmark's protocol: 4th-order Butterworth at 100 Hz forwards and backwards, central differences, the first 49
-/// samples dropped, regressors and force decimated by 10 (Chebyshev type I of order 8), least squares.
+/// The EMPS benchmark's protocol: 4th-order Butterworth at 100 Hz forwards and backwards, central differences, the
+/// first 49 samples dropped, regressors and force decimated by 10 (Chebyshev type I of order 8), least squares.
 ///
-/// Published: 4.0834 % on the training run and 5.9824 % on the run with pulses (symmetric friction), 3.1117 % on the training
-/// run (asymmetric friction).
+/// Published: 4.0834 % on the training run and 5.9824 % on the run with pulses (symmetric friction), 3.1117 % on the
+/// training run (asymmetric friction).
 fn published_protocol(root: &Path) -> Result<(), Failed> {
     let folder = root.join("emps");
     for (asymmetric, published_train, most_on_pulses) in [(false, 4.0834, 6.1), (true, 3.1117, 5.5)] {

@@ -1,9 +1,11 @@
 //! Bit timing of the bus, and how far a node's clock may be off with it.
 //!
-//! Two conditions (ISO 11898-1, "oscillator tolerance"; Bosch CAN specification 2.0, part B, chapter 10), with NBT the quanta of a bit, PS1 and
-//! PS2 the phase segments before and after the sample point, SJW the width by which an edge resynchronises. A clock may be off by df where
+//! Two conditions (ISO 11898-1, "oscillator tolerance"; Bosch CAN specification 2.0, part B, chapter 10), with NBT the
+//! quanta of a bit, PS1 and PS2 the phase segments before and after the sample point, SJW the width by which an edge
+//! resynchronises. A clock may be off by df where
 //!
-//! - df <= SJW / (2 * 10 NBT): ten bits lie between two edges at the most, and one resynchronisation has to make up for them;
+//! - df <= SJW / (2 * 10 NBT): ten bits lie between two edges at the most, and one resynchronisation has to make up for
+//!   them;
 //! - df <= min(PS1, PS2) / (2 * (13 NBT - PS2)): the last bit of an error flag is sampled 13 bits after the last edge.
 //!
 //! All nodes may be off by as much, to either side.
@@ -21,11 +23,12 @@ pub struct BitTiming {
     pub jump_width: u8,
 }
 
-/// 1 Mbit/s at the 170 MHz that both boards give the controller, without a prescaler: 170 quanta a bit, sampled after 126 of them (74 %).
+/// 1 Mbit/s at the 170 MHz that both boards give the controller, without a prescaler: 170 quanta a bit, sampled after
+/// 126 of them (74 %).
 ///
-/// The boards' clock is the chip's internal oscillator, which is off by up to 1 % from 0 to 85 °C (from memory of the chip's datasheet): this timing
-/// bears 1.01 %. What CiA 301 asks for, a sample after 7/8 of the bit, bears 0.48 %. 81 quanta, 476 ns, are left for the way there and back: with
-/// 135 ns a transceiver, 20 m at 5 ns/m.
+/// The boards' clock is the chip's internal oscillator, which is off by up to 1 % from 0 to 85 °C (from memory of the
+/// chip's datasheet): this timing bears 1.01 %. What CiA 301 asks for, a sample after 7/8 of the bit, bears 0.48 %. 81
+/// quanta, 476 ns, are left for the way there and back: with 135 ns a transceiver, 20 m at 5 ns/m.
 pub const BUS: BitTiming = BitTiming { propagation: 81, phase1: 44, phase2: 44, jump_width: 44 };
 
 impl BitTiming {
@@ -34,7 +37,8 @@ impl BitTiming {
         1 + self.propagation as u16 + self.phase1 as u16 + self.phase2 as u16
     }
 
-    /// Quanta before the sample point without the first, as the controller's register NBTP takes them (NTSEG1; RM0440, FDCAN_NBTP).
+    /// Quanta before the sample point without the first, as the controller's register NBTP takes them (NTSEG1; RM0440,
+    /// FDCAN_NBTP).
     pub const fn before_sample(&self) -> u8 {
         self.propagation + self.phase1
     }

@@ -46,8 +46,8 @@ pub(super) struct Emergencies {
     pub(super) inhibit: u16,
     /// The application's bits of the error register.
     application: u8,
-    /// The server's own errors that last, a bit for each: monitored nodes in 0 to 6, error passive in 7, RPDO deadlines
-    /// from 8 on, SYNC of another length in 15.
+    /// The server's own errors that last, a bit for each: monitored nodes in 0 to 6, error passive in 7, RPDO
+    /// deadlines from 8 on, SYNC of another length in 15.
     lasting: u16,
     history: Deque<u32, HISTORY>,
     pending: Deque<[u8; 8], PENDING>,

@@ -4,9 +4,8 @@
 //! # Two contexts
 //! A node is three values that share nothing mutable but atomics:
 //!
-//!  - [`Receiver`], in the receive interrupt, sees every frame in order. NMT commands, SYNC and RPDOs act in that
-//!    call; heartbeats of others are noted. For the task it leaves only what is addressed to this node's SDO server,
-//!    and LSS.
+//!  - [`Receiver`], in the receive interrupt, sees every frame in order. NMT commands, SYNC and RPDOs act in that call;
+//!    heartbeats of others are noted. For the task it leaves only what is addressed to this node's SDO server, and LSS.
 //!  - [`Server`], in a task below, answers SDO and LSS and sends heartbeats, EMCYs, the boot-up message and the TPDOs
 //!    of event and timer.
 //!  - [`Shared`], a static, which both borrow: the NMT state, the PDO parameters, instants. See there why no lock is
@@ -22,8 +21,8 @@
 //!
 //! So a stop is never behind anything: no queue and no mailbox lies between the controller and [`Receiver`], and when
 //! it returns the next frame meets the new state. A flood of other nodes' frames costs the interrupt a few comparisons
-//! each and never reaches the queue, and of a flood of SYNC one in [`SHORTEST_SYNC`] counts. The queue may be as short as one SDO block ([`SdoSettings::block_size`]); what it
-//! drops the protocol sends again or ends by time-out.
+//! each and never reaches the queue, and of a flood of SYNC one in [`SHORTEST_SYNC`] counts. The queue may be as short
+//! as one SDO block ([`SdoSettings::block_size`]); what it drops the protocol sends again or ends by time-out.
 //!
 //! The NMT state belongs to the interrupt. The task changes it where the server itself does (boot-up, object 1029h),
 //! by compare-and-exchange: a command that comes at the same moment wins. Set-points count while [`Shared::state`] is

@@ -13,8 +13,8 @@ use super::pdo::transmit::{Synchronous, assemble};
 use super::shared::{Epoch, Shared};
 use super::{LSS_MASTER, NMT, SDO_RECEIVE};
 
-/// A SYNC sooner after one that counted does not count, us: at 1 Mbit/s a SYNC and a single full TPDO take 160 to 190. Without this a bus full of
-/// nothing but SYNC, 20,000 a second, leaves tasks no time.
+/// A SYNC sooner after one that counted does not count, us: at 1 Mbit/s a SYNC and a single full TPDO take 160 to 190.
+/// Without this a bus full of nothing but SYNC, 20,000 a second, leaves tasks no time.
 pub const SHORTEST_SYNC: u32 = 180;
 
 /// What remains to be done with a frame.
@@ -85,7 +85,8 @@ impl<'a> Receiver<'a> {
         Route::Done
     }
 
-    /// Whether a frame received at `now` is a SYNC that counts, so that [`Receiver::receive`] asks for what TPDOs carry.
+    /// Whether a frame received at `now` is a SYNC that counts, so that [`Receiver::receive`] asks for what TPDOs
+    /// carry.
     pub fn is_sync(&self, frame: &Frame, now: u32) -> bool {
         // Time wraps: of the SYNCs that come after an hour, one in 20 million is taken for one that came too soon.
         let soon = |before| now.wrapping_sub(before) < SHORTEST_SYNC;

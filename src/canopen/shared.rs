@@ -5,9 +5,9 @@
 //!  - The interrupt is never interrupted by the task, so what it reads cannot change while it runs, and its NMT
 //!    commands are final. The task changes the NMT state by compare-and-exchange, and a command that came in between
 //!    wins.
-//!  - The task alone writes parameters. A PDO's mapping, inhibit time and identifier change only while the PDO does
-//!    not exist (bit 31 of its COB-ID), which is CiA 301's own procedure; the COB-ID is written last (release) and
-//!    read first (acquire).
+//!  - The task alone writes parameters. A PDO's mapping, inhibit time and identifier change only while the PDO does not
+//!    exist (bit 31 of its COB-ID), which is CiA 301's own procedure; the COB-ID is written last (release) and read
+//!    first (acquire).
 
 use super::frame::Frame;
 use super::nmt::{NmtState, Reset};
@@ -94,8 +94,8 @@ impl Shared {
         self.events.fetch_or(bit(pdo), Ordering::Relaxed);
     }
 
-    /// Whether a frame of this node makes the one before it with the same identifier worthless: TPDOs, and heartbeats but for the boot-up
-    /// message. Any context.
+    /// Whether a frame of this node makes the one before it with the same identifier worthless: TPDOs, and heartbeats
+    /// but for the boot-up message. Any context.
     pub fn is_renewable(&self, frame: &Frame) -> bool {
         let heartbeat = HEARTBEAT | u16::from(self.node_id());
         match frame.id() {

@@ -1,22 +1,23 @@
-//! Frames that wait for the controller, and with it what happens when the bus has no room; interrupt and task, each while the other cannot
-//! come between.
+//! Frames that wait for the controller, and with it what happens when the bus has no room; interrupt and task, each
+//! while the other cannot come between.
 //!
 //! - The lowest identifier goes first, as on the bus; of the same identifier the oldest.
-//! - A TPDO or heartbeat that still waits when its successor comes is overwritten, in its place: nobody wants to know how it was. It is
-//!   counted.
+//! - A TPDO or heartbeat that still waits when its successor comes is overwritten, in its place: nobody wants to know
+//!   how it was. It is counted.
 //! - Anything else waits. What finds no room is dropped and counted.
 //! - A frame that has waited for [`PATIENCE`] goes before all others of this node, the oldest of them first.
-//! - A node whose heartbeat had to wait so long, here and in the controller, adds nothing until it is out, and no PDO for as long again. Heartbeats have the highest identifiers of all and are the first
-//!   to be lost; as every joint makes room like this, the PDOs of joints cannot starve the heartbeats of joints. Without the pause, the joints
+//! - A node whose heartbeat had to wait so long, here and in the controller, adds nothing until it is out, and no PDO
+//!   for as long again. Heartbeats have the highest identifiers of all and are the first to be lost; as every joint
+//!   makes room like this, the PDOs of joints cannot starve the heartbeats of joints. Without the pause, the joints
 //!   with the lowest identifiers take the whole bus, and those with the highest are never heard of.
-//! - What is urgent ([`URGENT`]: EMCYs) comes before even that, and the controller's last free buffer is kept for it: what the controller
-//!   has is out of reach, and on a full bus stays there.
+//! - What is urgent ([`URGENT`]: EMCYs) comes before even that, and the controller's last free buffer is kept for it:
+//!   what the controller has is out of reach, and on a full bus stays there.
 
 use super::time::{MILLISECOND, elapsed};
 use super::{Frame, HEARTBEAT};
 
-/// After this time a frame is not overtaken any more, us. Long against a frame (0.13 ms) and the usual distance of two SYNCs, short against
-/// heartbeats and the time-outs of SDO.
+/// After this time a frame is not overtaken any more, us. Long against a frame (0.13 ms) and the usual distance of two
+/// SYNCs, short against heartbeats and the time-outs of SDO.
 pub const PATIENCE: u32 = 10 * MILLISECOND;
 
 /// Identifiers from here on are not urgent: PDOs and all that follows. CiA 301 section 7.3.3.
@@ -77,8 +78,8 @@ impl<const N: usize> TransmitQueue<N> {
         Self { waiting: [None; N], number: 0, heartbeat: None, pausing: None, overwritten: 0, dropped: 0 }
     }
 
-    /// Takes a frame at `now` (us, wrapping); false where it is dropped. `renewable`: it makes the one before it worthless
-    /// ([`Shared::is_renewable`](super::Shared::is_renewable)).
+    /// Takes a frame at `now` (us, wrapping); false where it is dropped. `renewable`: it makes the one before it
+    /// worthless ([`Shared::is_renewable`](super::Shared::is_renewable)).
     pub fn push(&mut self, frame: Frame, renewable: bool, now: u32) -> bool {
         let same = |waiting: &&mut Waiting| waiting.renewable && waiting.frame.id() == frame.id();
         if renewable && let Some(waiting) = self.waiting.iter_mut().flatten().find(same) {
@@ -95,8 +96,8 @@ impl<const N: usize> TransmitQueue<N> {
         true
     }
 
-    /// The frame that the controller is to have next. `buffers`: what it has for transmission. To be called again whenever a buffer
-    /// becomes free.
+    /// The frame that the controller is to have next. `buffers`: what it has for transmission. To be called again
+    /// whenever a buffer becomes free.
     pub fn pop(&mut self, now: u32, buffers: Buffers) -> Option<Frame> {
         let late = |since| elapsed(now, since) >= PATIENCE;
         if buffers.occupied == 0 {
@@ -261,7 +262,8 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever the bus lets through, nothing waits for longer than the patience and the frames that were there before.
+        /// Whatever the bus lets through, nothing waits for longer than the patience and the frames that were there
+        /// before.
         #[test]
         fn every_frame_gets_its_turn(pushes in prop::collection::vec((URGENT..0x700, any::<bool>()), 1..200)) {
             let mut queue = TransmitQueue::<8>::new();

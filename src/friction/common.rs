@@ -1,5 +1,5 @@
-//! What all parameter sets of an image have in common: pre-sliding and ripple. They belong to the joint's bearings and gears, whatever the
-//! regime; control step.
+//! What all parameter sets of an image have in common: pre-sliding and ripple. They belong to the joint's bearings and
+//! gears, whatever the regime; control step.
 
 use super::maxwell_slip::{Bent, ELEMENTS, MaxwellElement, MaxwellSlip};
 use super::ripple::{RIPPLES, Ripple, Rippled, ripple};

@@ -50,20 +50,22 @@ impl Range {
 pub struct Domain {
     /// Trained ranges.
     pub ranges: [Range; SIGNALS],
-    /// How far beyond its half width a signal may go until the model has faded out, Q16.16: the network has no weight left at
-    /// one margin, the physical model none at two.
+    /// How far beyond its half width a signal may go until the model has faded out, Q16.16: the network has no weight
+    /// left at one margin, the physical model none at two.
     pub margin: u32,
     /// Temperature at which the physical parameters hold, Q16.16.
     pub reference_temperature: i32,
 }
 
 impl Domain {
-    /// The box with one margin added on every side: where the physical model is evaluated. Beyond it, signals are clamped.
+    /// The box with one margin added on every side: where the physical model is evaluated. Beyond it, signals are
+    /// clamped.
     pub fn widened(&self) -> [Range; SIGNALS] {
         self.ranges.map(|range| range.widened(self.margin))
     }
 
-    /// Full scale of each signal in the physical model, as the left shift that brings a signal of the widened box to Q31.
+    /// Full scale of each signal in the physical model, as the left shift that brings a signal of the widened box to
+    /// Q31.
     ///
     /// Full scale is the smallest power of two that the signal's magnitude stays below in the widened box (temperature:
     /// the difference from the reference); in SI it is 2^(15 - shift).
@@ -167,9 +169,9 @@ impl Fade {
     pub(super) const NONE: Self =
         Self { edges: [Edge { range: Range { low: 0, high: 0 }, margin: 0, factor: 0, per_step: 0 }; SIGNALS] };
 
-    /// Prepares the fade of `domain`. Nothing fades towards the cold: a joint that is colder than it was in training has more
-    /// friction, its lubricant being stiffer, so what the coldest trained temperature (the physical model: one margin below)
-    /// gives is less than friction takes.
+    /// Prepares the fade of `domain`. Nothing fades towards the cold: a joint that is colder than it was in training
+    /// has more friction, its lubricant being stiffer, so what the coldest trained temperature (the physical model:
+    /// one margin below) gives is less than friction takes.
     pub fn new(domain: &Domain) -> Self {
         let mut edges = domain.ranges.map(|range| Edge::new(range, domain.margin));
         edges[Signal::Temperature as usize].range.low = i32::MIN;
@@ -181,7 +183,8 @@ impl Fade {
     pub fn weights(&self, signals: &[i32; SIGNALS]) -> Weights {
         let [a, b, c, d, e, f] = *signals;
         let [ea, eb, ec, ed, ee, ef] = &self.edges;
-        // Within the ranges, where signals are as a rule, nothing fades. Written out: an array of pairs would be made in memory.
+        // Within the ranges, where signals are as a rule, nothing fades. Written out: an array of pairs would be made
+        // in memory.
         match ea.holds(a) && eb.holds(b) && ec.holds(c) && ed.holds(d) && ee.holds(e) && ef.holds(f) {
             true => Weights::full(),
             false => self.faded(signals),

@@ -1,15 +1,15 @@
 //! Pre-sliding friction: Maxwell-slip elements in parallel; control step.
 //!
-//! Friction does not change its side at once when motion turns back: the contacts bend first, over microradians to tenths of a radian,
-//! and give way one after the other. Each element is a spring of length `s` that is dragged along by the motion and slips at its
-//! distance `d`, so that s / d stays within +-1:
+//! Friction does not change its side at once when motion turns back: the contacts bend first, over microradians to
+//! tenths of a radian, and give way one after the other. Each element is a spring of length `s` that is dragged along
+//! by the motion and slips at its distance `d`, so that s / d stays within +-1:
 //!
 //! ```text
 //! z(k) = clamp(z(k-1) + v T / d, -1, 1)        torque = sum of level z
 //! ```
 //!
-//! Source: Iwan 1966; Lampaert, Swevers, Al-Bender 2002 (generalised Maxwell slip), without its velocity weakening: the Stribeck term has that.
-//! The state is bounded by construction, and at a velocity of zero it stays as it is.
+//! Source: Iwan 1966; Lampaert, Swevers, Al-Bender 2002 (generalised Maxwell slip), without its velocity weakening: the
+//! Stribeck term has that. The state is bounded by construction, and at a velocity of zero it stays as it is.
 
 use crate::dsp::{saturate, smlal, smull};
 
@@ -31,8 +31,8 @@ pub const MAX_STIFFNESS: i32 = 16_384 << 16;
 /// Largest [`level`](MaxwellElement::level), 8,191 Nm: the torque of all elements fits.
 pub const MAX_LEVEL: i32 = i32::MAX / ELEMENTS as i32;
 
-/// Fewest steps a second at which the stiffest element bends as far as it should; below it a gain may be held at the end
-/// of its range.
+/// Fewest steps a second at which the stiffest element bends as far as it should; below it a gain may be held at the
+/// end of its range.
 pub const LOWEST_RATE: u32 = 1_000;
 
 /// Bending of each element, Q31: at the ends of the range it slips.

@@ -4,8 +4,8 @@
 //! Hybrid fixed point. Layer 0 multiplies Q31 inputs with 32-bit weights, because the velocity weights see the Coulomb
 //! edge and 16 bits there cost ten times the error of all other layers. Layers 1 to 3 use 16-bit weights with a
 //! power of two per neuron, two products an instruction, the bias as a sixth input. Every neuron's sum reaches the
-//! table in Q25. Sums wrap: an image is used only after the [certificate](crate::parameters::certificate) has proved that they
-//! fit.
+//! table in Q25. Sums wrap: an image is used only after the [certificate](crate::parameters::certificate) has proved
+//! that they fit.
 
 use super::domain::{Domain, Range};
 use super::smooth::tanh;
@@ -21,8 +21,8 @@ pub const MIN_FRACTION: u8 = 10;
 /// Most fraction bits of a 16-bit weight: |weight| < 1/32.
 pub const MAX_FRACTION: u8 = 20;
 
-/// Largest torque for an output of 1, Q16.16: below 256 Nm. With seven bits more it fits a word still, and the upper word of its product with the output
-/// is the torque.
+/// Largest torque for an output of 1, Q16.16: below 256 Nm. With seven bits more it fits a word still, and the upper
+/// word of its product with the output is the torque.
 pub const MAX_SCALE: i32 = (1 << 24) - 1;
 
 /// A neuron of layers 1 to 3: five weights and a bias with a common power-of-two scale.
@@ -37,7 +37,8 @@ pub struct Neuron {
 /// The network as it is stored and transferred.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct NetworkParameters {
-    /// Layer 0: per neuron five weights in Q26 and a bias in Q25. Inputs are scaled so that the trained box is [-1, 1].
+    /// Layer 0: per neuron five weights in Q26 and a bias in Q25. Inputs are scaled so that the trained box is [-1,
+    /// 1].
     pub first: [[i32; INPUTS + 1]; NEURONS],
     /// Layers 1 and 2.
     pub hidden: [[Neuron; NEURONS]; 2],
@@ -70,8 +71,8 @@ impl InputScale {
     pub fn new(range: Range) -> Self {
         let half_width = range.half_width();
         let Some(divisor) = core::num::NonZeroU64::new(half_width as u64) else { return Self::NONE };
-        // The centred value is first shifted left until the half width lies in [2^30, 2^31], then multiplied by a gain in
-        // (2^29, 2^31): the high word of the product is below 2^29, so that a last shift by two gives Q31.
+        // The centred value is first shifted left until the half width lies in [2^30, 2^31], then multiplied by a gain
+        // in (2^29, 2^31): the high word of the product is below 2^29, so that a last shift by two gives Q31.
         let shift = half_width.leading_zeros().saturating_sub(1);
         let gain = (((1u64 << 61) - (1 << 33)) / divisor) >> shift;
         let gain = gain.min(i32::MAX as u64) as i32;
@@ -86,7 +87,8 @@ impl InputScale {
         (self.apply(i32::MIN), self.apply(i32::MAX))
     }
 
-    /// The scaled input, Q31. Clamped by sums that saturate: a comparison takes three instructions where one of them takes one.
+    /// The scaled input, Q31. Clamped by sums that saturate: a comparison takes three instructions where one of them
+    /// takes one.
     #[inline(always)]
     pub fn apply(&self, value: i32) -> i32 {
         let centred = value.saturating_sub(self.centre);
@@ -156,7 +158,8 @@ fn activate(sums: [i32; NEURONS]) -> [u32; 3] {
     [pkhtb(tanh(a), tanh(b)), pkhtb(tanh(c), tanh(d)), movt::<ONE>(tanh(e) as u32 >> 16)]
 }
 
-/// Layer 0's sums with one more input. No closure, here and below: optimised for nothing but size, the compiler calls those.
+/// Layer 0's sums with one more input. No closure, here and below: optimised for nothing but size, the compiler calls
+/// those.
 #[inline(always)]
 fn add([a, b, c, d, e]: [i32; NEURONS], [wa, wb, wc, wd, we]: &[i32; NEURONS], x: i32) -> [i32; NEURONS] {
     in_turn([smmla(*wa, x, a), smmla(*wb, x, b), smmla(*wc, x, c), smmla(*wd, x, d), smmla(*we, x, e)])
@@ -213,9 +216,11 @@ impl Layers {
         }
     }
 
-    /// The network's torque. `signals` in Q16.16, in the order of [`Signal`](super::state::Signal); each is clamped to its trained range.
+    /// The network's torque. `signals` in Q16.16, in the order of [`Signal`](super::state::Signal); each is clamped to
+    /// its trained range.
     ///
-    /// Written out, neuron by neuron and layer 0 input by input: optimised for size, the compiler keeps a loop, and with it every sum in memory.
+    /// Written out, neuron by neuron and layer 0 input by input: optimised for size, the compiler keeps a loop, and
+    /// with it every sum in memory.
     #[inline]
     pub fn evaluate(&self, inputs: &Inputs, signals: &[i32; super::state::SIGNALS]) -> Torque {
         let ([s0, s1, s2, s3, s4], [w0, w1, w2, w3, w4]) = (&inputs.0, &self.first);

@@ -13,13 +13,14 @@
 //! | ripple | C sin(h q) + D cos(h q) | [`ripple`](super::ripple) |
 //! | rotor inertia | I_a a | 002 |
 //!
-//! q position, v velocity, a acceleration, tau theoretical torque, th temperature minus reference; (+/-): one value for each
-//! direction of v. Two steps of the papers' formulas are made continuous, because a loop is closed around them: sign a is
-//! `k_a a` held at +-1, and the harmonics pass from one direction's set to the other's along with tanh(v / v_c).
+//! q position, v velocity, a acceleration, tau theoretical torque, th temperature minus reference; (+/-): one value for
+//! each direction of v. Two steps of the papers' formulas are made continuous, because a loop is closed around them:
+//! sign a is `k_a a` held at +-1, and the harmonics pass from one direction's set to the other's along with tanh(v /
+//! v_c).
 //!
-//! Signals come in Q31 of their [full scale](super::domain::Domain::shifts), coefficients are Q16.16 torques at full scale: so a small
-//! coefficient of a large signal keeps its resolution. Products have 47 fraction bits and are summed in 64 bits; the sum
-//! wraps, an image is used only after its certificate has proved that it fits.
+//! Signals come in Q31 of their [full scale](super::domain::Domain::shifts), coefficients are Q16.16 torques at full
+//! scale: so a small coefficient of a large signal keeps its resolution. Products have 47 fraction bits and are summed
+//! in 64 bits; the sum wraps, an image is used only after its certificate has proved that it fits.
 
 use super::common::CommonTorques;
 use super::domain::{Domain, Range};
@@ -331,7 +332,8 @@ impl Sum {
     }
 }
 
-/// The sum of sines (Q30) with their amplitudes (Q16.16), rounded. No closure: optimised for nothing but size, the compiler calls those.
+/// The sum of sines (Q30) with their amplitudes (Q16.16), rounded. No closure: optimised for nothing but size, the
+/// compiler calls those.
 #[inline(always)]
 fn weighted([b1, b3, b5, b7, b9]: &[i32; HARMONICS], [s1, s3, s5, s7, s9]: &[i32; HARMONICS]) -> i32 {
     let sum = smlal(smlal(smlal(smlal(smull(*b1, *s1), *b3, *s3), *b5, *s5), *b7, *s7), *b9, *s9);
@@ -358,7 +360,8 @@ impl Scaling {
         }
     }
 
-    /// The signals clamped to the widened box and scaled to Q31 of full scale; temperature as difference from the reference.
+    /// The signals clamped to the widened box and scaled to Q31 of full scale; temperature as difference from the
+    /// reference.
     #[inline(always)]
     pub fn apply(&self, signals: &[i32; SIGNALS]) -> [i32; SIGNALS] {
         // Written out: optimised for size, the compiler keeps a loop, and with it every signal in memory.
@@ -384,8 +387,8 @@ impl Physical {
         Self { scaling: Scaling::new(domain), terms: PreparedTerms::new(parameters) }
     }
 
-    /// The model's torque without the [common terms](super::common). `signals` in Q16.16, in the order of [`Signal`]; each is clamped to
-    /// the widened box.
+    /// The model's torque without the [common terms](super::common). `signals` in Q16.16, in the order of [`Signal`];
+    /// each is clamped to the widened box.
     pub fn evaluate(&self, signals: &[i32; SIGNALS]) -> Torque {
         self.terms.evaluate(&self.scaling.apply(signals), &CommonTorques::default())
     }
@@ -523,8 +526,8 @@ impl PreparedTerms {
         velocity.saturating_add(narrow_product(c.hysteresis_width, sign))
     }
 
-    /// The sum of the harmonics, Q16.16. A function of its own, because not every model has them, and the control interrupt's code is short of
-    /// room.
+    /// The sum of the harmonics, Q16.16. A function of its own, because not every model has them, and the control
+    /// interrupt's code is short of room.
     #[inline(never)]
     fn harmonic_amplitude(&self, q: i32, direction: i32) -> i32 {
         let phase = (smull(self.harmonic_turns, q) >> 15) as u32;

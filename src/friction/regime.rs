@@ -1,9 +1,10 @@
-//! Which parameter set applies now: up to two criteria, each with hysteresis, choose one of up to four sets; control step.
+//! Which parameter set applies now: up to two criteria, each with hysteresis, choose one of up to four sets; control
+//! step.
 //!
-//! Criteria: |acceleration| (accelerating against uniform motion) and |velocity| (high against low speed) are the mobile-robot
-//! paper's two ways to divide motion (001, section 3.1); own speed against that of a coupled joint is the WAM's (003,
-//! section II.C). After a change-over the last output of the old set fades into the new set's, so the torque has no step,
-//! stays between the two, and no second evaluation is needed.
+//! Criteria: |acceleration| (accelerating against uniform motion) and |velocity| (high against low speed) are the
+//! mobile-robot paper's two ways to divide motion (001, section 3.1); own speed against that of a coupled joint is the
+//! WAM's (003, section II.C). After a change-over the last output of the old set fades into the new set's, so the
+//! torque has no step, stays between the two, and no second evaluation is needed.
 
 use super::Estimate;
 use super::maxwell_slip::Bent;
@@ -107,7 +108,8 @@ pub struct Memory {
 }
 
 impl Memory {
-    /// Forgets the past. Field by field: optimised for size the compiler would make a record of it and copy that, byte by byte.
+    /// Forgets the past. Field by field: optimised for size the compiler would make a record of it and copy that, byte
+    /// by byte.
     #[inline(always)]
     pub(crate) fn reset(&mut self) {
         (self.set, self.weight) = (None, 0);

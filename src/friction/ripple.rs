@@ -5,8 +5,9 @@
 //! torque = sum over the series of  C sin(h q) + D cos(h q)      whatever the direction: cogging, error of the gear
 //! ```
 //!
-//! The harmonics of 003 eq. 5 have one frequency, and all of them the phase of position zero; a joint repeats at that of its output and at that of its
-//! motor, each where it happens to stand. The phase wraps with the integers: nothing is lost on any number of turns.
+//! The harmonics of 003 eq. 5 have one frequency, and all of them the phase of position zero; a joint repeats at that
+//! of its output and at that of its motor, each where it happens to stand. The phase wraps with the integers: nothing
+//! is lost on any number of turns.
 
 use crate::dsp::{saturate, smlal};
 use crate::sine::cos_sin;

@@ -1,12 +1,12 @@
 //! The smooth functions of the friction model: tanh, the Stribeck bump, atan, sine; control step.
 //!
-//! Each is a table for [`interpolate`], computed at compile time from its power series, so every machine holds the same words. Knots
-//! are raised by a sixteenth of step^2 times the curvature: that halves the largest error of a chord. Within a table the
-//! interpolation is continuous and follows the knots exactly, therefore it is monotone wherever the knots are; the
-//! certificate relies on that.
+//! Each is a table for [`interpolate`], computed at compile time from its power series, so every machine holds the same
+//! words. Knots are raised by a sixteenth of step^2 times the curvature: that halves the largest error of a chord.
+//! Within a table the interpolation is continuous and follows the knots exactly, therefore it is monotone wherever the
+//! knots are; the certificate relies on that.
 //!
-//! All of them are odd, so the 257 knots of half a table are enough: 514 bytes. Only tanh, which a network looks up 15 times in a step, has a table of 512 words, each
-//! with its slope: sign and slope take nine instructions.
+//! All of them are odd, so the 257 knots of half a table are enough: 514 bytes. Only tanh, which a network looks up 15
+//! times in a step, has a table of 512 words, each with its slope: sign and slope take nine instructions.
 
 use crate::dsp::{
     HALF_TABLE_LEN, TABLE_LEN, interpolate, interpolate_odd, interpolate_odd_product, interpolate_product, smmul,
@@ -72,8 +72,8 @@ fn atan_up_to_one(x: u32) -> i32 {
     interpolate_odd(&ATAN, (x.min(0xffff) << 12) as i32)
 }
 
-/// The sines of the first five odd multiples of a phase, Q30. Phase: 2^32 is a turn. Error of the sine of n x: 1e-5 (n^2 + 1)
-/// maximum (8e-4 for n = 9, of which the model's factor 4 / (pi n) leaves 1.2e-4 of the amplitude).
+/// The sines of the first five odd multiples of a phase, Q30. Phase: 2^32 is a turn. Error of the sine of n x: 1e-5
+/// (n^2 + 1) maximum (8e-4 for n = 9, of which the model's factor 4 / (pi n) leaves 1.2e-4 of the amplitude).
 ///
 /// One sine and one cosine, then sin((n+2) x) = 2 cos(2x) sin(n x) - sin((n-2) x): a fifth of five calls.
 #[inline(always)]
@@ -107,9 +107,9 @@ impl Shape {
     }
 }
 
-/// Interpolation words for a function sampled at `step`, from the step with index `first` on: knot in the upper half (Q15), 16 times the rise to the next
-/// knot in the lower half. The word is their sum, so a negative slope borrows from the upper half and the addition
-/// in [`interpolate`] gives it back.
+/// Interpolation words for a function sampled at `step`, from the step with index `first` on: knot in the upper half
+/// (Q15), 16 times the rise to the next knot in the lower half. The word is their sum, so a negative slope borrows from
+/// the upper half and the addition in [`interpolate`] gives it back.
 const fn table<const LEN: usize>(shape: Shape, first: i32, step: f64) -> [i32; LEN] {
     let mut words = [0; LEN];
     let mut i = 0;

@@ -1,7 +1,8 @@
 //! DRV8353S gate driver: coding of its registers, and names of its faults.
 //!
-//! Sources: TI SLVSDY6, "Register maps", and the tables of codes in the vendor's firmware (fw/drv8323.cc), read not copied; both agree with a second public
-//! header of the register fields. Frames of 16 bits: bit 15 reads, bits 14 to 11 are the register, bits 10 to 0 the data.
+//! Sources: TI SLVSDY6, "Register maps", and the tables of codes in the vendor's firmware (fw/drv8323.cc), read not
+//! copied; both agree with a second public header of the register fields. Frames of 16 bits: bit 15 reads, bits 14 to
+//! 11 are the register, bits 10 to 0 the data.
 //!
 //! | register | bits |
 //! |---|---|
@@ -62,8 +63,8 @@ const fn code<const N: usize>(values: [u16; N], value: u16) -> u16 {
     code as u16
 }
 
-/// What a board asks of the driver. The rest is the same everywhere: three PWM inputs, over-current latched and switching all half bridges
-/// off, faults reported cycle by cycle, reference of the amplifiers halved.
+/// What a board asks of the driver. The rest is the same everywhere: three PWM inputs, over-current latched and
+/// switching all half bridges off, faults reported cycle by cycle, reference of the amplifiers halved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
     /// Source and sink current of the high-side gates, mA.
@@ -105,7 +106,8 @@ impl Settings {
             (CONTROL, 1 << 10 | 0b01 << 5),
             (3, 0b011 << 8 | high),
             (4, 1 << 10 | code(DRIVE_TIME_NS, self.drive_time) << 8 | low),
-            // Latched; the retry time of 8 ms does not count then (the DRV8323 of older boards has 4 ms by the same bit).
+            // Latched; the retry time of 8 ms does not count then (the DRV8323 of older boards has 4 ms by the same
+            // bit).
             (
                 5,
                 code(DEAD_TIME_NS, self.dead_time) << 8

@@ -1,5 +1,5 @@
-//! Hardware of a board that tells of itself: its gate driver, its revision, the option bytes of its chip. Pure code: who reads pins and registers is the
-//! board.
+//! Hardware of a board that tells of itself: its gate driver, its revision, the option bytes of its chip. Pure code:
+//! who reads pins and registers is the board.
 
 pub mod chip_options;
 pub mod drv8353;
@@ -22,7 +22,8 @@ pub enum Setup {
     NotConfigured = 3,
     /// The gate driver reports a fault that has not been cleared.
     Fault = 4,
-    /// The pins that tell family and revision of the board tell of another one than the program is for: nothing is driven.
+    /// The pins that tell family and revision of the board tell of another one than the program is for: nothing is
+    /// driven.
     WrongBoard = 5,
     /// A converter of the chip does not get ready.
     Converter = 6,

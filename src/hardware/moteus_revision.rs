@@ -1,9 +1,10 @@
 //! Family and revision of a board of the moteus family by its pins, before any other pin is driven.
 //!
-//! As in the vendor's firmware (fw/moteus_hw.cc), read not copied. Boards of other families (c1, x1) pull PB10 or PB11; those of the families r4
-//! and n1 leave both floating, so they follow the chip's own pull-up and pull-down. An r4 tells its revision by pulling PC6, PA15 and PA10 low.
-//! A board of the family n1 is told from an r4 by its gate driver, which lies elsewhere: as an r4 of revision 4 it shows a driver that does not
-//! answer, unless its pins happen to tell of another revision (unconfirmed).
+//! As in the vendor's firmware (fw/moteus_hw.cc), read not copied. Boards of other families (c1, x1) pull PB10 or PB11;
+//! those of the families r4 and n1 leave both floating, so they follow the chip's own pull-up and pull-down. An r4
+//! tells its revision by pulling PC6, PA15 and PA10 low. A board of the family n1 is told from an r4 by its gate
+//! driver, which lies elsewhere: as an r4 of revision 4 it shows a driver that does not answer, unless its pins happen
+//! to tell of another revision (unconfirmed).
 //!
 //! | code | silk | gate driver |
 //! |---|---|---|
@@ -13,8 +14,8 @@
 //! | 3 | r4.5b to r4.8 | DRV8353 with a dead time of 200 ns |
 //! | 4 | r4.10, r4.11 | DRV8353 with a dead time of 50 ns |
 //!
-//! The program is for code 4 alone: dead time, supply divider and gate currents are those of that revision, and stronger gate currents damage the
-//! revisions of code 3.
+//! The program is for code 4 alone: dead time, supply divider and gate currents are those of that revision, and
+//! stronger gate currents damage the revisions of code 3.
 
 /// Code of the revision that the program is for.
 pub const SUPPORTED: u8 = 4;

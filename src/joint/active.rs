@@ -31,8 +31,8 @@ pub const SLOW_RATE: f32 = 100.0;
 const REFERENCE_TEMPERATURE: f32 = 25.0;
 /// Span over which the current is derated below the limits of winding and bridge, K.
 pub const DERATING: f32 = 20.0;
-/// Part of the regeneration band in which braking current fades. In the rest nothing feeds the supply: the board takes so little that its voltage comes to
-/// rest where almost all is withheld, and there noise would find the limit.
+/// Part of the regeneration band in which braking current fades. In the rest nothing feeds the supply: the board takes
+/// so little that its voltage comes to rest where almost all is withheld, and there noise would find the limit.
 const FADE: f32 = 0.8;
 /// Peak of the voltage between two phases over that of one.
 const SQRT_3: f32 = 1.732_050_8;
@@ -40,20 +40,21 @@ const SQRT_3: f32 = 1.732_050_8;
 const OBSERVER_RESERVE: f32 = 2.0;
 /// Highest rotor acceleration, rad/s²: a rotor of 1e-6 kg m² under 1 Nm.
 const HIGHEST_ACCELERATION: f32 = 1e6;
-/// Largest sum of the phase currents as a part of the over-current limit: at the current limit, three sensors that are 2 % off
-/// and noise of 1 % make up half of it.
+/// Largest sum of the phase currents as a part of the over-current limit: at the current limit, three sensors that are
+/// 2 % off and noise of 1 % make up half of it.
 const CURRENT_SUM: f32 = 0.1;
 /// Voltage that may be unexplained in any case, as a part of the highest supply.
 const UNEXPLAINED: f32 = 0.015;
 /// And besides what of the dead time is not compensated.
 const BESIDES_DEAD_TIME: f32 = 0.003;
-/// Voltage that the dead time takes as a part of the supply, for its part of the period: 4/3 of it in space-vector components.
+/// Voltage that the dead time takes as a part of the supply, for its part of the period: 4/3 of it in space-vector
+/// components.
 const DEAD_TIME: f32 = 4.0 / 3.0;
-/// Part of that which is not compensated although the current is large: a phase's around its zero crossing is half of all, and the transistors' delays
-/// come on top. Near zero current it is all.
+/// Part of that which is not compensated although the current is large: a phase's around its zero crossing is half of
+/// all, and the transistors' delays come on top. Near zero current it is all.
 const UNCOMPENSATED: f32 = 0.75;
-/// Noise of a current as a part of the current limit that may be taken for a change: differentiated with the windings' inductance it
-/// is a voltage, in windings of many turns more than all the rest.
+/// Noise of a current as a part of the current limit that may be taken for a change: differentiated with the windings'
+/// inductance it is a voltage, in windings of many turns more than all the rest.
 const CURRENT_NOISE: f32 = 0.005;
 /// Time in which the energy guard takes compensation away, s.
 const BACK_OFF: f32 = 0.005;
@@ -119,8 +120,8 @@ impl Scales {
         self.zero
     }
 
-    /// The joint's motion from the rotor's. Whole turns and fraction are converted by themselves: together they have more digits than
-    /// a single-precision number.
+    /// The joint's motion from the rotor's. Whole turns and fraction are converted by themselves: together they have
+    /// more digits than a single-precision number.
     #[inline(always)]
     pub fn joint(&self, motion: &Motion) -> JointMotion {
         let turns = (motion.position >> 32) as i32 as f32;
@@ -272,7 +273,8 @@ pub struct Active {
     pub flux_linkage: f32,
     /// Rotor's way, rad, that an innovation of the observer may have.
     pub jump_limit: f32,
-    /// Silent steps of the encoder after which the rotor's turns are still known: in which it makes a quarter of a turn at the fastest.
+    /// Silent steps of the encoder after which the rotor's turns are still known: in which it makes a quarter of a
+    /// turn at the fastest.
     pub bridged_steps: u32,
     /// Control steps without a new command.
     pub deadline_steps: u32,
@@ -341,8 +343,9 @@ struct Checked {
     rotor_velocity: f32,
 }
 
-/// Field weakening up to an electrical speed, rad/s, on a highest supply, V. Refused are a d current that would raise the voltage again, and a speed
-/// at which the diodes would bring the supply above its limit once the bridge is off: the peak between two phases is sqrt 3 of that of a phase.
+/// Field weakening up to an electrical speed, rad/s, on a highest supply, V. Refused are a d current that would raise
+/// the voltage again, and a speed at which the diodes would bring the supply above its limit once the bridge is off:
+/// the peak between two phases is sqrt 3 of that of a phase.
 #[inline(never)]
 fn weakening(
     motor: &MotorConfiguration,

@@ -1,8 +1,9 @@
 //! What a board bears, and what its converters can see: no joint on it may be configured for more; task, host.
 //!
-//! They are checked with the [whole configuration](super::configuration::Configuration::prepare), and what the control step uses is held to them once
-//! more, so that no record from elsewhere switches a protection off. A reading at the end of a converter's range may stand for anything beyond it, and
-//! counts as beyond its limit: no limit reaches that far, and no offset of a sensor takes the reading back below it.
+//! They are checked with the [whole configuration](super::configuration::Configuration::prepare), and what the control
+//! step uses is held to them once more, so that no record from elsewhere switches a protection off. A reading at the
+//! end of a converter's range may stand for anything beyond it, and counts as beyond its limit: no limit reaches that
+//! far, and no offset of a sensor takes the reading back below it.
 
 use super::configuration::Limits;
 use crate::motor::number::lesser;
@@ -10,7 +11,8 @@ use crate::sensors::analog::Analog;
 
 /// Largest offset that a sound current sensor has, as a part of the over-current limit.
 const LARGEST_OFFSET: f32 = 0.25;
-/// Part of the converters' range up to its nearer end that an over-current limit may take: the rest is for the sensors' offsets.
+/// Part of the converters' range up to its nearer end that an over-current limit may take: the rest is for the sensors'
+/// offsets.
 const SEEN: f32 = 0.95;
 
 /// Highest settings that a board permits, and the ends of its converters' ranges.
@@ -44,8 +46,8 @@ impl BoardLimits {
         lesser(-low, high)
     }
 
-    /// Largest offset, A, that a sound sensor has with an over-current limit, A: a quarter of it, and no more than lets the end of the range lie beyond the
-    /// limit once the offset is taken off.
+    /// Largest offset, A, that a sound sensor has with an over-current limit, A: a quarter of it, and no more than lets
+    /// the end of the range lie beyond the limit once the offset is taken off.
     pub(super) fn largest_offset(&self, over_current: f32) -> f32 {
         lesser(LARGEST_OFFSET * over_current, self.nearest_end() - over_current)
     }

@@ -95,8 +95,8 @@ pub struct Command {
     /// Nm; torque mode, and added in every other one.
     pub torque: f32,
     /// The part of the torque that pushes the joint to where it is to go, Nm, by its sign for the
-    /// [energy guard](super::friction_feedforward) in torque mode. What holds gravity is none of it; zero where nobody said
-    /// what holds.
+    /// [energy guard](super::friction_feedforward) in torque mode. What holds gravity is none of it; zero where nobody
+    /// said what holds.
     pub push: f32,
     /// Nm/rad; impedance mode, 0 to 1e5.
     pub stiffness: f32,
@@ -152,14 +152,15 @@ pub struct Demand {
     pub controlword: Controlword,
     /// The newest set-point.
     pub command: Command,
-    /// Changes with every set-point that arrives, also where its content is the same: the command deadline counts from here.
+    /// Changes with every set-point that arrives, also where its content is the same: the command deadline counts from
+    /// here.
     pub sequence: u32,
     /// The joint that shares this joint's drive.
     pub coupled: Coupled,
 }
 
-/// Velocity of the joint that shares this joint's drive, as its neighbour last told it. One that is silent for longer than the command
-/// deadline counts as standing.
+/// Velocity of the joint that shares this joint's drive, as its neighbour last told it. One that is silent for longer
+/// than the command deadline counts as standing.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Coupled {
     /// rad/s.

@@ -139,7 +139,8 @@ impl Faults {
     /// No fault.
     pub const NONE: Self = Self(0);
 
-    /// Faults of motion that count in the open loop, too: where its position is, a joint under commissioning need not know.
+    /// Faults of motion that count in the open loop, too: where its position is, a joint under commissioning need not
+    /// know.
     pub(super) const OPEN_LOOP: Self =
         Self(Fault::OverSpeed.bit() | Fault::WindingTemperature.bit() | Fault::StaleCommand.bit());
 

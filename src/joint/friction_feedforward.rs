@@ -1,20 +1,21 @@
-//! Friction compensation in the joint: which state the model sees, what holds it back near standstill, and the energy guard;
-//! control step.
+//! Friction compensation in the joint: which state the model sees, what holds it back near standstill, and the energy
+//! guard; control step.
 //!
-//! Two things keep compensation from moving a joint by itself. Where the command has a velocity, friction is computed for that
-//! velocity: a pure feedforward, which no error of the model can turn into an instability, and zero while nothing is asked for. A model with
-//! pre-sliding has friction at a velocity of zero, too, where motion turns back: there the feedforward fades over [`RELEASE`] instead of at once.
-//! Where there is none (torque mode), friction is computed for the measured velocity, and that is a positive feedback. It is held by the
-//! fade near standstill and by the guard: while the joint speeds up although its command does not push it that way, the
-//! compensation backs off within milliseconds, and it comes back only while the command pushes (docs/energy-guard.md).
+//! Two things keep compensation from moving a joint by itself. Where the command has a velocity, friction is computed
+//! for that velocity: a pure feedforward, which no error of the model can turn into an instability, and zero while
+//! nothing is asked for. A model with pre-sliding has friction at a velocity of zero, too, where motion turns back:
+//! there the feedforward fades over [`RELEASE`] instead of at once. Where there is none (torque mode), friction is
+//! computed for the measured velocity, and that is a positive feedback. It is held by the fade near standstill and by
+//! the guard: while the joint speeds up although its command does not push it that way, the compensation backs off
+//! within milliseconds, and it comes back only while the command pushes (docs/energy-guard.md).
 //!
 //! The guard takes no more than what is uncertain. Let friction be at least `1 - u` of gain times the model at every
-//! velocity, with the uncertainty `u` of the configuration. Then the rest, `1 - u` of the compensation, never gives more
-//! power than friction takes at the same instant: joint and compensation together are passive, and no hand, spring or
-//! gravity that leads them is answered by motion of their own. The guard decides about the part `u` alone, where friction
-//! may or may not be there. With `u` = 1 it decides about all, and so it does near standstill, where the delay of the
-//! sensors lets compensation act after the joint has turned back: until the mean velocity is five times the standstill
-//! velocity, and in part until it is ten times.
+//! velocity, with the uncertainty `u` of the configuration. Then the rest, `1 - u` of the compensation, never gives
+//! more power than friction takes at the same instant: joint and compensation together are passive, and no hand, spring
+//! or gravity that leads them is answered by motion of their own. The guard decides about the part `u` alone, where
+//! friction may or may not be there. With `u` = 1 it decides about all, and so it does near standstill, where the delay
+//! of the sensors lets compensation act after the joint has turned back: until the mean velocity is five times the
+//! standstill velocity, and in part until it is ten times.
 
 use super::active::{Active, AdaptationGains, CompensationGains, JointMotion};
 use super::adaptation::{ADAPTS, Factors};
@@ -105,7 +106,8 @@ impl FrictionFeedforward {
         (self.adapted, self.reference) = (0.0, None);
     }
 
-    /// First stage of a round: the state that friction is computed for, and its regime. `measured_torque` is the torque of the measured current, Nm.
+    /// First stage of a round: the state that friction is computed for, and its regime. `measured_torque` is the torque
+    /// of the measured current, Nm.
     #[inline(always)]
     pub fn begin(
         &mut self,
@@ -196,8 +198,8 @@ impl FrictionFeedforward {
         self.adapted += limited(wanted - image - self.adapted, gains.slew);
     }
 
-    /// Acceleration for the model, rad/s²: the reference's, where there is one. The measured one is mostly noise, and a sign of noise
-    /// switches the friction of a hysteresis back and forth.
+    /// Acceleration for the model, rad/s²: the reference's, where there is one. The measured one is mostly noise, and a
+    /// sign of noise switches the friction of a hysteresis back and forth.
     fn acceleration(&mut self, period: f32, reference: Option<f32>, motion: &JointMotion) -> f32 {
         let Some(velocity) = reference else {
             self.reference = None;
@@ -209,10 +211,10 @@ impl FrictionFeedforward {
         acceleration
     }
 
-    /// Part of the compensation that the energy guard lets through, 0 to 1. The command pushes towards the velocity that it
-    /// asks for, or in torque mode by its torque without the offset. A spring's torque does not count: around a held
-    /// position it pushes back and forth, and too much compensation makes it hunt. Nor does what holds gravity: it works on
-    /// every way up, also where the joint swings by itself.
+    /// Part of the compensation that the energy guard lets through, 0 to 1. The command pushes towards the velocity
+    /// that it asks for, or in torque mode by its torque without the offset. A spring's torque does not count:
+    /// around a held position it pushes back and forth, and too much compensation makes it hunt. Nor does what
+    /// holds gravity: it works on every way up, also where the joint swings by itself.
     #[inline(never)]
     fn guard(&mut self, gains: &CompensationGains, velocity: f32, wanted: &Wanted) -> f32 {
         let speed = magnitude(velocity);
@@ -422,8 +424,8 @@ mod tests {
         }
     }
 
-    /// Speed, rad/s, of a joint that was let go at a velocity, with a viscous friction (Nm s/rad) and a model of more of it,
-    /// after 3 s.
+    /// Speed, rad/s, of a joint that was let go at a velocity, with a viscous friction (Nm s/rad) and a model of more
+    /// of it, after 3 s.
     fn let_go(active: &Active, friction: f32, mut velocity: f32) -> f32 {
         // Without the guard it would run away with a time constant of 0.3 s: inertia over what the model has too much.
         let inertia = 0.3 * 0.3 * friction;

@@ -1,7 +1,8 @@
 //! The last steps before a fault, kept for whoever asks what happened; control step writes, task reads.
 //!
-//! A step takes 20 bytes. All of its numbers but the position are cut to their upper halves: a sign, the whole range of a
-//! single-precision number and 8 significant bits, so that they are up to 0.8 % too small in magnitude; what is not a number remains none.
+//! A step takes 20 bytes. All of its numbers but the position are cut to their upper halves: a sign, the whole range of
+//! a single-precision number and 8 significant bits, so that they are up to 0.8 % too small in magnitude; what is not a
+//! number remains none.
 
 use super::fault::{Fault, Faults};
 use super::state_machine::State;
@@ -38,8 +39,8 @@ struct Packed {
     /// [`Faults`], and the state from bit [`STATE_BIT`] on.
     state: u32,
     position: f32,
-    /// Velocity and commanded torque, compensation torque and current d, current q and supply: the first one's upper half in the
-    /// lower half of the word.
+    /// Velocity and commanded torque, compensation torque and current d, current q and supply: the first one's upper
+    /// half in the lower half of the word.
     pairs: [u32; 3],
 }
 

@@ -1,14 +1,17 @@
-//! The limits of torque, velocity and position as bounds of the torque, by gains of their own; control step, once a round of the motion loop.
+//! The limits of torque, velocity and position as bounds of the torque, by gains of their own; control step, once a
+//! round of the motion loop.
 //!
-//! Whatever mode, stiffness and damping a joint has: within its limits it may be given the whole permitted torque, in both directions, at rest even
-//! at a position limit. Towards a limit the torque is held below a straight line in the velocity v, with the limit damping D:
+//! Whatever mode, stiffness and damping a joint has: within its limits it may be given the whole permitted torque, in
+//! both directions, at rest even at a position limit. Towards a limit the torque is held below a straight line in the
+//! velocity v, with the limit damping D:
 //!
 //! ```text
 //! bound = D (v0 - v), within plus and minus the torque limit T
 //! ```
 //!
-//! v0 is the speed at which nothing is left to drive the joint on; above it, it is braked. With the fade f = T/D, the room x up to the position limit
-//! in the direction of motion, the margin m behind it, and the quick stop's deceleration a, v0 is the least of
+//! v0 is the speed at which nothing is left to drive the joint on; above it, it is braked. With the fade f = T/D, the
+//! room x up to the position limit in the direction of motion, the margin m behind it, and the quick stop's
+//! deceleration a, v0 is the least of
 //!
 //! | | v0 |
 //! |---|---|
@@ -16,28 +19,34 @@
 //! | on the way to a position limit, x >= 0 | sqrt(f^2 + 2 a x) |
 //! | beyond it, x < 0 | f (1 + 2 x / m) |
 //!
-//! So at a velocity limit v the torque is whole up to v - f, none at v, and brakes with T from v + f on. At a position limit it is whole at rest, none half the
-//! margin behind it, where a constant push outwards ends, and -T where the margin ends and the fault begins. A joint that approaches at a speed is braked
-//! along the parabola of its quick stop. The parabola begins with f, so that it leads into the straight line: the slope D dv0/dx, a stiffness, is
+//! So at a velocity limit v the torque is whole up to v - f, none at v, and brakes with T from v + f on. At a position
+//! limit it is whole at rest, none half the margin behind it, where a constant push outwards ends, and -T where the
+//! margin ends and the fault begins. A joint that approaches at a speed is braked along the parabola of its quick stop.
+//! The parabola begins with f, so that it leads into the straight line: the slope D dv0/dx, a stiffness, is
 //! a D^2 / T there and less before, where sqrt(2 a x) alone would have none that is finite.
 //!
-//! **Where it holds.** A joint of inertia J that is driven outwards with T all the way is braked at a along v = v0 + J a / D, passes the limit with
-//! f (1 + J a / T), and meets a spring of 2 T / m with the damper D. With D = T / sqrt(a m) it gets 0.8 m behind the limit where J a = T / 2; where J a = 0.8 T it takes twice
-//! that damping to stay within the margin. Where J a > T, or friction, a load or a hot winding's derating leave less torque than J a, the joint may pass it.
+//! **Where it holds.** A joint of inertia J that is driven outwards with T all the way is braked at a along v = v0 + J
+//! a / D, passes the limit with f (1 + J a / T), and meets a spring of 2 T / m with the damper D. With D = T / sqrt(a
+//! m) it gets 0.8 m behind the limit where J a = T / 2; where J a = 0.8 T it takes twice that damping to stay within
+//! the margin. Where J a > T, or friction, a load or a hot winding's derating leave less torque than J a, the joint may
+//! pass it.
 //!
-//! **Against the delays** of motion loop, current loop and observer, the time constant J / D has to be long. The configuration does not know J, so that no
-//! upper limit of D would mean anything but the least D does: a lighter joint needs a higher velocity limit. With an observer of 200 Hz and a motion loop of 4 kHz, 1 ms
-//! is enough; at 0.3 ms, the torque ripples by 12 % at the velocity limit. The observer's noise times D is a torque, too. Tests measure all of this
-//! (`tools/plant/tests/joint_limits.rs`).
+//! **Against the delays** of motion loop, current loop and observer, the time constant J / D has to be long. The
+//! configuration does not know J, so that no upper limit of D would mean anything but the least D does: a lighter joint
+//! needs a higher velocity limit. With an observer of 200 Hz and a motion loop of 4 kHz, 1 ms is enough; at 0.3 ms, the
+//! torque ripples by 12 % at the velocity limit. The observer's noise times D is a torque, too. Tests measure all of
+//! this (`tools/plant/tests/joint_limits.rs`).
 
 use super::active::{Active, JointMotion};
 use super::configuration::{Gains, Limits};
 use crate::motor::number::{greater, lesser, limited, square_root};
 
-/// Part of the longest braking time that the integral of braking takes at least: it has three such times to find a load.
+/// Part of the longest braking time that the integral of braking takes at least: it has three such times to find a
+/// load.
 const SHORTEST_INTEGRAL: f32 = 0.05;
 
-/// More than twice the relative error of the root: a square this much above that of a limit has its root above the limit.
+/// More than twice the relative error of the root: a square this much above that of a limit has its root above the
+/// limit.
 const ROOT_RESERVE: f32 = 1e-5;
 
 /// The gains of the limits, prepared.
@@ -61,7 +70,8 @@ impl LimitGains {
     /// For a motion loop with rounds of `period` s.
     pub(super) fn new(limits: &Limits, gains: &Gains, period: f32) -> Self {
         let fade = limits.torque / limits.damping;
-        // With it the loop's damping ratio is 0.5 for the largest inertia that the torque can brake so, and more for all others.
+        // With it the loop's damping ratio is 0.5 for the largest inertia that the torque can brake so, and more for
+        // all others.
         let integral_time = greater(fade / gains.quick_stop_deceleration, SHORTEST_INTEGRAL * gains.braking_time);
         Self {
             fade,
@@ -221,8 +231,8 @@ mod tests {
         assert!(near(highest(2.0 - 0.6, 5.5), 45.0) && highest(2.0 - 0.57, 5.5) < 44.0);
     }
 
-    /// How far a joint gets behind its limit, as a part of the margin, that the whole torque drives onto it from afar. `inertia` is what of the torque the
-    /// quick stop's deceleration takes, `damping` counts from T / sqrt(a m) on.
+    /// How far a joint gets behind its limit, as a part of the margin, that the whole torque drives onto it from afar.
+    /// `inertia` is what of the torque the quick stop's deceleration takes, `damping` counts from T / sqrt(a m) on.
     fn farthest(inertia: f32, damping: f32) -> f32 {
         let active = prepared(|configuration| {
             configuration.limits.velocity = 60.0;

@@ -1,22 +1,25 @@
 //! One joint: measurements and demands in, bridge and duty cycles out.
 //!
-//! [`Joint::control_step`] runs once a PWM period in the board's highest-priority interrupt and, unchanged, on the host against a
-//! virtual joint. Everything it needs comes in: it reads no clock, no register and no global. In the order of a step:
+//! [`Joint::control_step`] runs once a PWM period in the board's highest-priority interrupt and, unchanged, on the host
+//! against a virtual joint. Everything it needs comes in: it reads no clock, no register and no global. In the order of
+//! a step:
 //!
 //!  - `signals`: what the board measures and what it is told;
 //!  - `offsets`: the current sensors' offsets, from the first steps;
 //!  - [`monitor`]: faults, and [`fault`]: what they lead to;
 //!  - [`state_machine`]: whether the joint may move;
-//!  - [`motion_loop`], slower than the rest, a stage a step: [`command`] and [`motion_law`], from a set-point to a torque, [`limit_law`], how much of it
-//!    the limits permit, and [`friction_feedforward`], what friction will take of it;
+//!  - [`motion_loop`], slower than the rest, a stage a step: [`command`] and [`motion_law`], from a set-point to a
+//!    torque, [`limit_law`], how much of it the limits permit, and [`friction_feedforward`], what friction will take of
+//!    it;
 //!  - [`stopping`]: how the joint stops, and its holding brake;
 //!  - `regeneration`: how much of a braking current the supply bears, and [`chopper`]: what a resistor takes of it;
 //!  - [`history`]: the last steps before a fault; `telemetry`: what tasks are told of a step.
 //!
 //! In place of the motion loop and the current loop, for commissioning: [`open_loop`](crate::motor::open_loop).
 //!
-//! Beside it, outside the interrupt: [`adaptation`] how friction has changed, [`load_feedforward`] the torque of the configured load, [`external_torque`] what acts on the link from outside, [`configuration`] what the joint is, [`board_limits`] what it may be on its board, [`active`] the same prepared for
-//! the step.
+//! Beside it, outside the interrupt: [`adaptation`] how friction has changed, [`load_feedforward`] the torque of the
+//! configured load, [`external_torque`] what acts on the link from outside, [`configuration`] what the joint is,
+//! [`board_limits`] what it may be on its board, [`active`] the same prepared for the step.
 
 pub mod active;
 pub mod adaptation;
@@ -78,7 +81,8 @@ pub(crate) const STANDING: f32 = 0.01;
 /// What the slow task knows and the control step uses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slow {
-    /// Part of current and torque limit that the winding's temperature permits, 0 to 1. That of the bridge is the control step's own.
+    /// Part of current and torque limit that the winding's temperature permits, 0 to 1. That of the bridge is the
+    /// control step's own.
     pub derating: f32,
     /// Temperature of the gear, °C: for friction.
     pub gear_temperature: f32,
@@ -143,8 +147,8 @@ impl Joint {
         Self::default()
     }
 
-    /// One control step. Whatever the measurements are, not numbers included, the duties lie within the modulation's limits, and
-    /// a fault of the kind [`Reaction::SwitchOff`] has the bridge off in the same step.
+    /// One control step. Whatever the measurements are, not numbers included, the duties lie within the modulation's
+    /// limits, and a fault of the kind [`Reaction::SwitchOff`] has the bridge off in the same step.
     #[inline]
     pub fn control_step(&mut self, active: &Active, demand: &Demand, slow: &Slow, measured: &Measurements) -> Bridge {
         self.step::<true>(active, demand, slow, measured)
@@ -200,7 +204,8 @@ impl Joint {
 
         let mut brake_open = false;
         let (bridge, reference, current) = if state.makes_torque() {
-            // What is hot bears the current of braking for as long as braking may take; a joint that coasts into somebody is worse.
+            // What is hot bears the current of braking for as long as braking may take; a joint that coasts into
+            // somebody is worse.
             let limit = match state {
                 State::OperationEnabled => active.current_limit * derating,
                 _ if self.stopping.bears() => active.current_limit * derating,
@@ -299,8 +304,8 @@ impl Joint {
         self.found.outputs
     }
 
-    /// The last step is one that tasks are told of: behind the network's stage, where the longest control interrupt bears
-    /// it, and whenever the bridge is off. Nobody asks more often than once a round.
+    /// The last step is one that tasks are told of: behind the network's stage, where the longest control interrupt
+    /// bears it, and whenever the bridge is off. Nobody asks more often than once a round.
     #[inline(always)]
     pub fn is_to_be_told(&self) -> bool {
         self.motion_loop.due() == Stage::PhysicalModel || !self.machine.state().makes_torque()
@@ -338,8 +343,8 @@ impl Joint {
         self.mean_square.take()
     }
 
-    /// A commanded voltage in place of the current loop. A function of its own, which may lie where code waits for the flash: on a board that has only
-    /// one bank, nothing is written there while the bridge switches.
+    /// A commanded voltage in place of the current loop. A function of its own, which may lie where code waits for the
+    /// flash: on a board that has only one bank, nothing is written there while the bridge switches.
     #[inline(never)]
     fn apply_open_loop(
         &mut self,
@@ -369,8 +374,8 @@ impl Joint {
         self.offsets.taken_from(measured)
     }
 
-    /// What the observer is given. A few missing samples it bridges with its prediction; a lost encoder counts as standing where it was
-    /// last seen, because a prediction that nothing corrects runs away.
+    /// What the observer is given. A few missing samples it bridges with its prediction; a lost encoder counts as
+    /// standing where it was last seen, because a prediction that nothing corrects runs away.
     #[inline(always)]
     fn encoder_sample(&mut self, active: &Active, measured: &Measurements) -> Option<u32> {
         if measured.encoder_valid {

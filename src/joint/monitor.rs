@@ -2,12 +2,14 @@
 //!
 //! Every check answers in the step in which its signal shows the fault; that of the current loop at the end of a round
 //! of the motion loop. Three signals cannot be told from noise or from an ordinary transient in one step; for them the
-//! number of steps is a constant here. What each check takes until the bridge is off stands in docs/faults.md, measured.
+//! number of steps is a constant here. What each check takes until the bridge is off stands in docs/faults.md,
+//! measured.
 //!
-//! The current loop is watched by the motor's own equations (see [`crate::motor::current`]), on its means over a round of the motion loop: of the
-//! voltage that the bridge applied, resistance, inductance and induced voltage explain all but the errors of the constants. What is left shows an encoder that
-//! no longer tells where the rotor is, because the voltage that the rotor really induces is missing in the equations, and a phase
-//! without current, because the loop raises the voltage and nothing follows. In the second case the current misses its reference.
+//! The current loop is watched by the motor's own equations (see [`crate::motor::current`]), on its means over a round
+//! of the motion loop: of the voltage that the bridge applied, resistance, inductance and induced voltage explain all
+//! but the errors of the constants. What is left shows an encoder that no longer tells where the rotor is, because the
+//! voltage that the rotor really induces is missing in the equations, and a phase without current, because the loop
+//! raises the voltage and nothing follows. In the second case the current misses its reference.
 
 use super::JointMotion;
 use super::active::{Active, VOLTAGE_FILTER};
@@ -28,10 +30,11 @@ pub const CURRENT_SUM_STEPS: u32 = 3;
 pub const UNEXPLAINED_STEPS: u32 = 30;
 /// The same in rounds of the motion loop, in each of which it is looked at once.
 const UNEXPLAINED_ROUNDS: u32 = UNEXPLAINED_STEPS / MOTION_STEPS;
-/// Error of the resistance that counts as explained: copper 100 K above the temperature that the constants hold for has 39 % more.
+/// Error of the resistance that counts as explained: copper 100 K above the temperature that the constants hold for has
+/// 39 % more.
 const RESISTANCE_ERROR: f32 = 0.5;
-/// Error of what the rotor's turning induces that counts as explained: a saturated or hot magnet, and an electrical angle that is a
-/// few degrees off, which turns it from one axis to the other.
+/// Error of what the rotor's turning induces that counts as explained: a saturated or hot magnet, and an electrical
+/// angle that is a few degrees off, which turns it from one axis to the other.
 const INDUCED_ERROR: f32 = 0.3;
 /// The current misses its reference by this part of the current limit and ...
 const MISSED_LIMIT: f32 = 0.02;
@@ -42,8 +45,8 @@ pub(super) const OVER_SPEED: f32 = 1.2;
 /// Temperatures outside these are an open or shorted sensor, °C.
 const SENSOR_RANGE: (f32, f32) = (-40.0, 180.0);
 
-/// Counts bad steps twice and good ones once against them, so that what is bad every other step is found too. A fault stays until
-/// as many good steps have come as the bad ones count.
+/// Counts bad steps twice and good ones once against them, so that what is bad every other step is found too. A fault
+/// stays until as many good steps have come as the bad ones count.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Bucket {
     level: u32,
@@ -127,8 +130,8 @@ fn within(value: f32, low: f32, high: f32) -> bool {
     value >= low && value <= high
 }
 
-/// One round of a first-order filter. Once not a number it finds nothing until the bridge goes off, which a current that is no number causes by its limit in the same
-/// step.
+/// One round of a first-order filter. Once not a number it finds nothing until the bridge goes off, which a current
+/// that is no number causes by its limit in the same step.
 #[inline(always)]
 fn filter(state: &mut Dq, value: Dq) {
     let step = |state: f32, value: f32| state + VOLTAGE_FILTER * (value - state);
@@ -136,9 +139,11 @@ fn filter(state: &mut Dq, value: Dq) {
 }
 
 impl Monitor {
-    /// Whether the encoder is lost: it did not answer in several steps. Also at the start, when nothing else is watched.
+    /// Whether the encoder is lost: it did not answer in several steps. Also at the start, when nothing else is
+    /// watched.
     ///
-    /// After more than `bridged` silent steps in a row it stays lost, whatever it says: nobody knows how many turns it made meanwhile.
+    /// After more than `bridged` silent steps in a row it stays lost, whatever it says: nobody knows how many turns it
+    /// made meanwhile.
     #[inline(always)]
     pub fn encoder_is_lost(&mut self, valid: bool, bridged: u32) -> bool {
         let lost = self.encoder.step(!valid, ENCODER_STEPS + 1);
@@ -188,7 +193,8 @@ impl Monitor {
         faults
     }
 
-    /// Faults that only a joint in motion, or meant to be, can have. `winding` is the part of the current that the winding's temperature permits.
+    /// Faults that only a joint in motion, or meant to be, can have. `winding` is the part of the current that the
+    /// winding's temperature permits.
     #[inline(always)]
     pub fn motion(&mut self, active: &Active, motion: &JointMotion, stale_steps: u32, winding: f32) -> Faults {
         let mut faults = Faults::NONE;
@@ -200,9 +206,9 @@ impl Monitor {
         faults
     }
 
-    /// What the current loop did in a step in which the bridge switched. `reference` is the wanted current, A; `way` the encoder's since the step
-    /// before, 2^32 a turn: the observer's speed takes some milliseconds to see a rotor stopped by an obstacle, and what its estimate then
-    /// induces would look like a fault.
+    /// What the current loop did in a step in which the bridge switched. `reference` is the wanted current, A; `way`
+    /// the encoder's since the step before, 2^32 a turn: the observer's speed takes some milliseconds to see a
+    /// rotor stopped by an obstacle, and what its estimate then induces would look like a fault.
     #[inline(always)]
     pub fn current_loop(&mut self, reference: Dq, output: &FieldOrientedOutput, way: f32) {
         let Voltage { sums, last, .. } = &mut self.voltage;
@@ -220,7 +226,8 @@ impl Monitor {
         self.voltage.found
     }
 
-    /// Checks the current loop by what it did since the last time: once a round of the motion loop. A bridge that has not switched shows nothing.
+    /// Checks the current loop by what it did since the last time: once a round of the motion loop. A bridge that has
+    /// not switched shows nothing.
     #[inline(never)]
     pub fn check_current_loop(&mut self, active: &Active) {
         let memory = &mut self.voltage;
@@ -236,8 +243,9 @@ impl Monitor {
         let induced = Dq { d: -inductance.q * current.q, q: inductance.d * current.d + active.flux_linkage } * speed;
 
         let unexplained = voltage - current * resistance - induced;
-        // The speed of two samples errs by up to two counts a round, and in the next round the other way: with a coarse encoder that is more voltage than all
-        // that counts as explained. A stuck encoder's voltage keeps its sign.
+        // The speed of two samples errs by up to two counts a round, and in the next round the other way: with a coarse
+        // encoder that is more voltage than all that counts as explained. A stuck encoder's voltage keeps its
+        // sign.
         let keeps_sign = (unexplained.q.to_bits() ^ memory.last_unexplained.to_bits()) as i32 >= 0;
         memory.last_unexplained = unexplained.q;
         filter(&mut memory.unexplained, unexplained);

@@ -42,8 +42,8 @@ impl MotionLaw {
         *self = Self::default();
     }
 
-    /// One round towards a command. `derating` is the part of the torque limit that is permitted, 0 to 1. What is not a number counts
-    /// as zero; the torque is always within the limit.
+    /// One round towards a command. `derating` is the part of the torque limit that is permitted, 0 to 1. What is not a
+    /// number counts as zero; the torque is always within the limit.
     #[inline(always)]
     pub fn step(&mut self, active: &Active, command: &Command, motion: &JointMotion, derating: f32) -> Wanted {
         if self.mode != Some(command.mode) {
@@ -190,7 +190,8 @@ impl MotionLaw {
         self.position += self.velocity * active.motion.period;
     }
 
-    /// Velocity of the fastest approach to `target` from which the ramp can still stop there (trapezoidal profile, in closed loop).
+    /// Velocity of the fastest approach to `target` from which the ramp can still stop there (trapezoidal profile, in
+    /// closed loop).
     #[inline(always)]
     fn approach(&self, target: f32, limits: &CommandLimits, active: &Active) -> f32 {
         let gains = &active.motion;

@@ -1,8 +1,9 @@
-//! The motion loop: from a command to the torque that the current loop is to make, a round of it in [`MOTION_STEPS`](super::configuration::MOTION_STEPS) control steps;
-//! control step.
+//! The motion loop: from a command to the torque that the current loop is to make, a round of it in
+//! [`MOTION_STEPS`](super::configuration::MOTION_STEPS) control steps; control step.
 //!
-//! A position, a velocity and friction change in milliseconds, and a control step has to be short: each does one stage of a round, and torques are
-//! held until the next round comes by. A new state of the joint begins a round: a quick stop waits for nothing.
+//! A position, a velocity and friction change in milliseconds, and a control step has to be short: each does one stage
+//! of a round, and torques are held until the next round comes by. A new state of the joint begins a round: a quick
+//! stop waits for nothing.
 
 use super::active::{Active, JointMotion};
 use super::adaptation::Factors;
@@ -17,7 +18,8 @@ pub enum Stage {
     /// From the command to a torque.
     #[default]
     Law,
-    /// The regime of friction; and what the current loop did since the round before is checked (see [`super::monitor`]).
+    /// The regime of friction; and what the current loop did since the round before is checked (see
+    /// [`super::monitor`]).
     Regime,
     /// Friction by the network.
     Network,
@@ -77,7 +79,8 @@ impl MotionLoop {
             return 0.0;
         }
         let enabled = state == State::OperationEnabled;
-        // Nobody waits for the first torque of an enabled joint, and the step of a new state has enough to do; a brake's comes at once.
+        // Nobody waits for the first torque of an enabled joint, and the step of a new state has enough to do; a
+        // brake's comes at once.
         if !(begins && enabled) {
             self.stage::<COMPENSATION>(active, demand, seen);
         }
@@ -87,7 +90,8 @@ impl MotionLoop {
         }
     }
 
-    /// A round begins in a new state: compensation only while operation is enabled, torque only while the bridge switches.
+    /// A round begins in a new state: compensation only while operation is enabled, torque only while the bridge
+    /// switches.
     #[inline(never)]
     fn begin(&mut self, active: &Active, state: State) {
         if !self.state.makes_torque() {

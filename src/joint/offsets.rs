@@ -1,7 +1,8 @@
-//! Offsets of the current sensors: the mean of the first steps, in which the bridge is off and no current flows; control step.
+//! Offsets of the current sensors: the mean of the first steps, in which the bridge is off and no current flows;
+//! control step.
 //!
-//! Amplifiers drift. While the joint is switched off and stands, the offsets follow the readings slowly; a bridge that switches, a rotor that turns and
-//! a reading beyond what a sound sensor has at the start hold them.
+//! Amplifiers drift. While the joint is switched off and stands, the offsets follow the readings slowly; a bridge that
+//! switches, a rotor that turns and a reading beyond what a sound sensor has at the start hold them.
 
 use super::active::Active;
 use super::configuration::Limits;
@@ -40,8 +41,8 @@ impl Offsets {
         self.restarts >= REFUSED_READINGS
     }
 
-    /// Adds a step's currents, A, of sensors whose offset is at most `largest`. What a sound sensor without current cannot
-    /// read begins the measurement anew: a single disturbance in the mean would be there for good.
+    /// Adds a step's currents, A, of sensors whose offset is at most `largest`. What a sound sensor without current
+    /// cannot read begins the measurement anew: a single disturbance in the mean would be there for good.
     pub fn add(&mut self, measured: Phases, largest: f32) {
         if !are_sound(measured, largest) {
             *self = Self { restarts: self.restarts.saturating_add(1), ..Self::default() };
@@ -61,8 +62,9 @@ impl Offsets {
         self.steps = OFFSET_STEPS;
     }
 
-    /// Follows a step's currents, A, where the joint is off and its velocity (rad/s) that of a joint that stands. A reading that no sound sensor has at the start is
-    /// a current, or a broken sensor, and nothing is followed for a while; so the offsets stay within what a start permits.
+    /// Follows a step's currents, A, where the joint is off and its velocity (rad/s) that of a joint that stands. A
+    /// reading that no sound sensor has at the start is a current, or a broken sensor, and nothing is followed for
+    /// a while; so the offsets stay within what a start permits.
     pub fn follow(&mut self, measured: Phases, is_off: bool, velocity: f32, limits: &Limits, largest: f32) {
         let standing = STANDING * limits.velocity;
         if !(is_off && velocity <= standing && velocity >= -standing && are_sound(measured, largest)) {
@@ -88,8 +90,9 @@ impl Offsets {
 }
 
 impl Joint {
-    /// Begins a step behind one that left the bridge off: nothing is left of the current loop, and the offsets are measured or followed. On the way to where the
-    /// bridge switches lies "switched on", which holds them. In this module because one board's program has all of it in flash.
+    /// Begins a step behind one that left the bridge off: nothing is left of the current loop, and the offsets are
+    /// measured or followed. On the way to where the bridge switches lies "switched on", which holds them. In this
+    /// module because one board's program has all of it in flash.
     #[inline(never)]
     pub(super) fn rest(&mut self, active: &Active, measured: Phases) {
         self.field_oriented.reset();

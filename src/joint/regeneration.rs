@@ -1,16 +1,22 @@
-//! Braking into a supply that takes nothing back: the braking current fades before over-voltage has to switch off; control step.
+//! Braking into a supply that takes nothing back: the braking current fades before over-voltage has to switch off;
+//! control step.
 //!
-//! A motor that brakes is a generator. What it gives beyond its own copper loss goes into the supply's capacitor, and where the supply takes nothing back (a
-//! laboratory supply, an adapter, a full battery whose protection has opened) the voltage rises. Over the last volts below the highest supply, the
-//! [band](super::configuration::Limits::regeneration_band), less and less of the current that would feed the supply is made; at the limit, none. What the
-//! winding burns by itself is not withheld, so that a joint at rest holds its load and a slow one brakes with all of its torque, nor is a torque that drives.
+//! A motor that brakes is a generator. What it gives beyond its own copper loss goes into the supply's capacitor, and
+//! where the supply takes nothing back (a laboratory supply, an adapter, a full battery whose protection has opened)
+//! the voltage rises. Over the last volts below the highest supply, the
+//! [band](super::configuration::Limits::regeneration_band), less and less of the current that would feed the supply is
+//! made; at the limit, none. What the winding burns by itself is not withheld, so that a joint at rest holds its load
+//! and a slow one brakes with all of its torque, nor is a torque that drives.
 //!
-//! The power at the motor's terminals, of the equations in [`crate::motor::current`] at rest, is 3/2 (w psi + R i_q) i_q: the supply is fed where that is
-//! negative. What is withheld rises in the same step as the supply, and comes back slowly; where the winding burns all of it, at once, because half of such a
-//! current feeds the supply again. Between both edges lies a quarter of the induced voltage: noise would switch the current.
+//! The power at the motor's terminals, of the equations in [`crate::motor::current`] at rest, is 3/2 (w psi + R i_q)
+//! i_q: the supply is fed where that is negative. What is withheld rises in the same step as the supply, and comes back
+//! slowly; where the winding burns all of it, at once, because half of such a current feeds the supply again. Between
+//! both edges lies a quarter of the induced voltage: noise would switch the current.
 //!
-//! A d current makes loss without torque: as much of the [loss current](super::configuration::MotorConfiguration::loss_current) flows as q current is
-//! withheld. Both together stay within the current limit: with a part s of it left for q and 1 - s for d, the vector is at most sqrt(s^2 + (1 - s)^2) of it.
+//! A d current makes loss without torque: as much of the [loss
+//! current](super::configuration::MotorConfiguration::loss_current) flows as q current is withheld. Both together stay
+//! within the current limit: with a part s of it left for q and 1 - s for d, the vector is at most sqrt(s^2 + (1 -
+//! s)^2) of it.
 
 use super::active::Active;
 use crate::motor::number::{greater, within};
@@ -18,7 +24,8 @@ use crate::motor::transform::Dq;
 
 /// Control steps in which all of what is withheld comes back.
 const RECOVERY_STEPS: f32 = 200.0;
-/// Induced voltage, as a part of it, that the winding must be able to burn before a current that is withheld flows again.
+/// Induced voltage, as a part of it, that the winding must be able to burn before a current that is withheld flows
+/// again.
 const HYSTERESIS: f32 = 1.25;
 
 /// How much of a braking current is withheld, from one control step to the next.
@@ -29,8 +36,8 @@ pub struct Regeneration {
 }
 
 impl Regeneration {
-    /// The current to be made, A, where `wanted` is the one for the torque, at an electrical speed, rad/s, and a supply, V. `derating` is the part of the
-    /// current limit that winding and bridge permit.
+    /// The current to be made, A, where `wanted` is the one for the torque, at an electrical speed, rad/s, and a
+    /// supply, V. `derating` is the part of the current limit that winding and bridge permit.
     #[inline(always)]
     pub fn step(&mut self, active: &Active, wanted: f32, speed: f32, bus_voltage: f32, derating: f32) -> Dq {
         if bus_voltage > active.onset || self.withheld > 0.0 {
@@ -66,7 +73,8 @@ mod tests {
     use crate::default_configuration::B_G431B_ESC1;
     use proptest::prelude::*;
 
-    /// A joint of 0.1 ohm on 8 to 25 V that fades over 2 V, with so many of its 20 A for losses. It induces 0.1 V at 52.5 rad/s.
+    /// A joint of 0.1 ohm on 8 to 25 V that fades over 2 V, with so many of its 20 A for losses. It induces 0.1 V at
+    /// 52.5 rad/s.
     fn active(loss_current: f32) -> Active {
         let mut board = B_G431B_ESC1;
         (board.joint.motor.current_limit, board.joint.motor.loss_current) = (20.0, loss_current);

@@ -6,7 +6,8 @@ use crate::motor::phases::Phases;
 
 /// Everything that one control step knows about the outside world.
 ///
-/// The board scales its codes to these units with nominal gains; offsets of the current sensors are the joint's business.
+/// The board scales its codes to these units with nominal gains; offsets of the current sensors are the joint's
+/// business.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measurements {
     /// Phase currents, A, positive into the motor, sampled at the centre of the PWM period.
@@ -17,7 +18,8 @@ pub struct Measurements {
     pub encoder: u32,
     /// Whether the encoder answered, with a good parity or checksum where it has one.
     pub encoder_valid: bool,
-    /// Whether the encoder's zero is where it always is: false for an incremental encoder that has not met its index since power-on.
+    /// Whether the encoder's zero is where it always is: false for an incremental encoder that has not met its index
+    /// since power-on.
     pub encoder_referenced: bool,
     /// Temperature of the winding's sensor, °C; NaN where the board has none.
     pub winding_temperature: f32,

@@ -1,14 +1,17 @@
 //! The drive's state machine (CiA 402-2, "Power drive system finite state automaton"); control step.
 //!
-//! What the network asks for comes as the controlword, what the drive is comes out as the statusword; the bridge switches only in
-//! [`State::OperationEnabled`], [`State::QuickStopActive`], while a fault reaction brakes, and in [`State::OpenLoop`].
+//! What the network asks for comes as the controlword, what the drive is comes out as the statusword; the bridge
+//! switches only in [`State::OperationEnabled`], [`State::QuickStopActive`], while a fault reaction brakes, and in
+//! [`State::OpenLoop`].
 //!
-//! [`State::OpenLoop`] is not of the profile: it takes the place of "operation enabled" in [`Mode::OpenLoop`](super::Mode::OpenLoop), in which a voltage
-//! turns the motor and nothing can brake it. Whatever leaves it switches the bridge off in the same step.
+//! [`State::OpenLoop`] is not of the profile: it takes the place of "operation enabled" in
+//! [`Mode::OpenLoop`](super::Mode::OpenLoop), in which a voltage turns the motor and nothing can brake it. Whatever
+//! leaves it switches the bridge off in the same step.
 
 use super::stopping::StopConfiguration;
 
-/// Control steps for which a fault reset waits for the gate driver: a task clears it, and configures it anew where it has to. 100 ms at 40 kHz.
+/// Control steps for which a fault reset waits for the gate driver: a task clears it, and configures it anew where it
+/// has to. 100 ms at 40 kHz.
 pub const RESET_STEPS: u16 = 4_000;
 
 /// States of the power drive system.
@@ -275,8 +278,8 @@ impl State {
         matches!(self, Self::OperationEnabled | Self::QuickStopActive | Self::FaultReactionActive)
     }
 
-    /// The statusword's bits that tell the state (object 6041h, mask 006Fh), quick stop bit included. The open loop is "operation enabled" with the
-    /// manufacturer's bit 14.
+    /// The statusword's bits that tell the state (object 6041h, mask 006Fh), quick stop bit included. The open loop is
+    /// "operation enabled" with the manufacturer's bit 14.
     pub const fn statusword(self) -> u16 {
         match self {
             Self::NotReadyToSwitchOn => 0x00,

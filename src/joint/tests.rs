@@ -100,7 +100,8 @@ fn before_the_first_step_telemetry_tells_nothing() {
     assert_eq!(Telemetry::NOTHING.motion, JointMotion::default());
 }
 
-/// Wanted current as a part of the current limit at a temperature of the bridge, and faults, in "operation enabled" and while braking.
+/// Wanted current as a part of the current limit at a temperature of the bridge, and faults, in "operation enabled" and
+/// while braking.
 fn derated(bridge_temperature: f32, winding: f32, sensor: bool) -> (f32, Faults) {
     let mut board = crate::default_configuration::B_G431B_ESC1;
     board.bridge.has_bridge_sensor = sensor;

@@ -1,4 +1,5 @@
-//! Current control in the rotor's frame: PI with decoupling, from wanted currents to the voltage that they need; control step.
+//! Current control in the rotor's frame: PI with decoupling, from wanted currents to the voltage that they need;
+//! control step.
 //!
 //! The machine in the rotor's frame (Krishnan, Permanent Magnet Synchronous and Brushless DC Motor Drives, chapter 3):
 //!
@@ -7,10 +8,10 @@
 //! v_q = R i_q + L_q di_q/dt + w L_d i_d + w psi
 //! ```
 //!
-//! The terms with the electrical speed w are fed forward, which leaves two windings R + s L. The zero of each PI lies on its winding's
-//! pole, so the open loop is an integrator with the wanted bandwidth and the delay of sampling, computing and holding:
-//! one and a half periods. Seen from one period to the next, with a = exp(-R T / L), the gains of that are
-//! k_p = w_c L (1 + R T / 2 L) and k_i T = w_c R T.
+//! The terms with the electrical speed w are fed forward, which leaves two windings R + s L. The zero of each PI lies
+//! on its winding's pole, so the open loop is an integrator with the wanted bandwidth and the delay of sampling,
+//! computing and holding: one and a half periods. Seen from one period to the next, with a = exp(-R T / L), the gains
+//! of that are k_p = w_c L (1 + R T / 2 L) and k_i T = w_c R T.
 //!
 //! What the bridge could not apply is taken out of the integral as if the reference had been one that it could follow
 //! (Hanus' conditioning), so nothing winds up.
@@ -35,8 +36,8 @@ pub struct MotorConstants {
     pub inductance_d: f32,
     /// Inductance across the magnet's flux, H; 1 µH to 0.1 H.
     pub inductance_q: f32,
-    /// Magnet's flux linkage, Wb: peak phase voltage per electrical rad/s; 0 to 1. Torque is 3/2 times pole pairs times flux
-    /// linkage times i_q.
+    /// Magnet's flux linkage, Wb: peak phase voltage per electrical rad/s; 0 to 1. Torque is 3/2 times pole pairs
+    /// times flux linkage times i_q.
     pub flux_linkage: f32,
 }
 
@@ -68,8 +69,8 @@ pub struct CurrentGains {
 }
 
 impl CurrentGains {
-    /// Checks settings and prepares them. The bandwidth is refused where the delay would leave a phase margin below 60°, and the
-    /// winding where its time constant is below two periods: it is too fast for the rate.
+    /// Checks settings and prepares them. The bandwidth is refused where the delay would leave a phase margin below
+    /// 60°, and the winding where its time constant is below two periods: it is too fast for the rate.
     pub fn new(settings: &CurrentSettings) -> Result<Self, SettingError> {
         let rate = in_range!("control rate", "Hz", settings.rate, 1e3, 200e3)?;
         let bandwidth = in_range!("current loop's bandwidth", "Hz", settings.bandwidth, 10.0, rate / LEAST_PERIODS)?;
@@ -105,8 +106,9 @@ pub struct CurrentControl {
 impl CurrentControl {
     /// The voltage that takes `measured` to `reference`, V, for currents in A at an electrical speed in rad/s.
     ///
-    /// Where a measured or wanted current is not a number its axis has no error in this step, and where the speed is not a
-    /// number nothing is fed forward. The result is finite for any finite currents below 1e15 A. [`Self::settle`] must follow.
+    /// Where a measured or wanted current is not a number its axis has no error in this step, and where the speed is
+    /// not a number nothing is fed forward. The result is finite for any finite currents below 1e15 A.
+    /// [`Self::settle`] must follow.
     #[inline(always)]
     pub fn step(&mut self, gains: &CurrentGains, reference: Dq, measured: Dq, electrical_speed: f32) -> Dq {
         let error = reference - measured;
@@ -164,7 +166,8 @@ mod tests {
     const SETTINGS: CurrentSettings =
         CurrentSettings { motor: MOTOR, bandwidth: 1000.0, rate: 20_000.0, highest_voltage: 60.0 };
 
-    /// The machine in the rotor's frame at a constant speed; a voltage acts in the period after the one that computed it.
+    /// The machine in the rotor's frame at a constant speed; a voltage acts in the period after the one that computed
+    /// it.
     struct Machine {
         current: (f64, f64),
         speed: f64,

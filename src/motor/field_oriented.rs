@@ -1,9 +1,9 @@
 //! Field-oriented control of one motor: phase currents and a wanted current in, duties out; control step.
 //!
-//! The currents are sampled at an instant that the rotor's angle is known for. The voltage that they lead to acts in the middle of
-//! the period after next, one and a half periods later, when the rotor has moved on. It is therefore turned back into the
-//! stationary frame with the angle of that later instant: at 20 kHz and an electrical speed of 3000 rad/s the difference is 13°,
-//! and 13° of the voltage would end up on the wrong axis.
+//! The currents are sampled at an instant that the rotor's angle is known for. The voltage that they lead to acts in
+//! the middle of the period after next, one and a half periods later, when the rotor has moved on. It is therefore
+//! turned back into the stationary frame with the angle of that later instant: at 20 kHz and an electrical speed of
+//! 3000 rad/s the difference is 13°, and 13° of the voltage would end up on the wrong axis.
 
 use super::angle::{ElectricalAngle, TAU};
 use super::current::{CurrentControl, CurrentGains, CurrentSettings, DELAY_PERIODS};
@@ -74,8 +74,9 @@ pub struct FieldOriented {
 }
 
 impl FieldOriented {
-    /// The current to be made in this control step, A, where `wanted` is the one without [field weakening](super::field_weakening): the same where that is
-    /// off. `speed` is the electrical speed, rad/s, `limit` the current limit, A. [`step`](Self::step) must follow.
+    /// The current to be made in this control step, A, where `wanted` is the one without [field
+    /// weakening](super::field_weakening): the same where that is off. `speed` is the electrical speed, rad/s,
+    /// `limit` the current limit, A. [`step`](Self::step) must follow.
     #[inline(always)]
     pub fn reference(
         &mut self,
@@ -139,7 +140,8 @@ mod tests {
         FieldOrientedGains::new(&current, &modulation).unwrap()
     }
 
-    /// Currents of each step, in the true rotor's frame, with the speed held and the rotor's angle and speed known exactly.
+    /// Currents of each step, in the true rotor's frame, with the speed held and the rotor's angle and speed known
+    /// exactly.
     fn run(gains: &FieldOrientedGains, speed: f64, dead_time: f64, advance: bool, steps: usize) -> Vec<Dq> {
         let mut motor = VirtualMotor { dead_time, held_speed: Some(speed), ..VirtualMotor::default() };
         let mut gains = *gains;
@@ -174,7 +176,8 @@ mod tests {
 
     #[test]
     fn the_angle_is_advanced_by_the_delay() {
-        // The rotor turns 13° in the delay. Without the advance the back-EMF's voltage is turned by as much, and the axes couple.
+        // The rotor turns 13° in the delay. Without the advance the back-EMF's voltage is turned by as much, and the
+        // axes couple.
         let worst = |advance| {
             let currents = run(&gains(0.0), 3000.0 / 14.0, 0.0, advance, 60);
             currents.iter().map(|i| i.d.abs()).fold(0.0, f32::max)
@@ -183,7 +186,8 @@ mod tests {
         assert!(with < 0.5 * without, "{with} A with, {without} A without");
     }
 
-    /// RMS of the current's error over several electrical turns at a low speed, A, with a dead time of 1 % of the period.
+    /// RMS of the current's error over several electrical turns at a low speed, A, with a dead time of 1 % of the
+    /// period.
     fn ripple(compensation: f32) -> f32 {
         let currents = run(&gains(compensation), 5.0, 0.01, true, 20_000);
         let late = &currents[2_000..];

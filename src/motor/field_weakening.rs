@@ -1,30 +1,34 @@
 //! Field weakening: a d current against the magnet's flux, where the supply's voltage is used up; control step.
 //!
-//! The faster a rotor turns, the more voltage it induces, and at its base speed nothing is left to drive a current with. A negative d current takes
-//! L_d i_d from the flux linkage psi, and with it from the voltage (Krishnan, Permanent Magnet Synchronous and Brushless DC Motor Drives, chapter 6).
-//! How much is needed an integrator finds, of what the current loop asked for in the step before:
+//! The faster a rotor turns, the more voltage it induces, and at its base speed nothing is left to drive a current
+//! with. A negative d current takes L_d i_d from the flux linkage psi, and with it from the voltage (Krishnan,
+//! Permanent Magnet Synchronous and Brushless DC Motor Drives, chapter 6). How much is needed an integrator finds, of
+//! what the current loop asked for in the step before:
 //!
 //! ```text
 //! i_d += k ((0.95 V)^2 - v_d^2 - v_q^2), within -I_w and 0
 //! ```
 //!
-//! V is the longest voltage vector that the [modulation](super::modulation) permits, I_w the field-weakening current. No constant of the motor tells how much
-//! is needed, so that a wrong flux linkage does not matter. Near the limit the integrator is a first-order loop whose bandwidth rises with the speed; k is such
-//! that it is a tenth of the current loop's at the fastest the joint may be.
+//! V is the longest voltage vector that the [modulation](super::modulation) permits, I_w the field-weakening current.
+//! No constant of the motor tells how much is needed, so that a wrong flux linkage does not matter. Near the limit the
+//! integrator is a first-order loop whose bandwidth rises with the speed; k is such that it is a tenth of the current
+//! loop's at the fastest the joint may be.
 //!
-//! More d current helps as long as it takes more voltage from q than its resistance adds to d: R |v_d| < w L_d v_q, the derivative of the vector's length. Where that
-//! ends, in a motor of high resistance soon, it goes no further.
+//! More d current helps as long as it takes more voltage from q than its resistance adds to d: R |v_d| < w L_d v_q, the
+//! derivative of the vector's length. Where that ends, in a motor of high resistance soon, it goes no further.
 //!
-//! A voltage that the winding's resistance takes, or a change of the current, no d current gives back: below a speed at which the rotor induces
-//! seven tenths of V the d current goes back to zero. The current limit holds for both: q current keeps what d current leaves of its circle. I_w is at most
-//! psi / L_d, beyond which more of it would raise the voltage again, and there it may not be lost: while the bridge switches it bounds
-//! the voltage, and off, the diodes rectify all of what the rotor induces. A [configuration](crate::joint::configuration) with I_w above 0 is therefore
+//! A voltage that the winding's resistance takes, or a change of the current, no d current gives back: below a speed at
+//! which the rotor induces seven tenths of V the d current goes back to zero. The current limit holds for both: q
+//! current keeps what d current leaves of its circle. I_w is at most psi / L_d, beyond which more of it would raise the
+//! voltage again, and there it may not be lost: while the bridge switches it bounds the voltage, and off, the diodes
+//! rectify all of what the rotor induces. A [configuration](crate::joint::configuration) with I_w above 0 is therefore
 //! refused where that would be more than the highest supply.
 
 use super::number::{limited, magnitude, square_root, within};
 use super::transform::Dq;
 
-/// Part of the longest voltage vector that is used before the field is weakened: the rest is for changes of the current.
+/// Part of the longest voltage vector that is used before the field is weakened: the rest is for changes of the
+/// current.
 pub const SHARE: f32 = 0.95;
 /// Part of the longest voltage vector that the rotor has to induce.
 pub const INDUCED: f32 = 0.7;
@@ -61,7 +65,8 @@ pub struct WeakeningGains {
     integral: f32,
     /// Wb.
     flux_linkage: f32,
-    /// Part of the longest voltage vector, for an electrical speed of 1 rad/s, up to which a voltage along d leaves something to be gained, s.
+    /// Part of the longest voltage vector, for an electrical speed of 1 rad/s, up to which a voltage along d leaves
+    /// something to be gained, s.
     time_constant: f32,
 }
 
@@ -95,8 +100,9 @@ pub struct FieldWeakening {
 }
 
 impl FieldWeakening {
-    /// The current to be made, A, where `reference` is the one without field weakening. `asked` is the voltage, V, that the current loop asked for in the step
-    /// before, `reach` the longest vector, V, `speed` the electrical speed, rad/s, `limit` the current limit, A. The larger demand of d current counts.
+    /// The current to be made, A, where `reference` is the one without field weakening. `asked` is the voltage, V, that
+    /// the current loop asked for in the step before, `reach` the longest vector, V, `speed` the electrical speed,
+    /// rad/s, `limit` the current limit, A. The larger demand of d current counts.
     ///
     /// What is not a number counts as no voltage and no speed. A function of its own: it is seldom run.
     #[inline(never)]

@@ -1,8 +1,8 @@
 //! The current loop: everything between a wanted torque and three duty cycles; control step.
 //!
-//! Single-precision floating point in SI units. The Cortex-M4F and the host both compute it by IEEE 754 without contraction,
-//! so the bits are the same as long as nothing calls a mathematics library: angles are 32-bit fractions of a turn, their sine
-//! and cosine come from integers ([`crate::sine`]), square roots from [`number`].
+//! Single-precision floating point in SI units. The Cortex-M4F and the host both compute it by IEEE 754 without
+//! contraction, so the bits are the same as long as nothing calls a mathematics library: angles are 32-bit fractions of
+//! a turn, their sine and cosine come from integers ([`crate::sine`]), square roots from [`number`].
 //!
 //! In the order of a control step:
 //!  - [`phases`]: one value for each of the three phases;
@@ -15,7 +15,8 @@
 //!
 //! Beside it:
 //!  - [`thermal`]: how hot the winding is and how much current it bears; slow task;
-//!  - [`open_loop`]: a field of a commanded voltage, and means of the winding's answer, for commissioning; control step;
+//!  - [`open_loop`]: a field of a commanded voltage, and means of the winding's answer, for commissioning; control
+//!    step;
 //!  - [`setting`]: how a setting out of its range is refused; task, host;
 //!  - [`number`]: limits and roots that treat NaN the same everywhere.
 

@@ -1,14 +1,15 @@
 //! Space-vector modulation: from a voltage vector to three duties, and what they really apply; control step.
 //!
-//! Half the sum of the largest and the smallest phase voltage is taken from all phases. This centres them between the rails, which
-//! is what space-vector modulation does with its zero vectors (Holmes and Lipo, Pulse Width Modulation for Power Converters,
-//! section 6.2), and a vector of any angle fits up to V_bus / sqrt 3. Beyond that the duties reach their limits one after the
-//! other; the corners of the hexagon lie at 2/3 V_bus. A vector that leaves it is shortened until the span of its phase voltages, largest less
-//! smallest, fits: its angle is kept, and a torque stays smoother than with duties that are cut off one by one.
+//! Half the sum of the largest and the smallest phase voltage is taken from all phases. This centres them between the
+//! rails, which is what space-vector modulation does with its zero vectors (Holmes and Lipo, Pulse Width Modulation for
+//! Power Converters, section 6.2), and a vector of any angle fits up to V_bus / sqrt 3. Beyond that the duties reach
+//! their limits one after the other; the corners of the hexagon lie at 2/3 V_bus. A vector that leaves it is shortened
+//! until the span of its phase voltages, largest less smallest, fits: its angle is kept, and a torque stays smoother
+//! than with duties that are cut off one by one.
 //!
-//! While a leg's two transistors are both off, its current chooses the rail. A current out of the leg costs the dead time's
-//! part of the period times V_bus, a current into it gains as much. Compensation adds that back by the sign of the current; within a
-//! band around zero in proportion, because there the sign is noise.
+//! While a leg's two transistors are both off, its current chooses the rail. A current out of the leg costs the dead
+//! time's part of the period times V_bus, a current into it gains as much. Compensation adds that back by the sign of
+//! the current; within a band around zero in proportion, because there the sign is noise.
 
 use super::number::{greater, lesser, limited, square_root};
 use super::phases::Phases;
@@ -21,15 +22,15 @@ pub const HIGHEST_VOLTAGE_FRACTION: f32 = 1.154_700_5;
 /// How the bridge modulates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ModulationSettings {
-    /// Longest voltage vector as a fraction of the longest one that fits at any angle: 0.1 to 2 / sqrt 3; up to 1 no duty
-    /// ever reaches its limit.
+    /// Longest voltage vector as a fraction of the longest one that fits at any angle: 0.1 to 2 / sqrt 3; up to 1 no
+    /// duty ever reaches its limit.
     pub voltage_fraction: f32,
     /// Least duty of the high side; 0 to 0.4.
     pub minimum_duty: f32,
     /// Greatest duty of the high side; 0.6 to 1. Low-side shunts are sampled in what is left.
     pub maximum_duty: f32,
-    /// Time in which both transistors of a leg are off at each commutation, beyond what the switching itself hides, as a
-    /// fraction of the PWM period; 0 (no compensation) to 0.1.
+    /// Time in which both transistors of a leg are off at each commutation, beyond what the switching itself hides, as
+    /// a fraction of the PWM period; 0 (no compensation) to 0.1.
     pub dead_time: f32,
     /// Below this phase current, A, compensation is in proportion to it; 0.001 to 100.
     pub dead_time_band: f32,
@@ -48,7 +49,8 @@ pub struct Modulated {
     pub limited: bool,
 }
 
-/// Compare value of a centre-aligned timer that counts up to `top`, for a duty of at most `largest`. A duty that is no number is 0.
+/// Compare value of a centre-aligned timer that counts up to `top`, for a duty of at most `largest`. A duty that is no
+/// number is 0.
 #[inline(always)]
 pub fn compare_value(duty: f32, top: u16, largest: f32) -> u16 {
     // Held to 16 bits as an integer: one instruction, where the conversion to `u16` takes two comparisons.
@@ -64,7 +66,8 @@ pub struct Modulator {
     maximum_duty: f32,
     /// Longest vector as a fraction of the supply.
     reach: f32,
-    /// Widest span of the phase voltages as a fraction of the supply; infinite where no permitted vector has a wider one.
+    /// Widest span of the phase voltages as a fraction of the supply; infinite where no permitted vector has a wider
+    /// one.
     span: f32,
     dead_time: f32,
     dead_time_per_ampere: f32,
@@ -122,11 +125,11 @@ impl Modulator {
         Dq { d, q }
     }
 
-    /// Duties for a voltage vector, V. `currents`, A, out of the bridge: the ones that will flow while the duties act; the
-    /// reference's are quieter near zero than measured ones.
+    /// Duties for a voltage vector, V. `currents`, A, out of the bridge: the ones that will flow while the duties act;
+    /// the reference's are quieter near zero than measured ones.
     ///
-    /// Where the supply is too low (or not a number) all duties are at their centre and nothing is applied. NaN in a voltage or
-    /// current counts as 0.
+    /// Where the supply is too low (or not a number) all duties are at their centre and nothing is applied. NaN in a
+    /// voltage or current counts as 0.
     #[inline(always)]
     pub fn modulate(&self, voltage: AlphaBeta, bus_voltage: f32, currents: Phases) -> Modulated {
         if !(bus_voltage > self.minimum_bus_voltage && bus_voltage.is_finite()) {
@@ -154,8 +157,8 @@ impl Modulator {
         }
     }
 
-    /// One leg: the duty that was asked for, and that for the dead time at a current, A. No closure: optimised for nothing but size, the compiler
-    /// calls those.
+    /// One leg: the duty that was asked for, and that for the dead time at a current, A. No closure: optimised for
+    /// nothing but size, the compiler calls those.
     #[inline(always)]
     fn leg(&self, wanted: f32, current: f32) -> Leg {
         let compensation = limited(current * self.dead_time_per_ampere, self.dead_time);

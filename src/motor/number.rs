@@ -1,12 +1,13 @@
 //! Limits and roots of single-precision numbers, with the same bits on every machine, NaN included; control step.
 //!
-//! `f32::min` and `f32::max` are calls of a mathematics library on a Cortex-M4, which has no instruction for them, and they
-//! drop a NaN silently. `f32::clamp` links a panic. Here everything is a comparison, and each function says where a NaN
-//! goes: it always ends in a bounded number, so that no measurement can leave one behind in a state.
+//! `f32::min` and `f32::max` are calls of a mathematics library on a Cortex-M4, which has no instruction for them, and
+//! they drop a NaN silently. `f32::clamp` links a panic. Here everything is a comparison, and each function says where
+//! a NaN goes: it always ends in a bounded number, so that no measurement can leave one behind in a state.
 //!
-//! A magnitude is compared with its limit as an integer: without their signs, numbers are in the order of their bits, and what is not a
-//! number comes after all of them. On the core that is three instructions where two comparisons of the floating-point unit take nine. Nothing
-//! but the root is a call: around a call, every number in the floating-point registers is put aside.
+//! A magnitude is compared with its limit as an integer: without their signs, numbers are in the order of their bits,
+//! and what is not a number comes after all of them. On the core that is three instructions where two comparisons of
+//! the floating-point unit take nine. Nothing but the root is a call: around a call, every number in the floating-point
+//! registers is put aside.
 
 /// The lesser; `b` where `a` is NaN.
 #[inline(always)]
@@ -68,9 +69,9 @@ pub fn or_zero(value: f32) -> f32 {
 
 /// Square root; 0 for negative numbers and NaN. Relative error at most 2e-6, for arguments in `1e-30..=1e30`.
 ///
-/// The estimate from the halved exponent is `micromath`'s (6 % off); each of two steps of Heron's method squares its error and
-/// costs one division. The type `F32` is named because its trait's `sqrt` would lose to the library's own wherever there is a
-/// standard library, and the host would compute other bits than the board.
+/// The estimate from the halved exponent is `micromath`'s (6 % off); each of two steps of Heron's method squares its
+/// error and costs one division. The type `F32` is named because its trait's `sqrt` would lose to the library's own
+/// wherever there is a standard library, and the host would compute other bits than the board.
 #[cfg_attr(target_os = "none", inline(never))]
 #[cfg_attr(not(target_os = "none"), inline(always))]
 pub fn square_root(value: f32) -> f32 {

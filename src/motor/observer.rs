@@ -1,15 +1,17 @@
 //! Tracking observer: position over many turns, velocity and acceleration from a wrapping encoder; control step.
 //!
-//! A predictor of third order (position, velocity, acceleration) that each encoder sample corrects by a part of the innovation, the
-//! difference between the sample and its prediction. All three poles lie at the same place, theta = exp(-w T), which makes it the
-//! critically damped fading-memory filter (Brookner, Tracking and Kalman Filtering Made Easy, section 1.3; gains 1 - theta^3,
-//! 3/2 (1 - theta)^2 (1 + theta) and (1 - theta)^3). It follows a constant acceleration without any lag.
+//! A predictor of third order (position, velocity, acceleration) that each encoder sample corrects by a part of the
+//! innovation, the difference between the sample and its prediction. All three poles lie at the same place, theta =
+//! exp(-w T), which makes it the critically damped fading-memory filter (Brookner, Tracking and Kalman Filtering Made
+//! Easy, section 1.3; gains 1 - theta^3, 3/2 (1 - theta)^2 (1 + theta) and (1 - theta)^3). It follows a constant
+//! acceleration without any lag.
 //!
-//! The acceleration that the motor is known to cause, torque over inertia, is fed forward. The state then only holds what is left,
-//! friction, load and errors of the inertia, and the estimate of the total does not wait for the bandwidth.
+//! The acceleration that the motor is known to cause, torque over inertia, is fed forward. The state then only holds
+//! what is left, friction, load and errors of the inertia, and the estimate of the total does not wait for the
+//! bandwidth.
 //!
-//! Errors with a 14-bit encoder at 20 kHz while the rotor slowly runs up from 3 to 13 rad/s and from 0.1 to 1 rad/s, and the time after a
-//! step of the acceleration without feedforward (tests assert these figures):
+//! Errors with a 14-bit encoder at 20 kHz while the rotor slowly runs up from 3 to 13 rad/s and from 0.1 to 1 rad/s,
+//! and the time after a step of the acceleration without feedforward (tests assert these figures):
 //!
 //! | bandwidth | velocity, RMS | acceleration, RMS | slow: velocity | slow: acceleration | 90 % of an acceleration step |
 //! |---|---|---|---|---|---|
@@ -17,8 +19,8 @@
 //! | 100 Hz | 0.015 rad/s | 3.2 rad/s² | 0.017 rad/s | 3.6 rad/s² | 8.5 ms |
 //! | 300 Hz | 0.08 rad/s | 50 rad/s² | 0.12 rad/s | 77 rad/s² | 2.8 ms |
 //!
-//! Positions are whole numbers and wrap with the encoder, so nothing is lost over any number of turns; the innovation is right as long as
-//! the prediction is less than half a turn off, that is at any speed below half a turn in a step.
+//! Positions are whole numbers and wrap with the encoder, so nothing is lost over any number of turns; the innovation
+//! is right as long as the prediction is less than half a turn off, that is at any speed below half a turn in a step.
 
 use super::angle::{STEPS, TAU};
 use super::number::{limited, or_zero};
@@ -61,7 +63,8 @@ impl ObserverGains {
         let rate = in_range!("control rate", "Hz", settings.rate, 1e3, 200e3)?;
         let bandwidth = in_range!("observer's bandwidth", "Hz", settings.bandwidth, 1.0, 0.1 * rate)?;
         let latency = in_range!("encoder's latency", "s", settings.latency, 0.0, 0.01)?;
-        // exp(-x) as its first Padé approximation: 2 % off at the highest bandwidth, 0.03 % off at a hundredth of the rate.
+        // exp(-x) as its first Padé approximation: 2 % off at the highest bandwidth, 0.03 % off at a hundredth of the
+        // rate.
         let half = 0.5 * TAU * bandwidth / rate;
         let theta = (1.0 - half) / (1.0 + half);
         let rest = 1.0 - theta;
@@ -114,8 +117,8 @@ pub struct Observation {
     pub motion: Motion,
     /// Sample less its prediction, rad; 0 in a step without a sample. Half a turn at most.
     ///
-    /// At rest it is the encoder's noise. A jump of the encoder appears in full in the step in which it happens; an encoder that stands
-    /// still while the rotor turns makes it grow by the way of each step.
+    /// At rest it is the encoder's noise. A jump of the encoder appears in full in the step in which it happens; an
+    /// encoder that stands still while the rotor turns makes it grow by the way of each step.
     pub innovation: f32,
     /// Steps since the last sample; 0 in a step with one.
     pub held: u32,
@@ -131,9 +134,9 @@ pub struct Observer {
 }
 
 impl Observer {
-    /// One control step with the encoder's angle, 2^32 a turn, or none where it did not answer: then the prediction is held. With it the
-    /// acceleration, rad/s², that the motor caused since the last step in the encoder's direction: torque over inertia, or 0.
-    /// NaN counts as 0.
+    /// One control step with the encoder's angle, 2^32 a turn, or none where it did not answer: then the prediction is
+    /// held. With it the acceleration, rad/s², that the motor caused since the last step in the encoder's
+    /// direction: torque over inertia, or 0. NaN counts as 0.
     #[inline(always)]
     pub fn step(&mut self, gains: &ObserverGains, sample: Option<u32>, caused: f32) -> Observation {
         if !self.started {
@@ -203,8 +206,8 @@ mod tests {
         (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt()
     }
 
-    /// RMS errors of velocity and acceleration while a rotor runs up through the speeds from `slowest` to `fastest` in 20 s,
-    /// at which the steps of a 14-bit encoder beat with the samples in all ways.
+    /// RMS errors of velocity and acceleration while a rotor runs up through the speeds from `slowest` to `fastest` in
+    /// 20 s, at which the steps of a 14-bit encoder beat with the samples in all ways.
     fn noise(bandwidth: f32, slowest: f64, fastest: f64) -> (f64, f64) {
         let gains = gains(bandwidth);
         let mut observer = Observer::default();
@@ -236,7 +239,8 @@ mod tests {
         }
     }
 
-    /// Steps until the estimated acceleration has reached 90 % of a step of 1000 rad/s², and the largest error of velocity.
+    /// Steps until the estimated acceleration has reached 90 % of a step of 1000 rad/s², and the largest error of
+    /// velocity.
     fn acceleration_step(bandwidth: f32, caused: f32) -> (usize, f64) {
         let gains = gains(bandwidth);
         let mut observer = Observer::default();

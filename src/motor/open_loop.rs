@@ -1,11 +1,12 @@
 //! Open-loop voltage: a field of a commanded voltage and speed, and means of the winding's answer; control step.
 //!
-//! Commissioning measures a motor that nobody has described: resistance, inductances, pole pairs, direction and electrical zero are computed by
-//! whoever commands this, from the means that a window of [`WINDOW`] control steps gives. Nothing here needs a constant of the motor.
+//! Commissioning measures a motor that nobody has described: resistance, inductances, pole pairs, direction and
+//! electrical zero are computed by whoever commands this, from the means that a window of [`WINDOW`] control steps
+//! gives. Nothing here needs a constant of the motor.
 //!
-//! The voltage lies along a field that turns at the commanded speed from phase A on. On top of it a voltage may alternate with an eighth of the
-//! control rate, along the field and across it. All voltages slew at [`SLEW`], and fall where the current exceeds its limit, so that
-//! a winding of any resistance is reached slowly.
+//! The voltage lies along a field that turns at the commanded speed from phase A on. On top of it a voltage may
+//! alternate with an eighth of the control rate, along the field and across it. All voltages slew at [`SLEW`], and fall
+//! where the current exceeds its limit, so that a winding of any resistance is reached slowly.
 //!
 //! Nothing controls the current: it swings about its limit and passes it, by how much is in docs/commissioning.md.
 

@@ -1,7 +1,8 @@
 //! How a setting of the current loop that is out of its range is refused; task, host.
 
-/// Names of settings and units of their numbers, in the order of their numbers on the bus (object 2100h:3), and index and sub-index of the object that sets it or
-/// what it is computed from; zeros where that is nobody's to set over the bus. New ones come last.
+/// Names of settings and units of their numbers, in the order of their numbers on the bus (object 2100h:3), and index
+/// and sub-index of the object that sets it or what it is computed from; zeros where that is nobody's to set over the
+/// bus. New ones come last.
 const NAMES: [(&str, &str, u16, u8); 77] = [
     ("", "", 0x0000, 0),
     ("control rate", "Hz", 0x0000, 0),
@@ -82,7 +83,8 @@ const NAMES: [(&str, &str, u16, u8); 77] = [
     ("uncertainty of the load", "", 0x2203, 3),
 ];
 
-/// The name of a setting. A board has its number only: texts and units are linked where somebody formats them, on a host.
+/// The name of a setting. A board has its number only: texts and units are linked where somebody formats them, on a
+/// host.
 #[derive(Clone, Copy, Default, PartialEq, Eq)]
 pub struct Name(u8);
 
@@ -109,7 +111,8 @@ impl Name {
         NAMES.get(usize::from(self.0)).map_or("", |(_, unit, ..)| unit)
     }
 
-    /// As object 2100h:3 carries it: index of its object in bits 16 to 31, sub-index in bits 8 to 15, the name's number in bits 0 to 7.
+    /// As object 2100h:3 carries it: index of its object in bits 16 to 31, sub-index in bits 8 to 15, the name's number
+    /// in bits 0 to 7.
     pub fn code(self) -> u32 {
         /// Objects of the names, without texts.
         static PLACES: [u16; NAMES.len()] = places();

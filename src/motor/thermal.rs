@@ -1,7 +1,8 @@
 //! How hot the winding is and how much current it still bears; slow task, 100 Hz or so.
 //!
-//! Two nodes: copper loss heats the winding, the winding heats the housing (stator iron and shell), the housing heats the
-//! surroundings. Makers of small motors state just these four constants: two thermal resistances and two time constants.
+//! Two nodes: copper loss heats the winding, the winding heats the housing (stator iron and shell), the housing heats
+//! the surroundings. Makers of small motors state just these four constants: two thermal resistances and two time
+//! constants.
 //!
 //! ```text
 //! C_w dT_w/dt = 3/2 R(T_w) (i_d^2 + i_q^2) - (T_w - T_h) / R_wh
@@ -9,9 +10,10 @@
 //! R(T)        = R_25 (1 + 0.00393 (T - 25 °C))                      copper
 //! ```
 //!
-//! A sensor on the winding, where the board has one, pulls both nodes up towards it slowly: it corrects what the model has too cold, start and
-//! surroundings first of all, and the model gives what the sensor is too slow for. The hotter of the two counts. It never pulls them
-//! down: a sensor that sticks while the motor is cold looks just like good cooling, and would take the protection away.
+//! A sensor on the winding, where the board has one, pulls both nodes up towards it slowly: it corrects what the model
+//! has too cold, start and surroundings first of all, and the model gives what the sensor is too slow for. The hotter
+//! of the two counts. It never pulls them down: a sensor that sticks while the motor is cold looks just like good
+//! cooling, and would take the protection away.
 
 use super::number::{greater, lesser, or_zero, within};
 use super::setting::{SettingError, in_range};
@@ -34,15 +36,16 @@ pub struct MeanSquareCurrent {
 }
 
 impl MeanSquareCurrent {
-    /// Adds a control step's current, A. A current that is not a number counts as zero; one beyond 10 kA as 10 kA. Control
-    /// step.
+    /// Adds a control step's current, A. A current that is not a number counts as zero; one beyond 10 kA as 10 kA.
+    /// Control step.
     #[inline(always)]
     pub fn add(&mut self, current: Dq) {
         self.sum += lesser(or_zero(current.norm_squared()), 1e8);
         self.count = self.count.saturating_add(1);
     }
 
-    /// The mean since the last time, A^2, and begins anew; 0 where nothing was added. Exact to 0.1 % for up to 10,000 steps.
+    /// The mean since the last time, A^2, and begins anew; 0 where nothing was added. Exact to 0.1 % for up to 10,000
+    /// steps.
     pub fn take(&mut self) -> f32 {
         let mean = if self.count > 0 { self.sum / self.count as f32 } else { 0.0 };
         *self = Self::default();
@@ -65,8 +68,8 @@ pub struct ThermalSettings {
     pub housing_to_ambient: f32,
     /// Temperature of the surroundings, °C; -40 to 85.
     pub ambient: f32,
-    /// Time in which the sensor corrects the model, s; 1 to 10,000 and at least ten periods. About three times the sensor's own
-    /// time constant: shorter, and the sensor's lag passes for the winding's temperature.
+    /// Time in which the sensor corrects the model, s; 1 to 10,000 and at least ten periods. About three times the
+    /// sensor's own time constant: shorter, and the sensor's lag passes for the winding's temperature.
     pub correction_time: f32,
     /// Derating begins here, °C; 30 to 180.
     pub warning: f32,
@@ -109,9 +112,9 @@ pub struct WindingTemperature {
 }
 
 impl WindingTemperature {
-    /// Checks settings and starts with both nodes at a temperature, °C: the sensor's where there is one; else, as nobody
-    /// knows how hot the motor was switched off, the warning's is the safe choice and the surroundings' the usual one. Refused where a
-    /// heat path is too fast for the rate.
+    /// Checks settings and starts with both nodes at a temperature, °C: the sensor's where there is one; else, as
+    /// nobody knows how hot the motor was switched off, the warning's is the safe choice and the surroundings' the
+    /// usual one. Refused where a heat path is too fast for the rate.
     pub fn new(settings: &ThermalSettings, start: f32) -> Result<Self, SettingError> {
         let s = settings;
         let rate = in_range!("thermal model's rate", "Hz", s.rate, 1.0, 1000.0)?;
@@ -137,15 +140,16 @@ impl WindingTemperature {
         })
     }
 
-    /// The same model with both nodes at another temperature, °C; at the surroundings' where that is none that a sensor shows.
+    /// The same model with both nodes at another temperature, °C; at the surroundings' where that is none that a sensor
+    /// shows.
     pub fn starting_at(&self, start: f32) -> Self {
         let plausible = start >= PLAUSIBLE_SENSOR.0 && start <= PLAUSIBLE_SENSOR.1;
         let node = Node::at(if plausible { start } else { self.settings.ambient });
         Self { winding: node, housing: node, ..*self }
     }
 
-    /// One step with the mean square of the current's vector since the last one, A^2, and the sensor's reading, °C, or NaN where
-    /// there is none. A current that is not a number counts as zero.
+    /// One step with the mean square of the current's vector since the last one, A^2, and the sensor's reading, °C, or
+    /// NaN where there is none. A current that is not a number counts as zero.
     pub fn step(&mut self, mean_square_current: f32, sensor: f32) {
         let s = &self.settings;
         let square = within(or_zero(mean_square_current), 0.0, 1e8);
@@ -228,7 +232,8 @@ mod tests {
 
     #[test]
     fn a_short_overload_heats_the_winding_alone() {
-        // 2 s at 40 A: nearly adiabatic, 288 W and rising with the resistance, into 20 J/K, less what the housing takes.
+        // 2 s at 40 A: nearly adiabatic, 288 W and rising with the resistance, into 20 J/K, less what the housing
+        // takes.
         let model = after(2, 25.0, 1600.0, f32::NAN);
         assert!((25.0..31.0).contains(&(model.temperature() - 25.0)), "{}", model.temperature());
         assert!(model.housing() < 25.4, "{}", model.housing());

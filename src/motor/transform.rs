@@ -1,9 +1,9 @@
 //! Clarke and Park transforms and their inverses, amplitude-invariant; control step.
 //!
-//! A sine of amplitude A in the phases is a vector of length A in both frames. Power is therefore 3/2 of the product of the
-//! vectors. Phase A lies on the alpha axis; the rotor's d axis is its magnet's north pole, q leads d by a quarter of an
-//! electrical turn. Any standard text on field-oriented control has these formulas, for example Krishnan, Permanent
-//! Magnet Synchronous and Brushless DC Motor Drives, chapter 3.
+//! A sine of amplitude A in the phases is a vector of length A in both frames. Power is therefore 3/2 of the product of
+//! the vectors. Phase A lies on the alpha axis; the rotor's d axis is its magnet's north pole, q leads d by a quarter
+//! of an electrical turn. Any standard text on field-oriented control has these formulas, for example Krishnan,
+//! Permanent Magnet Synchronous and Brushless DC Motor Drives, chapter 3.
 
 use super::angle::SinCos;
 use super::number::square_root;

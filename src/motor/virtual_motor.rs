@@ -1,8 +1,8 @@
 //! A small motor, inverter and encoder for the tests of the current loop; host, tests only.
 //!
-//! The dq machine of [`super::current`] in double precision with a rotor, Coulomb and viscous friction, dead time, current-sensor
-//! offsets, an encoder with any direction and offset, and a phase that may be open. Duties act in the period after the
-//! one that computed them.
+//! The dq machine of [`super::current`] in double precision with a rotor, Coulomb and viscous friction, dead time,
+//! current-sensor offsets, an encoder with any direction and offset, and a phase that may be open. Duties act in the
+//! period after the one that computed them.
 
 use super::angle::{Direction, ElectricalAngle, EncoderAlignment};
 use super::phases::Phases;

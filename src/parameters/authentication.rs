@@ -7,25 +7,28 @@
 //! | 0 | L | the [image](super::image), whose bytes 6 and 7 state L |
 //! | L | 0 or 32 | nothing, or the tag |
 //!
-//! The tag is HMAC-SHA256 (RFC 2104, FIPS 180-4) with the joint's key of 32 bytes over 16 bytes that say what is signed, the ASCII
-//! characters `joint image tag1`, and the L bytes of the image. These hold the target (product and serial number) and the version,
-//! so the tag binds both. The tag is not part of the image and is not stored with it: what lies in a slot was let in before.
-//! An upload with a tag is at most [`STAGING`] bytes. A joint without a key takes uploads with and without a tag.
+//! The tag is HMAC-SHA256 (RFC 2104, FIPS 180-4) with the joint's key of 32 bytes over 16 bytes that say what is
+//! signed, the ASCII characters `joint image tag1`, and the L bytes of the image. These hold the target (product and
+//! serial number) and the version, so the tag binds both. The tag is not part of the image and is not stored with it:
+//! what lies in a slot was let in before. An upload with a tag is at most [`STAGING`] bytes. A joint without a key
+//! takes uploads with and without a tag.
 //!
 //! # Who may change what a joint can do
 //!
-//! An owned joint, which is one with a key, wants a session for whatever changes what it can do to its surroundings. The owner reads a
-//! challenge of 16 random bytes (2215h:5) and writes the response (2215h:7): HMAC-SHA256 with the key over 16 bytes for the purpose, product and serial
-//! number (4 bytes each, little-endian) and the challenge. A challenge is good for one right response. Purposes: `joint session  1` opens
-//! a session, `joint key back 1` has the joint forget its key. A new key (2215h:6, 64 bytes) comes as the key exclusive or HMAC(`joint key mask 1`, …), and
-//! behind it the response for `joint key next 1`, which covers these 32 bytes too. Security access of ISO 14229-1, service 27h, works alike, and
-//! like there a session that is open serves whoever sends on the bus: CAN does not say who sent a frame.
+//! An owned joint, which is one with a key, wants a session for whatever changes what it can do to its surroundings.
+//! The owner reads a challenge of 16 random bytes (2215h:5) and writes the response (2215h:7): HMAC-SHA256 with the key
+//! over 16 bytes for the purpose, product and serial number (4 bytes each, little-endian) and the challenge. A
+//! challenge is good for one right response. Purposes: `joint session  1` opens a session, `joint key back 1` has the
+//! joint forget its key. A new key (2215h:6, 64 bytes) comes as the key exclusive or HMAC(`joint key mask 1`, …), and
+//! behind it the response for `joint key next 1`, which covers these 32 bytes too. Security access of ISO 14229-1,
+//! service 27h, works alike, and like there a session that is open serves whoever sends on the bus: CAN does not say
+//! who sent a frame.
 //!
-//! The same key verifies and signs: whoever reads it out of a joint can sign for every joint that shares it. Commands in real time,
-//! setpoints among them, are not authenticated.
+//! The same key verifies and signs: whoever reads it out of a joint can sign for every joint that shares it. Commands
+//! in real time, setpoints among them, are not authenticated.
 //!
-//! Wrong tags are counted and keep nobody out: 256 bits cannot be guessed, and a joint that refused right tags after wrong ones could be shut off from its
-//! owner by anybody on the bus.
+//! Wrong tags are counted and keep nobody out: 256 bits cannot be guessed, and a joint that refused right tags after
+//! wrong ones could be shut off from its owner by anybody on the bus.
 
 use super::image::{MAX_LENGTH, ROOM};
 use hmac::{Hmac, KeyInit, Mac};
@@ -146,7 +149,8 @@ impl Key {
         self.response(purpose, challenge, masked).verify(response.into()).is_ok()
     }
 
-    /// Another key's bytes as they go over the bus, or back: each is the exclusive or of the other and of an HMAC over the challenge.
+    /// Another key's bytes as they go over the bus, or back: each is the exclusive or of the other and of an HMAC over
+    /// the challenge.
     pub fn mask(&self, challenge: &Challenge, bytes: &[u8; KEY]) -> [u8; KEY] {
         let mut masked: [u8; KEY] = self.bound(MASK, challenge).finalize().into_bytes().into();
         masked.iter_mut().zip(bytes).for_each(|(place, byte)| *place ^= byte);

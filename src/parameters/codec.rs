@@ -294,8 +294,8 @@ fn encode_set(set: &ParameterSet, format: u16, writer: &mut Writer) {
     writer.put(&[0; 2]);
 }
 
-/// Takes numbers off the front of a byte string. The first error stays; what is read behind it is of no meaning, but within the limits that were
-/// asked for. One look at the end instead of one behind every number is half the code.
+/// Takes numbers off the front of a byte string. The first error stays; what is read behind it is of no meaning, but
+/// within the limits that were asked for. One look at the end instead of one behind every number is half the code.
 #[derive(Clone)]
 pub(super) struct Reader<'a> {
     pub(super) bytes: &'a [u8],

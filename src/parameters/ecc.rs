@@ -1,8 +1,8 @@
 //! What to do about a double error of the flash's ECC: go on where a parameter word is torn, stop everywhere else.
 //!
-//! Called by the handler of the non-maskable interrupt; pure. A loss of power leaves torn double words in the parameters' pages, and
-//! reading one raises that interrupt (RM0440, FLASH_ECCR). That the address counts bytes from the bank's start is
-//! unconfirmed.
+//! Called by the handler of the non-maskable interrupt; pure. A loss of power leaves torn double words in the
+//! parameters' pages, and reading one raises that interrupt (RM0440, FLASH_ECCR). That the address counts bytes from
+//! the bank's start is unconfirmed.
 
 use core::ops::Range;
 

@@ -1,4 +1,5 @@
-//! Record that guards a joint: version floor, wrong tags, the owner's key; task or host. Boards and the virtual joint keep the same bytes.
+//! Record that guards a joint: version floor, wrong tags, the owner's key; task or host. Boards and the virtual joint
+//! keep the same bytes.
 //!
 //! | offset | bytes | content, little-endian |
 //! |---|---|---|

@@ -2,11 +2,11 @@
 //!
 //! # Layout, format versions 1 and 2
 //!
-//! Format 2 has [common terms](crate::friction::common) and one coefficient more. An image is written in the oldest format that can hold it, and one of format 1
-//! means the same bits that it always did.
+//! Format 2 has [common terms](crate::friction::common) and one coefficient more. An image is written in the oldest
+//! format that can hold it, and one of format 1 means the same bits that it always did.
 //!
-//! All numbers are little-endian two's complement. Q16.16 means a 32-bit integer that counts 1/65536 of the unit. Reserved
-//! bytes are zero. "Full scale" is explained in [`Domain::shifts`](crate::friction::domain::Domain::shifts).
+//! All numbers are little-endian two's complement. Q16.16 means a 32-bit integer that counts 1/65536 of the unit.
+//! Reserved bytes are zero. "Full scale" is explained in [`Domain::shifts`](crate::friction::domain::Domain::shifts).
 //!
 //! | offset | bytes | content |
 //! |---|---|---|
@@ -49,12 +49,14 @@
 //! | 4 | torque for an output of 1, Q16.16, below 256 Nm |
 //! | 2 | reserved |
 //!
-//! A golden vector is 36 bytes: the index of the set (1 byte), three reserved, the six signals (Q16.16, in the order of [`Signal`]),
-//! and the exact Q16.16 torques of the physical model and of the network. A device evaluates them before it uses an
-//! image, which proves that its arithmetic is the one that the image was judged with. Golden vectors are a sequence: each is one step of [`GOLDEN_RATE`],
-//! and pre-sliding elements, at rest before the first, go on from one to the next.
+//! A golden vector is 36 bytes: the index of the set (1 byte), three reserved, the six signals (Q16.16, in the order of
+//! [`Signal`]), and the exact Q16.16 torques of the physical model and of the network. A device evaluates them before
+//! it uses an image, which proves that its arithmetic is the one that the image was judged with. Golden vectors are a
+//! sequence: each is one step of [`GOLDEN_RATE`], and pre-sliding elements, at rest before the first, go on from one to
+//! the next.
 //!
-//! An upload is an image and, behind it, the tag of 32 bytes that [authenticates](super::authentication) it, where there is one.
+//! An upload is an image and, behind it, the tag of 32 bytes that [authenticates](super::authentication) it, where
+//! there is one.
 
 use super::certificate::Limits;
 use super::codec::{Reader, Writer, decode_content, encode_content};
@@ -86,7 +88,8 @@ const HEADER_LENGTH: usize = 144;
 pub(super) const CRC_LENGTH: usize = 4;
 const CRC: crc::Crc<u32, crc::NoTable> = crc::Crc::<u32, crc::NoTable>::new(&crc::CRC_32_ISO_HDLC);
 
-/// Unit of the effort that an image speaks of. A board accepts Nm (N on a linear axis); data sets in A or V are for study.
+/// Unit of the effort that an image speaks of. A board accepts Nm (N on a linear axis); data sets in A or V are for
+/// study.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Effort {
@@ -314,8 +317,8 @@ impl Image {
         Ok(content)
     }
 
-    /// Writes the image to the start of `buffer`; the number of bytes used. An image that [`Image::decode`] would not give
-    /// back is refused.
+    /// Writes the image to the start of `buffer`; the number of bytes used. An image that [`Image::decode`] would not
+    /// give back is refused.
     pub fn encode(&self, buffer: &mut [u8; MAX_LENGTH]) -> Result<usize, ImageError> {
         self.check()?;
         let mut writer = Writer { rest: &mut buffer[..], offset: 0 };

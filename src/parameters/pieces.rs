@@ -1,7 +1,7 @@
 //! An image read piece by piece: its header, one parameter set, one golden vector at a time; task or host.
 //!
-//! A whole [`Image`] takes 2 KiB, and as much again wherever it is moved. A board that has less stack than that verifies an upload, and prepares
-//! a friction model in its place, with one parameter set in hand.
+//! A whole [`Image`] takes 2 KiB, and as much again wherever it is moved. A board that has less stack than that
+//! verifies an upload, and prepares a friction model in its place, with one parameter set in hand.
 
 use super::codec::{Header, Reader, decode_end, decode_golden, decode_header, decode_set};
 use super::image::{GoldenMismatch, GoldenSequence, GoldenVector, Image, ImageError};
@@ -113,8 +113,9 @@ impl<'a> Pieces<'a> {
 }
 
 impl Image {
-    /// Prepares the friction model of an image's bytes, for a control loop of `rate` Hz, in its place: none where they are no image. The
-    /// same as [`FrictionModel::new`] with what [`Image::decode`] gives, on a quarter of the stack.
+    /// Prepares the friction model of an image's bytes, for a control loop of `rate` Hz, in its place: none where they
+    /// are no image. The same as [`FrictionModel::new`] with what [`Image::decode`] gives, on a quarter of the
+    /// stack.
     pub fn prepare(bytes: &[u8], rate: u32, place: &mut Option<FrictionModel>) {
         *place = None;
         if let Ok(pieces) = Pieces::of(bytes) {

@@ -1,7 +1,7 @@
 //! Frames of the AS5047P, a magnetic encoder with 14 bit a turn on SPI; control step.
 //!
-//! Source: ams AS5047P datasheet, "SPI interface": 16-bit frames, mode 1, at most 10 MHz; bit 15 is even parity over the
-//! lower 15 bits, bit 14 of an answer flags an error of the previous command.
+//! Source: ams AS5047P datasheet, "SPI interface": 16-bit frames, mode 1, at most 10 MHz; bit 15 is even parity over
+//! the lower 15 bits, bit 14 of an answer flags an error of the previous command.
 
 /// Command that reads the angle with dynamic error compensation (register 0x3FFF, read bit, parity).
 pub const READ_ANGLE: u16 = with_parity(1 << 14 | 0x3fff);

@@ -1,7 +1,7 @@
 //! An incremental encoder with A, B and an index pulse a turn, counted by a timer; control step.
 
-/// Counts between two index pulses that may differ from a turn before counts are reported as lost: the index is as wide as
-/// one state of A and B, and its edge depends on the direction.
+/// Counts between two index pulses that may differ from a turn before counts are reported as lost: the index is as wide
+/// as one state of A and B, and its edge depends on the direction.
 const INDEX_TOLERANCE: u16 = 4;
 
 /// What turns counts into an angle.
@@ -31,20 +31,22 @@ impl Incremental {
         self.counts_per_turn
     }
 
-    /// Angle of a count, 2^32 a turn; zero is where the last index pulse was, and before the first one where the counter was zero.
+    /// Angle of a count, 2^32 a turn; zero is where the last index pulse was, and before the first one where the
+    /// counter was zero.
     #[inline(always)]
     pub const fn angle(&self, count: u16) -> u32 {
         (count as u32).wrapping_mul(self.scale).wrapping_sub(self.zero)
     }
 
-    /// Whether the angle's zero is the index: without it a rotor that was switched on elsewhere has another electrical zero.
+    /// Whether the angle's zero is the index: without it a rotor that was switched on elsewhere has another electrical
+    /// zero.
     #[inline(always)]
     pub const fn is_referenced(&self) -> bool {
         self.index.is_some()
     }
 
-    /// Takes the count at an index pulse, where the angle's zero is from now on unless it was there already; whether it is where the
-    /// pulse before was, within four counts.
+    /// Takes the count at an index pulse, where the angle's zero is from now on unless it was there already; whether it
+    /// is where the pulse before was, within four counts.
     ///
     /// False means that counts were lost or invented since. The first pulse is always true.
     #[inline(always)]

@@ -1,7 +1,7 @@
 //! Thermistors on a resistive divider; a task below the control interrupt, because of the logarithm.
 //!
-//! Beta equation: 1/T = 1/298.15 K + ln(R/R25)/B. Error of the arithmetic below 0.01 K from -30 to 150 °C; that of the parts is
-//! larger by far. micromath's logarithm was tried first: 5.8 K.
+//! Beta equation: 1/T = 1/298.15 K + ln(R/R25)/B. Error of the arithmetic below 0.01 K from -30 to 150 °C; that of the
+//! parts is larger by far. micromath's logarithm was tried first: 5.8 K.
 
 /// 0 °C in kelvin.
 const ICE: f32 = 273.15;
@@ -20,7 +20,8 @@ pub struct Thermistor {
 }
 
 impl Thermistor {
-    /// Temperature in °C from the reading as a fraction of the reference voltage; NaN where the wire is open or shorted.
+    /// Temperature in °C from the reading as a fraction of the reference voltage; NaN where the wire is open or
+    /// shorted.
     pub fn temperature(&self, fraction: f32) -> f32 {
         if !(RAIL..=1.0 - RAIL).contains(&fraction) {
             return f32::NAN;

@@ -1,5 +1,5 @@
-// A joint's state evaluated in full, the same on the board's core and on the host: included by the program `states` and by the test
-// that sends it images and states.
+// A joint's state evaluated in full, the same on the board's core and on the host: included by the program `states` and
+// by the test that sends it images and states.
 
 use joint_firmware::compensation::{Acting, Compensation, Reason, Request, Settings, SettingsError};
 use joint_firmware::friction::state::{JointState, SIGNALS};

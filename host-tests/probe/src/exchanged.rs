@@ -1,4 +1,5 @@
-// Memory that whoever emulates the core reads and writes while the program waits at a breakpoint. Included by the programs that have some.
+// Memory that whoever emulates the core reads and writes while the program waits at a breakpoint. Included by the
+// programs that have some.
 
 use core::cell::UnsafeCell;
 

@@ -1,5 +1,5 @@
-//! A minimal program for a Cortex-M4F: decodes images, certifies them, compensates, and prints for each image a hash of every
-//! torque, and how long certificate and golden vectors took, over semihosting.
+//! A minimal program for a Cortex-M4F: decodes images, certifies them, compensates, and prints for each image a hash of
+//! every torque, and how long certificate and golden vectors took, over semihosting.
 //!
 //! Its panic handler calls a function that does not exist: where friction, compensation or parameters could panic,
 //! the program does not link.

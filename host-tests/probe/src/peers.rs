@@ -1,10 +1,11 @@
-// The friction network of this project in other libraries: included by the program `networks`. Weights are data, as they are for this project's
-// own: an image brings them.
+// The friction network of this project in other libraries: included by the program `networks`. Weights are data, as
+// they are for this project's own: an image brings them.
 //
-// - microflow 0.1: 8-bit integers, its own fully connected layer. It has no tanh (its activations are none, ReLU, ReLU6 and softmax), so one is
-//   looked up in 256 bytes a layer. Its macro takes a network from a file when the program is built: the layers are called one by one.
-// - embedded-nn 0.2: 32-bit floats, its own fully connected layer. Its tanh for floats is x / (1 + |x|), which is another function (0.5 at 1
-//   instead of 0.76): libm's is called.
+// - microflow 0.1: 8-bit integers, its own fully connected layer. It has no tanh (its activations are none, ReLU, ReLU6
+//   and softmax), so one is looked up in 256 bytes a layer. Its macro takes a network from a file when the program is
+//   built: the layers are called one by one.
+// - embedded-nn 0.2: 32-bit floats, its own fully connected layer. Its tanh for floats is x / (1 + |x|), which is
+//   another function (0.5 at 1 instead of 0.76): libm's is called.
 // - Plain Rust in 32-bit floats with libm's tanhf.
 
 use embedded_nn::float_ops::fully_connected_f32;
@@ -37,7 +38,8 @@ pub struct Floats {
     pub output: FloatLayer<1>,
 }
 
-/// A layer of `N` neurons for microflow: weights in 8 bits, what a product counts and the biases, both in steps of the output.
+/// A layer of `N` neurons for microflow: weights in 8 bits, what a product counts and the biases, both in steps of the
+/// output.
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub struct ByteLayer<const N: usize> {

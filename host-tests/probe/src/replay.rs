@@ -1,8 +1,8 @@
-// Recorded runs of whole control steps, the same on the board's core and on the host: included by the program `step` and by the
-// test that records and counts.
+// Recorded runs of whole control steps, the same on the board's core and on the host: included by the program `step`
+// and by the test that records and counts.
 //
-// The run is recorded in closed loop on the host. Because the control step gives the same bits everywhere, the recording is a closed loop
-// for the core too; where it gave other bits, the hash would tell.
+// The run is recorded in closed loop on the host. Because the control step gives the same bits everywhere, the
+// recording is a closed loop for the core too; where it gave other bits, the hash would tell.
 
 use joint_firmware::compensation::Request;
 use joint_firmware::default_configuration::B_G431B_ESC1;
@@ -27,8 +27,8 @@ pub struct Scenario {
     pub source: VelocitySource,
 }
 
-/// The runs, each from the same start. The last one is the longest way through a control step: the approach of a position, all of the model, and the
-/// energy guard.
+/// The runs, each from the same start. The last one is the longest way through a control step: the approach of a
+/// position, all of the model, and the energy guard.
 pub const SCENARIOS: [Scenario; 5] = [
     Scenario { mode: Mode::Torque, request: Request::Off, source: VelocitySource::Reference },
     Scenario { mode: Mode::Impedance, request: Request::Physical, source: VelocitySource::Reference },

@@ -21,8 +21,8 @@ pub fn hash(hash: u32, word: u32) -> u32 {
     (hash ^ word).wrapping_mul(0x0100_0193)
 }
 
-/// Decodes, certifies and verifies an image, then compensates along the sequence; the hash of every torque. None where the
-/// image is refused.
+/// Decodes, certifies and verifies an image, then compensates along the sequence; the hash of every torque. None where
+/// the image is refused.
 pub fn run(bytes: &[u8]) -> Option<u32> {
     use joint_firmware::compensation::{Compensation, Request, Settings};
     use joint_firmware::friction::FrictionModel;

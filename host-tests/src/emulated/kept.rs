@@ -1,5 +1,5 @@
-//! What a board's flash holds when it is switched on: the stored configuration and a friction image, in the slots that the program reads
-//! (`src/tasks/connection/store.rs`).
+//! What a board's flash holds when it is switched on: the stored configuration and a friction image, in the slots that
+//! the program reads (`src/tasks/connection/store.rs`).
 
 use super::observed::Observed;
 use emulator::board::Wired;

@@ -1,5 +1,5 @@
-//! The boards' programs on emulated boards: on a bench supply, driven by a CANopen master in emulated time, watched control step by
-//! control step.
+//! The boards' programs on emulated boards: on a bench supply, driven by a CANopen master in emulated time, watched
+//! control step by control step.
 
 pub mod bench;
 pub mod commissioned;

@@ -147,7 +147,8 @@ impl<W: Observed> Moving<W> {
         self.bench.emulation.now()
     }
 
-    /// Moves on until the bridge is off; for how long it has been on since `from`, s. None where it still is after so many seconds.
+    /// Moves on until the bridge is off; for how long it has been on since `from`, s. None where it still is after so
+    /// many seconds.
     ///
     /// # Errors
     /// The run ended.

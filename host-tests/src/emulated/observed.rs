@@ -111,8 +111,8 @@ impl Observed for BG431BEsc1 {
         Ok(Reading { angle: Some(memory.word(0x4000_0824)?), referenced: false })
     }
 
-    /// The step reads the timer some cycles later, and which edge of the index came first only it knows. Its count may be one of its neighbours
-    /// in time.
+    /// The step reads the timer some cycles later, and which edge of the index came first only it knows. Its count may
+    /// be one of its neighbours in time.
     fn encoder_taken(
         memory: &mut Memory<'_, Self>,
         variables: &[Variable<'_>],
@@ -136,7 +136,8 @@ impl Observed for BG431BEsc1 {
     }
 }
 
-/// Counts by which a step's reading of the incremental encoder may differ from one some cycles before it: its lines are noisy.
+/// Counts by which a step's reading of the incremental encoder may differ from one some cycles before it: its lines are
+/// noisy.
 const NEIGHBOURS: u32 = 8;
 
 /// The chip's memory, to look at.

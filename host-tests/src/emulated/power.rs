@@ -79,8 +79,8 @@ impl<W: Wired> Bench<W> {
         }
     }
 
-    /// Runs until the power goes in the middle of the `operation`th operation from now on, counted from 1, and leaves words that are torn in this
-    /// way. False where there are not so many within some seconds.
+    /// Runs until the power goes in the middle of the `operation`th operation from now on, counted from 1, and leaves
+    /// words that are torn in this way. False where there are not so many within some seconds.
     ///
     /// # Errors
     /// Something else ended the run.

@@ -1,11 +1,12 @@
-//! The same joint on the host beside the one on an emulated board: given what the board's control step was given, it must come to the same
-//! bits, step by step.
+//! The same joint on the host beside the one on an emulated board: given what the board's control step was given, it
+//! must come to the same bits, step by step.
 //!
-//! Inputs are read where the control interrupt will read them, before its first instruction: the converters' codes, the words that tasks leave for
-//! it, the newest demand. What the step came to is read before the first instruction of the next one. Nothing in the program is there for it: variables
-//! are found by the debug information, as a debugger would.
+//! Inputs are read where the control interrupt will read them, before its first instruction: the converters' codes, the
+//! words that tasks leave for it, the newest demand. What the step came to is read before the first instruction of the
+//! next one. Nothing in the program is there for it: variables are found by the debug information, as a debugger would.
 //!
-//! As the plant is moved by the compare values alone, and is the same program on both sides, equal duties in every step make an equal closed loop.
+//! As the plant is moved by the compare values alone, and is the same program on both sides, equal duties in every step
+//! make an equal closed loop.
 
 use super::observed::{Memory, Observed, Reading};
 use emulator::emulation::Emulation;

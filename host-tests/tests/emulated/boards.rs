@@ -1,5 +1,5 @@
-//! The boards' programs, as they are flashed, on the emulated boards: they start, control at their rate and within their period, see the
-//! supply, the rotor and the button.
+//! The boards' programs, as they are flashed, on the emulated boards: they start, control at their rate and within
+//! their period, see the supply, the rotor and the button.
 
 use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired};
 use host_tests::emulated::Bench;

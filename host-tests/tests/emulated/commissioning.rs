@@ -23,7 +23,8 @@ use std::sync::OnceLock;
 const MOTORS: u64 = 20;
 /// Random motors that lose their power.
 const RESTARTED: u64 = 3;
-/// Velocity of a motor that turns again, turns of the rotor per second, for how long, s, and how far off its mean may be.
+/// Velocity of a motor that turns again, turns of the rotor per second, for how long, s, and how far off its mean may
+/// be.
 const SPEED: f64 = 0.5;
 const TURNING: f64 = 0.5;
 const RIGHT: f64 = 0.3;
@@ -149,7 +150,8 @@ impl Motor {
         let phases = self.sign();
         let direction = if self.encoder.reversed { -phases } else { phases };
         let pole_pairs = windings.pole_pairs as f64;
-        // An incremental encoder counts the edges that it has passed: on average it reads half a count less, and the joint goes by what it reads.
+        // An incremental encoder counts the edges that it has passed: on average it reads half a count less, and the
+        // joint goes by what it reads.
         let less = self.plan.counts.map_or(0.0, |counts| 0.5 / f64::from(counts));
         let reading = self.encoder.offset - less;
         (direction < 0.0, direction * pole_pairs * reading - phases * windings.electrical_zero / TAU)
@@ -222,8 +224,8 @@ fn is_commissioned<W: Wired>(board: &'static str, wired: fn(Drivetrain) -> W, se
     Ok(())
 }
 
-/// A joint of the B-G431B-ESC1 that is commissioned loses its power: it is not ready before its encoder's index has been
-/// met once more, as `jointctl commission --index-only` has it, and turns then by what is in its flash.
+/// A joint of the B-G431B-ESC1 that is commissioned loses its power: it is not ready before its encoder's index has
+/// been met once more, as `jointctl commission --index-only` has it, and turns then by what is in its flash.
 fn turns_again(seed: u64) -> Result<(), Failed> {
     let motor = Motor::random(seed, true);
     let bench = motor.board(BG431BEsc1::new, built(ESC1)?)?;
@@ -233,7 +235,8 @@ fn turns_again(seed: u64) -> Result<(), Failed> {
     commission(&mut joint, &motor.plan, &mut telling)
         .map_err(|failure| format!("{failure}\n{}", telling.told.join("\n")))?;
     let gear = joint.setting(Setting::GearRatio).map_err(stopped)?;
-    // Where the link is, and where the joint says that it is: what is between both stays, but for whole turns of the rotor.
+    // Where the link is, and where the joint says that it is: what is between both stays, but for whole turns of the
+    // rotor.
     let between = |joint: &mut Joint<OnBoard<'_, BG431BEsc1>>| -> Result<f64, String> {
         let [position, ..] = joint.motion().map_err(stopped)?;
         let link = joint.objects().bench.board().drivetrain().actuator().state().joint.position;

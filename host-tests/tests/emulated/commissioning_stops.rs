@@ -111,8 +111,8 @@ const TASK: f64 = 0.0005;
 /// The joint's dead man, and its button's debouncing, s.
 const DEAD_MAN: f64 = 0.1;
 const DEBOUNCE: f64 = 0.020;
-/// A joint that brakes takes at least so long, s; part of its speed that may be left when the bridge goes off; how often
-/// it is looked at, s.
+/// A joint that brakes takes at least so long, s; part of its speed that may be left when the bridge goes off; how
+/// often it is looked at, s.
 const BRAKING: f64 = 0.005;
 const LEFT: f64 = 0.2;
 const LOOK: f64 = 0.0005;

@@ -1,8 +1,8 @@
-//! The control loop of the flashed programs on both emulated boards, in closed loop with the plant, is the host's: a million control steps, the same bits
-//! in each.
+//! The control loop of the flashed programs on both emulated boards, in closed loop with the plant, is the host's: a
+//! million control steps, the same bits in each.
 //!
-//! Random joints' friction models with networks and regimes, driven over the bus through reversals, beyond the trained box and back, and into
-//! faults. See [`host_tests::emulated::twin`] for what is compared.
+//! Random joints' friction models with networks and regimes, driven over the bus through reversals, beyond the trained
+//! box and back, and into faults. See [`host_tests::emulated::twin`] for what is compared.
 
 use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4};
 use emulator::chip::Waiting;
@@ -34,7 +34,8 @@ use std::sync::Mutex;
 
 /// Control steps that are compared at least.
 const STEPS: u64 = 1_000_000;
-/// Most cycles of a control interrupt, entry and return included, with faults, transitions and uploads among the steps: the target of docs/budget.md.
+/// Most cycles of a control interrupt, entry and return included, with faults, transitions and uploads among the steps:
+/// the target of docs/budget.md.
 const LONGEST: u64 = 2500;
 /// Most cycles of the network from its inputs in Q31: the same.
 const NETWORK: u64 = 330;
@@ -59,7 +60,8 @@ pub fn trials() -> Vec<Trial> {
     ]
 }
 
-/// With the network acting, the longest control interrupt takes what docs/budget.md says, and no more than the target where that is called kept.
+/// With the network acting, the longest control interrupt takes what docs/budget.md says, and no more than the target
+/// where that is called kept.
 fn published<W: Observed + Clone>(name: &str, board: fn(Drivetrain) -> W) -> Result<(), Failed> {
     let path = build(name, env!("CARGO_TARGET_TMPDIR"))?;
     let program = Program::parse(std::fs::read(&path)?)?;

@@ -1,8 +1,9 @@
-//! Something breaks while the flashed program moves the joint on the emulated board: the bridge is off in time, and the reason can be read.
+//! Something breaks while the flashed program moves the joint on the emulated board: the bridge is off in time, and the
+//! reason can be read.
 //!
-//! Times run from the instant at which the part breaks to the one at which the plant sees the last gate off. How long that may take and what is to be
-//! read stands in the table of docs/emulated-board.md, which the tests read. Each fault is brought in at several instants, anywhere in a
-//! control period, drawn by a fixed seed; the worst counts.
+//! Times run from the instant at which the part breaks to the one at which the plant sees the last gate off. How long
+//! that may take and what is to be read stands in the table of docs/emulated-board.md, which the tests read. Each fault
+//! is brought in at several instants, anywhere in a control period, drawn by a fixed seed; the worst counts.
 
 use emulator::board::{BG431BEsc1, Drivetrain, Inputs, MoteusR4, Wired};
 use emulator::chip::time::Instant;
@@ -27,7 +28,8 @@ const INSTANTS: usize = 6;
 const MOVING: f64 = 0.8;
 /// How long the bus is disturbed, s.
 const DISTURBED: f64 = 0.4;
-/// Of the supply: what it rises to, what it falls to, and what is left of it where it is lost; the chip's regulators need more.
+/// Of the supply: what it rises to, what it falls to, and what is left of it where it is lost; the chip's regulators
+/// need more.
 const SURGE: f64 = 2.2;
 const SAG: f64 = 0.3;
 const LOST: f64 = 0.1;

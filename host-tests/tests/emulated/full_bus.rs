@@ -1,6 +1,7 @@
 //! A bus without a gap: the control steps of a joint in motion begin on time, whatever comes, and the stack suffices.
 //!
-//! Others fill the bus with frames that the node has to look at. Of those that it need not, its filters keep the receive interrupt free.
+//! Others fill the bus with frames that the node has to look at. Of those that it need not, its filters keep the
+//! receive interrupt free.
 
 use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired};
 use emulator::chip::fdcan::line::CanFrame;
@@ -62,7 +63,8 @@ const LOADS: [Load; 3] = [
 /// The frames of a flood, by their number.
 type Flood = (&'static str, fn(u32) -> Heard);
 
-/// Frames so short and so many that they leave nothing of the bus to anybody whose identifier is higher. Set-points may starve: the joint stops then.
+/// Frames so short and so many that they leave nothing of the bus to anybody whose identifier is higher. Set-points may
+/// starve: the joint stops then.
 const FLOODS: [Flood; 6] = [
     ("SYNC", |_| (0x080, Vec::new())),
     ("NMT commands that change nothing", |_| (0x000, vec![1, NODE])),
@@ -190,7 +192,8 @@ fn under<W: Observed>(bench: &mut Bench<W>, frames: fn(u32) -> Vec<Heard>) -> Re
     Ok((steps, (bits as f64 / microseconds).min(1.0)))
 }
 
-/// The control steps go on under a flood, and the node is there after it; how many frames came, and which part of the core no interrupt took.
+/// The control steps go on under a flood, and the node is there after it; how many frames came, and which part of the
+/// core no interrupt took.
 fn withstands<W: Observed>(bench: &mut Bench<W>, frame: fn(u32) -> Heard, period: u64) -> Result<(u32, f64), Failed> {
     let (mut steps, mut number) = (Steps::default(), 0);
     let from = bench.emulation.cpu.now();

@@ -1,6 +1,6 @@
-//! The moteus r4's gate driver, and either board's chip, by their programs on the emulated boards: faults of the driver are
-//! named over CAN and gone after a fault reset, without a loss of power; a driver that does not answer, or a supply that
-//! comes late, is waited for; another board is left alone; option bytes are told, and set when asked.
+//! The moteus r4's gate driver, and either board's chip, by their programs on the emulated boards: faults of the driver
+//! are named over CAN and gone after a fault reset, without a loss of power; a driver that does not answer, or a supply
+//! that comes late, is waited for; another board is left alone; option bytes are told, and set when asked.
 
 use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired as _};
 use emulator::cpu::Origin;

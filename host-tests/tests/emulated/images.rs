@@ -1,5 +1,6 @@
-//! A friction image on its way into a board's program, as it is flashed, on the emulated boards: the board is silent until LSS gives it a node id, takes
-//! the image by block download, proves it, stores it, and starts with it again. How deep the stack got on the way is held against what it has.
+//! A friction image on its way into a board's program, as it is flashed, on the emulated boards: the board is silent
+//! until LSS gives it a node id, takes the image by block download, proves it, stores it, and starts with it again. How
+//! deep the stack got on the way is held against what it has.
 
 use bus::client::cob_id;
 use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired};

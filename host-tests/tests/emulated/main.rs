@@ -1,4 +1,5 @@
-//! The flashed programs on the emulated boards: a file a promise. One program of tests, because each that has a core in it compiles it anew.
+//! The flashed programs on the emulated boards: a file a promise. One program of tests, because each that has a core in
+//! it compiles it anew.
 //!
 //! Needs the target; where it is missing the tests are reported as ignored, by name; with `CI` set they run and fail.
 

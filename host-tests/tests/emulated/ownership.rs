@@ -1,5 +1,5 @@
-//! Who owns a board: its first key by who is at it, and what only its owner may change. On the moteus, which has no button, sessions by the chip's random
-//! numbers; on the B-G431B-ESC1 the button.
+//! Who owns a board: its first key by who is at it, and what only its owner may change. On the moteus, which has no
+//! button, sessions by the chip's random numbers; on the B-G431B-ESC1 the button.
 
 use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired};
 use host_tests::emulated::Bench;

@@ -1,9 +1,9 @@
-//! The flashed program on the emulated board survives a loss of power at every operation of its flash: while it stores an image that came
-//! over the bus, its configuration, and its first key.
+//! The flashed program on the emulated board survives a loss of power at every operation of its flash: while it stores
+//! an image that came over the bus, its configuration, and its first key.
 //!
-//! After each: it starts, reads back the old content or the new one, whole, over the bus; the same after another start; it is able to move;
-//! and it can store again. The words that were being written read as every kind of [`Torn`] word. What is not tried everywhere, because it takes long,
-//! is drawn by a fixed seed, and counted.
+//! After each: it starts, reads back the old content or the new one, whole, over the bus; the same after another start;
+//! it is able to move; and it can store again. The words that were being written read as every kind of [`Torn`] word.
+//! What is not tried everywhere, because it takes long, is drawn by a fixed seed, and counted.
 
 use emulator::board::MoteusR4;
 use emulator::chip::flash::Torn;

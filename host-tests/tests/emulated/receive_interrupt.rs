@@ -1,7 +1,8 @@
 //! Cycles of the receive interrupt with a set-point: the time between a frame and the control step that knows it.
 //!
-//! The control interrupt preempts it and takes up to six tenths of the core on the moteus r4, so that it lasts two and a
-//! half times as long: 3,200 cycles are 47 us there, nearly two control periods. A quarter of them come behind the demand.
+//! The control interrupt preempts it and takes up to six tenths of the core on the moteus r4, so that it lasts two and
+//! a half times as long: 3,200 cycles are 47 us there, nearly two control periods. A quarter of them come behind the
+//! demand.
 
 use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4};
 use host_tests::emulated::Bench;

@@ -1,5 +1,6 @@
-//! The emulated boards are deterministic: a program's run is the same to the picosecond and the bit whenever it is repeated, however its time is cut
-//! into pieces, whether or not somebody watches, by whichever clone it is gone on with, and whatever of it is translated.
+//! The emulated boards are deterministic: a program's run is the same to the picosecond and the bit whenever it is
+//! repeated, however its time is cut into pieces, whether or not somebody watches, by whichever clone it is gone on
+//! with, and whatever of it is translated.
 
 use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired, Witnessed};
 use emulator::chip::fdcan::line::CanFrame;

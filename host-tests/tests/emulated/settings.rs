@@ -1,6 +1,7 @@
-//! Settings of the configuration over SDO, on the flashed programs: each at its lowest, its highest and just beyond both, at
-//! the board's own highest and just beyond that, and as what is no number. What the board does not bear is refused, and the
-//! configuration in use stays as it was; what is taken lies within the facts that docs/boards.md has of the board.
+//! Settings of the configuration over SDO, on the flashed programs: each at its lowest, its highest and just beyond
+//! both, at the board's own highest and just beyond that, and as what is no number. What the board does not bear is
+//! refused, and the configuration in use stays as it was; what is taken lies within the facts that docs/boards.md has
+//! of the board.
 
 use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired as _};
 use host_tests::emulated::Bench;

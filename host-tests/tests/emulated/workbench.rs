@@ -1,4 +1,5 @@
-//! The emulated board as a bench: commands do their thing, in the board's own time, and what the program stores outlasts the emulator.
+//! The emulated board as a bench: commands do their thing, in the board's own time, and what the program stores
+//! outlasts the emulator.
 
 use super::gate_driver::{COMPLETE, DRIVER, FAULT, NO_ANSWER, NOT_CONFIGURED, RESET, is, told, words};
 use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired};

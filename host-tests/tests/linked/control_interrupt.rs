@@ -1,12 +1,13 @@
 //! The control interrupt of the linked programs: it can reach no panic, and nothing of it lies in flash.
 //!
-//! The proof walks the machine code from the entries of the control interrupt and of the PWM timer's: every branch and call of
-//! every function that can be reached, through the linker's veneers and through registers with a constant. A jump that only the running program knows is
-//! refused. So
-//! is a constant that is an address in the program's flash, from a literal pool or put together by instructions: data there would make the
-//! interrupt wait while the flash erases. An address that is computed otherwise is not found out. The open loop may lie in flash: nothing
-//! is written there while the bridge switches. So may, in the program of the B-G431B-ESC1, what runs only while
-//! operation is enabled, or in braking, or at the start: there flash is written only while the joint is held off.
+//! The proof walks the machine code from the entries of the control interrupt and of the PWM timer's: every branch and
+//! call of every function that can be reached, through the linker's veneers and through registers with a constant. A
+//! jump that only the running program knows is refused. So
+//! is a constant that is an address in the program's flash, from a literal pool or put together by instructions: data
+//! there would make the interrupt wait while the flash erases. An address that is computed otherwise is not found out.
+//! The open loop may lie in flash: nothing is written there while the bridge switches. So may, in the program of the
+//! B-G431B-ESC1, what runs only while operation is enabled, or in braking, or at the start: there flash is written only
+//! while the joint is held off.
 
 use crate::thumb;
 use host_tests::bare_metal;
@@ -68,10 +69,10 @@ fn is_open_loop(name: &str) -> bool {
         .any(|part| name.contains(part))
 }
 
-/// Whether a function runs only with the bridge on, in operation ([`Joint::control_step`] asks for the state before) or in braking: the friction model and
-/// what adds it, the approach of a position, the torque's bounds, the brake and what the supply bears of it; or only while the bridge is off, when a step that
-/// would wait for the flash has waited for its vector already: the offsets. What decides on a state and what begins it
-/// runs in both.
+/// Whether a function runs only with the bridge on, in operation ([`Joint::control_step`] asks for the state before) or
+/// in braking: the friction model and what adds it, the approach of a position, the torque's bounds, the brake and what
+/// the supply bears of it; or only while the bridge is off, when a step that would wait for the flash has waited for
+/// its vector already: the offsets. What decides on a state and what begins it runs in both.
 ///
 /// [`Joint::control_step`]: joint_firmware::joint::Joint::control_step
 fn seldom_or_operating(name: &str) -> bool {

@@ -1,21 +1,24 @@
-//! The stack of the B-G431B-ESC1's program suffices: the deepest path of calls in thread mode and every interrupt's on top of it, all at their deepest at
-//! once, are within the region that the linker leaves for it.
+//! The stack of the B-G431B-ESC1's program suffices: the deepest path of calls in thread mode and every interrupt's on
+//! top of it, all at their deepest at once, are within the region that the linker leaves for it.
 //!
-//! By the frames of the linked functions ([`crate::thumb::stack`]). Of the priorities, each has one interrupt at a time on the stack; the entries are those of
-//! the vector table, at the priorities that the program gives them. While the program starts, only time and the torn words of the flash interrupt it; the
-//! others are enabled one after another when what is deep has returned. What is called by way of a table of functions is said below.
+//! By the frames of the linked functions ([`crate::thumb::stack`]). Of the priorities, each has one interrupt at a time
+//! on the stack; the entries are those of the vector table, at the priorities that the program gives them. While the
+//! program starts, only time and the torn words of the flash interrupt it; the others are enabled one after another
+//! when what is deep has returned. What is called by way of a table of functions is said below.
 
 use crate::thumb::Program;
 use crate::thumb::stack::{Depth, Stack};
 use host_tests::bare_metal;
 use libtest_mimic::{Failed, Trial};
 
-/// What an exception pushes before its first instruction: 8 core registers, 18 of the floating-point unit's, and a word to align them (ARM DDI 0403, B1.5.6).
+/// What an exception pushes before its first instruction: 8 core registers, 18 of the floating-point unit's, and a word
+/// to align them (ARM DDI 0403, B1.5.6).
 const EXCEPTION: u32 = 108;
 
 /// The program whose chip has no byte more.
 const BOARD: &str = "b-g431b-esc1";
-/// Its interrupts by priority, from the highest on: of each one is on the stack. The interrupt executor is below all of these.
+/// Its interrupts by priority, from the highest on: of each one is on the stack. The interrupt executor is below all of
+/// these.
 const INTERRUPTS: [&[&str]; 4] =
     [&["NonMaskableInt"], &["ADC1_2", "TIM1_UP_TIM16"], &["FDCAN1_IT0"], &["TIM1_BRK_TIM15"]];
 /// What interrupts a program that is still starting.

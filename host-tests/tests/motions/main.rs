@@ -1,8 +1,9 @@
-//! Leave one motion out: the image judged on motions that it was not made with, beside its own simplest model and three SciPy baselines
-//! that are computed on the same samples.
+//! Leave one motion out: the image judged on motions that it was not made with, beside its own simplest model and three
+//! SciPy baselines that are computed on the same samples.
 //!
-//! The figures are published in docs/motions.md, which this program writes with `UPDATE_DOCS=1` and holds to them otherwise. The recordings
-//! are others' ([`host_tests::recordings`]): without them, or without Python, what needs them is reported as ignored by name; with `CI` set a missing Python fails. `MOTIONS=xl330` judges, or writes, only the
+//! The figures are published in docs/motions.md, which this program writes with `UPDATE_DOCS=1` and holds to them
+//! otherwise. The recordings are others' ([`host_tests::recordings`]): without them, or without Python, what needs them
+//! is reported as ignored by name; with `CI` set a missing Python fails. `MOTIONS=xl330` judges, or writes, only the
 //! recordings whose name begins with that.
 
 mod judge;

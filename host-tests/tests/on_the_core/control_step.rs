@@ -1,9 +1,10 @@
-//! What a control step may cost on the board's core, part by part, and that it gives the host's bits: recorded runs of the whole joint, replayed
-//! on an emulated Cortex-M4F, of which every instruction is counted.
+//! What a control step may cost on the board's core, part by part, and that it gives the host's bits: recorded runs of
+//! the whole joint, replayed on an emulated Cortex-M4F, of which every instruction is counted.
 //!
-//! The code is built as each board's program is and runs on the core of `tools/emulator`; the board's own part of the interrupt (converters, timer,
-//! report) is not among it. Most instructions of every part are held to `.ci/instructions`; `cargo bench -p host-tests --bench
-//! budget` prints the same in full, with cycles. The bits are also those of `qemu-system-arm`.
+//! The code is built as each board's program is and runs on the core of `tools/emulator`; the board's own part of the
+//! interrupt (converters, timer, report) is not among it. Most instructions of every part are held to
+//! `.ci/instructions`; `cargo bench -p host-tests --bench budget` prints the same in full, with cycles. The bits are
+//! also those of `qemu-system-arm`.
 
 use crate::Missing;
 use host_tests::bare_metal::{BOARDS, Board};

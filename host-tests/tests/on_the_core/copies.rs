@@ -1,5 +1,5 @@
-//! The boards' programs copy and clear memory by routines of their own, which the compiler calls by name (RTABI, 4.3.4): every length, every
-//! overlap, and not a byte beside, executed from where the program has them.
+//! The boards' programs copy and clear memory by routines of their own, which the compiler calls by name (RTABI,
+//! 4.3.4): every length, every overlap, and not a byte beside, executed from where the program has them.
 
 use crate::Missing;
 use emulator::cpu::{Cpu, End};

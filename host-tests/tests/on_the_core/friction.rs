@@ -1,8 +1,9 @@
-//! Friction and its compensation on the board's core give the host's integers, all of them, for a million states of random certified
-//! images.
+//! Friction and its compensation on the board's core give the host's integers, all of them, for a million states of
+//! random certified images.
 //!
-//! The program `states` of the probe is compiled as each board's is and runs on the core of `tools/emulator`. Images, states and evaluations
-//! are exchanged in the emulated memory. A state that differs is told with its image's seed; the same seeds are drawn in every run.
+//! The program `states` of the probe is compiled as each board's is and runs on the core of `tools/emulator`. Images,
+//! states and evaluations are exchanged in the emulated memory. A state that differs is told with its image's seed; the
+//! same seeds are drawn in every run.
 
 #[path = "../../probe/src/evaluation.rs"]
 mod evaluation;

@@ -1,8 +1,8 @@
-//! What the board's core makes of the library, in the programs of the probe: bits, instructions, and what is linked; and of the boards' programs
-//! the routines that move memory. A file a promise.
+//! What the board's core makes of the library, in the programs of the probe: bits, instructions, and what is linked;
+//! and of the boards' programs the routines that move memory. A file a promise.
 //!
-//! Needs the target `thumbv7em-none-eabihf`, and some tests `qemu-system-arm`. Where they are missing the tests are reported as
-//! ignored, by name; with `CI` set they run and fail.
+//! Needs the target `thumbv7em-none-eabihf`, and some tests `qemu-system-arm`. Where they are missing the tests are
+//! reported as ignored, by name; with `CI` set they run and fail.
 
 mod control_step;
 mod copies;

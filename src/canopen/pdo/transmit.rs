@@ -86,8 +86,8 @@ pub(crate) struct Timers {
 }
 
 impl Timers {
-    /// What TPDO `pdo` sends now: `frame`, which is assembled where the inhibit time is over, if it is another one than the last, an event has
-    /// happened or the timer has expired. Called in every poll in OPERATIONAL.
+    /// What TPDO `pdo` sends now: `frame`, which is assembled where the inhibit time is over, if it is another one than
+    /// the last, an event has happened or the timer has expired. Called in every poll in OPERATIONAL.
     pub(crate) fn next(
         &mut self,
         shared: &Shared,

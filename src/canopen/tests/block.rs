@@ -173,7 +173,8 @@ fn apply(disturbance: Disturbance, segments: &mut Vec<[u8; 8]>, keep_ends: bool)
     }
 }
 
-/// Its seven zeros have the checksum that stands in its second and third byte, so the checksum alone would take it for an end.
+/// Its seven zeros have the checksum that stands in its second and third byte, so the checksum alone would take it for
+/// an end.
 #[test]
 fn the_only_segment_of_an_empty_download_may_come_twice() {
     for crc in [false, true] {

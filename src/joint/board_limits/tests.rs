@@ -1,4 +1,5 @@
-//! Protections attacked by configuration: whatever a board accepts, the control step does not let it bear more than it can.
+//! Protections attacked by configuration: whatever a board accepts, the control step does not let it bear more than it
+//! can.
 
 use super::*;
 use crate::default_configuration::{B_G431B_ESC1, BoardConfiguration, MOTEUS_R4};
@@ -78,7 +79,8 @@ fn depending(board: &BoardConfiguration, setting: Setting) -> Vec<f32> {
     }
 }
 
-/// Every setting with the numbers that it is attacked with: both ends, the board's, just beyond each, and what is no number.
+/// Every setting with the numbers that it is attacked with: both ends, the board's, just beyond each, and what is no
+/// number.
 fn attacks(board: &BoardConfiguration) -> Vec<(Setting, Vec<u32>)> {
     let of = |(object, text): (&crate::objects::table::Object, &crate::objects::table::Text)| {
         let (Field::Setting(setting) | Field::AtOnce(setting)) = object.field else { return None };
@@ -111,7 +113,8 @@ fn is_borne(board: &BoardConfiguration, accepted: &Configuration) {
     assert!(gains.current_bandwidth <= ROUNDED * rate / 18.0 && gains.observer_bandwidth <= ROUNDED * rate / 10.0);
     assert!((0.099..=1.1548).contains(&gains.voltage_fraction), "{}", gains.voltage_fraction);
     assert!((1..=64).contains(&motor.alignment.pole_pairs) && (16..=65_535).contains(&motor.encoder_counts));
-    // Half a turn in a control step at twice the velocity limit: beyond it nobody could tell which way the rotor turned.
+    // Half a turn in a control step at twice the velocity limit: beyond it nobody could tell which way the rotor
+    // turned.
     let rotor = limits.velocity * gear.ratio.abs();
     assert!(gear.ratio.abs() >= 1.0 && 2.0 * rotor <= ROUNDED * core::f32::consts::PI * rate, "{rotor} rad/s");
     // A rotor whose field is weakened does not charge the supply beyond its limit through the diodes.
@@ -129,8 +132,8 @@ fn is_borne(board: &BoardConfiguration, accepted: &Configuration) {
     assert!((0.000_999..=1.0).contains(&limits.chopper_share));
 }
 
-/// Turned at its velocity limit, with all the torque asked for, and stopped all of a sudden: duties leave the time in which the currents are
-/// sampled, and no more current is wanted than board and motor bear.
+/// Turned at its velocity limit, with all the torque asked for, and stopped all of a sudden: duties leave the time in
+/// which the currents are sampled, and no more current is wanted than board and motor bear.
 fn turned(running: &Joint, board: &BoardConfiguration, active: &Active, accepted: &Configuration, calm: &Measurements) {
     let (low, high) = board.bridge.duty;
     let most = accepted.motor.current_limit.min(board.bridge.limits.current);

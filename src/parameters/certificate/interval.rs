@@ -1,9 +1,11 @@
 //! Closed intervals of 64-bit integers, rounded outwards; an end that leaves the type is unbounded and stays so.
 //!
-//! Operations are functions of their own and never inlined: a proof has some hundred of them, and 64 bits that saturate take up to fifty
-//! instructions on the board. What its innermost loops do has a twin that is inlined there, `..._here`.
+//! Operations are functions of their own and never inlined: a proof has some hundred of them, and 64 bits that saturate
+//! take up to fifty instructions on the board. What its innermost loops do has a twin that is inlined there,
+//! `..._here`.
 
-/// All values from `low` to `high`; a `low` of `i64::MIN` and a `high` of `i64::MAX` mean that there is no bound on that side.
+/// All values from `low` to `high`; a `low` of `i64::MIN` and a `high` of `i64::MAX` mean that there is no bound on
+/// that side.
 ///
 /// Were an end merely held at the end of the type, a later term of the other sign would bring it back and hide that a
 /// sum had left the type.
@@ -66,7 +68,8 @@ impl Interval {
         self.times_here(other)
     }
 
-    /// Ends of 32 bits, by far the most, take one instruction a product on the board, where a saturating one takes fifty.
+    /// Ends of 32 bits, by far the most, take one instruction a product on the board, where a saturating one takes
+    /// fifty.
     #[inline(always)]
     pub(super) fn times_here(self, other: Self) -> Self {
         if let (Some((low, high)), Some((other_low, other_high))) = (self.narrow(), other.narrow()) {

@@ -10,14 +10,16 @@
 //! - |friction|, |network| never exceed the stated torques;
 //! - the slope of the network over measured torque, which closes a loop around the compensation, and the slope of
 //!   friction over velocity, which is negative damping, stay within the stated intervals; these contain zero, the slope
-//!   where a signal is clamped or a torque saturates. The fixed-point model is a fine staircase: between two states that differ
-//!   in that signal alone it moves by at most slope times distance plus twice the [resolution](Certificate::resolution).
+//!   where a signal is clamped or a torque saturates. The fixed-point model is a fine staircase: between two states
+//!   that differ in that signal alone it moves by at most slope times distance plus twice the
+//!   [resolution](Certificate::resolution).
 //!
-//! Pre-sliding elements have a state, whatever which: their torque is bounded, and the slope over velocity contains what one evaluation
-//! bends, a thousand times a second or more often. Over the position they are a spring of the sum of level times stiffness.
+//! Pre-sliding elements have a state, whatever which: their torque is bounded, and the slope over velocity contains
+//! what one evaluation bends, a thousand times a second or more often. Over the position they are a spring of the sum
+//! of level times stiffness.
 //!
-//! Not certified: what the [fade](crate::friction::domain::Fade) beyond the trained box and the cross-fade between sets add to these slopes.
-//! The compensation limits both by its slew rate.
+//! Not certified: what the [fade](crate::friction::domain::Fade) beyond the trained box and the cross-fade between sets
+//! add to these slopes. The compensation limits both by its slew rate.
 
 mod interval;
 mod network;
@@ -265,9 +267,11 @@ fn tanh_at(argument: i64) -> i64 {
     tanh(argument as i32) as i64
 }
 
-/// A bisection of a range of cells, `deepest` times (at most [`MAX_DEPTH`]): keeps splitting while a cell can still raise the largest bound found.
+/// A bisection of a range of cells, `deepest` times (at most [`MAX_DEPTH`]): keeps splitting while a cell can still
+/// raise the largest bound found.
 ///
-/// `bound` returns what holds in a cell, `covers` says whether the second adds nothing to the first, `split` halves a cell.
+/// `bound` returns what holds in a cell, `covers` says whether the second adds nothing to the first, `split` halves a
+/// cell.
 fn bisect<Cell: Copy, Bound: Copy>(
     root: Cell,
     deepest: u32,

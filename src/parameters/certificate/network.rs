@@ -176,7 +176,8 @@ fn check_sums(root: &Cell, parameters: &NetworkParameters) -> Result<(), Overflo
     check(3, 0, raw_sum(&parameters.output, &active)).map(|_| ())
 }
 
-/// The output's sum in one cell, Q25. One layer at a time: what all of them give takes a quarter of a kilobyte of stack.
+/// The output's sum in one cell, Q25. One layer at a time: what all of them give takes a quarter of a kilobyte of
+/// stack.
 #[inline(never)]
 fn output(cell: &Cell, parameters: &NetworkParameters) -> Interval {
     let mut active = first_sums(cell, parameters);
@@ -216,7 +217,8 @@ fn split(cell: &Cell, parameters: &NetworkParameters) -> Option<(Cell, Cell)> {
 /// Worst departure of the fixed-point network from exact arithmetic on the same weights and tables, Q16.16.
 fn resolution(parameters: &NetworkParameters) -> u32 {
     // In units of 2^-31. Layer 0: a sum is short by at most six units of Q25 and by the fraction's 12 bits (2^-17);
-    // the one input that differs is cut by at most four units of Q31, times a weight below 2^5. An activation is cut to Q15.
+    // the one input that differs is cut by at most four units of Q31, times a weight below 2^5. An activation is cut to
+    // Q15.
     const SUM: i64 = (6 << 6) + (1 << 14) + (4 << 5);
     const CUT: i64 = 1 << 16;
     let spread = |neuron: &Neuron, error: [i64; NEURONS]| {
@@ -264,7 +266,8 @@ mod tests {
     fn a_network_is_short_by_what_its_roundings_cut_and_the_bound_is_hardly_more() {
         let mut parameters = NetworkParameters { scale: 128 << 16, ..NetworkParameters::default() };
         assert!(resolution(&parameters) <= 4, "nothing but its last roundings: {}", resolution(&parameters));
-        // The output is one activation of the last layer: cut to Q15, of a sum that a fraction of 12 bits cuts by 2^-17.
+        // The output is one activation of the last layer: cut to Q15, of a sum that a fraction of 12 bits cuts by
+        // 2^-17.
         parameters.output.weights[0] = 1 << 14;
         parameters.output.fraction = 14;
         let cut = (1.0 / 32_768.0 + 1.0 / 131_072.0) * parameters.scale as f64;

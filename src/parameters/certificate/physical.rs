@@ -323,10 +323,10 @@ fn resolution(physical: &PreparedTerms, common: &Common, box_: &[Interval; SIGNA
     let coulomb = coulomb_levels(physical, common, box_, box_[Signal::Velocity as usize]).abs().high;
     let stribeck = level(physical.stribeck, box_[Signal::Velocity as usize]).abs().high;
     let harmonics: i64 = physical.harmonic_difference.iter().map(|a| (*a as i64).abs()).sum();
-    // Arguments are cut to 17 fraction bits before tanh (slope 1), to 18 before the Stribeck bump (slope 2.33): hardly more
-    // than 2^-17 of the Coulomb level and of the harmonics that follow the same edge, 2^-16.7 of the Stribeck level. Twice that, because
-    // where two directions have different levels, they meet at this distance from zero. The arc tangent's argument and
-    // reciprocal are rounded at 2^-16 (slope 2 / pi).
+    // Arguments are cut to 17 fraction bits before tanh (slope 1), to 18 before the Stribeck bump (slope 2.33): hardly
+    // more than 2^-17 of the Coulomb level and of the harmonics that follow the same edge, 2^-16.7 of the Stribeck
+    // level. Twice that, because where two directions have different levels, they meet at this distance from zero.
+    // The arc tangent's argument and reciprocal are rounded at 2^-16 (slope 2 / pi).
     let levels = (coulomb >> 16) + (harmonics >> 16) + (stribeck >> 15) + ((physical.hysteresis as i64).abs() >> 15);
     // Shifts above, v |v|, the harmonics' two roundings, those of pre-sliding and ripple, and the last one.
     (levels + 4 + 1 + 2 + common.roundings + 1).min(u32::MAX as i64) as u32

@@ -1,10 +1,11 @@
 //! Slope of the network over one scaled input, for every input in the box.
 //!
-//! The slope is the sum over all paths through the layers of the weights and of the slopes of tanh in the three neurons on the
-//! way: the sum over k of t1_k (sum over j of w1_kj t0_j w0_j) (sum over i of w3_i t2_i w2_ik), with t0, t1, t2 the slopes of tanh in
-//! layers 0, 1, 2. It is linear in each of these 15, so within their intervals it is largest and smallest at ends: 32
-//! combinations in layer 0, 32 in layer 2, and in layer 1 each neuron's end is known by itself. Intervals taken from layer
-//! to layer, with the box bisected 9 times, give bounds that are twice as wide at many times the cost.
+//! The slope is the sum over all paths through the layers of the weights and of the slopes of tanh in the three neurons
+//! on the way: the sum over k of t1_k (sum over j of w1_kj t0_j w0_j) (sum over i of w3_i t2_i w2_ik), with t0, t1, t2
+//! the slopes of tanh in layers 0, 1, 2. It is linear in each of these 15, so within their intervals it is largest and
+//! smallest at ends: 32 combinations in layer 0, 32 in layer 2, and in layer 1 each neuron's end is known by itself.
+//! Intervals taken from layer to layer, with the box bisected 9 times, give bounds that are twice as wide at many times
+//! the cost.
 
 use super::interval::Interval;
 use crate::friction::network::{INPUTS, NEURONS, NetworkParameters};
@@ -16,7 +17,8 @@ pub(super) const FRACTION_BITS: u32 = 20;
 const COMBINATIONS: usize = 1 << NEURONS;
 /// A layer's last neuron. Places are held to it, which they never exceed, so that no access can panic.
 const LAST: usize = NEURONS - 1;
-/// Combinations of layer 2 that are kept at a time: all would be 2.5 KiB of stack, and what is computed again for each part is little.
+/// Combinations of layer 2 that are kept at a time: all would be 2.5 KiB of stack, and what is computed again for each
+/// part is little.
 const AT_ONCE: usize = 4;
 
 /// Slope over a scaled input in units of the network's output, Q20. `tanh_slopes`: per layer and neuron, Q14.
@@ -63,8 +65,9 @@ fn ends(intervals: &[Interval; NEURONS], combination: usize) -> [i64; NEURONS] {
     })
 }
 
-/// Slopes of the sums of layer 1 over the input, for one combination of ends of layer 0's intervals after the other: each differs from the one before in one
-/// end (the reflected binary code of F. Gray, US patent 2,632,058), so that five products are new instead of 25.
+/// Slopes of the sums of layer 1 over the input, for one combination of ends of layer 0's intervals after the other:
+/// each differs from the one before in one end (the reflected binary code of F. Gray, US patent 2,632,058), so that
+/// five products are new instead of 25.
 struct Before<'a> {
     parameters: &'a NetworkParameters,
     tanh_0: &'a [Interval; NEURONS],
@@ -141,7 +144,8 @@ fn behind_layer_1(parameters: &NetworkParameters, tanh_2: &[i64; NEURONS]) -> [I
 
 /// Slopes of the tanh table, Q14, over an interval of arguments in Q25.
 ///
-/// The slope falls with the distance from zero, up to the rounding of the knots: one unit of Q15 on either side of a step.
+/// The slope falls with the distance from zero, up to the rounding of the knots: one unit of Q15 on either side of a
+/// step.
 pub(super) fn of_tanh(sum: Interval) -> Interval {
     const ROUNDING: i64 = 32;
     let step = |end: i64| (end >> 20).clamp(-256, 255);

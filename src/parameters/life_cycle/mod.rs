@@ -7,13 +7,15 @@
 //! ```
 //!
 //! It touches neither flash nor control step: it says what to do ([`Action`]) and is told how that went
-//! ([`LifeCycle::finished`]). Time is passed in, in milliseconds of a clock that does not wrap (u64). The bytes of an upload lie in
-//! a buffer of the caller's that nobody else writes; what was verified is compared by its checksum before it is run or stored.
+//! ([`LifeCycle::finished`]). Time is passed in, in milliseconds of a clock that does not wrap (u64). The bytes of an
+//! upload lie in a buffer of the caller's that nobody else writes; what was verified is compared by its checksum before
+//! it is run or stored.
 //!
-//! Versions: an image older than the floor is refused. Storing an image whose tag was right raises the floor to its version; the same version may come
-//! again. Rolling back goes to the stored previous image alone, whatever its version, and leaves the floor. A joint without a key takes none that is
-//! older than what it stored, which guards against slips; a key that is given later begins without that, or an image of version FFFFFFFFh
-//! from anybody would be the last one for good.
+//! Versions: an image older than the floor is refused. Storing an image whose tag was right raises the floor to its
+//! version; the same version may come again. Rolling back goes to the stored previous image alone, whatever its
+//! version, and leaves the floor. A joint without a key takes none that is older than what it stored, which guards
+//! against slips; a key that is given later begins without that, or an image of version FFFFFFFFh from anybody would be
+//! the last one for good.
 //!
 //! A key that is damaged locks: no image is taken, tried or rolled back.
 
@@ -31,7 +33,8 @@ pub use verification::{Requirements, Verified};
 /// Longest trial, ms: an hour.
 pub const MAX_TRIAL_MS: u32 = 3_600_000;
 
-/// Of what was verified. Not the CRC that an image ends with: over an image and its own CRC that one is the same for all of them.
+/// Of what was verified. Not the CRC that an image ends with: over an image and its own CRC that one is the same for
+/// all of them.
 const CRC: crc::Crc<u32, crc::NoTable> = crc::Crc::<u32, crc::NoTable>::new(&crc::CRC_32_ISCSI);
 
 /// What a client asks for, with the number that it writes to object 2212:1.
@@ -207,8 +210,8 @@ pub struct LifeCycle {
 impl LifeCycle {
     /// At start: nothing is staged.
     ///
-    /// `floor`: as it was kept. `newest`: the highest version of the stored images, whose tags nobody knows. `failures`: the kept count of
-    /// wrong tags.
+    /// `floor`: as it was kept. `newest`: the highest version of the stored images, whose tags nobody knows.
+    /// `failures`: the kept count of wrong tags.
     pub const fn new(requirements: Requirements, floor: u32, newest: u32, failures: u16) -> Self {
         Self {
             requirements,
@@ -252,7 +255,8 @@ impl LifeCycle {
         self.requirements.target
     }
 
-    /// Highest version with a right tag that was to be stored. To be kept when it has risen, before the image is stored.
+    /// Highest version with a right tag that was to be stored. To be kept when it has risen, before the image is
+    /// stored.
     pub const fn floor(&self) -> u32 {
         self.floor
     }

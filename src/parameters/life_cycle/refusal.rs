@@ -1,6 +1,7 @@
 //! Why an image is not taken a step further, with a number for each reason; task or host.
 //!
-//! The numbers are what a bus reads (result of the last command, object 2212:3). They never change their meaning; 0 is success.
+//! The numbers are what a bus reads (result of the last command, object 2212:3). They never change their meaning; 0 is
+//! success.
 
 use super::{Command, MAX_TRIAL_MS, State};
 use crate::parameters::certificate;

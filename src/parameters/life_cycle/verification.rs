@@ -1,8 +1,8 @@
 //! Everything that must hold of an upload before a joint runs it; task or host, some tens of milliseconds on the board.
 //!
-//! In this order: length and checksum, tag, the fields, version, target, unit, certificate, golden vectors. With a key, nothing
-//! behind the length is interpreted before the tag is right; a damaged upload is told from a forged one by its checksum and costs no
-//! failure.
+//! In this order: length and checksum, tag, the fields, version, target, unit, certificate, golden vectors. With a key,
+//! nothing behind the length is interpreted before the tag is right; a damaged upload is told from a forged one by its
+//! checksum and costs no failure.
 
 use super::Refusal;
 use crate::friction::ParameterSet;

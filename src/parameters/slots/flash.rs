@@ -1,8 +1,9 @@
 //! What a store of slots needs of a flash, with the rules of the STM32G4's; task, or host with a model.
 //!
-//! Double words of 8 bytes are written once after an erase, even 0xFF bytes; only all zeros may be written over anything. Pages of
-//! 2 KiB are erased to 0xFF (RM0440, embedded flash memory). A double word or page whose writing is cut off by a loss of power is torn: it may read as
-//! an ECC error, as what was there, as what was to be there, as anything else, and differently each time.
+//! Double words of 8 bytes are written once after an erase, even 0xFF bytes; only all zeros may be written over
+//! anything. Pages of 2 KiB are erased to 0xFF (RM0440, embedded flash memory). A double word or page whose writing is
+//! cut off by a loss of power is torn: it may read as an ECC error, as what was there, as what was to be there, as
+//! anything else, and differently each time.
 
 /// Bytes of a page, the least that can be erased.
 pub const PAGE: usize = 2048;

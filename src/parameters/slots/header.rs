@@ -6,8 +6,8 @@
 //! | 1, 2 | confirmations, [`CONFIRMED`] |
 //! | 3 | settled, once it is all zeros |
 //!
-//! The CRC-32 (ISO-HDLC) is of the content's kind (4 bytes), length, sequence number and payload. The reason for the other three
-//! is told in the [module](super).
+//! The CRC-32 (ISO-HDLC) is of the content's kind (4 bytes), length, sequence number and payload. The reason for the
+//! other three is told in the [module](super).
 
 use super::flash::{DOUBLE_WORD, SlotFlash};
 

@@ -1,4 +1,5 @@
-//! Two slots in flash for one payload, of which one is whole at any instant of power loss; task or host, never the control interrupt.
+//! Two slots in flash for one payload, of which one is whole at any instant of power loss; task or host, never the
+//! control interrupt.
 //!
 //! For friction images and for configurations: each has two slots of one or more pages. A store writes the slot that is
 //! not in use and never touches the newest whole one. At start [`Slots::open`] finds the newest whole slot.
@@ -15,10 +16,11 @@
 //!
 //! # Order of writing, and why it is this one
 //!
-//! Retire the slot (zero both confirmations, then the header), erase it, write the payload and read it back, then header, first
-//! confirmation, second confirmation, zeros into the last of the four. One word written last would do if a torn word always read the same.
-//! One that flickers would let a joint start with the new content today and with the old one tomorrow. So whatever a start finds
-//! undecided it decides, in flash, before anything is used, and the decision holds although torn words stay torn:
+//! Retire the slot (zero both confirmations, then the header), erase it, write the payload and read it back, then
+//! header, first confirmation, second confirmation, zeros into the last of the four. One word written last would do if
+//! a torn word always read the same. One that flickers would let a joint start with the new content today and with the
+//! old one tomorrow. So whatever a start finds undecided it decides, in flash, before anything is used, and the
+//! decision holds although torn words stay torn:
 //!
 //! | found | then |
 //! |---|---|
@@ -27,17 +29,18 @@
 //! | header, a confirmation | confirmed again where that is possible, last word zeroed: whole |
 //! | header, no confirmation | both confirmations zeroed, then the header: the store never happened |
 //!
-//! A torn header has blank confirmations behind it, so it is never taken; a torn last word has whole confirmations before it, so it
-//! always is. A torn first confirmation may go either way, but only once: afterwards zeros stand in the last word, or in
-//! the confirmations. Zeros can be written over torn words any number of times, so a loss of power meanwhile is repaired by the next
-//! start. The second confirmation covers that loss of power: until it is whole, the last word is blank. Against words that
-//! read as anything, differently each time, this holds for any two losses of power in a row (`tests` has every case).
+//! A torn header has blank confirmations behind it, so it is never taken; a torn last word has whole confirmations
+//! before it, so it always is. A torn first confirmation may go either way, but only once: afterwards zeros stand in
+//! the last word, or in the confirmations. Zeros can be written over torn words any number of times, so a loss of power
+//! meanwhile is repaired by the next start. The second confirmation covers that loss of power: until it is whole, the
+//! last word is blank. Against words that read as anything, differently each time, this holds for any two losses of
+//! power in a row (`tests` has every case).
 //!
 //! # Rolling back
 //!
-//! [`Slots::roll_back`] takes the previous payload into RAM and stores it again with a new sequence number, into the slot that it came
-//! from. The content that was in use stays whole until then and becomes the previous one. The price: where power is lost meanwhile,
-//! the joint starts with the content that was in use, and the previous one is lost.
+//! [`Slots::roll_back`] takes the previous payload into RAM and stores it again with a new sequence number, into the
+//! slot that it came from. The content that was in use stays whole until then and becomes the previous one. The price:
+//! where power is lost meanwhile, the joint starts with the content that was in use, and the previous one is lost.
 //!
 //! # Bit rot
 //!
@@ -67,8 +70,8 @@ pub struct Layout {
 }
 
 impl Layout {
-    /// Two slots of `pages` pages each (1 to 16) one behind the other from page `first_page`; `kind` goes into the checksum, so that
-    /// one sort of content is not taken for another. None for another number of pages.
+    /// Two slots of `pages` pages each (1 to 16) one behind the other from page `first_page`; `kind` goes into the
+    /// checksum, so that one sort of content is not taken for another. None for another number of pages.
     pub const fn new(first_page: usize, pages: usize, kind: u32) -> Option<Self> {
         if pages >= 1 && pages <= 16 { Some(Self { first_page, pages, kind }) } else { None }
     }
@@ -195,8 +198,8 @@ pub struct Slots {
 impl Slots {
     /// Finds out what the slots hold, and decides for good what a loss of power left undecided.
     ///
-    /// Writes at most six double words; none where the last store came to its end and nothing is damaged. After an error nothing is decided and
-    /// nothing may be used.
+    /// Writes at most six double words; none where the last store came to its end and nothing is damaged. After an
+    /// error nothing is decided and nothing may be used.
     pub fn open(flash: &mut impl SlotFlash, layout: Layout) -> Result<Self, WriteError> {
         let first = settle(flash, &layout, Slot::First)?;
         let second = settle(flash, &layout, Slot::Second)?;
@@ -217,7 +220,8 @@ impl Slots {
         }
     }
 
-    /// Whether a slot was whole once and is not any more, as it was found at start or since. What it held may have been newer than what the other one holds.
+    /// Whether a slot was whole once and is not any more, as it was found at start or since. What it held may have been
+    /// newer than what the other one holds.
     pub const fn is_damaged(&self) -> bool {
         matches!(self.first, SlotState::Damaged) || matches!(self.second, SlotState::Damaged)
     }
@@ -262,8 +266,8 @@ impl Slots {
         }
     }
 
-    /// The newest slot whose payload is whole at this moment, for whoever reads it in place; none where there is none. What is damaged
-    /// is dealt with as by [`Slots::load`].
+    /// The newest slot whose payload is whole at this moment, for whoever reads it in place; none where there is none.
+    /// What is damaged is dealt with as by [`Slots::load`].
     pub fn usable(&mut self, flash: &mut impl SlotFlash) -> Result<Option<Slot>, SlotError> {
         let Some(active) = self.active() else { return Ok(None) };
         if self.is_whole(flash, active) {
@@ -354,7 +358,8 @@ impl Slots {
         }
     }
 
-    /// Makes the previous content active again, the active one the previous. `buffer` must hold it ([`Layout::capacity`]).
+    /// Makes the previous content active again, the active one the previous. `buffer` must hold it
+    /// ([`Layout::capacity`]).
     pub fn roll_back(&mut self, flash: &mut impl SlotFlash, buffer: &mut [u8]) -> Result<(), SlotError> {
         let previous = self.previous().ok_or(SlotError::NoPrevious)?;
         let length = self.copy(flash, previous, buffer)?;

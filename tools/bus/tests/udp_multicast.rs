@@ -1,7 +1,7 @@
 //! CAN over UDP multicast: two programs of this project, and python-can itself.
 //!
-//! Where this machine takes no multicast, or has no Python with python-can and cannot get one, these tests are reported as ignored by name;
-//! with `CI` set they run, and fail.
+//! Where this machine takes no multicast, or has no Python with python-can and cannot get one, these tests are reported
+//! as ignored by name; with `CI` set they run, and fail.
 
 use bus::{Frame, Transport, open};
 use libtest_mimic::{Arguments, Failed, Trial};
@@ -84,7 +84,8 @@ fn groups() -> Result<(), Failed> {
 const PACKAGES: Packages =
     Packages { folder: "python-can", install: &["python-can==4.6.1", "msgpack==1.2.4"], import: "can, msgpack" };
 
-/// Says what it hears, and answers with the data reversed and the identifier plus one; then sends what has to be passed over.
+/// Says what it hears, and answers with the data reversed and the identifier plus one; then sends what has to be passed
+/// over.
 const PROGRAM: &str = r#"
 import sys, can
 with can.Bus(interface="udp_multicast", channel=sys.argv[1], port=int(sys.argv[2])) as bus:

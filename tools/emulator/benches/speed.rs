@@ -1,5 +1,5 @@
-//! Prints how fast the core is on this machine: `cargo bench -p emulator`. Instructions a second on three loops that never sleep, on a bus of
-//! memory alone; the mix of each is in its comment.
+//! Prints how fast the core is on this machine: `cargo bench -p emulator`. Instructions a second on three loops that
+//! never sleep, on a bus of memory alone; the mix of each is in its comment.
 
 use emulator::cpu::End;
 use emulator::memory::Memory;

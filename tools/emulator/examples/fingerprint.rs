@@ -1,5 +1,5 @@
-//! Prints a number that stands for everything a board's program did while somebody shook the joint and asked it things over the bus, and how
-//! fast the run was: what changes the emulator and not the number has changed no result.
+//! Prints a number that stands for everything a board's program did while somebody shook the joint and asked it things
+//! over the bus, and how fast the run was: what changes the emulator and not the number has changed no result.
 //! `cargo run --release -p emulator --example fingerprint -- moteus-r4 PROGRAM SECONDS`.
 
 use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired, Witnessed};

@@ -1,9 +1,9 @@
 //! Runs single instructions for a program that compares them: `against_unicorn.py` beside the sources.
 //!
 //! Reads cases from standard input until its end and writes a result for each, both as little-endian words.
-//! A case: address, number of instructions, code (2 words), r0 to r14, program status register, FPSCR, s0 to s31, 64 words of memory. A result: 0 if
-//! all of them ran, 1 if one was unpredictable, 2 if one was unknown, 3 for anything else; r0 to r14, address of the next instruction, program
-//! status register, FPSCR, s0 to s31, the 64 words.
+//! A case: address, number of instructions, code (2 words), r0 to r14, program status register, FPSCR, s0 to s31, 64
+//! words of memory. A result: 0 if all of them ran, 1 if one was unpredictable, 2 if one was unknown, 3 for anything
+//! else; r0 to r14, address of the next instruction, program status register, FPSCR, s0 to s31, the 64 words.
 
 use emulator::cpu::{Cpu, End, Refused};
 use emulator::memory::Memory;

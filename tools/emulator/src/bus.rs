@@ -1,4 +1,5 @@
-//! What an emulated core is connected to: addresses that answer, time that makes things happen, and lines that interrupt.
+//! What an emulated core is connected to: addresses that answer, time that makes things happen, and lines that
+//! interrupt.
 
 use std::ops::Range;
 
@@ -30,12 +31,13 @@ impl Width {
 pub enum Refusal {
     /// Nothing on the chip answers there: the core takes a precise bus fault.
     NoAnswer,
-    /// The chip would answer, but that part of it is not modelled: the run ends, so that no result rests on it. In words, with the section of
-    /// the reference manual.
+    /// The chip would answer, but that part of it is not modelled: the run ends, so that no result rests on it. In
+    /// words, with the section of the reference manual.
     Unmodelled(String),
 }
 
-/// What the bus tells the core besides data. Read after every write to a device, every read of one, and every [`Bus::advance`].
+/// What the bus tells the core besides data. Read after every write to a device, every read of one, and every
+/// [`Bus::advance`].
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Signals {
     /// Level of interrupt line n in bit n % 32 of word n / 32.
@@ -46,8 +48,9 @@ pub struct Signals {
     pub reset: bool,
     /// Code that changed by itself (flash that was erased or written), which the core must decode anew.
     pub rewritten: Option<Range<u32>>,
-    /// Memory that does not answer before a cycle: code and data that the core wants from there wait until then. Read it also after a store to
-    /// memory that is not RAM: flash that is erased or written begins to stall with that store.
+    /// Memory that does not answer before a cycle: code and data that the core wants from there wait until then. Read
+    /// it also after a store to memory that is not RAM: flash that is erased or written begins to stall with that
+    /// store.
     pub stall: Option<(Range<u32>, u64)>,
 }
 
@@ -57,8 +60,8 @@ pub trait Bus {
     fn read(&mut self, now: u64, address: u32, width: Width) -> Result<u32, Refusal>;
     /// A store.
     fn write(&mut self, now: u64, address: u32, width: Width, value: u32) -> Result<(), Refusal>;
-    /// A load from memory that answers at once and that nothing else hears of: most of the traffic, for which the core does nothing else.
-    /// None for everything else, which the core then [`read`](Self::read)s.
+    /// A load from memory that answers at once and that nothing else hears of: most of the traffic, for which the core
+    /// does nothing else. None for everything else, which the core then [`read`](Self::read)s.
     #[inline(always)]
     fn load(&self, _address: u32, _width: Width) -> Option<u32> {
         None
@@ -78,7 +81,8 @@ pub trait Bus {
     fn block_mut(&mut self, _address: u32, _bytes: u32) -> Option<&mut [u8]> {
         None
     }
-    /// All memory that answers so from 2000_0000h on, for translated code. It never changes its length, but that it is empty without power.
+    /// All memory that answers so from 2000_0000h on, for translated code. It never changes its length, but that it is
+    /// empty without power.
     #[inline(always)]
     fn memory(&mut self) -> &mut [u8] {
         &mut []
@@ -87,7 +91,8 @@ pub trait Bus {
     fn place(&self, _address: u32) -> Option<usize> {
         None
     }
-    /// A word of memory that changes only with [`Signals::rewritten`], and that nothing hears of when it is loaded; none where it is none.
+    /// A word of memory that changes only with [`Signals::rewritten`], and that nothing hears of when it is loaded;
+    /// none where it is none.
     fn constant(&self, _address: u32) -> Option<u32> {
         None
     }
@@ -97,8 +102,8 @@ pub trait Bus {
     fn code(&self) -> Vec<Range<u32>>;
     /// Cycles that an access there takes more than the core's own.
     fn wait_states(&self, address: u32) -> u32;
-    /// Bytes of a line of code, a power of two, where each line costs the wait states of its address although the one before it was fetched; none where fetching
-    /// in sequence costs nothing.
+    /// Bytes of a line of code, a power of two, where each line costs the wait states of its address although the one
+    /// before it was fetched; none where fetching in sequence costs nothing.
     fn line(&self) -> Option<u32> {
         None
     }
@@ -106,7 +111,8 @@ pub trait Bus {
     fn next_event(&self) -> u64;
     /// Does what is due up to `now`.
     fn advance(&mut self, now: u64);
-    /// Whether there may be signals that it was not told yet. Where there are none, asking for them would change nothing.
+    /// Whether there may be signals that it was not told yet. Where there are none, asking for them would change
+    /// nothing.
     #[inline(always)]
     fn has_news(&self) -> bool {
         true

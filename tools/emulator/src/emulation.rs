@@ -72,8 +72,8 @@ impl<W: Wired> Emulation<W> {
         self.cpu.bus.instant(self.cpu.now())
     }
 
-    /// Runs for so many seconds, through resets. What else ended the run, if anything did; a loss of power shows as a reset by the chip, and
-    /// nothing runs before [`power_up`](Self::power_up).
+    /// Runs for so many seconds, through resets. What else ended the run, if anything did; a loss of power shows as a
+    /// reset by the chip, and nothing runs before [`power_up`](Self::power_up).
     pub fn run(&mut self, seconds: f64) -> Option<End> {
         self.run_until(Instant(self.now().0 + (seconds * 1e12) as u64))
     }

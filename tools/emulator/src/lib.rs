@@ -1,8 +1,9 @@
-//! An emulated board: the program as it would be flashed, on a Cortex-M4F with the peripherals of an STM32G4, wired to a plant.
+//! An emulated board: the program as it would be flashed, on a Cortex-M4F with the peripherals of an STM32G4, wired to
+//! a plant.
 //!
-//! Data flows one way: [`cpu`] executes instructions and knows only a [`bus::Bus`]; `chip` is that bus, memories and peripherals; `board`
-//! connects the chip's pins to actuator and bus. Everything is deterministic: the same program and the same inputs
-//! give the same run, to the cycle.
+//! Data flows one way: [`cpu`] executes instructions and knows only a [`bus::Bus`]; `chip` is that bus, memories and
+//! peripherals; `board` connects the chip's pins to actuator and bus. Everything is deterministic: the same program and
+//! the same inputs give the same run, to the cycle.
 //!
 //! Host only.
 

@@ -28,7 +28,8 @@ struct Block {
 }
 
 impl Memory {
-    /// A core that is connected to it: not generic, so that its operations are compiled here and not in every program that runs one.
+    /// A core that is connected to it: not generic, so that its operations are compiled here and not in every program
+    /// that runs one.
     pub fn core(self) -> Cpu<Self> {
         Cpu::new(self)
     }

@@ -133,7 +133,8 @@ mod tests {
         // Executable for Arm; entry, program headers, section headers, flags; sizes and counts of headers.
         file.extend(words(&[2 | 40 << 16, 1, 0, 52, sections, 0x0500_0200]));
         file.extend(words(&[52 | 32 << 16, 1 | 40 << 16, 3 | 2 << 16]));
-        // One segment to load: virtual address in CCM SRAM, physical in flash, room for eight bytes of which four are in the file.
+        // One segment to load: virtual address in CCM SRAM, physical in flash, room for eight bytes of which four are
+        // in the file.
         file.extend(words(&[1, data, 0x1000_0000, 0x0800_1000, 4, 8, 5, 4]));
         file.extend([1, 2, 3, 4]);
         file.extend(words(&[0; 4]));

@@ -1,7 +1,8 @@
 //! What the program logs: SEGGER's real-time transfer read out of its memory, and the defmt messages in it.
 //!
-//! Host only. The control block is that of `defmt-rtt`: a name of 16 bytes, the number of channels in each direction, then for each channel
-//! name, buffer, size, write offset, read offset, flags, a word each. A debug probe does the same over its wire.
+//! Host only. The control block is that of `defmt-rtt`: a name of 16 bytes, the number of channels in each direction,
+//! then for each channel name, buffer, size, write offset, read offset, flags, a word each. A debug probe does the same
+//! over its wire.
 
 use crate::bus::{Bus, Refusal, Width};
 use crate::program::Program;
@@ -179,7 +180,8 @@ mod tests {
     fn offsets_that_cannot_be_are_told() {
         let (mut memory, rtt) = channel(9, 0);
         assert_eq!(rtt.read(&mut memory, 0), Err(RttError::Damaged { size: 8, write: 9, read: 0 }));
-        // As memory comes up: a buffer that ends beyond the address space, one that ends with it, and one as large as it.
+        // As memory comes up: a buffer that ends beyond the address space, one that ends with it, and one as large as
+        // it.
         for (buffer, size, write, read) in [
             (u32::MAX - 6, 8, 5, 2),
             (u32::MAX - 8, 8, 5, 2),

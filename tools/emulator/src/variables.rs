@@ -1,7 +1,8 @@
-//! A program's static variables, by name and field, as a debugger finds them: from the debug information in its file. Host.
+//! A program's static variables, by name and field, as a debugger finds them: from the debug information in its file.
+//! Host.
 //!
-//! Layouts are the compiler's own choice; nothing here knows one. A static that an optimiser has taken to pieces is found piece by piece; what it has
-//! taken out of the program is not found.
+//! Layouts are the compiler's own choice; nothing here knows one. A static that an optimiser has taken to pieces is
+//! found piece by piece; what it has taken out of the program is not found.
 
 use crate::bus::{Bus, Refusal, Width};
 use crate::program::Program;
@@ -79,7 +80,8 @@ enum Shape {
     Elements { of: UnitSectionOffset, count: u32 },
     /// An enumeration without fields.
     Names(Vec<(u64, String)>),
-    /// One with fields, in which `tag` says which of the variants it is; a variant without a value is the one that no other is.
+    /// One with fields, in which `tag` says which of the variants it is; a variant without a value is the one that no
+    /// other is.
     Variants { tag: Option<Field>, variants: Vec<(Option<u64>, Field)> },
 }
 
@@ -171,8 +173,9 @@ impl Variables {
         Ok(())
     }
 
-    /// A variable by the end of its static's path and by the parts of it that follow, `control::CONTROL.joint.telemetry`: fields by their
-    /// names, elements by their numbers. Structures around a single value need not be named.
+    /// A variable by the end of its static's path and by the parts of it that follow,
+    /// `control::CONTROL.joint.telemetry`: fields by their names, elements by their numbers. Structures around a
+    /// single value need not be named.
     ///
     /// # Errors
     /// No such static or part, or several statics.

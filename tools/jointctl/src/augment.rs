@@ -1,7 +1,8 @@
 //! More training samples from the same recording, by what the joint's friction should not care about; host.
 //!
-//! Inputs are rows of position, velocity, theoretical torque, measured torque and temperature, in SI units, as the network takes
-//! them; the target is the friction torque that the row belongs to. Only training samples may be augmented.
+//! Inputs are rows of position, velocity, theoretical torque, measured torque and temperature, in SI units, as the
+//! network takes them; the target is the friction torque that the row belongs to. Only training samples may be
+//! augmented.
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
@@ -22,7 +23,8 @@ pub struct Augment {
     pub mirror: bool,
     /// Copies that are shifted and made noisy.
     pub copies: usize,
-    /// Largest shift of the position, rad or m; each copy is shifted as a whole. For friction that does not depend on position.
+    /// Largest shift of the position, rad or m; each copy is shifted as a whole. For friction that does not depend on
+    /// position.
     pub shift: f64,
     /// Standard deviation of the noise on each input, in the input's unit.
     pub noise: Inputs,
@@ -30,7 +32,8 @@ pub struct Augment {
     pub seed: u64,
 }
 
-/// The samples, then their mirror images, then shifted and noisy copies of both. `inputs` and `target` are of equal length.
+/// The samples, then their mirror images, then shifted and noisy copies of both. `inputs` and `target` are of equal
+/// length.
 pub fn augment(inputs: &[Inputs], target: &[f64], options: &Augment) -> (Vec<Inputs>, Vec<f64>) {
     let (mut all_inputs, mut all_targets) = (inputs.to_vec(), target.to_vec());
     if options.mirror {

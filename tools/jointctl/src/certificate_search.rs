@@ -48,7 +48,8 @@ pub fn search(parameters: &FrictionParameters, states: usize, seed: u64) -> Foun
                 if low == high || ranges[signal as usize] == Range::ANY {
                     return 0.0;
                 }
-                // A step of a hundredth of the range, smaller at standstill: large against the staircase, small against the curve.
+                // A step of a hundredth of the range, smaller at standstill: large against the staircase, small against
+                // the curve.
                 let width = (high as i64 - low as i64) as i32 / if n % 4 == 3 { 1000 } else { 100 };
                 let from = signals[signal as usize].min(high - width);
                 let (a, b) = (at(with(signals, signal, from)), at(with(signals, signal, from + width)));

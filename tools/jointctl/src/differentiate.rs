@@ -2,7 +2,8 @@
 
 /// Central difference (x[i+1] - x[i-1]) / (2 T), one-sided at both ends; zeros where there are fewer than two values.
 ///
-/// `period` T in s. It is the derivative of the EMPS benchmark's protocol: no phase lag, and a gain of sin(w T) / (w T).
+/// `period` T in s. It is the derivative of the EMPS benchmark's protocol: no phase lag, and a gain of sin(w T) / (w
+/// T).
 pub fn central_difference(values: &[f64], period: f64) -> Vec<f64> {
     let last = values.len().saturating_sub(1);
     (0..values.len())

@@ -1,7 +1,8 @@
-//! Making rare motions count: a joint spends most of a recording at a few speeds, and a network learns only those; host.
+//! Making rare motions count: a joint spends most of a recording at a few speeds, and a network learns only those;
+//! host.
 //!
-//! Samples are sorted into strata of velocity, sign of the acceleration and load. The frequency of each stratum is moved from what it
-//! is in the recording towards the same for all, either by drawing samples or by weighting them.
+//! Samples are sorted into strata of velocity, sign of the acceleration and load. The frequency of each stratum is
+//! moved from what it is in the recording towards the same for all, either by drawing samples or by weighting them.
 
 use crate::samples::{Part, Samples};
 use rand::seq::SliceRandom;

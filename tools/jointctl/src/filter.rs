@@ -51,7 +51,8 @@ impl LowPassFilter {
         }
     }
 
-    /// Chebyshev type I low-pass of even `order` (2 to 12) with `ripple` dB up to `cutoff`, a fraction of the Nyquist frequency.
+    /// Chebyshev type I low-pass of even `order` (2 to 12) with `ripple` dB up to `cutoff`, a fraction of the Nyquist
+    /// frequency.
     pub fn chebyshev(order: usize, ripple: f64, cutoff: f64) -> Result<LowPassFilter, FilterError> {
         check(order, cutoff)?;
         if order % 2 == 1 {
@@ -79,7 +80,8 @@ impl LowPassFilter {
         Ok(LowPassFilter { sections })
     }
 
-    /// Fewest samples that `zero_phase` accepts: one more than it mirrors at each end (three times the coefficients, as SciPy).
+    /// Fewest samples that `zero_phase` accepts: one more than it mirrors at each end (three times the coefficients, as
+    /// SciPy).
     pub fn minimum_samples(&self) -> usize {
         let first_order = |last: fn(&Sos<f64>) -> f64| self.sections.iter().filter(|s| last(s) == 0.0).count();
         let degree = 2 * self.sections.len() - first_order(|s| s.b[2]).min(first_order(|s| s.a[2]));

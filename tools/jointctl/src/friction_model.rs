@@ -245,7 +245,8 @@ pub struct FrictionModel {
     /// f_a.
     #[serde(default)]
     pub viscous_asymmetry: f64,
-    /// 1/d_n: the reciprocal of the way that bends a pre-sliding element to its end; 0: absent. Not identified, but chosen.
+    /// 1/d_n: the reciprocal of the way that bends a pre-sliding element to its end; 0: absent. Not identified, but
+    /// chosen.
     #[serde(default)]
     pub element_stiffness: [f64; ELEMENTS],
     /// L_n.
@@ -417,7 +418,8 @@ impl FrictionModel {
     ) -> f64 {
         use FrictionParameter as P;
         let (forward, backward) = (0.5 * (1.0 + direction), 0.5 * (1.0 - direction));
-        // sin and cos of the odd multiples by the Chebyshev recurrence f((2j+1) x) = 2 cos(2x) f((2j-1) x) - f((2j-3) x).
+        // sin and cos of the odd multiples by the Chebyshev recurrence f((2j+1) x) = 2 cos(2x) f((2j-1) x) - f((2j-3)
+        // x).
         let (sine, cosine) = (self.harmonic_frequency * q).sin_cos();
         let twice = 2.0 * (2.0 * cosine * cosine - 1.0);
         let (mut s, mut s_before, mut c, mut c_before) = (sine, -sine, cosine, cosine);

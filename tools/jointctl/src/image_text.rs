@@ -202,8 +202,8 @@ pub fn to_text(image: &Image) -> String {
     format!("# Friction parameters of a joint. Units: SI, with the effort's unit for torque.\n{body}")
 }
 
-/// The image that a TOML text describes. Golden vectors are taken as they stand: whether they still hold after an edit is
-/// for [`Image::verify_golden`] to say.
+/// The image that a TOML text describes. Golden vectors are taken as they stand: whether they still hold after an edit
+/// is for [`Image::verify_golden`] to say.
 pub fn from_text(text: &str) -> Result<Image, TextError> {
     // A text of another format may have other keys: its format is looked at first.
     #[derive(Deserialize)]

@@ -1,7 +1,8 @@
 //! The friction of a joint as f64 and as the firmware's integers, evaluated over recorded samples; host.
 //!
-//! Every judged number of an image comes from [`fixed_point`], which calls the code that the board runs. [`FloatFriction`] is
-//! its twin in f64: what was trained, or what an image says without the rounding of its arithmetic.
+//! Every judged number of an image comes from [`fixed_point`], which calls the code that the board runs.
+//! [`FloatFriction`] is its twin in f64: what was trained, or what an image says without the rounding of its
+//! arithmetic.
 
 use crate::friction_model::{FrictionModel, JointState as FloatState};
 use crate::network::Network;
@@ -129,8 +130,8 @@ pub fn regimes(selector: &Selector, states: &[JointState], samples: &Samples) ->
     sets
 }
 
-/// Steps of the firmware for one sample: as many as it takes to reach [`LOWEST_RATE`]. Between samples velocity is held,
-/// which bends an element as far as one long step does.
+/// Steps of the firmware for one sample: as many as it takes to reach [`LOWEST_RATE`]. Between samples velocity is
+/// held, which bends an element as far as one long step does.
 struct Steps {
     /// Steps a second.
     rate: u32,
@@ -177,8 +178,8 @@ pub fn fixed_point(
     states.par_iter().zip(sets).zip(&common).with_min_len(4096).map(evaluate).collect()
 }
 
-/// Compensation torque of every sample, computed step by step as in the control loop: regimes with cross-fade, fades outside
-/// the trained box; full gain, no clamp, no slew limit. Every run begins anew.
+/// Compensation torque of every sample, computed step by step as in the control loop: regimes with cross-fade, fades
+/// outside the trained box; full gain, no clamp, no slew limit. Every run begins anew.
 pub fn replay(parameters: &FrictionParameters, states: &[JointState], samples: &Samples) -> Vec<f64> {
     let steps = Steps::of(samples);
     let model = FirmwareModel::new(parameters, steps.rate);

@@ -1,9 +1,9 @@
 //! Levenberg-Marquardt for small dense problems, with optional bounds; host.
 //!
 //! Both the physical friction's shape parameters and the network's weights are found here. The damping schedule is that
-//! of the legged-robot paper's trainer (table 3.1: gradient threshold 1e-7, mu limit 1e10; mu starts at 1e-3 and moves by
-//! factors of ten). The crate `levenberg-marquardt` has no bounds, no mu limit, no hook for early stopping, and keeps the
-//! whole Jacobian; we accumulate the normal equations, so memory does not grow with the number of samples.
+//! of the legged-robot paper's trainer (table 3.1: gradient threshold 1e-7, mu limit 1e10; mu starts at 1e-3 and moves
+//! by factors of ten). The crate `levenberg-marquardt` has no bounds, no mu limit, no hook for early stopping, and
+//! keeps the whole Jacobian; we accumulate the normal equations, so memory does not grow with the number of samples.
 
 use nalgebra::{DMatrix, DVector};
 use std::ops::ControlFlow;

@@ -4,8 +4,8 @@
 //! split; the rigid body and the physical friction are identified, a network is trained on what is left, the better
 //! model on validation data is quantised, certified and judged by the same `no_std` code that the board runs.
 //!
-//! Beside it, [`simulation`] closes the firmware's control step over a simulated actuator, [`joint_text`] is a joint's configuration
-//! as a file, and [`excite`] finds motions that identify a joint. [`remote`] is a joint over a bus,
+//! Beside it, [`simulation`] closes the firmware's control step over a simulated actuator, [`joint_text`] is a joint's
+//! configuration as a file, and [`excite`] finds motions that identify a joint. [`remote`] is a joint over a bus,
 //! [`describe`] tells other people's tools of it. [`robot`] identifies all joints of an arm at once and hands each to
 //! this pipeline.
 

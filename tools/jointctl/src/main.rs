@@ -1,5 +1,6 @@
-//! The `jointctl` program: reads its arguments, runs one command, reports an error in one line. It ends with 0 where that is done, with 1 where it failed, with 2 where
-//! the arguments are wrong, and with 3 where it is done and nothing better came of it.
+//! The `jointctl` program: reads its arguments, runs one command, reports an error in one line. It ends with 0 where
+//! that is done, with 1 where it failed, with 2 where the arguments are wrong, and with 3 where it is done and nothing
+//! better came of it.
 
 use clap::FromArgMatches;
 use jointctl::commands::{Arguments, arguments, run};

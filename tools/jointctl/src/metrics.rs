@@ -54,7 +54,8 @@ pub struct Metrics {
     pub max_error: f64,
     /// 100 RMSE / RMS(measured), %. None where nothing but zero was measured.
     pub percent_of_rms: Option<f64>,
-    /// Coefficient of determination, 1 - sum(error^2) / sum((measured - mean)^2). None where the measured effort is constant.
+    /// Coefficient of determination, 1 - sum(error^2) / sum((measured - mean)^2). None where the measured effort is
+    /// constant.
     pub r2: Option<f64>,
     /// Mean |predicted - measured| / |measured|, % (001 eq. 11). None where every sample is below the floor.
     pub relative_torque_error: Option<f64>,
@@ -112,7 +113,8 @@ pub fn metrics(measured: &[f64], predicted: &[f64], floor: f64) -> Result<Option
     Ok(over(measured, predicted, floor, |_| true))
 }
 
-/// Errors of `predicted` against `measured` for all samples and for each motion state; None for a state without samples.
+/// Errors of `predicted` against `measured` for all samples and for each motion state; None for a state without
+/// samples.
 ///
 /// Each state is judged against its own RMS and mean, all with the same `floor`.
 ///

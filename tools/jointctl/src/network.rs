@@ -1,7 +1,7 @@
 //! The learned part of the friction model in f64: a small tanh network with a box around its inputs; host.
 //!
-//! This is the network before quantisation: what the trainers return, what reports draw and what the fixed-point network
-//! of the firmware is compared with. Structure: five inputs and three hidden layers of five neurons after the
+//! This is the network before quantisation: what the trainers return, what reports draw and what the fixed-point
+//! network of the firmware is compared with. Structure: five inputs and three hidden layers of five neurons after the
 //! mobile-robot paper (section 2.2.3, figure 4), linear output; other hidden layers are allowed for comparison.
 //!
 //! Inputs are clamped to the box they were trained on and scaled to [-1, 1], exactly as the firmware does it: outside
@@ -9,7 +9,8 @@
 
 use thiserror::Error;
 
-/// Number of inputs: position, velocity, theoretical torque, measured torque, temperature, in this order and in SI units.
+/// Number of inputs: position, velocity, theoretical torque, measured torque, temperature, in this order and in SI
+/// units.
 pub const INPUTS: usize = 5;
 
 /// Names of the inputs, for messages and reports.
@@ -133,8 +134,8 @@ impl InputBox {
 
 /// Number of neurons in each layer, from the inputs to the one output.
 ///
-/// Parameters are one vector: layer by layer, within a layer neuron by neuron, within a neuron its weights in the order of
-/// its inputs and then its bias.
+/// Parameters are one vector: layer by layer, within a layer neuron by neuron, within a neuron its weights in the order
+/// of its inputs and then its bias.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Shape {
     sizes: Vec<usize>,

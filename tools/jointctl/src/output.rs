@@ -45,7 +45,8 @@ impl OutputFile {
     }
 }
 
-/// Checks that a file could be written: `path` names no folder, and the nearest folder above it that exists takes a file.
+/// Checks that a file could be written: `path` names no folder, and the nearest folder above it that exists takes a
+/// file.
 ///
 /// # Errors
 /// [`OutputError`]; nothing is left behind.

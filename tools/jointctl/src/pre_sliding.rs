@@ -1,9 +1,11 @@
-//! How far pre-sliding elements are bent along a recording: the twin of the firmware's Maxwell-slip elements in f64; host.
+//! How far pre-sliding elements are bent along a recording: the twin of the firmware's Maxwell-slip elements in f64;
+//! host.
 
 use crate::friction_model::Bent;
 use crate::samples::Samples;
 
-/// How far the elements of these stiffnesses (1/rad or 1/m) are bent after each sample. Every run begins at rest: nobody recorded what was before.
+/// How far the elements of these stiffnesses (1/rad or 1/m) are bent after each sample. Every run begins at rest:
+/// nobody recorded what was before.
 pub fn bent(samples: &Samples, stiffness: &[f64]) -> Vec<Bent> {
     let mut elements = Bent::default();
     let period = samples.period();

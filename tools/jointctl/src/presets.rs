@@ -110,8 +110,8 @@ pub struct Structure {
 }
 
 impl Structure {
-    /// True when the rigid part is held at the theoretical torque: `c_tau tau_t` is a multiple of the rigid part, so the
-    /// two can only be told apart when one of them is given, and 001 takes the theoretical torque as given.
+    /// True when the rigid part is held at the theoretical torque: `c_tau tau_t` is a multiple of the rigid part, so
+    /// the two can only be told apart when one of them is given, and 001 takes the theoretical torque as given.
     pub fn holds_rigid(&self) -> bool {
         self.terms.contains(Term::Load)
     }

@@ -3,13 +3,14 @@
 //! effort = rigid + friction. For one joint the rigid part is inertia times acceleration and gravity as a function of
 //! position; where mass and length of the load are known run by run (pendulum rigs), each coefficient splits into a
 //! constant part (the joint itself) and a part in proportion to m l^2 or m l. A constant offset belongs to friction
-//! (`Term::Constant`), and a motor's back-EMF k_e v cannot be told from viscous friction: it is part of that coefficient.
+//! (`Term::Constant`), and a motor's back-EMF k_e v cannot be told from viscous friction: it is part of that
+//! coefficient.
 //!
-//! A joint behind an elastic gear, on an arm that gives way, is no rigid body: its effort answers to accelerations before
-//! and after, too. Where those pay on motions that were left out (`identify::lags`) they are regressors as well, each less
-//! the acceleration of now, so that the inertia stays that of slow motion. A linear filter of the acceleration is what small
-//! elastic deflections amount to (Spong 1987, Modeling and control of elastic joint robots); left out, friction terms would
-//! learn it.
+//! A joint behind an elastic gear, on an arm that gives way, is no rigid body: its effort answers to accelerations
+//! before and after, too. Where those pay on motions that were left out (`identify::lags`) they are regressors as well,
+//! each less the acceleration of now, so that the inertia stays that of slow motion. A linear filter of the
+//! acceleration is what small elastic deflections amount to (Spong 1987, Modeling and control of elastic joint robots);
+//! left out, friction terms would learn it.
 
 use crate::friction_parameter::Units;
 use serde::{Deserialize, Serialize};

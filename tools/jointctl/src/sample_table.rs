@@ -1,4 +1,5 @@
-//! The samples of a fit as a table of text, so that other programs can judge on the same signals, splits and predictions; host.
+//! The samples of a fit as a table of text, so that other programs can judge on the same signals, splits and
+//! predictions; host.
 //!
 //! One row a sample, in the order of the recording. The columns are documented in `docs/baselines.md`.
 

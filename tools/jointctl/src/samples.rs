@@ -82,7 +82,8 @@ impl Samples {
         pairs.find(|period| *period > 0.0).unwrap_or(1.0)
     }
 
-    /// Index of the sample that is later than sample `index` by `time`, s, at the first sampling period; held at the ends of its run.
+    /// Index of the sample that is later than sample `index` by `time`, s, at the first sampling period; held at the
+    /// ends of its run.
     pub fn shifted(&self, index: usize, time: f64) -> usize {
         let by = (time.abs() / self.period()).round() as usize;
         let same_run = |i: &usize| self.run[*i] == self.run[index];

@@ -1,7 +1,8 @@
-//! Files of `jointctl eds`, `dbc` and `bus-yml`, loaded by python-canopen, cantools and dcf-tools and compared with a virtual
-//! joint.
+//! Files of `jointctl eds`, `dbc` and `bus-yml`, loaded by python-canopen, cantools and dcf-tools and compared with a
+//! virtual joint.
 //!
-//! Without Python, or where these cannot be installed, this is reported as ignored by name; with `CI` set it runs, and fails.
+//! Without Python, or where these cannot be installed, this is reported as ignored by name; with `CI` set it runs, and
+//! fails.
 
 use jointctl::remote::{Entry, RemoteJoint};
 use libtest_mimic::{Arguments, Failed, Trial};

@@ -1,6 +1,6 @@
-//! The way of docs/on-a-board.md from unboxing to a turning motor, as somebody goes it who has no board: from step 5 on,
-//! with the programs as they are flashed on emulated boards, and with the commands as they stand there, but for bus and folders.
-//! Between steps 6 and 7 the power is off.
+//! The way of docs/on-a-board.md from unboxing to a turning motor, as somebody goes it who has no board: from step 5
+//! on, with the programs as they are flashed on emulated boards, and with the commands as they stand there, but for bus
+//! and folders. Between steps 6 and 7 the power is off.
 //!
 //! Needs the boards' target; where it is missing the tests are reported as ignored, by name; with `CI` set they run and
 //! fail. Real time counts here, as it does for the user: one board at a time, and where a command says that the machine

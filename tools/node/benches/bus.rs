@@ -32,7 +32,8 @@ struct Measured {
     load: f64,
     /// From SYNC's last bit to a TPDO's, us, and the frames on the wire from then on, the TPDO included.
     answers: Vec<(f64, usize)>,
-    /// From handing an RPDO to the master's controller to its last bit, us, and the frames on the wire in that time, the RPDO included.
+    /// From handing an RPDO to the master's controller to its last bit, us, and the frames on the wire in that time,
+    /// the RPDO included.
     commands: Vec<(f64, usize)>,
     /// From the RPDO's last bit to the control step whose set-point is the new one, us.
     reactions: Vec<f64>,
@@ -103,7 +104,8 @@ impl Round {
         let joints = usize::from(self.joints);
         let mut measured = Measured::default();
         let (mut frames, mut sync_ended, mut sync_frames) = (0usize, None, 0);
-        // Of each joint: when its RPDO was handed over with how many frames before, when it was received, the torque before it acted.
+        // Of each joint: when its RPDO was handed over with how many frames before, when it was received, the torque
+        // before it acted.
         let mut waiting: Vec<Option<(Duration, usize)>> = vec![None; joints];
         let mut received: Vec<Option<(Duration, Duration)>> = vec![None; joints];
         let mut torques: Vec<f32> = (0..joints).map(|joint| self.asked(joint)).collect();

@@ -1,7 +1,9 @@
-//! Random, mutated and well-formed frames through server and object table, judged after each; overflow checks on in the dev profile.
+//! Random, mutated and well-formed frames through server and object table, judged after each; overflow checks on in the
+//! dev profile.
 //!
-//! `cargo run -p node --example hostile_bus [-- FRAMES [SEED]]`; a million frames by default, half of them against a joint with a key.
-//! [`node::hostile`] says what is judged. A violation or panic ends with the seed and the number of the frame.
+//! `cargo run -p node --example hostile_bus [-- FRAMES [SEED]]`; a million frames by default, half of them against a
+//! joint with a key. [`node::hostile`] says what is judged. A violation or panic ends with the seed and the number of
+//! the frame.
 
 use joint_firmware::parameters::authentication::Key;
 use node::hostile::{Counts, HostileNode, Noise, Statics};

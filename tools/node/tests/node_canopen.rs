@@ -1,7 +1,8 @@
-//! node-canopen (npm: canopen) drives the virtual joint, in real time, through everything that it can do; over slcan by TCP.
+//! node-canopen (npm: canopen) drives the virtual joint, in real time, through everything that it can do; over slcan by
+//! TCP.
 //!
-//! Without Node.js, or where node-canopen cannot be installed (its checksum is a native module, which npm builds), this is reported as ignored by
-//! name; with `CI` set it runs, and fails.
+//! Without Node.js, or where node-canopen cannot be installed (its checksum is a native module, which npm builds), this
+//! is reported as ignored by name; with `CI` set it runs, and fails.
 
 mod client;
 

@@ -1,4 +1,5 @@
-//! The virtual joint driven over the bus alone, in simulated time: SDO, PDO, NMT, and images from upload to flash and back.
+//! The virtual joint driven over the bus alone, in simulated time: SDO, PDO, NMT, and images from upload to flash and
+//! back.
 
 mod master;
 

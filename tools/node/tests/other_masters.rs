@@ -20,7 +20,8 @@ const STILL: f64 = 1e-3;
 /// Where the joint is brought before, µrad.
 const SOMEWHERE: i32 = 361_000;
 
-/// RPDO 1 as ros2_canopen maps it: controlword, mode, target position. Its 22 SDO writes follow the procedure of CiA 301.
+/// RPDO 1 as ros2_canopen maps it: controlword, mode, target position. Its 22 SDO writes follow the procedure of CiA
+/// 301.
 fn map_for_ros2_canopen(master: &mut Master) {
     let id = u32::from(ID);
     master.download(0x1400, 1, &(0x8000_0200 | id).to_le_bytes()).unwrap();

@@ -145,7 +145,8 @@ fn what_was_said_of_the_target_before_does_not_count_for_the_next_one() {
     let begun = position(&mut master);
     give(&mut master, begun, 0);
     arrival(&mut master, 1_000);
-    // Two more, one behind the other, before the task has looked again: it still says that the joint is where it was to go.
+    // Two more, one behind the other, before the task has looked again: it still says that the joint is where it was to
+    // go.
     for (word, target) in [(ENABLE | NEW, 300_000), (ENABLE, 0), (ENABLE | NEW, -100_000), (ENABLE, 0)] {
         let data = [&word.to_le_bytes()[..], &[0, 0], &(begun + target).to_le_bytes()].concat();
         master.node.receive(&Frame::new(0x200 + u16::from(ID), &data).unwrap());

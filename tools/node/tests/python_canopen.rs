@@ -1,6 +1,8 @@
-//! python-canopen drives the virtual joint, in real time: with the example that is shipped, and through everything that it can do.
+//! python-canopen drives the virtual joint, in real time: with the example that is shipped, and through everything that
+//! it can do.
 //!
-//! Without Python, or where python-canopen cannot be installed, these are reported as ignored by name; with `CI` set they run, and fail.
+//! Without Python, or where python-canopen cannot be installed, these are reported as ignored by name; with `CI` set
+//! they run, and fail.
 
 mod client;
 

@@ -1,4 +1,5 @@
-//! Prints what a period of the virtual actuator costs, driven, coasting and with a broken lead: `cargo bench -p plant --bench actuator`.
+//! Prints what a period of the virtual actuator costs, driven, coasting and with a broken lead: `cargo bench -p plant
+//! --bench actuator`.
 
 use plant::actuator::{Fault, Phase};
 use plant::{Actuator, ActuatorParameters};

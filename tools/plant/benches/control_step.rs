@@ -1,4 +1,5 @@
-//! What a control step costs on the host, whole and by its parts, and how many times faster than real time the closed loop runs.
+//! What a control step costs on the host, whole and by its parts, and how many times faster than real time the closed
+//! loop runs.
 
 use divan::{Bencher, black_box};
 use joint_firmware::compensation::{Acting, Request};
@@ -96,8 +97,8 @@ fn friction_model(bencher: Bencher) {
     bencher.bench_local(|| model.evaluate(0, black_box(&state)));
 }
 
-/// A thousand steps: a recorded closed loop, which goes on as it did because the step gives the same bits. (Measurements that do not follow are a fault,
-/// and a joint in fault has less to do.)
+/// A thousand steps: a recorded closed loop, which goes on as it did because the step gives the same bits.
+/// (Measurements that do not follow are a fault, and a joint in fault has less to do.)
 #[divan::bench]
 fn thousand_control_steps(bencher: Bencher) {
     let (mut virtual_joint, mut demand) = moving();

@@ -1,4 +1,5 @@
-//! Braking into a supply that takes nothing back: the braking current fades before over-voltage has to switch off, and what the rotor loses is found again.
+//! Braking into a supply that takes nothing back: the braking current fades before over-voltage has to switch off, and
+//! what the rotor loses is found again.
 
 mod rig;
 
@@ -9,14 +10,16 @@ use plant::virtual_joint::Setup;
 use rig::{Rig, torque, velocity};
 use std::f64::consts::PI;
 
-/// A random joint without a payload on a supply that takes nothing back. Its highest supply is 130 % of the supply's voltage, as [`Setup`] has it.
+/// A random joint without a payload on a supply that takes nothing back. Its highest supply is 130 % of the supply's
+/// voltage, as [`Setup`] has it.
 fn one_way(seed: u64) -> ActuatorParameters {
     let mut parameters = ActuatorParameters::randomised(seed).aligned().without_payload();
     parameters.bus.takes_back = false;
     parameters
 }
 
-/// Time in which the full braking power, at the speed limit and the current limit, would charge the capacitor over the band of the setup, s.
+/// Time in which the full braking power, at the speed limit and the current limit, would charge the capacitor over the
+/// band of the setup, s.
 fn charging_time(parameters: &ActuatorParameters, setup: &Setup) -> f64 {
     let motor = &parameters.joint.motor;
     let highest = f64::from(setup.configuration.limits.bus_voltage.1);
@@ -53,7 +56,8 @@ enum Stop {
     Torque,
 }
 
-/// Up to nine tenths of the speed limit, then a quick stop, which brakes as hard as it may, for `time` s or until it ends.
+/// Up to nine tenths of the speed limit, then a quick stop, which brakes as hard as it may, for `time` s or until it
+/// ends.
 fn braked(parameters: &ActuatorParameters, setup: &Setup, stop: Stop, time: f64) -> Braked {
     braked_with(parameters, setup, stop, time, 0.0)
 }
@@ -139,8 +143,8 @@ fn a_quick_stop_never_raises_the_supply_to_its_limit() {
     assert!(needed >= 30, "with next to no band {needed} of 100 switch off");
 }
 
-/// The current cannot follow the supply faster than its loop: where all of the braking power charges the capacitor over the band in less than two of its
-/// time constants, over-voltage switches off.
+/// The current cannot follow the supply faster than its loop: where all of the braking power charges the capacitor over
+/// the band in less than two of its time constants, over-voltage switches off.
 #[test]
 fn all_torque_at_once_raises_it_to_the_limit_only_where_the_current_cannot_follow() {
     let (mut needed, mut slow) = (0, 0);

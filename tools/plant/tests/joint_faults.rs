@@ -1,5 +1,6 @@
-//! Every fault of the joint, produced in the virtual joint: it reaches the state that docs/faults.md defines within the time that stands
-//! there, the torque stays within its limit on the way, and it is left by a reset when the documentation says so.
+//! Every fault of the joint, produced in the virtual joint: it reaches the state that docs/faults.md defines within the
+//! time that stands there, the torque stays within its limit on the way, and it is left by a reset when the
+//! documentation says so.
 
 mod rig;
 
@@ -11,7 +12,8 @@ use plant::virtual_joint::Setup;
 use rig::table::{Reset, documented, documented_faults};
 use rig::{Rig, break_down, mend, position, reference, reset, torque, velocity};
 
-/// What the motor's torque may exceed its limit by: gain errors of the current sensors and overshoot of the current loop.
+/// What the motor's torque may exceed its limit by: gain errors of the current sensors and overshoot of the current
+/// loop.
 const TORQUE_TOLERANCE: f64 = 1.05;
 
 fn moving() -> Rig {
@@ -38,7 +40,8 @@ fn limited(change: impl Fn(&mut Limits)) -> Rig {
     rig
 }
 
-/// A fault from its cause to the joint's return into service. `shows` tells whether the signals of the last step show the cause.
+/// A fault from its cause to the joint's return into service. `shows` tells whether the signals of the last step show
+/// the cause.
 fn runs_its_course(
     mut rig: Rig,
     fault: Fault,
@@ -150,8 +153,8 @@ fn current_not_followed() {
     runs_its_course(holding(), Fault::CurrentNotFollowed, opened, |_| true, mend);
 }
 
-/// How soon it shows depends on the current that flows in the phase as it opens; where it is small, the current hardly misses its
-/// reference, and the other name is given.
+/// How soon it shows depends on the current that flows in the phase as it opens; where it is small, the current hardly
+/// misses its reference, and the other name is given.
 #[test]
 fn an_open_phase_is_found_wherever_the_rotor_stands() {
     for n in 0..24 {
@@ -261,7 +264,8 @@ fn position_limit() {
     load_drives_it_over(limited(limits), Fault::PositionLimit, 110.0, shows);
 }
 
-/// A load of `push` Nm, more than the joint's whole torque, drives it over a limit, through its braking and on with the bridge off.
+/// A load of `push` Nm, more than the joint's whole torque, drives it over a limit, through its braking and on with the
+/// bridge off.
 fn load_drives_it_over(mut rig: Rig, fault: Fault, push: f64, shows: impl Fn(&Rig) -> bool) {
     let row = documented(fault);
     assert_eq!((row.reaction, row.reset), (Reaction::Brake, Reset::OnceGone));

@@ -9,10 +9,12 @@ use plant::actuator::ActuatorParameters;
 use plant::virtual_joint::Setup;
 use rig::{Rig, reference, torque, velocity};
 
-/// Part of the supply that the joints here have of what they are made for: their base speed lies below the velocity limit then.
+/// Part of the supply that the joints here have of what they are made for: their base speed lies below the velocity
+/// limit then.
 const SUPPLY: f64 = 0.6;
 
-/// A joint without gravity on a weak supply, and its setup with the highest velocity limit that permits field weakening.
+/// A joint without gravity on a weak supply, and its setup with the highest velocity limit that permits field
+/// weakening.
 fn weak(parameters: ActuatorParameters) -> (ActuatorParameters, Setup) {
     let mut parameters = parameters.aligned();
     let load = &mut parameters.joint.load;

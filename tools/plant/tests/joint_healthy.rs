@@ -44,7 +44,8 @@ fn runs_hard(seed: u64) {
     let rig = runs_without_a_fault(seed, parameters, &parameters, &Setup::of(&parameters));
     // It was hard: what is not asked for cannot trip.
     assert!(rig.worst_torque > 0.9 * rig.torque_limit(), "seed {seed}: {} Nm", rig.worst_torque);
-    // The limit holds for the current; with some of these windings a few degrees of it along d are another tenth of torque.
+    // The limit holds for the current; with some of these windings a few degrees of it along d are another tenth of
+    // torque.
     assert!(rig.worst_torque < 1.2 * rig.torque_limit(), "seed {seed}: {} Nm", rig.worst_torque);
 }
 
@@ -53,7 +54,8 @@ fn random_actuators_run_for_two_seconds_each_without_a_fault() {
     (0..40).for_each(runs_hard);
 }
 
-/// A winding 100 K above the temperature that its resistance is known for, and a torque constant that the hot magnet has lowered.
+/// A winding 100 K above the temperature that its resistance is known for, and a torque constant that the hot magnet
+/// has lowered.
 #[test]
 fn a_hot_motor_is_not_taken_for_a_broken_encoder() {
     for seed in 0..10 {

@@ -1,5 +1,5 @@
-//! Whatever bits the measurements and the network's words are made of, the control step keeps its promises, and the joint can be
-//! brought back into service once they make sense again.
+//! Whatever bits the measurements and the network's words are made of, the control step keeps its promises, and the
+//! joint can be brought back into service once they make sense again.
 
 mod rig;
 
@@ -184,8 +184,9 @@ proptest! {
         comes_back(&mut joint, &active)?;
     }
 
-    /// Nothing but the commands is wild here, so every one of them gets to the motion law. The motor does not answer them, which is
-    /// a fault soon: the steps stay a round below that, because the first round has seen the first torque.
+    /// Nothing but the commands is wild here, so every one of them gets to the motion law. The motor does not answer
+    /// them, which is a fault soon: the steps stay a round below that, because the first round has seen the first
+    /// torque.
     #[test]
     fn whatever_is_commanded_the_torque_stays_within_its_limit(
         commands in prop::collection::vec((command(mode()), slow()), 1..(UNEXPLAINED_STEPS - MOTION_STEPS) as usize),

@@ -1,4 +1,5 @@
-//! Velocity and position limits of the virtual joint: torque up to them, holding torque at them, and no way through them, whatever the modes' gains are.
+//! Velocity and position limits of the virtual joint: torque up to them, holding torque at them, and no way through
+//! them, whatever the modes' gains are.
 
 mod rig;
 
@@ -55,8 +56,8 @@ fn narrow(change: impl Fn(&mut Setup)) -> Rig {
     Rig::enabled(parameters, &setup)
 }
 
-/// A load pulls away from the limit or pushes against it: 90 % of the torque limit, which is announced, or 80 %, which position mode's integral finds in
-/// some 5 s, because friction takes most of the rest.
+/// A load pulls away from the limit or pushes against it: 90 % of the torque limit, which is announced, or 80 %, which
+/// position mode's integral finds in some 5 s, because friction takes most of the rest.
 #[test]
 fn a_load_is_held_at_each_position_limit_by_position_and_by_impedance() {
     for (side, away) in [(-1.0f32, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)] {
@@ -118,8 +119,8 @@ fn at_limit(side: f32, stiffness: f32, damping: f32, usual: &Gains) -> Rig {
 ///
 /// What pulls inwards, announced by nobody and held by no stiffness, the joint follows, as it is to: with a damping
 /// slowly, and the law holds it at the other limit; without one a fault ends it, because beyond the velocity limit its
-/// current is at the end of the supply's voltage (OverCurrent), or because a tenth of the torque is what is left to stop
-/// it at the other limit, less than the quick stop's deceleration takes (PositionLimit).
+/// current is at the end of the supply's voltage (OverCurrent), or because a tenth of the torque is what is left to
+/// stop it at the other limit, less than the quick stop's deceleration takes (PositionLimit).
 #[test]
 fn a_load_of_nine_tenths_is_held_at_each_position_limit_with_any_gains_in_every_mode() {
     let usual = Setup::of(&weightless(reference())).configuration.gains;
@@ -252,8 +253,8 @@ fn random_joints_without_load_are_held_at_the_velocity_limit() {
     assert!(slow <= 10, "{slow}");
 }
 
-/// The speed between two of its samples, a round of the motion loop apart, errs by two counts and more with the encoder's noise, and the limit damping makes
-/// torque of it. That is no contradiction between encoder and voltage.
+/// The speed between two of its samples, a round of the motion loop apart, errs by two counts and more with the
+/// encoder's noise, and the limit damping makes torque of it. That is no contradiction between encoder and voltage.
 #[test]
 fn joints_with_a_coarse_encoder_behind_a_low_gear_reverse_at_any_damping_without_a_fault() {
     let random = (0..400).map(|seed| ActuatorParameters::randomised(seed).aligned());
@@ -274,7 +275,8 @@ fn joints_with_a_coarse_encoder_behind_a_low_gear_reverse_at_any_damping_without
     }
 }
 
-/// What stands in `limit_law` on stability: how much of the torque limit the torque ripples by (RMS) at the velocity limit.
+/// What stands in `limit_law` on stability: how much of the torque limit the torque ripples by (RMS) at the velocity
+/// limit.
 #[test]
 fn an_inertia_over_damping_of_a_millisecond_is_enough_for_the_loops_delays() {
     let parameters = weightless(reference());
@@ -297,8 +299,8 @@ fn an_inertia_over_damping_of_a_millisecond_is_enough_for_the_loops_delays() {
     }
 }
 
-/// Brakes until the bridge is off, which it is when the joint stands, or, where a coarse encoder does not let it see that, after the braking time:
-/// the joint's speed then as a part of the velocity limit.
+/// Brakes until the bridge is off, which it is when the joint stands, or, where a coarse encoder does not let it see
+/// that, after the braking time: the joint's speed then as a part of the velocity limit.
 fn speed_after_braking(rig: &mut Rig) -> f64 {
     let limits = rig.joint.active().limits;
     let most = rig.joint.active().motion.braking_steps + 2;

@@ -1,4 +1,5 @@
-//! Every sensor of the joint broken in every way, as the table in docs/faults.md says; and where nothing can show, what comes of it.
+//! Every sensor of the joint broken in every way, as the table in docs/faults.md says; and where nothing can show, what
+//! comes of it.
 
 mod rig;
 
@@ -153,7 +154,8 @@ fn a_joint_whose_encoder_stuck_at_rest_stays_within_one_and_a_half_electrical_tu
     }
 }
 
-/// Half the speed limit, then the encoder sticks. Of 300 joints 284 notice it in 8,000 steps; a rotor that the field holds still contradicts nothing. Which of the two names it gets depends on how well the current follows.
+/// Half the speed limit, then the encoder sticks. Of 300 joints 284 notice it in 8,000 steps; a rotor that the field
+/// holds still contradicts nothing. Which of the two names it gets depends on how well the current follows.
 #[test]
 fn an_encoder_that_sticks_in_motion_is_found_on_random_joints() {
     let mut steps = vec![];

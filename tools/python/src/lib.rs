@@ -28,8 +28,8 @@ pub const DCF_TOOLS: Packages =
     Packages { folder: "python-dcf", install: &["dcf-tools==2.4.2"], import: "dcf, dcfgen" };
 
 impl Packages {
-    /// A Python that finds them, in a virtual environment below a test's temporary folder that is made once. None without Python, without its module
-    /// `venv`, or where the packages cannot be installed.
+    /// A Python that finds them, in a virtual environment below a test's temporary folder that is made once. None
+    /// without Python, without its module `venv`, or where the packages cannot be installed.
     pub fn python(&self, temporary: &str) -> Option<PathBuf> {
         let folder = Path::new(temporary).join(self.folder);
         let python = folder.join("bin/python3");

@@ -1,6 +1,7 @@
 //! The unit tests of the baselines, on joints with known parameters.
 //!
-//! Without Python, or where NumPy and SciPy cannot be installed, these are reported as ignored by name; with `CI` set they run, and fail.
+//! Without Python, or where NumPy and SciPy cannot be installed, these are reported as ignored by name; with `CI` set
+//! they run, and fail.
 
 use libtest_mimic::{Arguments, Failed, Trial};
 use python::baselines::{PACKAGES, command};

@@ -1,7 +1,8 @@
-//! The friction network and the same one in other libraries on a Cortex-M4F: each evaluates the same inputs, one call of a function of its own for
-//! each.
+//! The friction network and the same one in other libraries on a Cortex-M4F: each evaluates the same inputs, one call
+//! of a function of its own for each.
 //!
-//! `bkpt 1`: networks and inputs are wanted. `bkpt 2`, `3`, `4`, `5`: this project's, plain, embedded-nn's and microflow's outputs are there.
+//! `bkpt 1`: networks and inputs are wanted. `bkpt 2`, `3`, `4`, `5`: this project's, plain, embedded-nn's and
+//! microflow's outputs are there.
 #![no_std]
 #![no_main]
 

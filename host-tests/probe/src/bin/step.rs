@@ -1,7 +1,7 @@
 //! Whole control steps on a Cortex-M4F: replays recorded runs and prints for each the hash of what the steps led to.
 //!
-//! Built as the boards' programs are. Each control step is one call of [`counted_step`] from [`run`], so that whoever traces the program can tell
-//! its instructions from everything else.
+//! Built as the boards' programs are. Each control step is one call of [`counted_step`] from [`run`], so that whoever
+//! traces the program can tell its instructions from everything else.
 #![no_std]
 #![no_main]
 

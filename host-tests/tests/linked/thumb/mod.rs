@@ -93,7 +93,8 @@ impl Program {
         self.mapping.range(..=address).next_back().is_none_or(|(_, code)| *code)
     }
 
-    /// Everything that can run once `entry` runs. Functions of which `leaf` is true are in it, but nothing that only they can reach.
+    /// Everything that can run once `entry` runs. Functions of which `leaf` is true are in it, but nothing that only
+    /// they can reach.
     pub fn reachable(&self, entry: u32, leaf: impl Fn(&str) -> bool) -> Reached {
         let mut reached = Reached::default();
         let (mut waiting, mut seen) = (vec![entry], BTreeSet::new());

@@ -1,9 +1,9 @@
-//! Which constants a function's instructions put into registers: where a call through a register goes that the compiler makes of several calls of
-//! one function, and where the linker's veneers go.
+//! Which constants a function's instructions put into registers: where a call through a register goes that the compiler
+//! makes of several calls of one function, and where the linker's veneers go.
 //!
-//! Followed from one instruction to the next, whatever branches there are between them: a register is known while the last instruction before that
-//! writes it loads a constant. Because another path may come with another constant, all that the function has put into the register so far count.
-//! Encodings: ARM DDI 0403, A5.
+//! Followed from one instruction to the next, whatever branches there are between them: a register is known while the
+//! last instruction before that writes it loads a constant. Because another path may come with another constant, all
+//! that the function has put into the register so far count. Encodings: ARM DDI 0403, A5.
 
 /// Registers of a function on the way through its instructions.
 #[derive(Default)]
@@ -30,7 +30,8 @@ impl Registers {
         self.loaded.iter().filter(move |(of, _)| *of == register).map(|(_, address)| *address)
     }
 
-    /// Goes on by an instruction; the constant that it builds by itself (movw with movt), if it does. `word` reads a literal.
+    /// Goes on by an instruction; the constant that it builds by itself (movw with movt), if it does. `word` reads a
+    /// literal.
     pub fn follow(&mut self, first: u32, second: u32, at: u32, word: impl Fn(u32) -> Option<u32>) -> Option<u32> {
         if first >> 11 < 0b11101 {
             self.narrow(first, at, word);

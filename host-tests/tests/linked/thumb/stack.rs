@@ -1,10 +1,12 @@
-//! How much stack a linked Thumb program can take from one function on: the frames of its functions along the deepest path of calls.
+//! How much stack a linked Thumb program can take from one function on: the frames of its functions along the deepest
+//! path of calls.
 //!
-//! A frame is everything that a function's instructions take from the stack pointer, all of them together: where two of them never run in one
-//! call, more than it takes. A branch out of a function is a tail call, before which the compiler gives the frame back. What calls through a
-//! register may reach is said by whoever asks, where it is no constant of the function; a call that nobody knows of, recursion and a stack pointer that
-//! is computed are errors. What ends the program is not followed: a panic has the bridge off with its first instruction and resets, and if the stack
-//! does not even bear that, the fault resets.
+//! A frame is everything that a function's instructions take from the stack pointer, all of them together: where two of
+//! them never run in one call, more than it takes. A branch out of a function is a tail call, before which the compiler
+//! gives the frame back. What calls through a register may reach is said by whoever asks, where it is no constant of
+//! the function; a call that nobody knows of, recursion and a stack pointer that is computed are errors. What ends the
+//! program is not followed: a panic has the bridge off with its first instruction and resets, and if the stack does not
+//! even bear that, the fault resets.
 
 use super::registers::Registers;
 use super::{Flow, Program, narrow, wide_flow};
@@ -168,14 +170,16 @@ impl<'a> Stack<'a> {
     }
 }
 
-/// Bytes that an instruction takes from the stack, and whether it sets the stack pointer to what only the running program knows.
+/// Bytes that an instruction takes from the stack, and whether it sets the stack pointer to what only the running
+/// program knows.
 fn narrow_frame(word: u32) -> (u32, bool) {
     match word {
         // push
         _ if word & 0xfe00 == 0xb400 => (4 * (word & 0x1ff).count_ones(), false),
         // sub sp, #
         _ if word & 0xff80 == 0xb080 => (4 * (word & 0x7f), false),
-        // mov sp, r7 and mov sp, r4 give frames back, or align one that is taken already: at most 7 bytes more, which an exception's frame has room for.
+        // mov sp, r7 and mov sp, r4 give frames back, or align one that is taken already: at most 7 bytes more, which
+        // an exception's frame has room for.
         _ => (0, false),
     }
 }

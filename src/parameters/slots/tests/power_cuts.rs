@@ -1,7 +1,8 @@
-//! Power that goes at every erase and write of every operation, once more at every one of what follows, for five kinds of torn words.
+//! Power that goes at every erase and write of every operation, once more at every one of what follows, for five kinds
+//! of torn words.
 //!
-//! After each: the joint starts with the old content or the new one, whole, with the same one at every start from then on, and
-//! can store again. Host.
+//! After each: the joint starts with the old content or the new one, whole, with the same one at every start from then
+//! on, and can store again. Host.
 
 use super::super::*;
 use super::model::{Flash, Torn};
@@ -125,8 +126,8 @@ impl<P: Protocol> Scenario<P> {
             && (0..2).all(|_| self.protocol.start(&mut flash) == Ok(Some(next.clone())))
     }
 
-    /// As [`Scenario::recovers`], with a second loss of power in the `second` operation from now, in a start or in the store that
-    /// follows. None where there are not so many operations.
+    /// As [`Scenario::recovers`], with a second loss of power in the `second` operation from now, in a start or in the
+    /// store that follows. None where there are not so many operations.
     fn recovers_with_a_cut(&self, mut flash: Flash, second: usize) -> Option<bool> {
         let mut permitted = vec![self.old.clone(), Some(self.new.clone())];
         flash.cut_at(second);
@@ -207,7 +208,8 @@ fn a_payload_that_fills_its_slot_survives_a_loss_of_power_at_every_operation() {
             let scenario = scenario(operation, torn, 77, PAGE - OVERHEAD);
             let operations = scenario.operations();
             for cut in 1..=operations {
-                // Payload words are alike: a second loss of power after the first and last of them, and around all marks.
+                // Payload words are alike: a second loss of power after the first and last of them, and around all
+                // marks.
                 let followed = torn == Torn::Flicker && (cut <= 6 || cut + 6 > operations);
                 total.judge(&scenario, cut, followed);
             }

@@ -50,7 +50,8 @@ pub enum ClientError {
         /// Why.
         abort: Abort,
     },
-    /// Somebody else uses the node's SDO server at the same time. It has one channel, and the transfers destroy each other.
+    /// Somebody else uses the node's SDO server at the same time. It has one channel, and the transfers destroy each
+    /// other.
     #[error(
         "{object}: another client is talking to this node's SDO server; the transfer was given up. Stop the other client, or wait for it"
     )]

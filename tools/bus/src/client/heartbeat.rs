@@ -5,8 +5,8 @@ use crate::Frame;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// The node and its state; [`NmtState::Initialising`] is the boot-up message. None where the frame is no heartbeat, or names
-/// no state of CiA 301.
+/// The node and its state; [`NmtState::Initialising`] is the boot-up message. None where the frame is no heartbeat, or
+/// names no state of CiA 301.
 pub fn parse(frame: &Frame) -> Option<(u8, NmtState)> {
     let node = frame.id().checked_sub(cob_id::HEARTBEAT).filter(|node| matches!(node, 1..=127))? as u8;
     let &[byte] = frame.data() else { return None };
@@ -43,7 +43,8 @@ struct Seen {
     lost: bool,
 }
 
-/// Watches all nodes. A node that never sent a heartbeat is not missed; one that only booted may have none configured, and is not missed either.
+/// Watches all nodes. A node that never sent a heartbeat is not missed; one that only booted may have none configured,
+/// and is not missed either.
 #[derive(Clone, Debug)]
 pub struct Watch {
     timeout: Duration,

@@ -1,8 +1,8 @@
 //! LSS master's protocol: finding nodes without a node id by fastscan, and giving them one; CiA 305; no I/O, host.
 //!
-//! A fastscan finds one of any number of identical new nodes: the master asks bit by bit whether some node's address has a 0 there,
-//! and takes silence for a 1. All nodes that match answer with the same frame. The one that is left at the end is in configuration state; then it
-//! gets its node id, and is not asked again.
+//! A fastscan finds one of any number of identical new nodes: the master asks bit by bit whether some node's address
+//! has a 0 there, and takes silence for a 1. All nodes that match answer with the same frame. The one that is left at
+//! the end is in configuration state; then it gets its node id, and is not asked again.
 
 use super::sdo::Message;
 use std::fmt;
@@ -53,8 +53,8 @@ pub mod request {
         [command, a, b, c, d, 0, 0, 0]
     }
 
-    /// All nodes to waiting state (configuration false) or configuration state (true); no answer. A node without a node id that got one begins to
-    /// communicate when it returns to waiting.
+    /// All nodes to waiting state (configuration false) or configuration state (true); no answer. A node without a node
+    /// id that got one begins to communicate when it returns to waiting.
     pub const fn switch_global(configuration: bool) -> Message {
         [0x04, configuration as u8, 0, 0, 0, 0, 0, 0]
     }
@@ -75,7 +75,8 @@ pub mod request {
         [0x17, 0, 0, 0, 0, 0, 0, 0]
     }
 
-    /// Fastscan: nodes without an id whose number `part` equals `number` from `bit` up answer. Bit 128 asks all of them.
+    /// Fastscan: nodes without an id whose number `part` equals `number` from `bit` up answer. Bit 128 asks all of
+    /// them.
     pub fn fastscan(number: u32, bit: u8, part: u8, next: u8) -> Message {
         let [a, b, c, d] = number.to_le_bytes();
         [0x51, a, b, c, d, bit, part, next]

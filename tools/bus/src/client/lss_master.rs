@@ -12,8 +12,9 @@ use std::time::{Duration, Instant};
 const ATTEMPTS: u32 = 3;
 
 impl Network {
-    /// Finds one node that has no id, of any number of them, and puts it into configuration state; none where there is none. `wait` is
-    /// how long a node may take to answer, and how long each of 133 questions takes: 10 ms on a bus, more where nodes are programs.
+    /// Finds one node that has no id, of any number of them, and puts it into configuration state; none where there is
+    /// none. `wait` is how long a node may take to answer, and how long each of 133 questions takes: 10 ms on a
+    /// bus, more where nodes are programs.
     pub fn fastscan(&self, wait: Duration) -> Result<Option<Address>, ClientError> {
         let answers = self.subscribe(|frame| frame.id() == cob_id::LSS_SLAVE);
         for attempt in 1..=ATTEMPTS {
@@ -25,8 +26,8 @@ impl Network {
                     Step::Ask(question) => {
                         while answers.try_next()?.is_some() {}
                         self.lss(&question)?;
-                        // All of it, also after an answer: the other nodes' come at other moments, and would be taken for
-                        // answers to the next question.
+                        // All of it, also after an answer: the other nodes' come at other moments, and would be taken
+                        // for answers to the next question.
                         let deadline = Instant::now() + wait * attempt;
                         let mut answered = false;
                         while let Some(received) = answers.next(deadline.saturating_duration_since(Instant::now()))? {
@@ -55,8 +56,9 @@ impl Network {
         wait_for(&answers, 0x44, timeout)?.map(drop).ok_or_else(|| ClientError::Silence { what: what(), timeout })
     }
 
-    /// Gives the node in configuration state an id, 1 to 127, keeps it in the node where `store`, and lets the node begin: it boots. Only
-    /// after [`Network::fastscan`] or [`Network::select`]: every node in configuration state takes it.
+    /// Gives the node in configuration state an id, 1 to 127, keeps it in the node where `store`, and lets the node
+    /// begin: it boots. Only after [`Network::fastscan`] or [`Network::select`]: every node in configuration state
+    /// takes it.
     pub fn assign(&self, node: u8, store: bool) -> Result<(), ClientError> {
         if !matches!(node, 1..=127) {
             return Err(ClientError::NodeId(node));

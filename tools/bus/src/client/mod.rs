@@ -1,7 +1,8 @@
 //! CANopen from the master's side (CiA 301, CiA 305); host.
 //!
-//! Protocols are state machines without I/O, to which time is passed: [`sdo::Transfer`], [`heartbeat::Watch`], [`lss::Fastscan`]. They run in simulated
-//! time as well as on a bus. [`Network`] runs them on a bus: it owns the only reader, and everyone else subscribes.
+//! Protocols are state machines without I/O, to which time is passed: [`sdo::Transfer`], [`heartbeat::Watch`],
+//! [`lss::Fastscan`]. They run in simulated time as well as on a bus. [`Network`] runs them on a bus: it owns the only
+//! reader, and everyone else subscribes.
 //!
 //! ```no_run
 //! use bus::client::{Command, Network, Target};

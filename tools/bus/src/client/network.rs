@@ -49,7 +49,8 @@ struct Shared {
     frames: AtomicU64,
 }
 
-/// A CANopen network as a master sees it. Cloning gives another handle to the same reader, which ends with the last of them.
+/// A CANopen network as a master sees it. Cloning gives another handle to the same reader, which ends with the last of
+/// them.
 #[derive(Clone)]
 pub struct Network {
     reader: Arc<Reader>,
@@ -182,8 +183,8 @@ impl Network {
         }
     }
 
-    /// Every frame from now on for which `filter` is true: a TPDO by its identifier, or all of them for a monitor. `filter` runs in the
-    /// reader and has to be quick.
+    /// Every frame from now on for which `filter` is true: a TPDO by its identifier, or all of them for a monitor.
+    /// `filter` runs in the reader and has to be quick.
     pub fn subscribe(&self, filter: impl Fn(&Frame) -> bool + Send + 'static) -> Subscription {
         let (sender, frames) = sync_channel(UNREAD);
         let dropped = Arc::<AtomicU64>::default();
@@ -222,7 +223,8 @@ impl Network {
         self.subscribe(|frame| Emergency::decode(frame).is_some())
     }
 
-    /// Resets a node, or all, and waits for the boot-up message of `node`. It is listened for before the command is sent: a quick node is not missed.
+    /// Resets a node, or all, and waits for the boot-up message of `node`. It is listened for before the command is
+    /// sent: a quick node is not missed.
     pub fn reset_and_wait(&self, command: Command, node: u8, timeout: Duration) -> Result<(), ClientError> {
         let heartbeats = self.heartbeats();
         self.command(command, Target::Node(node))?;
@@ -302,7 +304,8 @@ pub struct Subscription {
 }
 
 impl Subscription {
-    /// The next frame; none when nothing came within `timeout`. Fails once the bus is gone and everything that came before was read.
+    /// The next frame; none when nothing came within `timeout`. Fails once the bus is gone and everything that came
+    /// before was read.
     pub fn next(&self, timeout: Duration) -> Result<Option<Received>, ClientError> {
         match self.frames.recv_timeout(timeout) {
             Ok(received) => Ok(Some(received)),

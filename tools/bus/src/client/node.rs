@@ -51,8 +51,8 @@ impl Node {
         Object { node: self.id, index, sub_index }
     }
 
-    /// Reads an object. Another client's request that comes in between ends the transfer, and it is read again, five times in all:
-    /// reading changes nothing. Writing is not repeated.
+    /// Reads an object. Another client's request that comes in between ends the transfer, and it is read again, five
+    /// times in all: reading changes nothing. Writing is not repeated.
     pub fn upload(&self, index: u16, sub_index: u8) -> Result<Vec<u8>, ClientError> {
         self.upload_by(index, sub_index, Method::Automatic)
     }

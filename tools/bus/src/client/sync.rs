@@ -25,8 +25,8 @@ pub struct Produced {
 }
 
 impl SyncProducer {
-    /// Sends the first SYNC at once. A host keeps periods of 1 ms to some 0.1 ms at best; a joint's control does not depend on it. A
-    /// period of zero counts as 1 us.
+    /// Sends the first SYNC at once. A host keeps periods of 1 ms to some 0.1 ms at best; a joint's control does not
+    /// depend on it. A period of zero counts as 1 us.
     pub fn new(network: &Network, period: Duration) -> Self {
         let (stop, stopped) = channel::<()>();
         let network = network.clone();

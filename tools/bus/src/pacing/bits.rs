@@ -15,7 +15,8 @@ pub fn bit_time(bitrate: u32) -> Duration {
     Duration::from_nanos(1_000_000_000 / u64::from(bitrate.max(1)))
 }
 
-/// Bits from start of frame to the end of the interframe space, stuff bits included: 47 + 8 n + stuff bits for n bytes of data.
+/// Bits from start of frame to the end of the interframe space, stuff bits included: 47 + 8 n + stuff bits for n bytes
+/// of data.
 pub fn bits(frame: &Frame) -> u32 {
     let stuffed = stuffed_region(frame);
     stuffed.len() as u32 + stuff_bits(&stuffed) + TRAILER + INTERFRAME_SPACE

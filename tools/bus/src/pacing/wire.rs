@@ -89,8 +89,8 @@ impl PacedBus {
         Station(self.controllers.len() - 1)
     }
 
-    /// A station hands a frame to its controller at `now`, which is no earlier than any time the bus was advanced to. A station that was never added
-    /// sends nothing.
+    /// A station hands a frame to its controller at `now`, which is no earlier than any time the bus was advanced to. A
+    /// station that was never added sends nothing.
     pub fn send(&mut self, station: Station, frame: Frame, now: Duration) {
         if let Some(controller) = self.controllers.get_mut(station.0) {
             controller.waiting.push_back(Waiting { frame, queued: now });
@@ -102,7 +102,8 @@ impl PacedBus {
         self.controllers.get(station.0).map_or(0, |controller| controller.waiting.len())
     }
 
-    /// The next frame that is received up to `until`. Call it until there is none; only then has the bus advanced to `until`.
+    /// The next frame that is received up to `until`. Call it until there is none; only then has the bus advanced to
+    /// `until`.
     pub fn advance(&mut self, until: Duration) -> Option<Delivery> {
         if self.on_wire.is_none() {
             self.arbitrate(until);
@@ -113,8 +114,8 @@ impl PacedBus {
         Some(delivery)
     }
 
-    /// When to call [`PacedBus::advance`] next, if nothing more is sent: at the end of the frame on the wire, or when the one that has
-    /// yet to begin has ended at the earliest. None where nothing waits.
+    /// When to call [`PacedBus::advance`] next, if nothing more is sent: at the end of the frame on the wire, or when
+    /// the one that has yet to begin has ended at the earliest. None where nothing waits.
     pub fn next_change(&self) -> Option<Duration> {
         match &self.on_wire {
             Some(delivery) => Some(delivery.ended),
@@ -132,8 +133,8 @@ impl PacedBus {
         self.statistics = Statistics::since(now);
     }
 
-    /// How often several stations sent different frames with the same identifier at the same time. On a wire that is an error frame and a
-    /// repetition that collides again; here the station that was added first goes first.
+    /// How often several stations sent different frames with the same identifier at the same time. On a wire that is an
+    /// error frame and a repetition that collides again; here the station that was added first goes first.
     pub fn collisions(&self) -> u64 {
         self.collisions
     }
@@ -145,7 +146,8 @@ impl PacedBus {
         Some(earliest.max(self.free))
     }
 
-    /// Begins the next frame, where it begins before `until`: from then on nothing that is sent later can win against it.
+    /// Begins the next frame, where it begins before `until`: from then on nothing that is sent later can win against
+    /// it.
     fn arbitrate(&mut self, until: Duration) {
         let Some(start) = self.start().filter(|start| *start < until) else { return };
         let offers: Vec<(usize, usize, Waiting)> = self
@@ -275,7 +277,8 @@ mod tests {
     }
 
     proptest! {
-        /// The bound of Davis, Burns, Bril, Lukkien 2007, eq. 4: the most urgent frame waits for one frame that began, then goes.
+        /// The bound of Davis, Burns, Bril, Lukkien 2007, eq. 4: the most urgent frame waits for one frame that began,
+        /// then goes.
         #[test]
         fn the_most_urgent_frame_waits_for_one_frame_at_most(sends in proptest::collection::vec((0usize..4, 1u16..0x800, 0u32..3000), 0..60), at in 0u32..3000) {
             let mut bus = PacedBus::new(1_000_000);

@@ -11,9 +11,9 @@
 //!
 //! Only data frames with 11-bit identifiers exist here ([`Frame`]); others that a bus carries are passed over.
 //!
-//! Sending and receiving take `&self` and may happen at once in two threads, so a monitor needs no second half: it shares the bus by
-//! [`Arc`]. Two threads that *receive* would take frames from each other; [`crate::client::Network`] is the one reader that gives every frame
-//! to everyone.
+//! Sending and receiving take `&self` and may happen at once in two threads, so a monitor needs no second half: it
+//! shares the bus by [`Arc`]. Two threads that *receive* would take frames from each other; [`crate::client::Network`]
+//! is the one reader that gives every frame to everyone.
 
 mod error;
 mod msgpack;
@@ -43,11 +43,12 @@ pub trait Transport: Send + Sync + std::fmt::Debug {
     /// The string that it was opened by.
     fn name(&self) -> &str;
 
-    /// Sends a frame. It is then on its way, in the order of calls; that somebody received it is not known. The sender does not
-    /// hear it. After [`BusError::Gone`] every call fails.
+    /// Sends a frame. It is then on its way, in the order of calls; that somebody received it is not known. The sender
+    /// does not hear it. After [`BusError::Gone`] every call fails.
     fn send(&self, frame: &Frame) -> Result<(), BusError>;
 
-    /// The next frame; none when nothing came within `timeout`, which may be zero (a serial line and SocketCAN may wait some milliseconds even then).
+    /// The next frame; none when nothing came within `timeout`, which may be zero (a serial line and SocketCAN may wait
+    /// some milliseconds even then).
     fn receive(&self, timeout: Duration) -> Result<Option<Frame>, BusError>;
 
     /// Frames that came and could not be kept or understood, since the bus was opened.

@@ -85,7 +85,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// `pack_message(can.Message(arbitration_id=0x601, is_extended_id=False, data=[1, 2, 3]))`, python-can 4.6.1, msgpack 1.2.4.
+    /// `pack_message(can.Message(arbitration_id=0x601, is_extended_id=False, data=[1, 2, 3]))`, python-can 4.6.1,
+    /// msgpack 1.2.4.
     const PACKED: &str = "8ba974696d657374616d70cb0000000000000000ae6172626974726174696f6e5f6964cd0601ae69735f657874656e6465645f6964c2\
 af69735f72656d6f74655f6672616d65c2ae69735f6572726f725f6672616d65c2a76368616e6e656cc0a3646c6303a464617461c403010203\
 a569735f6664c2ae626974726174655f737769746368c2b56572726f725f73746174655f696e64696361746f72c2";

@@ -6,11 +6,12 @@ use std::net::{Ipv4Addr, SocketAddr};
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Below those that systems give to clients (IANA: from 49152 on; Linux: from 32768 on): one of these that is free is a client's in the next moment.
+/// Below those that systems give to clients (IANA: from 49152 on; Linux: from 32768 on): one of these that is free is a
+/// client's in the next moment.
 const PORTS: Range<u16> = 20_000..32_000;
 
-/// A port that nobody uses now, by UDP or TCP, and that this function has not given to anybody else in this process; none where all are in use. For
-/// `udp:` and `slcan:listen:`, in tests for instance.
+/// A port that nobody uses now, by UDP or TCP, and that this function has not given to anybody else in this process;
+/// none where all are in use. For `udp:` and `slcan:listen:`, in tests for instance.
 pub fn free_port() -> Option<u16> {
     static GIVEN: AtomicU32 = AtomicU32::new(0);
     let count = u32::from(PORTS.end - PORTS.start);
@@ -21,8 +22,8 @@ pub fn free_port() -> Option<u16> {
         .find(|port| try_udp(*port).is_ok() && try_tcp(*port).is_ok())
 }
 
-/// Takes a port for a moment, where nobody has it. The moment can last: a program that another thread starts just now has a copy of the
-/// socket until it runs. So these sockets are such that they are in nobody's way.
+/// Takes a port for a moment, where nobody has it. The moment can last: a program that another thread starts just now
+/// has a copy of the socket until it runs. So these sockets are such that they are in nobody's way.
 fn try_udp(port: u16) -> io::Result<Socket> {
     let socket = Socket::new(Domain::IPV4, Type::DGRAM, None)?;
     socket.bind(&SocketAddr::from((Ipv4Addr::UNSPECIFIED, port)).into())?;
@@ -33,7 +34,8 @@ fn try_udp(port: u16) -> io::Result<Socket> {
     Ok(socket)
 }
 
-/// As [`try_udp`]: one that does not listen is in the way of none that does, where both may reuse the address, as std has it.
+/// As [`try_udp`]: one that does not listen is in the way of none that does, where both may reuse the address, as std
+/// has it.
 fn try_tcp(port: u16) -> io::Result<Socket> {
     let socket = Socket::new(Domain::IPV4, Type::STREAM, None)?;
     #[cfg(unix)]

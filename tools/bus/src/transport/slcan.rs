@@ -1,6 +1,7 @@
 //! This program as the host of an slcan adapter: opens the channel at 1 Mbit/s, then frames in both directions; host.
 //!
-//! TCP needs `TCP_NODELAY`: a short line otherwise waits for the acknowledgement of the one before, about 40 ms a frame.
+//! TCP needs `TCP_NODELAY`: a short line otherwise waits for the acknowledgement of the one before, about 40 ms a
+//! frame.
 
 use super::slcan_text::{Decoder, Line, encode};
 use super::{BusError, Transport, error::is_timeout};
@@ -11,8 +12,8 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-/// How long an adapter may take to answer the commands that open the channel. One that never answers is taken to have obeyed: several
-/// firmwares do not.
+/// How long an adapter may take to answer the commands that open the channel. One that never answers is taken to have
+/// obeyed: several firmwares do not.
 const ANSWER: Duration = Duration::from_millis(150);
 /// How long a line may take to be written.
 pub(super) const WRITE: Duration = Duration::from_secs(1);
@@ -86,7 +87,8 @@ impl Slcan {
             output: Mutex::new(output),
             lost: AtomicU64::new(0),
         };
-        // Ends whatever half line the adapter still holds, and a channel that another program left open. Refusals of these do not matter.
+        // Ends whatever half line the adapter still holds, and a channel that another program left open. Refusals of
+        // these do not matter.
         slcan.write(b"\r\rC\r")?;
         while slcan.line(Instant::now() + ANSWER / 3)?.is_some() {}
         for (command, problem) in

@@ -1,7 +1,8 @@
 //! This program as an slcan adapter that listens on TCP, so that a virtual joint serves any slcan client (python-can's
 //! `slcan` with `socket://host:port`); host. One client at a time; a second one waits until the first hangs up.
 //!
-//! A client that has not opened the channel (`O`), or no client at all, is a wire that nobody listens to: frames to it are gone, as on a bus.
+//! A client that has not opened the channel (`O`), or no client at all, is a wire that nobody listens to: frames to it
+//! are gone, as on a bus.
 
 use super::slcan::WRITE;
 use super::slcan_text::{BEL, Decoder, Line, encode};

@@ -1,7 +1,8 @@
 //! slcan, the text protocol of serial CAN adapters (Lawicel CAN232/CANUSB manual, chapter "Commands"); no I/O, host.
 //!
-//! `t` identifier (3 hex digits), length (1 digit), data (2 hex digits each), carriage return. An adapter answers commands with a
-//! carriage return, or with BEL where it refuses. Some adapters append four digits of time stamp to a frame, which are passed over.
+//! `t` identifier (3 hex digits), length (1 digit), data (2 hex digits each), carriage return. An adapter answers
+//! commands with a carriage return, or with BEL where it refuses. Some adapters append four digits of time stamp to a
+//! frame, which are passed over.
 
 use crate::Frame;
 use std::collections::VecDeque;

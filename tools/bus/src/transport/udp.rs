@@ -1,8 +1,10 @@
-//! CAN over UDP multicast, as python-can's `udp_multicast` speaks it: every program in the group is a node of one bus; host.
+//! CAN over UDP multicast, as python-can's `udp_multicast` speaks it: every program in the group is a node of one bus;
+//! host.
 //!
-//! There are two sockets. The one that receives is bound to the group's port, which all programs on a machine share. The one
-//! that sends has a port of its own, because the kernel gives every sender its own frames back, and by that port they are known
-//! and left out. (`IP_MULTICAST_LOOP` would not do: without it nobody else on this machine hears them either.)
+//! There are two sockets. The one that receives is bound to the group's port, which all programs on a machine share.
+//! The one that sends has a port of its own, because the kernel gives every sender its own frames back, and by that
+//! port they are known and left out. (`IP_MULTICAST_LOOP` would not do: without it nobody else on this machine hears
+//! them either.)
 
 use super::msgpack::{Message, decode, encode};
 use super::{BusError, Transport, error::is_timeout};

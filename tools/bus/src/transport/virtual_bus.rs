@@ -1,8 +1,8 @@
 //! Buses within this process, found by name: for tests, and for several joints in one program; host.
 //!
-//! Without a bit rate a frame is received the moment it is sent, in the order of sending. With one, a thread runs [`PacedBus`] against
-//! the clock: frames wait, are arbitrated, and take their time. A thread wakes up some 0.1 ms late at times; what had to
-//! happen meanwhile then happens at once and in its order, and no time is lost over it.
+//! Without a bit rate a frame is received the moment it is sent, in the order of sending. With one, a thread runs
+//! [`PacedBus`] against the clock: frames wait, are arbitrated, and take their time. A thread wakes up some 0.1 ms late
+//! at times; what had to happen meanwhile then happens at once and in its order, and no time is lost over it.
 
 use super::{BusError, Transport};
 use crate::Frame;

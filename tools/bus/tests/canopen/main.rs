@@ -1,4 +1,5 @@
-//! The client against the project's own server: SDO in simulated time with lost and late frames, everything else over buses in real time.
+//! The client against the project's own server: SDO in simulated time with lost and late frames, everything else over
+//! buses in real time.
 
 mod disturbed;
 mod network;

@@ -11,8 +11,8 @@ const STEP: Duration = Duration::from_micros(10);
 /// How long client and server take to answer a frame.
 const ANSWER: Duration = Duration::from_micros(50);
 
-/// Writes `data` to a node over a wire at 1 Mbit/s, with a station that sends frames of a higher priority every `period`; the
-/// time from the first bit until the client knows.
+/// Writes `data` to a node over a wire at 1 Mbit/s, with a station that sends frames of a higher priority every
+/// `period`; the time from the first bit until the client knows.
 fn write(data: &[u8], method: Method, other: Option<Duration>) -> (Duration, f64) {
     let mut wire = PacedBus::new(1_000_000);
     let [client, server, flood] = [Order::Identifier; 3].map(|order| wire.add_station(order));

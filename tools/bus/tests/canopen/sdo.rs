@@ -153,8 +153,8 @@ fn expedited_numbers_are_whole_and_other_lengths_are_refused() {
     assert_eq!(wire.node.dictionary.number, [1, 2, 3, 4]);
 }
 
-/// Every single frame of transfers of several lengths meets `fate`: the data arrive whole or the transfer fails with nothing half done,
-/// and the next one works. The number of failures is given back for each method: reading, writing.
+/// Every single frame of transfers of several lengths meets `fate`: the data arrive whole or the transfer fails with
+/// nothing half done, and the next one works. The number of failures is given back for each method: reading, writing.
 fn with_every_frame(fate: Fate) -> Vec<(Method, [usize; 2], [usize; 2])> {
     let mut counts = Vec::new();
     for method in [Method::Segmented, Method::Block] {

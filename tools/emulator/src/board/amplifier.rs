@@ -1,7 +1,8 @@
-//! How a current amplifier follows the current through the shunt of a low side that begins to conduct: a dead time, then one pole.
+//! How a current amplifier follows the current through the shunt of a low side that begins to conduct: a dead time,
+//! then one pole.
 //!
-//! While its low side does not conduct, no current flows through a shunt, and the amplifier shows that. What is sampled before it has settled is
-//! too small.
+//! While its low side does not conduct, no current flows through a shunt, and the amplifier shows that. What is sampled
+//! before it has settled is too small.
 
 /// A current amplifier's step response.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,7 +1,8 @@
 //! ST B-G431B-ESC1: pins to plant.
 //!
-//! Parts by docs/boards.md: shunts of 3 mOhm with 1.5 kOhm to the amplifier's input, 22 kOhm from there to 3.3 V and 2.2 kOhm to ground; supply
-//! divided by 169 and 18 kOhm; the bridge's thermistor of 10 kOhm, beta 3425 K, with 4.7 kOhm to ground.
+//! Parts by docs/boards.md: shunts of 3 mOhm with 1.5 kOhm to the amplifier's input, 22 kOhm from there to 3.3 V and
+//! 2.2 kOhm to ground; supply divided by 169 and 18 kOhm; the bridge's thermistor of 10 kOhm, beta 3425 K, with 4.7
+//! kOhm to ground.
 
 use super::amplifier::Amplifier;
 use super::drivetrain::{CYCLE, Drivetrain};
@@ -22,10 +23,11 @@ const COUNTS: u32 = 4_000;
 /// Shunt, Ohm.
 const SHUNT: f64 = 3e-3;
 const VDD: f64 = 3.3;
-/// Step response of gate driver and amplifier, *derived*: the L6387E takes 110 ns; the chip's operational amplifier has a gain-bandwidth product of at
-/// least 7 MHz (13 MHz are typical; DS12589, "Operational amplifiers characteristics", from memory) at a noise gain of 16. Its slew rate of at
-/// least 18 V/us passes the whole range in less than half of a time constant. The pole is in the chip; here it acts on the shunt's voltage, which
-/// is the same for everything linear.
+/// Step response of gate driver and amplifier, *derived*: the L6387E takes 110 ns; the chip's operational amplifier has
+/// a gain-bandwidth product of at least 7 MHz (13 MHz are typical; DS12589, "Operational amplifiers characteristics",
+/// from memory) at a noise gain of 16. Its slew rate of at least 18 V/us passes the whole range in less than half of a
+/// time constant. The pole is in the chip; here it acts on the shunt's voltage, which is the same for everything
+/// linear.
 pub(super) const STEP_RESPONSE: Amplifier = Amplifier::with_bandwidth(110e-9, 7e6, 16.0);
 const BRIDGE_NTC: Ntc = Ntc { nominal: 10_000.0, beta: 3_425.0 };
 /// The amplifiers' inputs by phase, and their negative inputs, which lie at the shunts' ground.
@@ -169,7 +171,8 @@ impl Wiring for BG431BEsc1 {
 #[derive(Clone, Debug)]
 struct Lines {
     encoder: Encoder,
-    /// Reading over all turns, 2^32 a turn; the index is where it is a multiple of that. Nothing before the first look.
+    /// Reading over all turns, 2^32 a turn; the index is where it is a multiple of that. Nothing before the first
+    /// look.
     angle: Option<i64>,
     /// Counts at the last look.
     count: i64,

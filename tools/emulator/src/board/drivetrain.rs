@@ -1,11 +1,12 @@
 //! Bridge, motor and joint behind the pins: the plant, moved on as the chip's PWM counter turns.
 //!
-//! The plant averages over a PWM period, from one top of the counter to the next. What each high side is on for in it comes from the compare
-//! values in force on the way down and on the way up. The converters sample just before the top; what is sampled there is the
-//! state at the end of the period, so the period ends a little early then, with the rest of it as the counter will go. While no PWM
-//! runs the plant moves in periods of its own.
+//! The plant averages over a PWM period, from one top of the counter to the next. What each high side is on for in it
+//! comes from the compare values in force on the way down and on the way up. The converters sample just before the top;
+//! what is sampled there is the state at the end of the period, so the period ends a little early then, with the rest
+//! of it as the counter will go. While no PWM runs the plant moves in periods of its own.
 //!
-//! A shunt carries its phase's current while the leg's low side conducts; the amplifiers follow that ([`Drivetrain::phase_current`]).
+//! A shunt carries its phase's current while the leg's low side conducts; the amplifiers follow that
+//! ([`Drivetrain::phase_current`]).
 
 use super::amplifier::Amplifier;
 use super::encoder::Encoder;
@@ -66,9 +67,9 @@ pub struct Drivetrain {
 }
 
 impl Drivetrain {
-    /// An actuator at rest, with the bridge off. Delays, steps of duty and resolutions of the plant's own sensors and timer are taken
-    /// away, because chip and board have theirs. The encoder's geometry is for the board: what a [`sample`](Self::sample) shows of it is the
-    /// rotor's own angle.
+    /// An actuator at rest, with the bridge off. Delays, steps of duty and resolutions of the plant's own sensors and
+    /// timer are taken away, because chip and board have theirs. The encoder's geometry is for the board: what a
+    /// [`sample`](Self::sample) shows of it is the rotor's own angle.
     ///
     /// # Errors
     /// What the plant refuses.
@@ -194,7 +195,8 @@ impl Drivetrain {
         &self.sample
     }
 
-    /// What an amplifier at a phase's low-side shunt shows at an instant, A. Where the bridge does not switch, that is whatever current there is.
+    /// What an amplifier at a phase's low-side shunt shows at an instant, A. Where the bridge does not switch, that is
+    /// whatever current there is.
     pub fn phase_current(&mut self, at: Instant, phase: usize, amplifier: &Amplifier) -> f64 {
         let current = self.sample(at).phase_currents[phase];
         if !self.is_switching() {
@@ -226,7 +228,8 @@ impl Drivetrain {
         self.least_settled.take()
     }
 
-    /// Which low sides the timer asks for at an instant, to which it has counted; where one was asked for since `from`, from when on.
+    /// Which low sides the timer asks for at an instant, to which it has counted; where one was asked for since `from`,
+    /// from when on.
     fn follow_low_sides(&mut self, from: Instant, until: Instant) {
         let Some((_, pwm)) = self.pwm else { return };
         for phase in 0..self.low_since.len() {

@@ -1,4 +1,5 @@
-//! What parts between motor, supply and pins make of currents, voltages and temperatures; pure functions of the schematics.
+//! What parts between motor, supply and pins make of currents, voltages and temperatures; pure functions of the
+//! schematics.
 
 /// Resistance of a divider's lower part over both.
 pub fn divided(volts: f64, upper: f64, lower: f64) -> f64 {

@@ -19,7 +19,8 @@ pub struct Encoder {
 }
 
 impl Encoder {
-    /// Takes the encoder out of the plant, which shows the rotor's own angle then, as finely as it can. Noise and eccentricity stay there.
+    /// Takes the encoder out of the plant, which shows the rotor's own angle then, as finely as it can. Noise and
+    /// eccentricity stay there.
     pub(super) fn take(parameters: &mut ActuatorParameters) -> Self {
         let sensor = &mut parameters.sensors.encoder;
         let counts = u32::try_from(sensor.counts_per_turn).unwrap_or(u32::MAX);

@@ -1,6 +1,7 @@
 //! The boards: what lies between the chip's pins, the plant and the bus.
 //!
-//! Each board's parts are those of its schematics, not the firmware's constants: where both agree, a run says something.
+//! Each board's parts are those of its schematics, not the firmware's constants: where both agree, a run says
+//! something.
 
 pub mod amplifier;
 pub mod b_g431b_esc1;
@@ -33,8 +34,8 @@ pub struct Inputs {
     pub driver_fault: bool,
     /// The bridge's thermistor is not connected any more.
     pub thermistor_open: bool,
-    /// The level that the data line of an encoder with a serial interface stays at, whatever the encoder says. Of one that is silent it is
-    /// high: the line is pulled up. The lines of an incremental encoder stay as they are.
+    /// The level that the data line of an encoder with a serial interface stays at, whatever the encoder says. Of one
+    /// that is silent it is high: the line is pulled up. The lines of an incremental encoder stay as they are.
     pub encoder_line: Option<bool>,
 }
 
@@ -51,8 +52,8 @@ pub trait Wired: Wiring {
     /// What the program does against the manual, knowingly.
     const DEVIATIONS: &'static [Deviation];
 
-    /// A core for its chip. A board says this itself, so that a core's thousand operations are compiled with the board, once, and not again in every
-    /// program that runs it.
+    /// A core for its chip. A board says this itself, so that a core's thousand operations are compiled with the board,
+    /// once, and not again in every program that runs it.
     fn core(chip: Chip<Self>) -> Cpu<Chip<Self>>
     where
         Self: Sized;

@@ -1,7 +1,8 @@
 //! mjbots moteus r4.11: pins to plant.
 //!
-//! Parts by docs/boards.md: shunts of 0.5 mOhm, amplified in the gate driver around half the reference; supply divided by 100 and 4.7 kOhm; the bridge's
-//! thermistor of 47 kOhm, beta 4050 K, with 10 kOhm to ground; no thermistor in the motor.
+//! Parts by docs/boards.md: shunts of 0.5 mOhm, amplified in the gate driver around half the reference; supply divided
+//! by 100 and 4.7 kOhm; the bridge's thermistor of 47 kOhm, beta 4050 K, with 10 kOhm to ground; no thermistor in the
+//! motor.
 
 use super::amplifier::Amplifier;
 use super::drivetrain::Drivetrain;
@@ -42,9 +43,9 @@ const REVISION: [Pin; 3] = [Pin::new('C', 6), Pin::new('A', 15), Pin::new('A', 1
 const R4_11: u8 = 4;
 /// Amplifier control of the gate driver: gain 5, 10, 20, 40 by its bits 7 and 6.
 const AMPLIFIERS: usize = 6;
-/// Step response at each gain: the settling time to 1 % of the driver's data sheet (SLVSDY6, "Electrical characteristics") begins 500 ns after the
-/// edge. Together they are what the board's vendor has measured to be needed at gain 20, and assumes at the others
-/// (docs/boards.md).
+/// Step response at each gain: the settling time to 1 % of the driver's data sheet (SLVSDY6, "Electrical
+/// characteristics") begins 500 ns after the edge. Together they are what the board's vendor has measured to be needed
+/// at gain 20, and assumes at the others (docs/boards.md).
 pub(super) const STEP_RESPONSE: [Amplifier; 4] = [
     Amplifier::settling(500e-9, 250e-9),
     Amplifier::settling(500e-9, 500e-9),

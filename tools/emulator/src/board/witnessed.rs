@@ -1,5 +1,5 @@
-//! A board with a witness between it and the chip: a number for everything that they tell each other, and one for a whole run. Two runs with
-//! the same number were the same run: every sample and every compare value at its picosecond.
+//! A board with a witness between it and the chip: a number for everything that they tell each other, and one for a
+//! whole run. Two runs with the same number were the same run: every sample and every compare value at its picosecond.
 //!
 //! Host only.
 

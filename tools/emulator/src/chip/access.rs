@@ -8,7 +8,8 @@ use super::{Chip, Deviation, FLASH_WIDTH, Waiting, gpio, iwdg, variant};
 use crate::bus::{Bus, Refusal, Signals, Width};
 use std::ops::Range;
 
-/// Address of the flash; it appears at address 0 as well, where the core looks for its vectors (2.6 "Boot configuration").
+/// Address of the flash; it appears at address 0 as well, where the core looks for its vectors (2.6 "Boot
+/// configuration").
 pub const FLASH: u32 = 0x0800_0000;
 
 impl<W: Wiring> Bus for Chip<W> {
@@ -219,8 +220,8 @@ impl<W: Wiring> Chip<W> {
         Ok(())
     }
 
-    /// Whether a device takes a write of this width. A timer's prescaler is written as half a word by embassy; the bridge repeats it in the
-    /// upper half, which is reserved.
+    /// Whether a device takes a write of this width. A timer's prescaler is written as half a word by embassy; the
+    /// bridge repeats it in the upper half, which is reserved.
     const fn takes(device: Device, offset: u32, width: Width) -> bool {
         match (device, width) {
             (_, Width::Word) => offset.is_multiple_of(4),
@@ -316,7 +317,8 @@ impl<W: Wiring> Chip<W> {
         })
     }
 
-    /// Brings a timer up to a cycle. What others see of it is an event, of which none is due: the agenda stays as it is.
+    /// Brings a timer up to a cycle. What others see of it is an event, of which none is due: the agenda stays as it
+    /// is.
     fn attend_timer(&mut self, index: usize, now: u64) {
         let timer = &mut self.timers[index];
         if timer.follows_encoder() {

@@ -1,13 +1,14 @@
 //! ADC: RM0440, chapter 21. Power, calibration, and injected sequences that a timer starts.
 //!
-//! Not modelled, and refused: regular conversions, the asynchronous clock, the queue of contexts, differential inputs, oversampling,
-//! offsets, watchdogs, dual modes, resolutions below 12 bits, injected sequences started by software.
+//! Not modelled, and refused: regular conversions, the asynchronous clock, the queue of contexts, differential inputs,
+//! oversampling, offsets, watchdogs, dual modes, resolutions below 12 bits, injected sequences started by software.
 //!
-//! Times: the regulator needs 20 µs, a calibration 116 clocks (DS12288, "ADC characteristics"), a conversion the sampling time and 12.5 clocks
-//! (21.4.16). From the trigger to the beginning of the sampling pass 3, 3.25 or 3.125 clocks at a clock divided by 1, 2 or 4 (DS12288, trigger
-//! conversion latency of injected channels; from memory, unconfirmed), here rounded up to a cycle of the core. While it samples, a converter's capacitor of
-//! 5 pF charges from what it held before through a switch of 1 kOhm and the source's resistance (DS12288, "ADC characteristics", from memory); otherwise
-//! the converters are ideal but for their 12 bits.
+//! Times: the regulator needs 20 µs, a calibration 116 clocks (DS12288, "ADC characteristics"), a conversion the
+//! sampling time and 12.5 clocks (21.4.16). From the trigger to the beginning of the sampling pass 3, 3.25 or 3.125
+//! clocks at a clock divided by 1, 2 or 4 (DS12288, trigger conversion latency of injected channels; from memory,
+//! unconfirmed), here rounded up to a cycle of the core. While it samples, a converter's capacitor of 5 pF charges from
+//! what it held before through a switch of 1 kOhm and the source's resistance (DS12288, "ADC characteristics", from
+//! memory); otherwise the converters are ideal but for their 12 bits.
 
 use super::register::{Block, Register, register};
 use super::time::{Instant, Moment};
@@ -39,7 +40,8 @@ const ADCAL: u32 = 1 << 31;
 
 const JQDIS: u32 = 1 << 31;
 
-/// CR: regular conversions, and calibration of differential inputs. CFGR: everything but the queue's switch. DIFSEL: differential inputs.
+/// CR: regular conversions, and calibration of differential inputs. CFGR: everything but the queue's switch. DIFSEL:
+/// differential inputs.
 const REGISTERS: &[Register] = &[
     register(ISR, "ISR", 0, 0, 0),
     register(IER, "IER", 0, 0x0000_07ff, 0x0000_079e),
@@ -78,7 +80,8 @@ pub struct Source {
     pub resistance: f64,
 }
 
-/// Triggers of injected sequences that are modelled: number in JEXTSEL, the same for all converters (tables 166 and 167).
+/// Triggers of injected sequences that are modelled: number in JEXTSEL, the same for all converters (tables 166 and
+/// 167).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Trigger {
     /// TIM1_TRGO.

@@ -1,5 +1,5 @@
-//! When each peripheral that counts cycles next does something, and which interrupts it asks for: computed anew for those only that may have
-//! changed.
+//! When each peripheral that counts cycles next does something, and which interrupts it asks for: computed anew for
+//! those only that may have changed.
 
 /// Peripherals that have a place: timers, converters and SPIs.
 pub const PLACES: usize = 16;
@@ -53,7 +53,8 @@ impl Agenda {
         self.first_of(self.changed)
     }
 
-    /// What is true of a peripheral now: its next cycle, and the levels of its lines. [`order`](Self::order) follows the last.
+    /// What is true of a peripheral now: its next cycle, and the levels of its lines. [`order`](Self::order) follows
+    /// the last.
     #[inline]
     pub fn note(&mut self, place: usize, next: u64, lines: u128) {
         self.ordered &= std::mem::replace(&mut self.next[place % PLACES], next) == next;

@@ -1,8 +1,8 @@
 //! SRAM1, SRAM2, CCM SRAM, and what the factory wrote: RM0440, 2.2 and 2.4, chapter 48 "Device electronic signature".
 //!
-//! SRAM1, SRAM2 and the second appearance of CCM SRAM lie side by side, so they are one piece of memory. Contents stay over resets (the
-//! option that erases them is not set) and are junk after power-up, the same junk on every run. Parity and the write
-//! protection of pages are not modelled.
+//! SRAM1, SRAM2 and the second appearance of CCM SRAM lie side by side, so they are one piece of memory. Contents stay
+//! over resets (the option that erases them is not set) and are junk after power-up, the same junk on every run. Parity
+//! and the write protection of pages are not modelled.
 
 use super::variant::Variant;
 use crate::bus::{Refusal, Width};

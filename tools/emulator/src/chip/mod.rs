@@ -1,10 +1,13 @@
-//! The microcontroller around the core: STM32G431CB and STM32G474CE, memories and the peripherals that the firmware uses.
+//! The microcontroller around the core: STM32G431CB and STM32G474CE, memories and the peripherals that the firmware
+//! uses.
 //!
-//! Sections are those of the reference manual RM0440; what is neither there nor in the datasheets is said where it is assumed. What is not
-//! modelled ends the run: any other register, any other mode, and whatever the manual forbids, for then nobody knows what the chip does.
+//! Sections are those of the reference manual RM0440; what is neither there nor in the datasheets is said where it is
+//! assumed. What is not modelled ends the run: any other register, any other mode, and whatever the manual forbids, for
+//! then nobody knows what the chip does.
 //!
-//! Timers, converters and frames count the core's cycles; flash, watchdog and start-up times count time. The chip does nothing between events: the
-//! earliest of all is computed when something changes, and counters are computed when somebody looks.
+//! Timers, converters and frames count the core's cycles; flash, watchdog and start-up times count time. The chip does
+//! nothing between events: the earliest of all is computed when something changes, and counters are computed when
+//! somebody looks.
 
 pub mod adc;
 pub mod crc;
@@ -53,7 +56,8 @@ use timer::Timer;
 use variant::Variant;
 use wiring::{Pin, Wiring};
 
-/// What a program does against the manual, and may go on all the same: each of them known, and named by whoever runs the program.
+/// What a program does against the manual, and may go on all the same: each of them known, and named by whoever runs
+/// the program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Deviation {
     /// A register of a peripheral without its clock is accessed: it reads 0 and ignores what is written.
@@ -65,7 +69,8 @@ pub enum Deviation {
     WithoutBoost,
 }
 
-/// Bytes that one access to the flash brings: 64 bits, of the chip with one bank and of that with two (RM0440, 3.3.1 and 5.3.1).
+/// Bytes that one access to the flash brings: 64 bits, of the chip with one bank and of that with two (RM0440, 3.3.1
+/// and 5.3.1).
 const FLASH_WIDTH: u32 = 8;
 
 /// Where the flash's wait states (ACR.LATENCY) are counted.
@@ -73,10 +78,12 @@ const FLASH_WIDTH: u32 = 8;
 pub enum Waiting {
     /// Nowhere: as if all code and data lay in SRAM.
     Never,
-    /// At the target of each taken branch and for each datum: the caches always miss, and the prefetch keeps up with code in sequence.
+    /// At the target of each taken branch and for each datum: the caches always miss, and the prefetch keeps up with
+    /// code in sequence.
     #[default]
     Prefetched,
-    /// For each line of code that is begun, in sequence too, and for each datum: caches and prefetch are of no use. Nothing can take longer.
+    /// For each line of code that is begun, in sequence too, and for each datum: caches and prefetch are of no use.
+    /// Nothing can take longer.
     Always,
 }
 
@@ -169,7 +176,8 @@ impl<W: Wiring> Chip<W> {
         &self.wiring
     }
 
-    /// The board. After a change that the chip has to see before its own next event, call [`wiring_changed`](Self::wiring_changed).
+    /// The board. After a change that the chip has to see before its own next event, call
+    /// [`wiring_changed`](Self::wiring_changed).
     pub const fn wiring_mut(&mut self) -> &mut W {
         &mut self.wiring
     }
@@ -209,7 +217,8 @@ impl<W: Wiring> Chip<W> {
         address.checked_sub(access::FLASH).is_some_and(|offset| self.flash.array.flash(offset, bytes))
     }
 
-    /// Pages of the flash in a range of addresses as a loss of power would leave them now, to be kept; none outside of the flash.
+    /// Pages of the flash in a range of addresses as a loss of power would leave them now, to be kept; none outside of
+    /// the flash.
     pub fn kept(&self, addresses: std::ops::Range<u32>) -> Option<Vec<u8>> {
         Some(self.flash.kept(self.pages(addresses)?))
     }
@@ -254,7 +263,8 @@ impl<W: Wiring> Chip<W> {
         self.powered
     }
 
-    /// Lets the power go in the middle of a flash operation: the `operation`th double word or page from now on, counted from 1.
+    /// Lets the power go in the middle of a flash operation: the `operation`th double word or page from now on, counted
+    /// from 1.
     pub fn power_cut_at(&mut self, operation: u64, kind: Torn) {
         self.flash.cut_at(operation, kind);
     }
@@ -345,7 +355,8 @@ impl<W: Wiring> Chip<W> {
         }
     }
 
-    /// Whether the flash is read slowly enough for the core's frequency, and the regulator gives what it takes (3.3.3, 5.3.3, 6.1.5).
+    /// Whether the flash is read slowly enough for the core's frequency, and the regulator gives what it takes (3.3.3,
+    /// 5.3.3, 6.1.5).
     fn check_speed(&self) -> Result<(), Refusal> {
         let allowed = self.deviations.contains(&Deviation::WithoutBoost);
         let range = match self.pwr.range() {

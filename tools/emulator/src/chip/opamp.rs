@@ -1,7 +1,8 @@
-//! The operational amplifiers 1 to 3: RM0440, chapter 25. Follower and programmable gain, with the bias input or without, into a converter.
+//! The operational amplifiers 1 to 3: RM0440, chapter 25. Follower and programmable gain, with the bias input or
+//! without, into a converter.
 //!
-//! Ideal within 0 V and VDDA: offset, bandwidth and the 3 to 6 µs of waking up are not modelled. Neither are the standalone mode, gains with a
-//! filter pin, outputs at a pin, and the modes that a timer switches.
+//! Ideal within 0 V and VDDA: offset, bandwidth and the 3 to 6 µs of waking up are not modelled. Neither are the
+//! standalone mode, gains with a filter pin, outputs at a pin, and the modes that a timer switches.
 
 use super::register::{Block, Register, register};
 use super::wiring::Pin;
@@ -52,7 +53,8 @@ impl Amplifiers {
         self.block.reset();
     }
 
-    /// What an amplifier, counted from 1, gives its converter; none where it is off, or where its output is not connected inside.
+    /// What an amplifier, counted from 1, gives its converter; none where it is off, or where its output is not
+    /// connected inside.
     pub fn amplification(&self, number: u8) -> Option<Amplification> {
         let index = usize::from(number.checked_sub(1)?);
         let &(inputs, bias) = INPUTS.get(index)?;

@@ -1,4 +1,5 @@
-//! PWR, power control: RM0440, chapter 6. The regulator's range decides how fast the core may run and how many wait states the flash takes.
+//! PWR, power control: RM0440, chapter 6. The regulator's range decides how fast the core may run and how many wait
+//! states the flash takes.
 
 use super::register::{Block, Register, register};
 use crate::bus::Refusal;
@@ -6,8 +7,8 @@ use crate::bus::Refusal;
 const CR1: u32 = 0x00;
 const CR5: u32 = 0x80;
 
-/// CR1: low-power modes and low-power run are not modelled. CR3: standby and pull configuration neither. PDCRx, PUCRx act in standby
-/// only, so they are left out.
+/// CR1: low-power modes and low-power run are not modelled. CR3: standby and pull configuration neither. PDCRx, PUCRx
+/// act in standby only, so they are left out.
 const REGISTERS: &[Register] = &[
     register(CR1, "CR1", 0x0000_0200, 0x0000_4707, 0x0000_4007),
     register(0x04, "CR2", 0, 0x0000_00ff, 0x0000_00ff),

@@ -1,10 +1,11 @@
 //! RCC, reset and clock control: RM0440, chapter 7.
 //!
-//! The clock tree is computed, not assumed: a program that switches to a clock that is not ready, or sets the PLL beyond its limits,
-//! stops the run. Peripherals' time counts the core's cycles, so the APB prescalers stay at 1 (`CFGR`, 7.4.3).
+//! The clock tree is computed, not assumed: a program that switches to a clock that is not ready, or sets the PLL
+//! beyond its limits, stops the run. Peripherals' time counts the core's cycles, so the APB prescalers stay at 1
+//! (`CFGR`, 7.4.3).
 //!
-//! Start-up times are the datasheet's typical ones (DS12288, "internal clock source characteristics", "PLL characteristics"). There is no
-//! crystal: neither board's firmware uses one.
+//! Start-up times are the datasheet's typical ones (DS12288, "internal clock source characteristics", "PLL
+//! characteristics"). There is no crystal: neither board's firmware uses one.
 
 use super::register::{Block, Register, register};
 use super::time::{Instant, Moment};
@@ -183,7 +184,8 @@ impl Rcc {
         let value = self.block.read(offset)?;
         let ready = |since: Instant, bit: u32| if at.instant() >= since { bit } else { 0 };
         Ok(match offset {
-            // HSICAL is the sum of HSITRIM and the factory's calibration (7.4.2). The oscillator is exact whatever they are.
+            // HSICAL is the sum of HSITRIM and the factory's calibration (7.4.2). The oscillator is exact whatever they
+            // are.
             ICSCR => value | (((value >> 24) + CALIBRATION) & 0xff) << 16,
             CR => value & !(HSIRDY | PLLRDY) | ready(self.hsi, HSIRDY) | ready(self.pll, PLLRDY),
             // The switch is done at once: only ready clocks are accepted.

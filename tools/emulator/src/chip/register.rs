@@ -1,5 +1,5 @@
-//! Registers that keep what is written: offset, name, value after reset, which bits exist, and which of them select something that
-//! is not modelled.
+//! Registers that keep what is written: offset, name, value after reset, which bits exist, and which of them select
+//! something that is not modelled.
 
 use crate::bus::Refusal;
 

@@ -1,5 +1,6 @@
-//! RNG, the random number generator: RM0440, chapter 26. Its numbers are a sequence that begins anew with each power-up of the emulated chip, so that runs
-//! repeat; how long a word takes, and the checks of the noise source, are not modelled.
+//! RNG, the random number generator: RM0440, chapter 26. Its numbers are a sequence that begins anew with each power-up
+//! of the emulated chip, so that runs repeat; how long a word takes, and the checks of the noise source, are not
+//! modelled.
 
 use super::register::{Block, Register, register};
 use crate::bus::Refusal;

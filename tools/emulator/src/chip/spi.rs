@@ -1,7 +1,8 @@
 //! SPI as a master: RM0440, chapter 39. Frames of 8 and 16 bits, both FIFOs, the busy flag, overrun.
 //!
-//! The slave is selected by a general-purpose output, so slave management is by software. Not modelled, and refused: slave mode, DMA, CRC, one
-//! data line, other sizes, the least significant bit first, I2S. A frame arrives when its last bit ends; both lines have no delay.
+//! The slave is selected by a general-purpose output, so slave management is by software. Not modelled, and refused:
+//! slave mode, DMA, CRC, one data line, other sizes, the least significant bit first, I2S. A frame arrives when its
+//! last bit ends; both lines have no delay.
 
 use super::register::{Block, Register, register};
 use super::variant::SpiDescription;
@@ -90,7 +91,8 @@ impl Spi {
         if self.block.get(CR2) >> 8 & 0xf == 0xf { 2 } else { 1 }
     }
 
-    /// A frame that ends at a cycle: what it was, and the cycle at which it began. The slave's answer goes to [`answer`](Self::answer).
+    /// A frame that ends at a cycle: what it was, and the cycle at which it began. The slave's answer goes to
+    /// [`answer`](Self::answer).
     pub fn ended(&mut self, cycle: u64, clock: u64) -> Option<(SpiFrame, u64)> {
         let frame = self.frame.filter(|frame| frame.ends <= cycle)?;
         self.frame = None;
@@ -204,7 +206,8 @@ impl Spi {
         Ok(())
     }
 
-    /// SPE with slave management in hardware would need the pin NSS; with it in software, SSI low is a mode fault (39.4.10).
+    /// SPE with slave management in hardware would need the pin NSS; with it in software, SSI low is a mode fault
+    /// (39.4.10).
     fn control(&mut self, cycle: u64) -> Result<(), Refusal> {
         let control = self.block.get(CR1);
         if control & SPE == 0 {

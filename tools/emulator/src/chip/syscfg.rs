@@ -1,12 +1,13 @@
-//! SYSCFG and DBGMCU: RM0440, chapters 10 and 47. Of SYSCFG, what breaks TIM1; DBGMCU keeps what is written, as no debugger is connected.
+//! SYSCFG and DBGMCU: RM0440, chapters 10 and 47. Of SYSCFG, what breaks TIM1; DBGMCU keeps what is written, as no
+//! debugger is connected.
 
 use super::register::{Block, Register, register};
 use crate::bus::Refusal;
 
 const CFGR2: u32 = 0x1c;
 
-/// EXTICR1 to 4 select pins for EXTI, which is not modelled; MEMRMP maps other memories to address 0; the SRAM's write protection is not
-/// modelled either.
+/// EXTICR1 to 4 select pins for EXTI, which is not modelled; MEMRMP maps other memories to address 0; the SRAM's write
+/// protection is not modelled either.
 const REGISTERS: &[Register] = &[
     register(0x00, "MEMRMP", 0, 0x0000_0107, 0x0000_0107),
     register(0x04, "CFGR1", 0x7c00_0001, 0xfcff_0300, 0),

@@ -1,6 +1,7 @@
 //! Time in the chip: the core counts cycles, oscillators that the core does not run on count by themselves.
 
-/// Picoseconds since the run began. Goes on over resets and losses of power: the plant does not stop either. Lasts for 213 days.
+/// Picoseconds since the run began. Goes on over resets and losses of power: the plant does not stop either. Lasts for
+/// 213 days.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Instant(pub u64);
 

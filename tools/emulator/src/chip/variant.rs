@@ -1,7 +1,8 @@
 //! The two chips: sizes, which peripherals exist, where pins and interrupts go.
 //!
-//! Sources: RM0440, 2.2 "Memory organization" and 14.3 "Interrupt and exception vectors"; pins from the tables of alternate functions of
-//! DS12589 (STM32G431) and DS12288 (STM32G474), as in the chip database that embassy is generated from.
+//! Sources: RM0440, 2.2 "Memory organization" and 14.3 "Interrupt and exception vectors"; pins from the tables of
+//! alternate functions of DS12589 (STM32G431) and DS12288 (STM32G474), as in the chip database that embassy is
+//! generated from.
 
 use super::wiring::{Pin, TimerName};
 

@@ -1,8 +1,8 @@
 //! The chip's outer side: what a board connects to its pins.
 //!
-//! The chip calls a board in the order of time, at instants that its own clocks decide: every turn of a PWM counter, every instant at which a
-//! converter holds its sample, every end of a frame. Between two calls nothing that the chip drives has changed, so a board may integrate its
-//! plant from call to call.
+//! The chip calls a board in the order of time, at instants that its own clocks decide: every turn of a PWM counter,
+//! every instant at which a converter holds its sample, every end of a frame. Between two calls nothing that the chip
+//! drives has changed, so a board may integrate its plant from call to call.
 
 use super::fdcan::line::CanLine;
 use super::time::Instant;
@@ -158,7 +158,8 @@ pub trait Wiring {
     /// A frame ended: what the board sent meanwhile.
     fn spi(&mut self, at: Instant, frame: &SpiFrame) -> u16;
 
-    /// The bus that FDCAN1's transceiver is connected to; none where it is to none, and the controller never sees it idle.
+    /// The bus that FDCAN1's transceiver is connected to; none where it is to none, and the controller never sees it
+    /// idle.
     fn can(&mut self) -> Option<&mut dyn CanLine> {
         None
     }

@@ -1,4 +1,5 @@
-//! Integer arithmetic of the architecture as pure functions: addition with carry, shifts, saturation, the expanded constant.
+//! Integer arithmetic of the architecture as pure functions: addition with carry, shifts, saturation, the expanded
+//! constant.
 //!
 //! From the pseudo-code of ARM DDI 0403 (ARMv7-M Architecture Reference Manual): A2.2.1, A5.3.2, A7.4.2, D6.5.
 

@@ -17,8 +17,8 @@ pub(super) struct Code<B: Bus> {
     line: Option<u32>,
     /// The region that the program is in.
     current: Region,
-    /// From the first to behind the last address in SRAM at which something was ever decoded: a store there may change it.
-    /// A word that begins up to three bytes before reaches into it: the start is that of such a word.
+    /// From the first to behind the last address in SRAM at which something was ever decoded: a store there may change
+    /// it. A word that begins up to three bytes before reaches into it: the start is that of such a word.
     changeable: Range<u32>,
     /// Its length.
     changeable_length: u32,
@@ -77,7 +77,8 @@ impl<B: Bus> Code<B> {
         Self::kept(&self.operations, self.place(address)?)
     }
 
-    /// Where the operation for an address of the current region is kept. That of the next instruction is kept behind it, by its half-words.
+    /// Where the operation for an address of the current region is kept. That of the next instruction is kept behind
+    /// it, by its half-words.
     #[inline(always)]
     pub fn place(&self, address: u32) -> Option<usize> {
         let offset = address.wrapping_sub(self.current.start);
@@ -164,8 +165,9 @@ impl<B: Bus> Code<B> {
         self.line.is_some()
     }
 
-    /// Cycles that an instruction in the current region waits for the lines that it lies in, without the one that it begins in where a branch leads there, which
-    /// the branch has waited for. `before` is where the instruction before it ends.
+    /// Cycles that an instruction in the current region waits for the lines that it lies in, without the one that it
+    /// begins in where a branch leads there, which the branch has waited for. `before` is where the instruction
+    /// before it ends.
     pub fn waits_for_lines_of(&self, address: u32, length: u8, before: u32) -> u64 {
         let Some(line) = self.line else { return 0 };
         let fetched = if before == address { address.wrapping_sub(1) } else { address };

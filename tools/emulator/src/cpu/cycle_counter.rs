@@ -1,6 +1,7 @@
 //! DWT's cycle counter (ARM DDI 0403, C1.8). Its comparators and its other counters are not modelled.
 //!
-//! It stands still while the core sleeps, as the core's clock does (RM0440, 6.3.8: sleep stops the CPU clock; no debugger is attached).
+//! It stands still while the core sleeps, as the core's clock does (RM0440, 6.3.8: sleep stops the CPU clock; no
+//! debugger is attached).
 
 #[derive(Clone, Default)]
 pub(super) struct CycleCounter {

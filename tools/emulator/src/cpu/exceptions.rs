@@ -1,8 +1,9 @@
-//! Exceptions: entry with its stack frame, tail-chaining, late arrival, return, and lazy stacking of the floating-point registers.
+//! Exceptions: entry with its stack frame, tail-chaining, late arrival, return, and lazy stacking of the floating-point
+//! registers.
 //!
-//! ARM DDI 0403, B1.5.6 to B1.5.8 and B1.5.11; cycles in `timing`. A request that arrives while the frame is written is taken instead, if it
-//! is more urgent. What arrives while a frame is read waits until it is read and then preempts: the hardware saves those
-//! cycles by giving the return up.
+//! ARM DDI 0403, B1.5.6 to B1.5.8 and B1.5.11; cycles in `timing`. A request that arrives while the frame is written is
+//! taken instead, if it is more urgent. What arrives while a frame is read waits until it is read and then preempts:
+//! the hardware saves those cycles by giving the return up.
 
 use super::interrupts::{EXTERNAL, HARD_FAULT};
 use super::operation::Trap;
@@ -13,8 +14,8 @@ use crate::bus::Bus;
 const BASIC_FRAME: u32 = 0x20;
 const FLOATING_FRAME: u32 = 0x48;
 
-/// What the handler of an exception has taken. Everything from the first cycle of entry to the last of return counts; what
-/// preempted it counts for it only in `cycles` and `instructions`.
+/// What the handler of an exception has taken. Everything from the first cycle of entry to the last of return counts;
+/// what preempted it counts for it only in `cycles` and `instructions`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ExceptionTimes {
     /// How often it has returned.
@@ -121,8 +122,8 @@ impl<B: Bus> Cpu<B> {
         self.store_aligned::<4>(place.wrapping_add(0x40), self.floating.bits())
     }
 
-    /// What a floating-point instruction needs before it can run (ExecuteFPCheck): the unit switched on, registers of what was interrupted
-    /// stored, and the context marked as used.
+    /// What a floating-point instruction needs before it can run (ExecuteFPCheck): the unit switched on, registers of
+    /// what was interrupted stored, and the context marked as used.
     #[cold]
     pub(super) fn check_floating_point(&mut self) -> Result<(), Trap> {
         self.settle();

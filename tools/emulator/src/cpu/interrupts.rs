@@ -1,6 +1,8 @@
-//! Which exceptions are pending, enabled and active, and which of them comes next: the NVIC and what the system exceptions share with it.
+//! Which exceptions are pending, enabled and active, and which of them comes next: the NVIC and what the system
+//! exceptions share with it.
 //!
-//! ARM DDI 0403, B1.5.2 to B1.5.4 (priorities), B3.4 (NVIC). Priorities have the four bits of an STM32G4 (RM0440, 14.1).
+//! ARM DDI 0403, B1.5.2 to B1.5.4 (priorities), B3.4 (NVIC). Priorities have the four bits of an STM32G4 (RM0440,
+//! 14.1).
 
 /// Numbers of the exceptions; interrupt n is `EXTERNAL` + n.
 pub(super) const NMI: u16 = 2;
@@ -151,8 +153,8 @@ impl Interrupts {
         self.update();
     }
 
-    /// New levels of the lines; true where something became pending. A line pends its interrupt when it rises, and as long as it is high
-    /// and the handler does not run (B3.4.1).
+    /// New levels of the lines; true where something became pending. A line pends its interrupt when it rises, and as
+    /// long as it is high and the handler does not run (B3.4.1).
     pub fn set_lines(&mut self, lines: [u32; 4], nmi: bool) -> bool {
         if lines == self.lines && nmi == self.nmi_line && (lines == [0; 4] || !self.refresh_pending()) {
             return false;

@@ -1,8 +1,8 @@
 //! A Cortex-M4F: predecoded, deterministic, one instruction at a time.
 //!
-//! From ARM DDI 0403 (ARMv7-M Architecture Reference Manual) with the DSP extension and the single-precision floating-point unit; what the
-//! core itself chooses is from its Technical Reference Manual (Arm 100166). An encoding that is not implemented, or whose outcome the
-//! architecture leaves open, ends the run and says where.
+//! From ARM DDI 0403 (ARMv7-M Architecture Reference Manual) with the DSP extension and the single-precision
+//! floating-point unit; what the core itself chooses is from its Technical Reference Manual (Arm 100166). An encoding
+//! that is not implemented, or whose outcome the architecture leaves open, ends the run and says where.
 //!
 //! - `run`, `stretch`: from one instruction to the next
 //! - `translation`: the same of what runs often, as functions of the host
@@ -112,7 +112,8 @@ pub struct Cpu<B: Bus> {
     trapped_address: u32,
     code: Code<B>,
     within: Within,
-    /// Makes operations. A pointer: whoever calls the decoder by name has all operations compiled, and programs that only run a core need not.
+    /// Makes operations. A pointer: whoever calls the decoder by name has all operations compiled, and programs that
+    /// only run a core need not.
     decode: Decode<B>,
     /// Memory that does not answer before a cycle.
     stall: Option<(std::ops::Range<u32>, u64)>,

@@ -160,7 +160,8 @@ pub(super) enum Part {
     Nothing,
 }
 
-/// What an instruction does, as far as it can be translated (see `translation`); the fields are those that its function is chosen by.
+/// What an instruction does, as far as it can be translated (see `translation`); the fields are those that its function
+/// is chosen by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Action {
     /// Is always called.

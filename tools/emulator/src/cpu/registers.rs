@@ -1,4 +1,5 @@
-//! The registers as a debugger sees them, the program status register, and what MRS and MSR reach (ARM DDI 0403, B1.4, B5.2).
+//! The registers as a debugger sees them, the program status register, and what MRS and MSR reach (ARM DDI 0403, B1.4,
+//! B5.2).
 
 use super::operation::Trap;
 use super::{Cpu, ExceptionTimes, Watch};
@@ -9,7 +10,8 @@ use std::collections::BTreeMap;
 const THUMB: u32 = 1 << 24;
 
 impl<B: Bus> Cpu<B> {
-    /// r0 to r12, the stack pointer in use (13), the link register (14), the address of the next instruction (15). Others are 0.
+    /// r0 to r12, the stack pointer in use (13), the link register (14), the address of the next instruction (15).
+    /// Others are 0.
     pub fn register(&self, number: usize) -> u32 {
         match number {
             15 => self.pc,

@@ -59,9 +59,10 @@ impl<B: Bus> Cpu<B> {
         }
     }
 
-    /// Resets the core and starts it by the vector table at `vectors` (B1.5.5), which VTOR then holds: 0 on an STM32, where the memory
-    /// that it boots from appears at 0. General registers, which reset leaves open, are 0. Time, counts and what was decoded stay;
-    /// the bus is the caller's to reset. Fails where nothing answers at the vectors.
+    /// Resets the core and starts it by the vector table at `vectors` (B1.5.5), which VTOR then holds: 0 on an STM32,
+    /// where the memory that it boots from appears at 0. General registers, which reset leaves open, are 0. Time,
+    /// counts and what was decoded stay; the bus is the caller's to reset. Fails where nothing answers at the
+    /// vectors.
     pub fn reset(&mut self, vectors: u32) -> Result<(), Refusal> {
         let stack = self.bus.read(self.now, vectors, Width::Word)?;
         let start = self.bus.read(self.now, vectors.wrapping_add(4), Width::Word)?;

@@ -8,7 +8,8 @@ use super::{Cpu, End};
 use crate::bus::Bus;
 
 impl<B: Bus> Cpu<B> {
-    /// Runs until the cycle `until` is reached or something else ends the run. The instruction that reaches it completes.
+    /// Runs until the cycle `until` is reached or something else ends the run. The instruction that reaches it
+    /// completes.
     pub fn run(&mut self, until: u64) -> End {
         self.until = until;
         // Whoever runs the core may have changed what it is connected to.
@@ -27,8 +28,8 @@ impl<B: Bus> Cpu<B> {
         }
     }
 
-    /// Runs one instruction, and before it the entry of an exception that is due. Sleep is passed over. Says what ended the run, if
-    /// anything did.
+    /// Runs one instruction, and before it the entry of an exception that is due. Sleep is passed over. Says what ended
+    /// the run, if anything did.
     pub fn step(&mut self) -> Option<End> {
         self.until = u64::MAX;
         self.read_signals();
@@ -102,7 +103,8 @@ impl<B: Bus> Cpu<B> {
         if let Err(Leave::Trapped(_)) = done {
             self.it = block;
         } else if rest != 0 && self.pc != next && self.exception == handler {
-            // A branch elsewhere than at the block's end. A return from a handler brings the block of what it interrupted with it.
+            // A branch elsewhere than at the block's end. A return from a handler brings the block of what it
+            // interrupted with it.
             self.refuse(pc, operation.timing.length, Refused::Unpredictable)?;
         }
         done

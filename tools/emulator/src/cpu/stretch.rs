@@ -1,14 +1,16 @@
-//! Stretches: instructions that are decoded one behind the other, as a list of calls with nothing to look up or to count in between.
+//! Stretches: instructions that are decoded one behind the other, as a list of calls with nothing to look up or to
+//! count in between.
 //!
-//! What an instruction takes without wait states is known beforehand, so a stretch is counted where it is left: at its end, by a branch, or by
-//! an instruction that needs the core as it is, which settles the count first (`Cpu::settle_at`) and leaves the stretch. What takes longer than
-//! was known beforehand (wait states, refilled pipelines) is added to the time as it happens.
+//! What an instruction takes without wait states is known beforehand, so a stretch is counted where it is left: at its
+//! end, by a branch, or by an instruction that needs the core as it is, which settles the count first
+//! (`Cpu::settle_at`) and leaves the stretch. What takes longer than was known beforehand (wait states, refilled
+//! pipelines) is added to the time as it happens.
 //!
-//! An instruction goes on with what is behind it (`Cpu::next`). One that may jump, trap or settle says before where it is (`Cpu::at`); one that
-//! may have settled goes on only if it has not (`Cpu::go_on`).
+//! An instruction goes on with what is behind it (`Cpu::next`). One that may jump, trap or settle says before where it
+//! is (`Cpu::at`); one that may have settled goes on only if it has not (`Cpu::go_on`).
 //!
-//! IT blocks are parts of stretches, up to an instruction of theirs that may branch: before each of their instructions there is a step that
-//! passes it over if its condition does not hold. IT itself only counts.
+//! IT blocks are parts of stretches, up to an instruction of theirs that may branch: before each of their instructions
+//! there is a step that passes it over if its condition does not hold. IT itself only counts.
 
 use super::Cpu;
 use super::execute::by_condition;
@@ -328,7 +330,8 @@ impl<B: Bus> Cpu<B> {
         }
     }
 
-    /// Goes on with what is behind an instruction. Every instruction that completes ends with this, unless it jumps or settles.
+    /// Goes on with what is behind an instruction. Every instruction that completes ends with this, unless it jumps or
+    /// settles.
     #[inline(always)]
     pub(super) fn next(&mut self, rest: Rest<B>) -> Done {
         match rest.split_first() {
@@ -370,8 +373,9 @@ impl<B: Bus> Cpu<B> {
         self.settle();
     }
 
-    /// Counts what has run of a stretch, and leaves it: for everything that looks at time, counts, IT state or an instruction's own
-    /// address, or changes what has to be attended to. Where the core is in no stretch, everything is counted already.
+    /// Counts what has run of a stretch, and leaves it: for everything that looks at time, counts, IT state or an
+    /// instruction's own address, or changes what has to be attended to. Where the core is in no stretch,
+    /// everything is counted already.
     #[inline]
     pub(super) fn settle(&mut self) {
         if let Some(mark) = self.count() {
@@ -411,8 +415,8 @@ impl<B: Bus> Cpu<B> {
     }
 }
 
-/// Before an instruction of an IT block: passes it over if its condition does not hold (A7.3.2). It takes `immediate` cycles otherwise, and m
-/// says whether it loads or stores one register.
+/// Before an instruction of an IT block: passes it over if its condition does not hold (A7.3.2). It takes `immediate`
+/// cycles otherwise, and m says whether it loads or stores one register.
 fn unless<B: Bus, const CONDITION: u8>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     if cpu.holds(CONDITION) {
         return cpu.next(rest);

@@ -1,4 +1,5 @@
-//! The core's own registers: system control block, floating-point context, identification, and the way to NVIC, SysTick and DWT.
+//! The core's own registers: system control block, floating-point context, identification, and the way to NVIC, SysTick
+//! and DWT.
 //!
 //! ARM DDI 0403, B3.2 to B3.5. MPU, ITM, breakpoints and debug control are not modelled: using them ends the run.
 
@@ -291,14 +292,16 @@ impl<B: Bus> Cpu<B> {
         let awake = self.now - self.slept;
         let system = &mut self.system;
         match offset {
-            // ACTLR: interruption of long instructions, write buffer and folding; none of them is in this model's timing.
+            // ACTLR: interruption of long instructions, write buffer and folding; none of them is in this model's
+            // timing.
             0x008 if value & !7 == 0 => system.auxiliary_control = value,
             0xd04 => self.set_interrupt_control(value),
             0xd08 => system.vectors = value & !0x7f,
             0xd0c => return self.set_application_interrupt(value),
             0xd10 => system.sleep = value & 0x16,
             0xd14 => system.configuration = value & 0x31b,
-            // Only the enable bits: setting an exception active or pending here is for operating systems that switch contexts by it.
+            // Only the enable bits: setting an exception active or pending here is for operating systems that switch
+            // contexts by it.
             0xd24 if value & !0x7_0000 == 0 => system.handlers = value,
             0xd2c => system.hard_fault &= !value,
             0xd30 => {}

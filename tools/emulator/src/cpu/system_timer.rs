@@ -1,4 +1,5 @@
-//! SysTick: counts down and pends its exception whenever it reaches zero (ARM DDI 0403, B3.3). Computed from the time, not counted.
+//! SysTick: counts down and pends its exception whenever it reaches zero (ARM DDI 0403, B3.3). Computed from the time,
+//! not counted.
 
 #[derive(Clone, Default)]
 pub(super) struct SystemTimer {

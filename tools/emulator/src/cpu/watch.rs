@@ -1,4 +1,5 @@
-//! What test equipment wants to know of a run: when functions are entered and left, what they took, how deep the stack went.
+//! What test equipment wants to know of a run: when functions are entered and left, what they took, how deep the stack
+//! went.
 //!
 //! A run without a watch takes another loop and pays nothing for it.
 
@@ -77,8 +78,8 @@ impl Watch {
         self.marks.get((address >> 7 & 0x3ff) as usize).is_some_and(|word| word >> (address >> 1 & 63) & 1 != 0)
     }
 
-    /// Watches the function at `address`, its lowest bit ignored. It has returned when the program is back at the address that it was
-    /// called from with the stack that it had.
+    /// Watches the function at `address`, its lowest bit ignored. It has returned when the program is back at the
+    /// address that it was called from with the stack that it had.
     pub fn function(mut self, address: u32) -> Self {
         self.functions.insert(address & !1);
         self.mark(address & !1);
@@ -107,8 +108,8 @@ impl Watch {
         self.lowest_process
     }
 
-    /// The handler of `exception` has returned at the cycle `now` after `count` instructions in all. It ends what was open in it, itself if it is
-    /// watched, and has preempted what is open below it.
+    /// The handler of `exception` has returned at the cycle `now` after `count` instructions in all. It ends what was
+    /// open in it, itself if it is watched, and has preempted what is open below it.
     pub(super) fn returned(&mut self, exception: u16, now: u64, count: u64, cycles: u64, instructions: u64) {
         while let Some(open) = self.open.pop_if(|open| open.exception == exception) {
             self.calls.push(open.closed(now, count));

@@ -1,9 +1,11 @@
 //! AS5047P, a magnetic encoder with 14 bits a turn.
 //!
-//! Source: ams AS5047P datasheet, "SPI interface": frames of 16 bits, mode 1, at most 10 MHz, even parity; the answer to a command comes with the
-//! next frame. Registers: NOP, ERRFL, DIAAGC, MAG, ANGLEUNC, ANGLECOM; those of the one-time memory read as zero and cannot be written here.
+//! Source: ams AS5047P datasheet, "SPI interface": frames of 16 bits, mode 1, at most 10 MHz, even parity; the answer
+//! to a command comes with the next frame. Registers: NOP, ERRFL, DIAAGC, MAG, ANGLEUNC, ANGLECOM; those of the
+//! one-time memory read as zero and cannot be written here.
 //!
-//! Assumption: what a command reads is what holds when its frame ends. Dynamic compensation is ideal: ANGLECOM is the angle itself.
+//! Assumption: what a command reads is what holds when its frame ends. Dynamic compensation is ideal: ANGLECOM is the
+//! angle itself.
 
 use crate::chip::wiring::SpiFrame;
 

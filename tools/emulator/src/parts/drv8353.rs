@@ -1,11 +1,12 @@
 //! DRV8353S, a gate driver for three half bridges: its registers, its enable, its supply and its fault output.
 //!
-//! Source: TI SLVSDY6, "SPI" and "Register maps": frames of 16 bits, mode 1: bit 15 reads, bits 14 to 11 are the register, bits 10 to 0 the data; the
-//! register's content comes back in the same frame. From memory of that document, unconfirmed: values after reset (the firmware writes every register), both voltages of
-//! the supply, and that the registers are lost at the lower one.
+//! Source: TI SLVSDY6, "SPI" and "Register maps": frames of 16 bits, mode 1: bit 15 reads, bits 14 to 11 are the
+//! register, bits 10 to 0 the data; the register's content comes back in the same frame. From memory of that document,
+//! unconfirmed: values after reset (the firmware writes every register), both voltages of the supply, and that the
+//! registers are lost at the lower one.
 //!
-//! Faults are latched: they stay, and keep the outputs off, until they are cleared or the enable was low. One whose cause is still [present](Drv8353::set_present)
-//! comes back at once.
+//! Faults are latched: they stay, and keep the outputs off, until they are cleared or the enable was low. One whose
+//! cause is still [present](Drv8353::set_present) comes back at once.
 
 use crate::chip::time::Instant;
 use crate::chip::wiring::SpiFrame;
@@ -139,7 +140,8 @@ impl Drv8353 {
         [50e-9, 100e-9, 200e-9, 400e-9][usize::from(self.registers[5] >> 8 & 0b11)]
     }
 
-    /// Something went wrong in the bridge, and is over: bits of both fault status words. They stay until they are cleared, and pull nFAULT low.
+    /// Something went wrong in the bridge, and is over: bits of both fault status words. They stay until they are
+    /// cleared, and pull nFAULT low.
     pub fn fail(&mut self, status: [u16; 2]) {
         if status != [0; 2] {
             self.registers[0] |= status[0] & DATA | FAULT;

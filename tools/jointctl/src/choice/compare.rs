@@ -1,13 +1,14 @@
 //! The rule: the simpler model unless a richer one wins beyond the spread of the folds; host.
 //!
-//! Two models are compared fold by fold on the same left-out samples, by ln(error of one / error of the other): the mean over the folds
-//! is the relative change, and its standard error is the spread of the folds over the root of their number. One large motion does not
-//! drown small ones that way.
+//! Two models are compared fold by fold on the same left-out samples, by ln(error of one / error of the other): the
+//! mean over the folds is the relative change, and its standard error is the spread of the folds over the root of their
+//! number. One large motion does not drown small ones that way.
 
 /// A richer model must lower the error by at least this fraction beyond one standard error.
 pub const LEAST_WORTH: f64 = 0.002;
-/// One standard error of few folds: the quantile of Student's t distribution with one degree of freedom less than folds that the normal distribution reaches at
-/// one (0.8413), for two to eight folds. The spread of two folds is itself hardly known.
+/// One standard error of few folds: the quantile of Student's t distribution with one degree of freedom less than folds
+/// that the normal distribution reaches at one (0.8413), for two to eight folds. The spread of two folds is itself
+/// hardly known.
 const ONE_STANDARD_ERROR: [f64; 7] = [1.837, 1.321, 1.197, 1.142, 1.111, 1.091, 1.077];
 /// No left-out motion may become worse than with the simplest model by more than this fraction.
 pub const WORST_FOLD: f64 = 0.02;
@@ -57,8 +58,8 @@ pub fn compare(simple: &[f64], rich: &[f64]) -> Comparison {
     Comparison { mean, standard_error, worst: ratios.into_iter().fold(f64::NEG_INFINITY, f64::max) }
 }
 
-/// Models in the order of preference, from their errors in every fold and their numbers of parameters. The first is the simplest of
-/// those over which the best one does not win beyond one standard error; the others follow by their errors.
+/// Models in the order of preference, from their errors in every fold and their numbers of parameters. The first is the
+/// simplest of those over which the best one does not win beyond one standard error; the others follow by their errors.
 pub fn rank(errors: &[Vec<f64>], parameters: &[usize]) -> Vec<usize> {
     let mut by_size: Vec<usize> = (0..errors.len()).collect();
     by_size.sort_by_key(|&i| parameters[i]);

@@ -12,8 +12,8 @@ pub const LEAST_FITTED: usize = 200;
 pub struct Folds {
     /// The groupings that the folds are of, in words.
     pub grouping: String,
-    /// True where the folds leave out motions; false where they are blocks of time of one motion, which say nothing about other
-    /// motions.
+    /// True where the folds leave out motions; false where they are blocks of time of one motion, which say nothing
+    /// about other motions.
     pub motions: bool,
     /// Number of the grouping that each fold is of, from 0.
     pub groupings: Vec<usize>,
@@ -39,8 +39,9 @@ impl Folds {
         self.left_out[sample] >> fold & 1 == 1
     }
 
-    /// Adds the folds of one grouping: `group` is the fold of each sample that is used, below `names.len()`. Folds that would judge or leave
-    /// too few samples are not added, and none beyond [`MOST_FOLDS`]. Returns how many were added.
+    /// Adds the folds of one grouping: `group` is the fold of each sample that is used, below `names.len()`. Folds that
+    /// would judge or leave too few samples are not added, and none beyond [`MOST_FOLDS`]. Returns how many were
+    /// added.
     pub(super) fn add(&mut self, names: Vec<String>, group: &[Option<usize>]) -> usize {
         self.left_out.resize(group.len(), 0);
         let mut sizes = vec![0; names.len()];

@@ -1,10 +1,13 @@
-//! Finding the motions of a recording: conditions, runs, clusters of speed, or, where there is one motion alone, blocks of time; host.
+//! Finding the motions of a recording: conditions, runs, clusters of speed, or, where there is one motion alone, blocks
+//! of time; host.
 //!
 //! 1. The columns that the description names (`choice.group_by`), and nothing else.
-//! 2. Columns of the table of runs whose values several runs share (trajectory, load, gain, session): the two whose groups visit most states
-//!    that no other group visits. A column that numbers repetitions visits none and is no condition.
+//! 2. Columns of the table of runs whose values several runs share (trajectory, load, gain, session): the two whose
+//!    groups visit most states that no other group visits. A column that numbers repetitions visits none and is no
+//!    condition.
 //! 3. Runs, where there are three or more; similar ones together where there are more than folds.
-//! 4. Strokes between two reversals, by their peak speed in four clusters; beside them the two runs, or the four quarters of a single one.
+//! 4. Strokes between two reversals, by their peak speed in four clusters; beside them the two runs, or the four
+//!    quarters of a single one.
 //! 5. Blocks of time, where all strokes are alike.
 
 use super::folds::{Folds, MOST_FOLDS};
@@ -50,8 +53,8 @@ struct Groups {
     of: Vec<Option<usize>>,
 }
 
-/// The folds of a recording. `labels` are the columns of the table of runs and those that `group_by` names. Only training and validation
-/// samples are looked at.
+/// The folds of a recording. `labels` are the columns of the table of runs and those that `group_by` names. Only
+/// training and validation samples are looked at.
 pub fn find(
     samples: &Samples,
     recordings: &[Recording],

@@ -5,8 +5,8 @@
 //! - [`mod@compare`] is the rule: the simpler model unless a richer one wins beyond the spread of the folds;
 //! - [`overrule`] holds decisions that a person makes instead.
 //!
-//! The physical terms (`identify::selection`), the physical models and the network with its inputs (`fit`) are chosen by the
-//! same rule over the same folds.
+//! The physical terms (`identify::selection`), the physical models and the network with its inputs (`fit`) are chosen
+//! by the same rule over the same folds.
 
 pub mod compare;
 pub mod folds;

@@ -21,8 +21,8 @@ const WITHOUT_ID: u32 = 1_000;
 /// Arguments of `sim` that put the joint on a bus.
 #[derive(Debug, Args)]
 pub struct OnBus {
-    /// Be a node on this bus instead of running scenarios, until Ctrl-C: socketcan:can0, slcan:/dev/ttyACM0, slcan:tcp://host:port,
-    /// slcan:listen://host:port, udp:239.74.163.2:43113
+    /// Be a node on this bus instead of running scenarios, until Ctrl-C: socketcan:can0, slcan:/dev/ttyACM0,
+    /// slcan:tcp://host:port, slcan:listen://host:port, udp:239.74.163.2:43113
     #[arg(long, value_name = "BUS")]
     bus: Option<String>,
     /// Node id on the bus, 1 to 127, or 255 for one that LSS has to give; repeatable, a joint each
@@ -31,8 +31,8 @@ pub struct OnBus {
     /// Serial number of the first joint, the others count up [default: the node id; without one, 1000 and up]
     #[arg(long, value_name = "N", requires = "bus")]
     serial: Option<u32>,
-    /// Keep what the joints store in this folder, one below it for each serial number, and what an emulated board's program stores in a file for the board;
-    /// without it they forget everything when they leave
+    /// Keep what the joints store in this folder, one below it for each serial number, and what an emulated board's
+    /// program stores in a file for the board; without it they forget everything when they leave
     #[arg(long, value_name = "DIR", requires = "bus")]
     storage: Option<PathBuf>,
     /// Leave the bus after this time, s

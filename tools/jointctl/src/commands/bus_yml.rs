@@ -16,8 +16,8 @@ use std::time::{SystemTime, UNIX_EPOCH};
 /// Arguments of `bus-yml`.
 #[derive(Debug, Args)]
 pub struct BusYml {
-    /// The bus to scan: an entry for every joint that answers, with its identity and serial number. The master then insists on
-    /// them: a joint that is replaced needs the file anew
+    /// The bus to scan: an entry for every joint that answers, with its identity and serial number. The master then
+    /// insists on them: a joint that is replaced needs the file anew
     #[arg(long, value_name = "BUS", required_unless_present = "node")]
     bus: Option<String>,
     /// Node id of a joint, 1 to 127; repeatable. With --bus only these [default: all]; without it, joints of any

@@ -37,10 +37,12 @@ pub struct Commission {
     /// Counts a turn of an incremental encoder: four times its lines [default: the joint's]
     #[arg(long, value_name = "C")]
     counts: Option<u32>,
-    /// Torque constant at the rotor, Nm/A of q current, by the data sheet [default: the joint's; a new one's by back-EMF]
+    /// Torque constant at the rotor, Nm/A of q current, by the data sheet [default: the joint's; a new one's by
+    /// back-EMF]
     #[arg(long, value_name = "K")]
     torque_constant: Option<f64>,
-    /// Rotor revolutions per revolution of the joint; negative where a positive rotor turns it backwards [default: the joint's]
+    /// Rotor revolutions per revolution of the joint; negative where a positive rotor turns it backwards [default: the
+    /// joint's]
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     gear: Option<f64>,
     /// The joint's present position, rad [default: as before; 0 on a new joint]
@@ -52,13 +54,15 @@ pub struct Commission {
     /// At the end the joint holds a load of this torque, Nm, to check the torque constant by
     #[arg(long, value_name = "NM", allow_negative_numbers = true)]
     load: Option<f64>,
-    /// At the end the joint swings this inertia, kg m^2 at the joint with the rotor's, to check the torque constant by; balanced, no load
+    /// At the end the joint swings this inertia, kg m^2 at the joint with the rotor's, to check the torque constant
+    /// by; balanced, no load
     #[arg(long, value_name = "KG_M2")]
     inertia: Option<f64>,
     /// Do not turn the motor with the new configuration at the end
     #[arg(long)]
     no_turn: bool,
-    /// Only find the index of an incremental encoder, with the constants that the joint has stored: after each power-up
+    /// Only find the index of an incremental encoder, with the constants that the joint has stored: after each
+    /// power-up
     #[arg(long)]
     index_only: bool,
     /// Ask nothing: the joint is free to turn

@@ -1,4 +1,5 @@
-//! `jointctl demo`: the whole round on a virtual joint that nobody has to own: excite, record, fit, and move with the image.
+//! `jointctl demo`: the whole round on a virtual joint that nobody has to own: excite, record, fit, and move with the
+//! image.
 
 use super::CommandError;
 use super::fit::{Choices, FILES, print_summary, write};

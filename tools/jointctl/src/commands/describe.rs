@@ -20,7 +20,8 @@ pub struct Eds {
     /// Permission to replace.
     #[command(flatten)]
     force: Force,
-    /// The bus of a joint whose identity (1018h) the file is to have: a master then takes no other [default: any joint]
+    /// The bus of a joint whose identity (1018h) the file is to have: a master then takes no other [default: any
+    /// joint]
     #[arg(long, value_name = "BUS", requires = "node")]
     bus: Option<String>,
     /// Node id of that joint, 1 to 127

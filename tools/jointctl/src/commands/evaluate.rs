@@ -30,8 +30,8 @@ pub struct Evaluate {
     image: PathBuf,
     /// Description of the data set
     dataset: PathBuf,
-    /// Table of the prepared samples with their part and every model's prediction, for other programs (docs/baselines.md);
-    /// FILE.gz is compressed
+    /// Table of the prepared samples with their part and every model's prediction, for other programs
+    /// (docs/baselines.md); FILE.gz is compressed
     #[arg(long, value_name = "FILE")]
     export: Option<PathBuf>,
     /// Permission to replace.

@@ -2,8 +2,8 @@
 
 use clap::Command;
 
-/// What a command is called below `jointctl`, and lines as one types them. `JOINTCTL_BUS` and `JOINTCTL_NODE` stand for `--bus` and
-/// `--node`.
+/// What a command is called below `jointctl`, and lines as one types them. `JOINTCTL_BUS` and `JOINTCTL_NODE` stand for
+/// `--bus` and `--node`.
 const EXAMPLES: [(&str, &[&str]); 38] = [
     ("demo", &["jointctl demo", "jointctl demo --seed 7 --out demo-7"]),
     ("fit", &["jointctl fit elbow.toml", "jointctl fit elbow.toml --all"]),

@@ -27,8 +27,8 @@ pub struct Fit {
     /// Permission to replace.
     #[command(flatten)]
     force: Force,
-    /// Table of the prepared samples with their part and every model's prediction, for other programs (docs/baselines.md);
-    /// FILE.gz is compressed
+    /// Table of the prepared samples with their part and every model's prediction, for other programs
+    /// (docs/baselines.md); FILE.gz is compressed
     #[arg(long, value_name = "FILE")]
     export: Option<PathBuf>,
     /// Choices of the fit.
@@ -78,8 +78,8 @@ pub enum InputChoice {
 /// Choices that `fit` and `demo` share.
 #[derive(Debug, Args)]
 pub struct Choices {
-    /// Physical model: coulomb-viscous, linear, stribeck, nscf, hysteresis, hysteresis-harmonics, full; repeatable, the
-    /// simplest that no other beats on motions that were left out is used [default: coulomb-viscous and full]
+    /// Physical model: coulomb-viscous, linear, stribeck, nscf, hysteresis, hysteresis-harmonics, full; repeatable,
+    /// the simplest that no other beats on motions that were left out is used [default: coulomb-viscous and full]
     #[arg(long, value_name = "NAME")]
     preset: Vec<Preset>,
     /// Fit every physical model and rank them
@@ -109,8 +109,8 @@ pub struct Choices {
     /// Train on mirrored samples too: for a joint without preferred direction
     #[arg(long)]
     mirror: bool,
-    /// Inputs of the network [default: velocity, and what pays of position, load where there is gravity, temperature where it
-    /// varies by 10 K]
+    /// Inputs of the network [default: velocity, and what pays of position, load where there is gravity, temperature
+    /// where it varies by 10 K]
     #[arg(long, value_enum, value_delimiter = ',')]
     inputs: Vec<InputChoice>,
     /// Regimes with a network each; up to two
@@ -119,7 +119,8 @@ pub struct Choices {
     /// Who decides about the network: the error on motions that were left out, or you
     #[arg(long, value_enum, default_value_t)]
     network: Decision,
-    /// Who decides about lagged accelerations beside the rigid body, for an elastic joint: the error on motions that were left out, or you
+    /// Who decides about lagged accelerations beside the rigid body, for an elastic joint: the error on motions that
+    /// were left out, or you
     #[arg(long = "lagged-accelerations", value_enum, default_value_t)]
     lags: Decision,
     /// Terms of the full model that are forced (+) or forbidden (-), as in +Stribeck,-Hysteresis

@@ -25,7 +25,8 @@ pub enum ImageCommand {
         #[arg(long)]
         json: bool,
     },
-    /// Check an image as a joint does before it uses one: checksum, fields, certificate, golden vectors; with a key, the tag
+    /// Check an image as a joint does before it uses one: checksum, fields, certificate, golden vectors; with a key,
+    /// the tag
     Verify {
         /// Image, binary, signed or TOML
         image: PathBuf,

@@ -18,8 +18,8 @@ pub enum KeyCommand {
         /// File to write; an existing one is never overwritten
         file: PathBuf,
     },
-    /// Give a key to a joint that has none. Somebody has to be at it: press its button meanwhile, or where it has none do
-    /// it within a minute after its supply came, before a master starts it
+    /// Give a key to a joint that has none. Somebody has to be at it: press its button meanwhile, or where it has none
+    /// do it within a minute after its supply came, before a master starts it
     Give {
         /// The key
         file: PathBuf,

@@ -122,7 +122,8 @@ impl Get {
 /// Arguments of `set`.
 #[derive(Debug, Args)]
 pub struct Set {
-    /// Names or indices, each with its value in the unit of docs/objects.md; settings that depend on each other together
+    /// Names or indices, each with its value in the unit of docs/objects.md; settings that depend on each other
+    /// together
     #[arg(value_name = "NAME|INDEX[:SUB] VALUE", num_args = 2.., required = true, allow_negative_numbers = true)]
     objects: Vec<String>,
     /// Which joint.

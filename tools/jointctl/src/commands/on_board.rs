@@ -10,15 +10,15 @@ use std::sync::atomic::AtomicBool;
 #[derive(Debug, Args)]
 #[cfg_attr(not(feature = "emulator"), allow(dead_code, reason = "the emulator alone reads it"))]
 pub struct OnBoard {
-    /// Run this program of a board, as probe-rs would flash it, on an emulated board instead of a virtual joint; its log goes to the terminal. Without
-    /// --storage what it stores is forgotten when it ends
+    /// Run this program of a board, as probe-rs would flash it, on an emulated board instead of a virtual joint; its
+    /// log goes to the terminal. Without --storage what it stores is forgotten when it ends
     #[arg(long, value_name = "ELF", requires_all = ["bus", "board"], conflicts_with_all = ["node", "serial", "image", "config"])]
     elf: Option<PathBuf>,
     /// The board that the program is for
     #[arg(long, value_name = "BOARD", value_enum, requires = "elf")]
     board: Option<Board>,
-    /// What somebody does to the board, a command a line, from this file, or from the terminal with "-"; "help" lists the commands. Each is answered
-    /// in one line
+    /// What somebody does to the board, a command a line, from this file, or from the terminal with "-"; "help" lists
+    /// the commands. Each is answered in one line
     #[arg(long, value_name = "FILE", requires = "elf")]
     commands: Option<PathBuf>,
 }
@@ -50,8 +50,8 @@ impl OnBoard {
         self.elf.is_some()
     }
 
-    /// Runs the program on the bus until `stop`, with its parameters in a folder where one is named. Time that the machine was too slow
-    /// for, s.
+    /// Runs the program on the bus until `stop`, with its parameters in a folder where one is named. Time that the
+    /// machine was too slow for, s.
     ///
     /// # Errors
     /// The program, the commands, the storage or the bus cannot be read or opened; this `jointctl` has no emulator.

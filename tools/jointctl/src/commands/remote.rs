@@ -68,7 +68,8 @@ impl Where {
 
 static STOP: AtomicBool = AtomicBool::new(false);
 
-/// From now on Ctrl-C and termination do not kill the program: [`running`] tells of them, and the joint is disabled first.
+/// From now on Ctrl-C and termination do not kill the program: [`running`] tells of them, and the joint is disabled
+/// first.
 pub fn catch_interrupts() -> Result<(), CommandError> {
     let caught = ctrlc::set_handler(|| STOP.store(true, Ordering::Relaxed));
     caught.map_err(|error| CommandError::Arguments(format!("Ctrl-C cannot be caught: {error}")))

@@ -1,12 +1,13 @@
 //! Pole pairs, direction, electrical zero, lag and flux linkage, from sweeps.
 //!
-//! Friction makes the rotor lag behind the field, and its back-EMF makes the current lag behind the voltage, one way there and the other
-//! way back: in the mean of both it drops out, and half the difference is the lag. Cogging repeats with the electrical turn and drops out of
-//! the mean over whole turns; an encoder that sits eccentrically repeats with the rotor's turn, which is why a whole one is swept where the joint
-//! is free to.
+//! Friction makes the rotor lag behind the field, and its back-EMF makes the current lag behind the voltage, one way
+//! there and the other way back: in the mean of both it drops out, and half the difference is the lag. Cogging repeats
+//! with the electrical turn and drops out of the mean over whole turns; an encoder that sits eccentrically repeats with
+//! the rotor's turn, which is why a whole one is swept where the joint is free to.
 //!
-//! The back-EMF E = v - R i - j w L i lies a quarter of a turn ahead of the magnet, and its magnitude is w psi: so a sweep shows the flux linkage as
-//! well, and with it the torque constant 3/2 p psi (D. W. Novotny, T. A. Lipo, "Vector Control and Dynamics of AC Drives", 1996, ch. 2).
+//! The back-EMF E = v - R i - j w L i lies a quarter of a turn ahead of the magnet, and its magnitude is w psi: so a
+//! sweep shows the flux linkage as well, and with it the torque constant 3/2 p psi (D. W. Novotny, T. A. Lipo, "Vector
+//! Control and Dynamics of AC Drives", 1996, ch. 2).
 
 use super::bench::Bench;
 use super::drive::Drive;
@@ -21,8 +22,8 @@ use std::f64::consts::TAU;
 pub(super) const MOST_POLE_PAIRS: u32 = 64;
 /// Largest lag, electrical turns: beyond 60 degrees the rotor is about to slip.
 const LARGEST_LAG: f64 = 1.0 / 6.0;
-/// Part of the current with which the zero is looked for again. Where the rotor lies beside the field, it differs then by 10 to 30 degrees unless
-/// psi is less than a quarter of (L_q - L_d) I.
+/// Part of the current with which the zero is looked for again. Where the rotor lies beside the field, it differs then
+/// by 10 to 30 degrees unless psi is less than a quarter of (L_q - L_d) I.
 const LESS_CURRENT: f64 = 0.6;
 /// Largest difference of the zeros, electrical turns: 8 degrees, which cost 1 % of the torque.
 const LARGEST_DIFFERENCE: f64 = 8.0 / 360.0;
@@ -49,12 +50,13 @@ pub struct Alignment {
     pub ratio: f64,
     /// The encoder counts down while the field turns forward.
     pub reversed: bool,
-    /// What `direction * pole pairs * encoder` reads where the d axis lies on phase A, electrical turns, 0 to 1. Its error is the scatter of
-    /// the electrical turns, with what an eccentric encoder adds.
+    /// What `direction * pole pairs * encoder` reads where the d axis lies on phase A, electrical turns, 0 to 1. Its
+    /// error is the scatter of the electrical turns, with what an eccentric encoder adds.
     pub zero: Estimate,
     /// How far the rotor lagged behind the field, electrical turns.
     pub lag: f64,
-    /// Flux linkage of the magnet, peak, Vs. Its error is no standard error: it is what may be hidden by what the legs lose, see `hidden`.
+    /// Flux linkage of the magnet, peak, Vs. Its error is no standard error: it is what may be hidden by what the legs
+    /// lose, see `hidden`.
     pub flux: Estimate,
     /// By how much the zero differs with less current, electrical turns.
     pub difference: f64,
@@ -108,8 +110,8 @@ pub(super) fn first<B: Bench>(drive: &mut Drive<'_, B>, known: &Known<'_>) -> Re
     Ok(First { ratio, speed: speed.min(by_samples).max(SPEEDS[0]) })
 }
 
-/// Speed of the field, electrical turns/s, at which the back-EMF of a flux linkage, Vs, takes little of the voltage that drives a current, A, and
-/// the rotor is no faster than so many rad/s.
+/// Speed of the field, electrical turns/s, at which the back-EMF of a flux linkage, Vs, takes little of the voltage
+/// that drives a current, A, and the rotor is no faster than so many rad/s.
 pub(super) fn speed(resistance: &Resistance, current: f64, flux: f64, pole_pairs: f64, rotor: f64) -> f64 {
     let by_emf = EMF * resistance.resistance.value * current / (TAU * flux.max(1e-6));
     by_emf.min(rotor / TAU * pole_pairs).clamp(SPEEDS[0], SPEEDS[1])
@@ -220,10 +222,11 @@ fn mean_angle(zeros: &[(f64, f64)]) -> f64 {
     reference + zeros.iter().map(|(zero, _)| wrapped(zero - reference)).sum::<f64>() / zeros.len() as f64
 }
 
-/// Back-EMF, V, that may be hidden by what a leg loses, V by the line of the resistance. Near zero current a board makes up for its dead time in part only, and (inferred) a
-/// turning current crosses zero late: that has the speed's sign, as the back-EMF has, so the mean of both ways keeps it. With a sixteenth of the dead time it does not show.
-/// In volts it hardly depends on the motor: on 20 random ones the back-EMF was -3 to +31 mV off on the emulated B-G431B-ESC1, whose legs lose 26 mV, and -19 to
-/// +3 mV on the moteus r4, with up to 5 mV.
+/// Back-EMF, V, that may be hidden by what a leg loses, V by the line of the resistance. Near zero current a board
+/// makes up for its dead time in part only, and (inferred) a turning current crosses zero late: that has the speed's
+/// sign, as the back-EMF has, so the mean of both ways keeps it. With a sixteenth of the dead time it does not show. In
+/// volts it hardly depends on the motor: on 20 random ones the back-EMF was -3 to +31 mV off on the emulated
+/// B-G431B-ESC1, whose legs lose 26 mV, and -19 to +3 mV on the moteus r4, with up to 5 mV.
 fn hidden(lost: f64) -> f64 {
     0.8 * lost + 0.022
 }

@@ -30,7 +30,8 @@ impl Estimate {
     }
 }
 
-/// Slope and intercept of the straight line through points (x, y) by least squares, with standard errors by what is left.
+/// Slope and intercept of the straight line through points (x, y) by least squares, with standard errors by what is
+/// left.
 pub fn line(points: &[(f64, f64)]) -> (Estimate, Estimate) {
     let count = points.len() as f64;
     let mean = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / count;

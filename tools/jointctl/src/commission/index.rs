@@ -1,4 +1,5 @@
-//! The index of an incremental encoder: the field turns the rotor until it is met, one way, and where it is not met, the other.
+//! The index of an incremental encoder: the field turns the rotor until it is met, one way, and where it is not met,
+//! the other.
 
 use super::alignment::MOST_POLE_PAIRS;
 use super::bench::{Bench, Frame};
@@ -20,8 +21,8 @@ pub struct Index {
     pub back: bool,
 }
 
-/// Turns the rotor until the index is met, with a voltage, V, at a speed, electrical turns/s; `ratio`: electrical turns in a mechanical one,
-/// about. At most `travel` mechanical turns to each side.
+/// Turns the rotor until the index is met, with a voltage, V, at a speed, electrical turns/s; `ratio`: electrical turns
+/// in a mechanical one, about. At most `travel` mechanical turns to each side.
 pub(super) fn find<B: Bench>(
     drive: &mut Drive<'_, B>,
     voltage: f64,

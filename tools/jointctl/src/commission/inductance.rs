@@ -1,9 +1,11 @@
-//! Inductances: the winding's answer to a voltage that alternates with an eighth of the control rate, along the magnet and across it.
+//! Inductances: the winding's answer to a voltage that alternates with an eighth of the control rate, along the magnet
+//! and across it.
 //!
-//! It alternates on top of the voltage that holds the rotor, so that no phase current crosses zero and dead time changes nothing. A voltage that is
-//! held for a period T makes the winding a filter of first order, i(z) / v(z) = (1 - a) / R / (z - a) with a = exp(-R T / L)
-//! (G. F. Franklin, J. D. Powell, M. Workman, "Digital Control of Dynamic Systems", 1998, sec. 4.3: zero-order hold).
-//! With m its measured gain at the angle theta = 2 pi / 8 a step, g = (m R)^2 and u = 1 - a:
+//! It alternates on top of the voltage that holds the rotor, so that no phase current crosses zero and dead time
+//! changes nothing. A voltage that is held for a period T makes the winding a filter of first order, i(z) / v(z) = (1 -
+//! a) / R / (z - a) with a = exp(-R T / L) (G. F. Franklin, J. D. Powell, M. Workman, "Digital Control of Dynamic
+//! Systems", 1998, sec. 4.3: zero-order hold). With m its measured gain at the angle theta = 2 pi / 8 a step, g = (m
+//! R)^2 and u = 1 - a:
 //!
 //! ```text
 //! u^2 = k (1 - u),   k = 2 g (1 - cos theta) / (1 - g),   L = -R T / ln(1 - u)
@@ -17,7 +19,8 @@ use super::estimate::Estimate;
 use super::failure::Failure;
 use super::resistance::{Resistance, rest};
 
-/// Amplitude of the current at which the voltage's stops rising, and the least to measure by, as parts of the holding current.
+/// Amplitude of the current at which the voltage's stops rising, and the least to measure by, as parts of the holding
+/// current.
 const AMPLITUDE: f64 = 0.2;
 const LEAST_AMPLITUDE: f64 = 0.02;
 /// Least impedance in parts of the resistance: below, the inductance's share is too small to tell.

@@ -1,4 +1,5 @@
-//! The torque constant against an inertia that is known: the joint swings to and fro, and its torque tells what it speeds up.
+//! The torque constant against an inertia that is known: the joint swings to and fro, and its torque tells what it
+//! speeds up.
 //!
 //! Work is change of kinetic energy plus what friction takes, over a way and without a clock, which a bus would blur:
 //!
@@ -6,7 +7,8 @@
 //! mean T = J (v2^2 - v1^2) / (2 dq) + friction
 //! ```
 //!
-//! In each direction the slope of the straight line through torque over acceleration is the inertia; friction stays in the intercept.
+//! In each direction the slope of the straight line through torque over acceleration is the inertia; friction stays in
+//! the intercept.
 
 use super::bench::{Bench, Motion};
 use super::estimate::{Estimate, line};

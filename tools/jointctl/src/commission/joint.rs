@@ -14,13 +14,15 @@ const STATE: f64 = 1.0;
 const LOOK: f64 = 0.002;
 /// Longest time that braking may take, s: the longest of a configuration.
 const BRAKING: f64 = 11.0;
-/// How often storing is asked for, and how long it is waited between, s: a board with one bank of flash writes at rest only.
+/// How often storing is asked for, and how long it is waited between, s: a board with one bank of flash writes at rest
+/// only.
 const STORES: usize = 20;
 const REST: f64 = 0.1;
 /// How often a joint is asked whether it has started, and how long it is waited before, s.
 const STARTS: usize = 5;
 const START: f64 = 0.2;
-/// How often a configuration is offered to a control step that has not taken the one before, and how long that is waited for, s.
+/// How often a configuration is offered to a control step that has not taken the one before, and how long that is
+/// waited for, s.
 const OFFERS: usize = 20;
 const TAKEN: f64 = 0.05;
 /// Object 2100h:1 and 2.
@@ -184,7 +186,8 @@ impl<O: Objects> Joint<O> {
         Err(Stopped::Joint("its control step does not take a configuration".into()))
     }
 
-    /// The setting that was refused, and what would be possible; where the joint does not say, the words of the refusal.
+    /// The setting that was refused, and what would be possible; where the joint does not say, the words of the
+    /// refusal.
     fn explained(&mut self, words: String) -> Stopped {
         let mut details = || -> Result<Option<String>, Stopped> {
             let code = self.raw(Field::Configuration(ConfigurationField::RefusedSetting))?;
@@ -255,7 +258,8 @@ impl<O: Objects> Bench for Joint<O> {
 
     fn off(&mut self) -> Result<(), Stopped> {
         self.told = Told::Nothing;
-        // One frame without an answer: outside of OPERATIONAL no set-point counts, and the open loop ends in the same control step.
+        // One frame without an answer: outside of OPERATIONAL no set-point counts, and the open loop ends in the same
+        // control step.
         self.objects.network(Command::EnterPreOperational)?;
         let mut waited = 0.0;
         loop {

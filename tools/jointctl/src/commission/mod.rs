@@ -1,17 +1,18 @@
 //! Commissioning: from a board that knows nothing of its motor to a motor that turns.
 //!
-//! The joint only applies voltages and samples currents ([`mod@bench`]); everything is computed here, without I/O and without a clock. In this order:
+//! The joint only applies voltages and samples currents ([`mod@bench`]); everything is computed here, without I/O and
+//! without a clock. In this order:
 //!
 //!  - `checks`: state, supply, temperatures, limits; nothing flows
 //!  - [`resistance`]: the slope of voltage over current, at several currents; the rotor turns into line
 //!  - [`inductance`]: the answer to an alternating voltage, along the magnet and across it
-//!  - [`alignment`]: a first short sweep, then a turn of the rotor there and back, then with less current: pole pairs, direction, electrical zero, flux
-//!    linkage; before the second the [`index`] of an incremental encoder
+//!  - [`alignment`]: a first short sweep, then a turn of the rotor there and back, then with less current: pole pairs,
+//!    direction, electrical zero, flux linkage; before the second the [`index`] of an incremental encoder
 //!  - `settings`: what the joint gets of it; position zero
 //!  - [`turning`]: the motor turns with it; [`load`], [`inertia`]: the torque constant against a known load, or inertia
 //!
-//! [`commission`] leads through them, [`joint`] is the joint on a bus by its objects, [`page`] what is written. The bridge is off before every
-//! question, and after every error.
+//! [`commission`] leads through them, [`joint`] is the joint on a bus by its objects, [`page`] what is written. The
+//! bridge is off before every question, and after every error.
 
 pub mod alignment;
 pub mod bench;
@@ -205,8 +206,8 @@ pub fn commission<B: Bench>(bench: &mut B, plan: &Plan, guide: &mut impl Guide) 
     Ok(found)
 }
 
-/// Finds the index of a joint's incremental encoder with the constants that it has stored; how far the rotor turned for it, none where it
-/// needs or has it.
+/// Finds the index of a joint's incremental encoder with the constants that it has stored; how far the rotor turned for
+/// it, none where it needs or has it.
 ///
 /// # Errors
 /// [`Failure`]; the bridge is off.

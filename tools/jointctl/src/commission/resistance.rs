@@ -1,8 +1,9 @@
 //! Resistance: the slope of voltage over current at several currents along phase A.
 //!
-//! Dead time and transistors take a voltage that does not depend on the current once every phase current is beyond the range where
-//! dead-time compensation fades; it is the intercept of the straight line and drops out of its slope. The current is first brought to its highest, which
-//! turns the rotor into line with phase A, where no back-EMF can arise; the levels are measured downwards from there.
+//! Dead time and transistors take a voltage that does not depend on the current once every phase current is beyond the
+//! range where dead-time compensation fades; it is the intercept of the straight line and drops out of its slope. The
+//! current is first brought to its highest, which turns the rotor into line with phase A, where no back-EMF can arise;
+//! the levels are measured downwards from there.
 
 use super::bench::{Bench, Frame, Window};
 use super::drive::Drive;
@@ -26,12 +27,14 @@ const LARGEST_ERROR: f64 = 0.05;
 /// Largest current across the field at rest, as a part of the one along it; an open phase B or C has 1/sqrt(3).
 const LARGEST_ASIDE: f64 = 0.1;
 const OPEN_PHASE: [f64; 2] = [0.45, 0.70];
-/// The rotor is at rest when its encoder has moved by less than this between two looks, mechanical turns: more than a count of 1,000.
+/// The rotor is at rest when its encoder has moved by less than this between two looks, mechanical turns: more than a
+/// count of 1,000.
 const REST: f64 = 0.0011;
 /// Between two looks at the rotor, and the longest time that it may take to come to rest, s.
 const LOOK: f64 = 0.025;
 const LONGEST: f64 = 4.0;
-/// Along phase A the whole current flows through A and half of it through B and through C: what is lost there over what one leg loses.
+/// Along phase A the whole current flows through A and half of it through B and through C: what is lost there over what
+/// one leg loses.
 const ALONG_A: f64 = 4.0 / 3.0;
 
 /// What the winding is along phase A.
@@ -202,7 +205,8 @@ fn aside(along: f64, across: f64) -> Result<(), Failure> {
         return Ok(());
     }
     Err(if (OPEN_PHASE[0]..=OPEN_PHASE[1]).contains(&ratio.abs()) {
-        // Without B the current of A comes back through C, whose direction lies to the negative side: beta = -i_c / sqrt(3).
+        // Without B the current of A comes back through C, whose direction lies to the negative side: beta = -i_c /
+        // sqrt(3).
         Failure::PhaseOpen { phase: if ratio > 0.0 { 'B' } else { 'C' }, ratio }
     } else {
         Failure::CurrentAside { ratio, limit: LARGEST_ASIDE }

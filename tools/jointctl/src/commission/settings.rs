@@ -14,8 +14,9 @@ pub(super) const ROTOR_SPEED: f64 = 150.0;
 const BACK_EMF: f64 = 0.35;
 /// Largest velocity limit of a configuration, rad/s.
 const FASTEST: f64 = 200.0;
-/// Part of the torque limit with which a new joint answers an error of one turn of the rotor per second, how fast it integrates it, 1/s, and how fast it
-/// answers an error of its position, 1/s. Its inertia is not known: these are soft, and to be tuned.
+/// Part of the torque limit with which a new joint answers an error of one turn of the rotor per second, how fast it
+/// integrates it, 1/s, and how fast it answers an error of its position, 1/s. Its inertia is not known: these are soft,
+/// and to be tuned.
 const DAMPING: f64 = 0.05;
 const INTEGRATION: f64 = 20.0;
 const STIFFNESS: f64 = 10.0;
@@ -39,7 +40,8 @@ pub(super) fn is_new<B: Bench>(bench: &mut B) -> Result<bool, Stopped> {
     Ok(true)
 }
 
-/// The torque constant that the joint gets: the user's; a new joint without one, the one by back-EMF; otherwise none, the joint keeps its own.
+/// The torque constant that the joint gets: the user's; a new joint without one, the one by back-EMF; otherwise none,
+/// the joint keeps its own.
 pub(super) fn torque_constant(plan: &Plan, found: &Found) -> Option<f64> {
     let measured = || found.alignment.torque_constant().value.clamp(0.001, 5.0);
     plan.torque_constant.or_else(|| torque_constant_is_measured(plan, found.new).then(measured))

@@ -1,7 +1,8 @@
 //! A sweep: the field turns there and back, and takes the rotor along.
 //!
-//! Field and encoder are sampled at the same instants. The half turn before and after what is evaluated is for the rotor to catch up with the
-//! field. Means are taken over the field's angle, so that it does not matter how evenly a bus delivers samples.
+//! Field and encoder are sampled at the same instants. The half turn before and after what is evaluated is for the
+//! rotor to catch up with the field. Means are taken over the field's angle, so that it does not matter how evenly a
+//! bus delivers samples.
 
 use super::bench::{Bench, Frame, Window};
 use super::drive::Drive;
@@ -126,14 +127,16 @@ impl Sweep {
         [CATCH_UP, CATCH_UP + f64::from(self.turns)]
     }
 
-    /// Mechanical turns of the rotor while the field turns forward, there, and the same of the way back: equal where it came back as it went.
+    /// Mechanical turns of the rotor while the field turns forward, there, and the same of the way back: equal where it
+    /// came back as it went.
     pub fn turned(&self) -> [f64; 2] {
         let [from, to] = self.ends();
         let by = |way: &Way| way.encoder_at(to) - way.encoder_at(from);
         [by(&self.forward), by(&self.backward)]
     }
 
-    /// Means of the encoder, mechanical turns, over the electrical turns between two places of the field, there and back.
+    /// Means of the encoder, mechanical turns, over the electrical turns between two places of the field, there and
+    /// back.
     pub fn means(&self, from: f64, to: f64) -> [f64; 2] {
         [self.forward.mean(from, to), self.backward.mean(from, to)]
     }

@@ -5,10 +5,12 @@ use super::failure::Failure;
 use joint_firmware::objects::settings::Setting;
 use std::f64::consts::TAU;
 
-/// Turns of the rotor per second, and how far it may go to each side, rotor turns; less where the joint's limits are narrower.
+/// Turns of the rotor per second, and how far it may go to each side, rotor turns; less where the joint's limits are
+/// narrower.
 const SPEED: f64 = 1.0;
 const WAY: f64 = 0.5;
-/// Part of the way to the nearest position limit that is used, which the ramps add half of it to, and of the velocity limit.
+/// Part of the way to the nearest position limit that is used, which the ramps add half of it to, and of the velocity
+/// limit.
 const PART: f64 = 0.4;
 /// Between two set-points, s.
 const PERIOD: f64 = 0.01;
@@ -109,7 +111,8 @@ fn there_and_back<B: Bench>(bench: &mut B, wanted: f64, way: f64, acceleration: 
     Ok(Turned { wanted, velocity, samples })
 }
 
-/// Down by a ramp of some seconds before the joint is told to stop: what brakes for longer than its command deadline has a fault.
+/// Down by a ramp of some seconds before the joint is told to stop: what brakes for longer than its command deadline
+/// has a fault.
 pub(super) fn rest<B: Bench>(bench: &mut B, ramp: f64) -> Result<(), Failure> {
     let mut left = REST + ramp;
     while left > 0.0 {

@@ -3,7 +3,8 @@
 use super::condition_keys::{Condition, Value};
 use super::load::Table;
 
-/// For each row whether `condition` holds. The columns it names must have been loaded as the kinds that it compares with.
+/// For each row whether `condition` holds. The columns it names must have been loaded as the kinds that it compares
+/// with.
 pub fn holds(condition: &Condition, table: &Table) -> Vec<bool> {
     // Nothing is one of no values.
     let mut mask = vec![condition.one_of.as_ref().is_none_or(|list| !list.is_empty()); table.len()];

@@ -2,7 +2,8 @@
 //!
 //! A joint that was never seen before needs only such a file. Unknown keys are errors, so that a misspelt filter does
 //! not silently mean no filter. Every time is in seconds, every frequency in hertz; "unit" is the position's unit,
-//! rad or m. The keys of the signal treatment are in `treatment.rs`; what each value may be is checked in `validate.rs`.
+//! rad or m. The keys of the signal treatment are in `treatment.rs`; what each value may be is checked in
+//! `validate.rs`.
 
 use super::choice_keys::Choice;
 use super::condition_keys::{Condition, Value};
@@ -59,8 +60,8 @@ pub struct Description {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Source {
-    /// Folder of the files: relative to the description's own folder, absolute, or beginning with `$NAME`, `${NAME}` or
-    /// `${NAME:-default}`. Absent: the description's own folder.
+    /// Folder of the files: relative to the description's own folder, absolute, or beginning with `$NAME`, `${NAME}`
+    /// or `${NAME:-default}`. Absent: the description's own folder.
     pub root: Option<String>,
     /// CSV tables with one header line, plain or gzip, in this order.
     pub files: Vec<String>,
@@ -245,7 +246,8 @@ pub enum Gravity {
     SineAndCosine,
 }
 
-/// The rigid body that is identified beside the friction: effort = inertia a + gravity(q) + back-EMF v + offset + friction.
+/// The rigid body that is identified beside the friction: effort = inertia a + gravity(q) + back-EMF v + offset +
+/// friction.
 #[derive(Clone, Debug, Deserialize, PartialEq, Eq)]
 #[serde(deny_unknown_fields, default)]
 pub struct RigidDescription {

@@ -49,8 +49,8 @@ impl Lag {
 /// Residuals of one group of rows for every shift.
 type Profile = Vec<Normal>;
 
-/// The delay of the effort, or None where the rows do not suffice. `run` is the run as recorded for each sample, `period`
-/// the sampling period, s, `limit` the largest magnitude, s.
+/// The delay of the effort, or None where the rows do not suffice. `run` is the run as recorded for each sample,
+/// `period` the sampling period, s, `limit` the largest magnitude, s.
 pub fn identify(samples: &Samples, rigid: &RigidModel, run: &[u32], period: f64, limit: f64) -> Option<Lag> {
     let reach = (limit / period).ceil() as usize + 1;
     let inside = |&i: &usize| {

@@ -26,12 +26,13 @@ pub struct Recordings {
     pub table: Table,
     /// The runs, in order of first appearance.
     pub runs: Vec<Run>,
-    /// Text columns that may tell motions apart: all of the table of runs but the run's label, and those that `choice.group_by` names.
+    /// Text columns that may tell motions apart: all of the table of runs but the run's label, and those that
+    /// `choice.group_by` names.
     pub conditions: Vec<String>,
     /// Paths of the files, in the order listed.
     pub files: Vec<PathBuf>,
-    /// SHA-256 over the bytes of the description, of every file in the order listed and of the table of runs, one after
-    /// the other: what `cat description.toml files... runs.csv | sha256sum` prints.
+    /// SHA-256 over the bytes of the description, of every file in the order listed and of the table of runs, one
+    /// after the other: what `cat description.toml files... runs.csv | sha256sum` prints.
     pub sha256: [u8; 32],
 }
 

@@ -1,6 +1,7 @@
 //! What the values of a description may be; host.
 //!
-//! Everything that can be judged without the recordings is judged here, so that a mistake shows before a large file is read.
+//! Everything that can be judged without the recordings is judged here, so that a mistake shows before a large file is
+//! read.
 
 use super::condition_keys::{Condition, Value};
 use super::description::{Description, EffortUnit, Gravity, PositionUnit, Rule};

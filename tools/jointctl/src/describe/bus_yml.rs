@@ -1,10 +1,11 @@
 //! The configuration of a ros2_canopen master, bus.yml, for joints on a bus; host.
 //!
-//! Written by a few lines of its own: a YAML serializer writes no comments, and all values here are numbers and names that are
-//! made here. ros2_canopen reads it with yaml-cpp, dcfgen with PyYAML.
+//! Written by a few lines of its own: a YAML serializer writes no comments, and all values here are numbers and names
+//! that are made here. ros2_canopen reads it with yaml-cpp, dcfgen with PyYAML.
 //!
-//! The PDOs are not those of a joint that nobody has set up. There the controlword is part of two RPDOs: a master that writes it into
-//! one of them only sends 0 in the other, which switches the joint off. Here an object is part of one RPDO at most.
+//! The PDOs are not those of a joint that nobody has set up. There the controlword is part of two RPDOs: a master that
+//! writes it into one of them only sends 0 in the other, which switches the joint off. Here an object is part of one
+//! RPDO at most.
 
 use super::eds::Identity;
 use crate::remote::Entry;
@@ -12,8 +13,8 @@ use joint_firmware::canopen::PdoParameters;
 use joint_firmware::objects::default_communication;
 use std::fmt::Write;
 
-/// Shortest and longest period of a master, ms. Longer ones leave less than one missing set-point to the command deadline that a joint
-/// has at first, 100 ms.
+/// Shortest and longest period of a master, ms. Longer ones leave less than one missing set-point to the command
+/// deadline that a joint has at first, 100 ms.
 pub const PERIODS: (u16, u16) = (1, 50);
 /// Distance of the heartbeats of master and joints, ms.
 const HEARTBEAT: u16 = 100;

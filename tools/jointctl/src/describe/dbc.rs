@@ -1,7 +1,7 @@
 //! The frames of joints as a DBC file, for cantools, SavvyCAN and the like; host.
 //!
-//! PDOs are those that a joint has at first; whoever maps others needs another file. The impedance frame is told by its five parts, with
-//! the ranges that a joint has at first (2012h).
+//! PDOs are those that a joint has at first; whoever maps others needs another file. The impedance frame is told by its
+//! five parts, with the ranges that a joint has at first (2012h).
 
 use super::plain;
 use crate::remote::entry::{Entry, slug};
@@ -43,7 +43,8 @@ struct Message {
     signals: Vec<Signal>,
 }
 
-/// The file's content, for joints with these node ids. Torques are parts of the rated torque (6076h), or with `rated_torque` in Nm.
+/// The file's content, for joints with these node ids. Torques are parts of the rated torque (6076h), or with
+/// `rated_torque` in Nm.
 pub fn text(nodes: &[u8], rated_torque: Option<f64>) -> String {
     let messages = nodes.iter().flat_map(|node| messages(*node, rated_torque)).collect::<Vec<_>>();
     let mut text = String::new();

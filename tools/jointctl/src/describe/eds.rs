@@ -1,8 +1,8 @@
 //! The electronic data sheet of a joint, CiA 306-1; host.
 //!
-//! Unit, factor and description are no keys of CiA 306, and strict readers (Lely's dcfchk) refuse what they do not know:
-//! they are comments. Limits are raw values, as the object has them on the bus. Those of REAL32 are comments, too: Lely's
-//! tools want the bit pattern there, which python-canopen takes for a number.
+//! Unit, factor and description are no keys of CiA 306, and strict readers (Lely's dcfchk) refuse what they do not
+//! know: they are comments. Limits are raw values, as the object has them on the bus. Those of REAL32 are comments,
+//! too: Lely's tools want the bit pattern there, which python-canopen takes for a number.
 
 use super::plain;
 use crate::remote::Entry;
@@ -49,8 +49,8 @@ impl Identity {
     }
 }
 
-/// The file's content. `name` is that of the file, `now` the time since 1970-01-01 UTC for the file's dates; `identity` is
-/// of the joint that the file is for.
+/// The file's content. `name` is that of the file, `now` the time since 1970-01-01 UTC for the file's dates; `identity`
+/// is of the joint that the file is for.
 pub fn text(name: &str, now: Duration, identity: Identity) -> String {
     let mut text = String::new();
     // Writing to a string does not fail.
@@ -238,7 +238,8 @@ fn pdo(index: u16, defaults: &CommunicationParameters) -> Option<&PdoParameters>
     all.get(usize::from(index & 0x1FF))
 }
 
-/// mm-dd-yyyy, as CiA 306 writes it. Days to a date: H. Hinnant, "chrono-compatible low-level date algorithms", civil_from_days.
+/// mm-dd-yyyy, as CiA 306 writes it. Days to a date: H. Hinnant, "chrono-compatible low-level date algorithms",
+/// civil_from_days.
 fn date(now: Duration) -> String {
     let days = now.as_secs() / 86_400 + 719_468;
     let (era, of_era) = (days / 146_097, days % 146_097);

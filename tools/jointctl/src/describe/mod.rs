@@ -1,5 +1,5 @@
-//! The joint's objects for other people's tools, from the one table: an EDS for CANopen masters, the configuration of ros2_canopen,
-//! a DBC for what shows frames; host.
+//! The joint's objects for other people's tools, from the one table: an EDS for CANopen masters, the configuration of
+//! ros2_canopen, a DBC for what shows frames; host.
 
 pub mod bus_yml;
 pub mod dbc;

@@ -1,8 +1,9 @@
 //! The box that a model was identified in, from robust coverage of the samples; host.
 //!
-//! The most extreme samples of a recording are few, often at reversals or where a filter rings, and the box between them is mostly empty. The
-//! box ends where samples are left: at the [`TAIL`] quantiles of each signal, but it is never narrower than nine tenths of the whole range
-//! on that account, so that it does not lose what a recording visits rarely on purpose.
+//! The most extreme samples of a recording are few, often at reversals or where a filter rings, and the box between
+//! them is mostly empty. The box ends where samples are left: at the [`TAIL`] quantiles of each signal, but it is never
+//! narrower than nine tenths of the whole range on that account, so that it does not lose what a recording visits
+//! rarely on purpose.
 
 use crate::joint_model::network_inputs;
 use crate::network::INPUTS;

@@ -1,7 +1,8 @@
 //! From a prepared data set to an image and a report: the whole pipeline, stage by stage; host.
 //!
-//! Identification sees the samples for training and validation, training stops by those for validation, choices are made on motions that were
-//! left out (`choice`). Test samples are looked at once, at the end, through the image in the firmware's own arithmetic.
+//! Identification sees the samples for training and validation, training stops by those for validation, choices are
+//! made on motions that were left out (`choice`). Test samples are looked at once, at the end, through the image in the
+//! firmware's own arithmetic.
 
 mod assemble;
 mod coverage;
@@ -61,8 +62,9 @@ pub struct Options {
     /// Copies of training samples.
     #[serde(skip)]
     pub augment: Augment,
-    /// Inputs that the network uses: position, velocity, theoretical torque, measured torque, temperature; None: velocity, and
-    /// those that pay of position, the theoretical torque where there is gravity, and the temperature where it varies by 10 K.
+    /// Inputs that the network uses: position, velocity, theoretical torque, measured torque, temperature; None:
+    /// velocity, and those that pay of position, the theoretical torque where there is gravity, and the
+    /// temperature where it varies by 10 K.
     pub inputs: Option<[bool; 5]>,
     /// Who decides about the network; `Choose`: as the description of the data set says.
     pub network: Decision,
@@ -311,7 +313,8 @@ fn simplest(identified: &[Identified]) -> &Identified {
     identified.iter().min_by_key(|one| one.parameters.len()).unwrap_or(&identified[0])
 }
 
-/// The simplest model that no other beats on motions that were left out, of those that the certificate accepts, and why it refused others.
+/// The simplest model that no other beats on motions that were left out, of those that the certificate accepts, and why
+/// it refused others.
 fn choose_physical(
     samples: &Samples,
     identified: &[Identified],

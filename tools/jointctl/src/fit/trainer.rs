@@ -17,8 +17,8 @@ pub enum Trainer {
     StochasticGradient,
 }
 
-/// Limit of epochs of Levenberg-Marquardt, for the networks that are judged on left-out motions and for the one that is used alike: longer
-/// training follows the runs that it has seen further than what was judged.
+/// Limit of epochs of Levenberg-Marquardt, for the networks that are judged on left-out motions and for the one that is
+/// used alike: longer training follows the runs that it has seen further than what was judged.
 const EPOCHS: usize = 150;
 
 /// One network to be trained.

@@ -1,8 +1,9 @@
 //! Where a recording says nothing: points of the trained box in cells that no sample visits; host.
 //!
-//! Most of a box is empty: a trajectory visits few pairs of position and velocity. Between the samples a network may take any value, up to many
-//! times the friction. So it is trained towards nothing there, which leaves the physical model: points are drawn evenly from the
-//! box, those in a cell that a sample visits are left out, and the others join the samples with the target 0.
+//! Most of a box is empty: a trajectory visits few pairs of position and velocity. Between the samples a network may
+//! take any value, up to many times the friction. So it is trained towards nothing there, which leaves the physical
+//! model: points are drawn evenly from the box, those in a cell that a sample visits are left out, and the others join
+//! the samples with the target 0.
 
 use crate::network::{INPUTS, InputBox};
 use crate::train::TrainingSet;

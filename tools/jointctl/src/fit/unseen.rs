@@ -1,8 +1,8 @@
 //! Whether a network helps on motions that were left out, and with which inputs; host.
 //!
-//! For every fold a network is trained without it, on what the physical model, fitted without it too, leaves; and judged on it. Of several
-//! seeds the one counts that stops at the lowest error, as for the network that is used. They are trained as long as that one, on fewer
-//! samples.
+//! For every fold a network is trained without it, on what the physical model, fitted without it too, leaves; and
+//! judged on it. Of several seeds the one counts that stops at the lowest error, as for the network that is used. They
+//! are trained as long as that one, on fewer samples.
 
 use super::FitError;
 use super::problem::{MINIMUM_SAMPLES, Problem};
@@ -46,8 +46,8 @@ pub(super) struct Verdict {
     pub notes: Vec<String>,
 }
 
-/// Tries the sets of inputs and compares the best of them with the physical model. `reference` are the errors of the simplest model.
-/// Nothing where there are fewer than two folds.
+/// Tries the sets of inputs and compares the best of them with the physical model. `reference` are the errors of the
+/// simplest model. Nothing where there are fewer than two folds.
 pub(super) fn judge(
     problem: &Problem,
     trainer: Trainer,

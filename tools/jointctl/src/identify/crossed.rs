@@ -1,7 +1,7 @@
 //! A structure fitted without each fold in turn, and its error there; host.
 //!
-//! Every fold descends from the fit over all rows: the shapes start where all motions put them and move to where the rest of the motions
-//! wants them.
+//! Every fold descends from the fit over all rows: the shapes start where all motions put them and move to where the
+//! rest of the motions wants them.
 
 use super::fold_rows::FoldRows;
 use super::nonlinear::{Effort, Fit, Problem};

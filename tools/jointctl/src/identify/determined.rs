@@ -1,7 +1,8 @@
 //! Which terms the data tell from all others; host.
 //!
-//! The measure is the part of a column's square that the other linear columns do not explain: the inverse of its variance inflation factor.
-//! Where it is small, noise decides how the sum of several terms is divided among them, and on another motion the parts no longer cancel.
+//! The measure is the part of a column's square that the other linear columns do not explain: the inverse of its
+//! variance inflation factor. Where it is small, noise decides how the sum of several terms is divided among them, and
+//! on another motion the parts no longer cancel.
 
 use super::freedom::Freedom;
 use super::layout::Role;
@@ -13,7 +14,8 @@ use crate::friction_parameter::FrictionParameter as P;
 use crate::rigid::RigidRegressor;
 use nalgebra::DMatrix;
 
-/// True where the column that a freedom adds to the fit has at least [`OWN_PART`] of its own, and for freedoms without one.
+/// True where the column that a freedom adds to the fit has at least [`OWN_PART`] of its own, and for freedoms without
+/// one.
 pub fn stands_for_itself(fit: &Fit, freedom: Freedom) -> bool {
     let layout = &fit.candidate.layout;
     let Some(column) = size(freedom).and_then(|parameter| layout.column_of(parameter)) else { return true };
@@ -31,7 +33,8 @@ fn own_part(hessian: &DMatrix<f64>, column: usize, others: &[usize]) -> f64 {
     inverse(hessian, &free).map_or(0.0, |inverse| 1.0 / (inverse[(last, last)] * hessian[(column, column)]))
 }
 
-/// The part of a constant over the rows that the rigid part does not explain: over a small range of positions gravity is nearly constant.
+/// The part of a constant over the rows that the rigid part does not explain: over a small range of positions gravity
+/// is nearly constant.
 pub fn own_part_of_offset(rows: &[Row], regressors: &[RigidRegressor]) -> f64 {
     let n = regressors.len() + 1;
     let sums = sum_over_rows(rows, normal_sums(n), |sums, row| {

@@ -19,8 +19,9 @@ pub struct Estimated {
     pub unit: String,
     /// Value.
     pub value: f64,
-    /// Standard error, sigma^2 (J^T J)^-1 with sigma^2 from the residual; it takes residuals for independent, which those of
-    /// filtered recordings are not: there it is a lower limit. None at a bound, or where the data do not determine it.
+    /// Standard error, sigma^2 (J^T J)^-1 with sigma^2 from the residual; it takes residuals for independent, which
+    /// those of filtered recordings are not: there it is a lower limit. None at a bound, or where the data do not
+    /// determine it.
     pub standard_error: Option<f64>,
     /// The value lies on one of its bounds.
     pub at_bound: bool,

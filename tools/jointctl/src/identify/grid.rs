@@ -1,7 +1,7 @@
 //! Where the descents start: a coarse grid over the shapes, with the linear parameters solved at every point; host.
 //!
-//! The mean square has many minima only over the shapes (slopes, hysteresis, harmonic frequency), a handful of numbers. They
-//! are gone through group by group, the other groups held at the best point so far.
+//! The mean square has many minima only over the shapes (slopes, hysteresis, harmonic frequency), a handful of numbers.
+//! They are gone through group by group, the other groups held at the best point so far.
 
 use super::layout::Role;
 use super::linear::bounded_step;
@@ -134,7 +134,8 @@ fn even((low, high): (f64, f64), column: usize, points: usize) -> Axis {
     Axis { column, values: (0..points).map(|i| low + (high - low) * (i as f64 + 0.5) / points as f64).collect() }
 }
 
-/// The points of the grid spanned by the axes around `x`, each with its linear parameters solved; without axes, `x` alone.
+/// The points of the grid spanned by the axes around `x`, each with its linear parameters solved; without axes, `x`
+/// alone.
 fn evaluate(candidate: &Candidate, rows: &[Row], x: &DVector<f64>, axes: &[Axis]) -> Vec<Point> {
     let count: usize = axes.iter().map(|axis| axis.values.len()).product();
     let point = |mut number: usize| {

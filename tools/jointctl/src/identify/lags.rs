@@ -12,16 +12,16 @@ use crate::levenberg_marquardt::NormalEquations;
 use crate::rigid::{LAGS, RigidModel, RigidRegressor};
 use nalgebra::DVector;
 
-/// Least fall of the error, as a fraction. Below it lie filters and sampling, which differ between acceleration and effort on a
-/// rigid joint, too.
+/// Least fall of the error, as a fraction. Below it lie filters and sampling, which differ between acceleration and
+/// effort on a rigid joint, too.
 const LEAST_GAIN: f64 = 0.02;
 /// Columns of Coulomb and viscous friction with an offset, before those of the rigid part.
 const FRICTION: usize = 3;
 /// All columns.
 const COLUMNS: usize = FRICTION + RigidRegressor::ALL.len();
 
-/// Number of [`LAGS`] that the rigid part gets, and what to say about it. `left_out` tells for each row which folds leave
-/// it out, one bit each.
+/// Number of [`LAGS`] that the rigid part gets, and what to say about it. `left_out` tells for each row which folds
+/// leave it out, one bit each.
 pub fn choose(
     rows: &[Row],
     left_out: &[u8],

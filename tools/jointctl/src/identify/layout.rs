@@ -1,8 +1,8 @@
 //! How the parameters of a model are laid out in the vector that is searched: columns, links, bounds; host.
 //!
-//! One column may serve several parameters (symmetric Coulomb friction, coupled slopes) and one parameter may be the sum
-//! of two columns (breakaway = Coulomb friction + excess, so that F_brk >= F_c is a bound on one number). Slopes are searched
-//! as logarithms: their plausible range covers three decades.
+//! One column may serve several parameters (symmetric Coulomb friction, coupled slopes) and one parameter may be the
+//! sum of two columns (breakaway = Coulomb friction + excess, so that F_brk >= F_c is a bound on one number). Slopes
+//! are searched as logarithms: their plausible range covers three decades.
 
 use super::observations::Limits;
 use crate::friction_model::{FrictionModel, Ripple, Term};
@@ -29,8 +29,9 @@ const LOAD_EFFECT: f64 = 20.0;
 const HYSTERESIS_WIDTH: f64 = 20.0;
 /// Range of the harmonic frequency in periods over the position range.
 const HARMONIC_PERIODS: (f64, f64) = (0.5, 20.0);
-/// Fewest periods over the position range where the rigid part has gravity: a slower wave, the position slope and a piece of
-/// gravity's sine are almost one shape, and fitted together they cancel each other at thousands of times the effort.
+/// Fewest periods over the position range where the rigid part has gravity: a slower wave, the position slope and a
+/// piece of gravity's sine are almost one shape, and fitted together they cancel each other at thousands of times the
+/// effort.
 const PERIODS_BESIDE_GRAVITY: f64 = 1.5;
 /// Lowest harmonic frequency where the rigid part has gravity, whose own is 1: closer to it, harmonics and gravity grow
 /// without limit against each other, and friction becomes many times the measured effort for hardly any gain.
@@ -284,8 +285,8 @@ impl Layout {
         if self.columns[column].role == Role::Slope { x.exp() } else { 1.0 }
     }
 
-    /// The model at `x`. Parameters without a column are 0, but those that only shape (slopes, widths) and the fixed ones
-    /// come from `template`.
+    /// The model at `x`. Parameters without a column are 0, but those that only shape (slopes, widths) and the fixed
+    /// ones come from `template`.
     pub fn decode(&self, x: &DVector<f64>, template: &FrictionModel) -> (RigidParameters, FrictionModel) {
         let mut rigid = RigidParameters::default();
         let mut friction = FrictionModel {
@@ -313,8 +314,8 @@ impl Layout {
         (rigid, friction)
     }
 
-    /// The vector whose model comes closest to the given one: columns that serve several parameters take their mean, and
-    /// all are moved into their bounds.
+    /// The vector whose model comes closest to the given one: columns that serve several parameters take their mean,
+    /// and all are moved into their bounds.
     pub fn encode(&self, rigid: &RigidParameters, friction: &FrictionModel) -> DVector<f64> {
         let mut x = DVector::zeros(self.len());
         for (column, of) in self.columns.iter().enumerate() {

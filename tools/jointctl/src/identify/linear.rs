@@ -1,20 +1,22 @@
-//! The linear algebra under the identification: sums over rows, columns that depend on each other, bounded solutions; host.
+//! The linear algebra under the identification: sums over rows, columns that depend on each other, bounded solutions;
+//! host.
 //!
-//! Sums run over chunks of fixed size, in parallel, and are added in the order of the rows: the result does not depend on the
-//! number of threads.
+//! Sums run over chunks of fixed size, in parallel, and are added in the order of the rows: the result does not depend
+//! on the number of threads.
 
 use crate::levenberg_marquardt::{Damping, LeastSquares, NormalEquations, Options, minimise};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 
-/// Least own part of a term that the data determine: its standard error is then ten times that of a term that stands alone.
+/// Least own part of a term that the data determine: its standard error is then ten times that of a term that stands
+/// alone.
 pub const OWN_PART: f64 = 0.01;
 
 /// Rows that one thread sums up at a time.
 const CHUNK: usize = 1024;
-/// A column of which less than this fraction of its square is left when the columns before it are projected out cannot be
-/// told from them: its standard error would be ten thousand times that of a column that stands alone.
+/// A column of which less than this fraction of its square is left when the columns before it are projected out cannot
+/// be told from them: its standard error would be ten thousand times that of a column that stands alone.
 const INDEPENDENCE: f64 = 1e-8;
 /// A column is named as a partner in a dependence when it explains at least this fraction of the dependent one.
 const PARTNER: f64 = 0.05;

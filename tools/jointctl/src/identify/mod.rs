@@ -1,15 +1,16 @@
 //! Identification of a joint: rigid part and physical friction from its train samples; host.
 //!
 //! 1. The rigid part is identified with viscous and Coulomb friction and an offset, and gets lagged accelerations where
-//!    they pay. Its effort is the theoretical torque of every sample (`Samples::load`), frozen from then on: friction terms
-//!    that depend on load never see the measured torque.
+//!    they pay. Its effort is the theoretical torque of every sample (`Samples::load`), frozen from then on: friction
+//!    terms that depend on load never see the measured torque.
 //! 2. The terms of the chosen preset are identified, jointly with the rigid part once more.
 //!
 //! Training and validation samples are both used; what is chosen is chosen by folds over motions (`choice`).
 //!
 //! `observations` checks and thins the samples, `lags` chooses lagged accelerations, `layout` maps parameters to the
-//! searched vector, `linear` and `nonlinear` fit, `grid` finds where to start, `selection` chooses the terms of `Preset::Full`, `crossed` fits without each
-//! fold, `shapes` chooses distances and frequencies, `determined` says which terms the data determine, `estimates` adds standard errors.
+//! searched vector, `linear` and `nonlinear` fit, `grid` finds where to start, `selection` chooses the terms of
+//! `Preset::Full`, `crossed` fits without each fold, `shapes` chooses distances and frequencies, `determined` says
+//! which terms the data determine, `estimates` adds standard errors.
 
 mod crossed;
 mod determined;
@@ -220,8 +221,8 @@ pub fn identify(
     })
 }
 
-/// Step 1: the rigid part with viscous and Coulomb friction; fills in the load of all samples. With the problem come the
-/// rigid part with the lagged accelerations that were chosen, and what is to be said of them.
+/// Step 1: the rigid part with viscous and Coulomb friction; fills in the load of all samples. With the problem come
+/// the rigid part with the lagged accelerations that were chosen, and what is to be said of them.
 fn theoretical_torque(
     samples: &mut Samples,
     rigid: &RigidModel,

@@ -1,7 +1,8 @@
 //! The `full` model: the terms that pay on motions that were left out; host.
 //!
-//! 1. From Coulomb and viscous friction with an offset, the term that lowers the error of the left-out motions most is taken, then those are
-//!    dropped without which it does not rise, and so on until neither helps. A preset that is better starts the same once more.
+//! 1. From Coulomb and viscous friction with an offset, the term that lowers the error of the left-out motions most is
+//!    taken, then those are dropped without which it does not rise, and so on until neither helps. A preset that is
+//!    better starts the same once more.
 //! 2. Of all models on that path the simplest one is chosen that the best does not beat beyond one standard error.
 //!
 //! A term that the others nearly explain is not considered (`determined`). Test samples are not seen.
@@ -86,8 +87,9 @@ impl Crossed {
         compare(&self.errors, &other.errors)
     }
 
-    /// True where `other` lowers the mean error by `worth`, and neither the error of all folds together rises nor that of one grouping: a gain on
-    /// slow motions is not paid for with the fast ones, nor one in time with one in speed.
+    /// True where `other` lowers the mean error by `worth`, and neither the error of all folds together rises nor that
+    /// of one grouping: a gain on slow motions is not paid for with the fast ones, nor one in time with one in
+    /// speed.
     fn improves(&self, other: &Self, worth: f64) -> bool {
         let grouping: Vec<usize> = self.folds.iter().map(|fold| fold.grouping).collect();
         improves(&self.errors, &other.errors, &grouping, worth)
@@ -264,7 +266,8 @@ impl Path<'_> {
         lowest(steps.collect())
     }
 
-    /// The freedom, but for the one just taken, without which the error of the left-out motions is lowest, if it does not rise.
+    /// The freedom, but for the one just taken, without which the error of the left-out motions is lowest, if it does
+    /// not rise.
     fn best_removal(&self, from: &Crossed, taken: Freedom) -> Option<(Freedom, Crossed)> {
         let others: Vec<Freedom> =
             freedoms(&from.structure(), &self.rules).into_iter().filter(|&freedom| freedom != taken).collect();

@@ -1,8 +1,10 @@
-//! Shapes that are chosen once, before the terms that have them are judged: distances of pre-sliding elements, frequencies of ripples; host.
+//! Shapes that are chosen once, before the terms that have them are judged: distances of pre-sliding elements,
+//! frequencies of ripples; host.
 //!
-//! Beside the rigid part and what friction has over velocity and load, all linear, every distance of a geometric row is offered as an element,
-//! and those are taken one after the other that lower the mean square most. The residual then shows the frequencies: every one of a grid is offered with sine
-//! and cosine, of the Coulomb friction and whatever the direction, and the best is refined. Whether the terms pay is for the folds to say.
+//! Beside the rigid part and what friction has over velocity and load, all linear, every distance of a geometric row is
+//! offered as an element, and those are taken one after the other that lower the mean square most. The residual then
+//! shows the frequencies: every one of a grid is offered with sine and cosine, of the Coulomb friction and whatever the
+//! direction, and the best is refined. Whether the terms pay is for the folds to say.
 
 use super::linear::{add_to_normal_sums, bounded_step, dependences, normal_equations, normal_sums, sum_over_rows};
 use super::nonlinear::Problem;
@@ -32,8 +34,9 @@ const DENSITY: f64 = 8.0;
 /// Fewest periods of a ripple over the position range.
 const PERIODS: f64 = 2.0;
 
-/// Fewest periods of a ripple over the position range with which it has a part that does not know the direction. A slower one is also what gravity
-/// leaves, or the motion of other joints; friction changes its sign with the direction, so its ripple is told apart at any frequency.
+/// Fewest periods of a ripple over the position range with which it has a part that does not know the direction. A
+/// slower one is also what gravity leaves, or the motion of other joints; friction changes its sign with the direction,
+/// so its ripple is told apart at any frequency.
 const TORQUE_PERIODS: f64 = 8.0;
 
 /// Columns of the regression that the elements are offered beside: the rigid part's and those of [`friction_columns`].
@@ -41,7 +44,8 @@ const BASE: usize = RIGID + 11;
 /// Columns of the rigid part.
 const RIGID: usize = RigidRegressor::ALL.len();
 
-/// Chooses distances and frequencies from the rows for training and validation; fills in how far the elements are bent at all samples and rows.
+/// Chooses distances and frequencies from the rows for training and validation; fills in how far the elements are bent
+/// at all samples and rows.
 pub fn choose(problem: &mut Problem, samples: &mut Samples) {
     let base: Vec<[f64; BASE]> = problem.train.iter().map(|row| columns(problem, row)).collect();
     let distances = elements(problem, samples, &base);
@@ -137,7 +141,8 @@ fn bent_at_used(samples: &Samples, stiffness: f64) -> Vec<f64> {
     observations::used(samples).into_iter().map(|i| bent[i][0]).collect()
 }
 
-/// Solves the linear columns with these elements, which have positive levels: columns, coefficients, and the mean square.
+/// Solves the linear columns with these elements, which have positive levels: columns, coefficients, and the mean
+/// square.
 fn regression(at: &NormalEquations, elements: &[usize]) -> (Vec<(usize, f64)>, f64) {
     let base: Vec<usize> = (0..BASE).collect();
     let dependent = dependences(&at.hessian, &base);

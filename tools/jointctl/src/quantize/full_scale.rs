@@ -1,7 +1,8 @@
 //! Numbers of the image as numbers in SI, and back.
 //!
 //! A coefficient is stored in Q16.16 at full scale of the signal it multiplies; full scale is a power of two of the
-//! signal's unit, so the conversion to SI is exact in f64 and a number that came from an image returns to the same bits.
+//! signal's unit, so the conversion to SI is exact in f64 and a number that came from an image returns to the same
+//! bits.
 
 use super::QuantizeError;
 use joint_firmware::friction::physical::Dimension;

@@ -50,8 +50,8 @@ pub enum QuantizeError {
     },
 }
 
-/// The box of signals between `low` and `high` (SI, in the order of [`Signal`]), rounded outwards; a signal without limits
-/// (None) is one that the model does not depend on.
+/// The box of signals between `low` and `high` (SI, in the order of [`Signal`]), rounded outwards; a signal without
+/// limits (None) is one that the model does not depend on.
 pub fn domain(
     limits: &[Option<(f64, f64)>; SIGNALS],
     margin: f64,
@@ -73,8 +73,8 @@ pub fn domain(
     })
 }
 
-/// Inputs spread over the box of `parameters`, with the exact outputs of the firmware's arithmetic: one vector a set, then
-/// more until there are `count`.
+/// Inputs spread over the box of `parameters`, with the exact outputs of the firmware's arithmetic: one vector a set,
+/// then more until there are `count`.
 pub fn golden_vectors(parameters: &FrictionParameters, count: usize) -> Vec<GoldenVector> {
     let model = FrictionModel::new(parameters, 1);
     let sets = parameters.selector.sets();

@@ -9,7 +9,8 @@ use joint_firmware::friction::network::{
     INPUTS, MAX_FRACTION, MAX_SCALE, MIN_FRACTION, NEURONS, NetworkParameters, Neuron,
 };
 
-/// Largest sum of a neuron's weights and bias that fits: Q25 in layer 0, Q15 times at least 10 fraction bits in the others.
+/// Largest sum of a neuron's weights and bias that fits: Q25 in layer 0, Q15 times at least 10 fraction bits in the
+/// others.
 const SUM_LIMIT: f64 = 64.0;
 /// What the firmware multiplies a 16-bit bias with, instead of one.
 const BIAS_INPUT: f64 = 32767.0 / 32768.0;
@@ -107,7 +108,8 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use rand_chacha::rand_core::SeedableRng;
 
-    /// A network like a trained one: weights of the first layer up to 3, of the velocity up to 20, of the others up to 1.5.
+    /// A network like a trained one: weights of the first layer up to 3, of the velocity up to 20, of the others up to
+    /// 1.5.
     fn network(seed: u64) -> (Network, Domain) {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let range = Range { low: -(4 << 16), high: 4 << 16 };

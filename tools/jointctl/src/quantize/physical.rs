@@ -9,8 +9,8 @@ use joint_firmware::friction::state::SIGNALS;
 
 /// Quantises `model` for evaluation in `domain`. Coefficients of terms that are off become zero.
 ///
-/// A slope too steep for its format (1/v_c, 1/v_st) is held at the steepest: both curves are then within a thousandth of
-/// their limit, a step, beyond a thousandth of full-scale velocity.
+/// A slope too steep for its format (1/v_c, 1/v_st) is held at the steepest: both curves are then within a thousandth
+/// of their limit, a step, beyond a thousandth of full-scale velocity.
 pub fn quantize(model: &FrictionModel, domain: &Domain) -> Result<PhysicalParameters, QuantizeError> {
     let shifts = domain.shifts();
     let values = natural(model);

@@ -1,7 +1,7 @@
 //! Settings of a joint: changed as a whole, stored, restored; host.
 //!
-//! Settings of the configuration (2101h to 2106h) are staged by being written and taken together by a command. [`set`] does both, and
-//! forgets what it staged where the joint refuses it: a joint never stays half configured.
+//! Settings of the configuration (2101h to 2106h) are staged by being written and taken together by a command. [`set`]
+//! does both, and forgets what it staged where the joint refuses it: a joint never stays half configured.
 
 use super::entry::Entry;
 use super::error::RemoteError;

@@ -109,7 +109,8 @@ impl RemoteJoint {
         }
     }
 
-    /// Sends an NMT command and makes sure that it acted. In PRE-OPERATIONAL and STOPPED a joint brakes and switches off by itself.
+    /// Sends an NMT command and makes sure that it acted. In PRE-OPERATIONAL and STOPPED a joint brakes and switches
+    /// off by itself.
     pub fn nmt(&self, command: Command, wanted: NmtState) -> Result<(), RemoteError> {
         let heartbeats = self.network().heartbeats();
         let node = self.id();
@@ -137,9 +138,9 @@ impl RemoteJoint {
         })
     }
 
-    /// Brakes and switches off, whoever commands the joint: outside OPERATIONAL no set-point counts. The state that it ends in:
-    /// [`State::SwitchOnDisabled`], or [`State::Fault`] where there is one: a joint that brakes for longer than its command deadline has
-    /// one. [`Stream::end`](super::Stream::end) brakes without.
+    /// Brakes and switches off, whoever commands the joint: outside OPERATIONAL no set-point counts. The state that it
+    /// ends in: [`State::SwitchOnDisabled`], or [`State::Fault`] where there is one: a joint that brakes for longer
+    /// than its command deadline has one. [`Stream::end`](super::Stream::end) brakes without.
     pub fn disable(&self) -> Result<State, RemoteError> {
         let began = Instant::now();
         let disturbed = |error: &RemoteError| {

@@ -1,7 +1,7 @@
 //! Objects by the names that the one table gives them; host.
 //!
-//! A name is what docs/objects.md says, small, with dashes for blanks: `torque-limit`. Where several objects share it, the record goes
-//! before it: `image-life-cycle.command`. An index does as well: `2103:1`, `2103h:1`, `0x2103:1`.
+//! A name is what docs/objects.md says, small, with dashes for blanks: `torque-limit`. Where several objects share it,
+//! the record goes before it: `image-life-cycle.command`. An index does as well: `2103:1`, `2103h:1`, `0x2103:1`.
 
 use super::error::RemoteError;
 use joint_firmware::canopen::Access;

@@ -1,7 +1,8 @@
 //! The life of a parameter image on a joint, from upload to roll back; host.
 //!
-//! Nothing is half done: what is in use changes by a commit or a roll back alone, which the joint does whole or not at all; a trial and a
-//! shadow end by themselves. Every upload is compared with what the joint says it received, and every commit is read back.
+//! Nothing is half done: what is in use changes by a commit or a roll back alone, which the joint does whole or not at
+//! all; a trial and a shadow end by themselves. Every upload is compared with what the joint says it received, and
+//! every commit is read back.
 
 use super::entry::Entry;
 use super::error::RemoteError;
@@ -154,9 +155,9 @@ impl RemoteJoint {
         }
     }
 
-    /// Takes the image that this program uploaded and that the joint verified a step further, from shadow to trial say, without
-    /// sending it again. Whose image is staged no object tells: the checksum of the staged bytes is the same for all whole images
-    /// without a tag, because their own is part of them.
+    /// Takes the image that this program uploaded and that the joint verified a step further, from shadow to trial say,
+    /// without sending it again. Whose image is staged no object tells: the checksum of the staged bytes is the
+    /// same for all whole images without a tag, because their own is part of them.
     pub fn use_image(&self, upload: &[u8], usage: Use, progress: &dyn Progress) -> Result<ImageStatus, RemoteError> {
         self.check_use(usage)?;
         match usage {

@@ -10,7 +10,8 @@
 //! - [`entry`], [`value`]: objects by name, and their values as people write and read them
 //! - [`joint`]: the node; [`drive`]: its state machine and faults
 //! - [`pdo`]: what PDOs carry; [`telemetry`]: out of the joint; [`stream`]: into it; [`motion`]: `jointctl move`
-//! - [`image`]: the life of a parameter image, [`refusal`] its numbers in words; [`configuration`]: settings, stored and restored
+//! - [`image`]: the life of a parameter image, [`refusal`] its numbers in words; [`configuration`]: settings, stored
+//!   and restored
 //! - [`commission`]: the objects of a joint for its commissioning
 //! - [`record`]: samples as a data set; [`retrain`]: a joint's friction learned anew, from excitation to commit
 //! - [`address`]: node ids for new joints; [`info`]: a joint on one page

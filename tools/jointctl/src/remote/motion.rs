@@ -103,7 +103,8 @@ impl Motion {
         Ok(())
     }
 
-    /// Enables the joint, moves it for as long as `running` says so and the duration is not over, and disables it, whatever happens.
+    /// Enables the joint, moves it for as long as `running` says so and the duration is not over, and disables it,
+    /// whatever happens.
     pub fn run(
         &self,
         joint: &RemoteJoint,
@@ -138,7 +139,8 @@ impl Motion {
             stream.set(command);
             return Ok(());
         }
-        // A spring that is suddenly stretched is a blow; the stiffness acts at once, so its rest position begins where the joint is.
+        // A spring that is suddenly stretched is a blow; the stiffness acts at once, so its rest position begins where
+        // the joint is.
         let from = joint.number(Field::Actual(Actual::Position))? as f32;
         let approach = APPROACH * self.duration;
         stream.play(move |elapsed| {

@@ -1,6 +1,8 @@
-//! A joint that belongs to somebody: sessions by challenge and response, and its key given, replaced and taken back; host.
+//! A joint that belongs to somebody: sessions by challenge and response, and its key given, replaced and taken back;
+//! host.
 //!
-//! A session is opened by what first needs it, and ended with the last copy of the joint: while it is open it serves whoever sends on the bus.
+//! A session is opened by what first needs it, and ended with the last copy of the joint: while it is open it serves
+//! whoever sends on the bus.
 
 use super::entry::Entry;
 use super::error::RemoteError;

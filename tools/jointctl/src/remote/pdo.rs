@@ -71,7 +71,8 @@ impl Pdo {
         Ok(parameters)
     }
 
-    /// Changes it, in the order that CiA 301 demands: out of service, mapping, back into service. The identifier is free to choose.
+    /// Changes it, in the order that CiA 301 demands: out of service, mapping, back into service. The identifier is
+    /// free to choose.
     pub fn write(self, joint: &RemoteJoint, parameters: &PdoParameters) -> Result<(), RemoteError> {
         let node = joint.node();
         let (communication, mapping) = (self.communication(), self.mapping());
@@ -93,7 +94,8 @@ impl Pdo {
         Ok(())
     }
 
-    /// Changes it where it is not as wanted; what it was before, to be put back. An identifier that somebody chose stays.
+    /// Changes it where it is not as wanted; what it was before, to be put back. An identifier that somebody chose
+    /// stays.
     pub fn ensure(self, joint: &RemoteJoint, wanted: &PdoParameters) -> Result<Change, RemoteError> {
         let before = self.read(joint)?;
         let cob_id = if before.cob_id & INVALID == 0 { before.cob_id } else { wanted.cob_id };

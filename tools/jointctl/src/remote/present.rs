@@ -10,7 +10,8 @@ pub const PATIENCE: Duration = Duration::from_millis(500);
 /// Request of an SDO upload of object 1000h, which every node has (CiA 301, 7.2.4.3.5).
 const ASK: [u8; 8] = [0x40, 0x00, 0x10, 0, 0, 0, 0, 0];
 
-/// Nodes that answer. All are asked at once: a node on a busy machine may take its time without the others having to wait for it.
+/// Nodes that answer. All are asked at once: a node on a busy machine may take its time without the others having to
+/// wait for it.
 pub fn present(network: &Network, patience: Duration) -> Result<BTreeSet<u8>, ClientError> {
     let answers = network.subscribe(|frame| matches!(frame.id(), 0x581..=0x5FF));
     for id in 1..=127u16 {

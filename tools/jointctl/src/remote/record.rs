@@ -1,7 +1,8 @@
 //! Samples of a joint as a table that `jointctl fit` reads, with the description of it; host.
 //!
-//! Every signal of a row is of one control step, the one that SYNC marked, so that none lags another; a network takes such a lag for
-//! friction. Times are those at which this machine received the samples: `fit` interpolates onto even ones.
+//! Every signal of a row is of one control step, the one that SYNC marked, so that none lags another; a network takes
+//! such a lag for friction. Times are those at which this machine received the samples: `fit` interpolates onto even
+//! ones.
 
 use super::error::RemoteError;
 use super::joint::RemoteJoint;

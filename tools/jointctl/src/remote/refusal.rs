@@ -1,7 +1,7 @@
 //! Why a joint refuses an image: its number (object 2212h:3) in words, with what both sides are known to be; host.
 //!
-//! The joint tells a number. What stands behind it in [`Refusal`] is read from the joint and from the image, and said in the firmware's
-//! own words; what cannot be known from here is said in general ones.
+//! The joint tells a number. What stands behind it in [`Refusal`] is read from the joint and from the image, and said
+//! in the firmware's own words; what cannot be known from here is said in general ones.
 
 use super::error::RemoteError;
 use super::joint::RemoteJoint;

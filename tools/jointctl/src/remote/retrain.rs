@@ -9,10 +9,11 @@
 //! compare, commit     where what neither feed-forward nor compensation explain (2020h:2) falls; with the motor off
 //! ```
 //!
-//! The motions carry the torque of the rigid body that was identified, so that what is left is friction. A joint warms up while it moves, and its
-//! friction falls with that by itself (by 9 % from one motion to the next in the reference joint): so the new image stands between two
-//! motions with the old one, and has to be better than the better of them. Whatever fails, the joint is
-//! left disabled, with the stored image that it had, nothing on trial, and the compensation that was requested before.
+//! The motions carry the torque of the rigid body that was identified, so that what is left is friction. A joint warms
+//! up while it moves, and its friction falls with that by itself (by 9 % from one motion to the next in the reference
+//! joint): so the new image stands between two motions with the old one, and has to be better than the better of them.
+//! Whatever fails, the joint is left disabled, with the stored image that it had, nothing on trial, and the
+//! compensation that was requested before.
 
 use super::configuration;
 use super::entry::Entry;
@@ -35,8 +36,8 @@ use joint_firmware::parameters::image::MAX_LENGTH;
 use joint_firmware::parameters::life_cycle::State;
 use std::path::PathBuf;
 
-/// Part of the joint's limits of position and velocity that the motion uses: the rest is left to the controller, which does not know
-/// gravity yet.
+/// Part of the joint's limits of position and velocity that the motion uses: the rest is left to the controller, which
+/// does not know gravity yet.
 pub const SHARE: f64 = 0.6;
 /// Largest acceleration, rad/s²: faster motion tells inertia better, and friction no better.
 pub const ACCELERATION: f64 = 20.0;
@@ -170,7 +171,8 @@ pub struct Outcome {
     pub fitted: Fitted,
     /// Samples of the excitation, and SYNCs without one.
     pub samples: (usize, u64),
-    /// With what was stored before, or without any compensation: the better of the motions before and after the new image's.
+    /// With what was stored before, or without any compensation: the better of the motions before and after the new
+    /// image's.
     pub before: Shown,
     /// With the new image.
     pub after: Shown,

@@ -1,7 +1,7 @@
 //! Fourier series that a joint follows in impedance mode, one after the other, and what is recorded meanwhile; host.
 //!
-//! The reference is sent with its velocity and with the torque of the rigid body as far as that is known. The joint is led from where it
-//! is to the middle of the series first, by the minimum-jerk motion's smooth step.
+//! The reference is sent with its velocity and with the torque of the rigid body as far as that is known. The joint is
+//! led from where it is to the middle of the series first, by the minimum-jerk motion's smooth step.
 
 use super::error::RemoteError;
 use super::joint::RemoteJoint;

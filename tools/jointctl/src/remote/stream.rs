@@ -1,8 +1,9 @@
 //! Set-points at a rate, into an enabled joint; host, a thread of its own.
 //!
-//! The thread renews the command, so that the joint's command deadline holds as long as this program runs and the bus works. Where it
-//! ends, by [`Stream::end`], an error or a panic, the joint brakes along its quick-stop ramp and is left disabled, in PRE-OPERATIONAL;
-//! where this program is killed or the bus is cut, the joint brakes by itself once its command deadline is over.
+//! The thread renews the command, so that the joint's command deadline holds as long as this program runs and the bus
+//! works. Where it ends, by [`Stream::end`], an error or a panic, the joint brakes along its quick-stop ramp and is
+//! left disabled, in PRE-OPERATIONAL; where this program is killed or the bus is cut, the joint brakes by itself once
+//! its command deadline is over.
 
 use super::drive::{BRAKING, LOOK};
 use super::entry::Entry;
@@ -112,8 +113,9 @@ impl std::fmt::Debug for Stream {
 }
 
 impl Stream {
-    /// Enables the joint in a mode and holds it: no torque, no velocity, or the position where it is. `rate` set-points a second, at
-    /// least two within the joint's command deadline. `acknowledge` resets a fault whose cause is gone; without it a fault is an error.
+    /// Enables the joint in a mode and holds it: no torque, no velocity, or the position where it is. `rate` set-points
+    /// a second, at least two within the joint's command deadline. `acknowledge` resets a fault whose cause is
+    /// gone; without it a fault is an error.
     pub fn begin(joint: &RemoteJoint, mode: Mode, rate: f64, acknowledge: bool) -> Result<Self, RemoteError> {
         let deadline = joint.number(Field::Setting(Setting::CommandDeadline))?;
         let [low, high] = RATES;
@@ -254,8 +256,8 @@ impl Stream {
         self.play(move |_| command);
     }
 
-    /// From now on this is asked of the joint, as a function of the time since now. It runs in the sending thread, once a period, and
-    /// has to be quick.
+    /// From now on this is asked of the joint, as a function of the time since now. It runs in the sending thread, once
+    /// a period, and has to be quick.
     pub fn play(&self, source: impl FnMut(Duration) -> Command + Send + 'static) {
         if let Some(sources) = &self.sources {
             // A thread that has ended has said why.
@@ -284,7 +286,8 @@ impl Stream {
             return self.joint.state();
         }
         self.shared.controlword.store(Controlword::QUICK_STOP.0, Ordering::Relaxed);
-        // With set-points that go on: outside OPERATIONAL a joint that brakes for longer than its command deadline has a fault.
+        // With set-points that go on: outside OPERATIONAL a joint that brakes for longer than its command deadline has
+        // a fault.
         let began = Instant::now();
         while self.thread.is_some() && self.failure().is_ok() && began.elapsed() < BRAKING {
             match self.joint.state() {

@@ -162,8 +162,8 @@ impl Entry {
         Ok(bytes.into_iter().take(length).collect())
     }
 
-    /// A number as the raw value that comes nearest, held at the ends of the type: for set-points, which are limited by the joint. The
-    /// entry is a whole number.
+    /// A number as the raw value that comes nearest, held at the ends of the type: for set-points, which are limited by
+    /// the joint. The entry is a whole number.
     pub fn saturate(&self, number: f64) -> u64 {
         let (low, high) = integer(self.object.data_type).map_or((0, 1), |(bits, sign)| span(bits, sign));
         let raw = (number / self.text.scale).round() as i128;

@@ -1,4 +1,5 @@
-//! How the model was chosen, as a section of the page: the folds with the errors there, the steps, and what was overruled; host.
+//! How the model was chosen, as a section of the page: the folds with the errors there, the steps, and what was
+//! overruled; host.
 
 use super::number::significant;
 use super::{Choice, Report};

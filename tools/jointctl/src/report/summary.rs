@@ -13,8 +13,8 @@ const SIMPLER: f64 = 1.02;
 pub struct Verdict {
     /// The sentence, with a full stop.
     pub sentence: String,
-    /// On every test set the compensation lowers the error and no simpler model does better by 2 %, and the certificate
-    /// (where there is one) passed.
+    /// On every test set the compensation lowers the error and no simpler model does better by 2 %, and the
+    /// certificate (where there is one) passed.
     pub good: bool,
 }
 

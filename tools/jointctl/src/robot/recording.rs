@@ -245,8 +245,8 @@ pub fn record(path: &Path, environment: Environment) -> Result<Recording, RobotF
     Ok(recording)
 }
 
-/// Reads the robot that the TOML file at `path` describes, and the text of its URDF; `environment` gives the variables in
-/// its path.
+/// Reads the robot that the TOML file at `path` describes, and the text of its URDF; `environment` gives the variables
+/// in its path.
 ///
 /// # Errors
 /// [`RobotFitError`], with file, joint and what to do.

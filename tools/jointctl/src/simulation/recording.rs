@@ -1,7 +1,8 @@
-//! The log of a virtual joint as a user would record it over the bus: excited without compensation, a row every 4 ms; host.
+//! The log of a virtual joint as a user would record it over the bus: excited without compensation, a row every 4 ms;
+//! host.
 //!
-//! A row holds means over its time, of all signals alike. A mean of the torque beside a sample of the position would lag by half a
-//! row, and a network takes such a lag for friction.
+//! A row holds means over its time, of all signals alike. A mean of the torque beside a sample of the position would
+//! lag by half a row, and a network takes such a lag for friction.
 
 use super::run::{Ending, USUAL_SAMPLE_PERIOD, drive, every};
 use super::{Motion, Part, SimulationError};

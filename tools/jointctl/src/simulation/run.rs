@@ -78,7 +78,8 @@ pub struct Run {
 /// Runs a part with `friction` as the joint's friction model.
 ///
 /// # Errors
-/// What plant or firmware refuse, and a joint that cannot be enabled. A fault in motion is no error: the run ends with it.
+/// What plant or firmware refuse, and a joint that cannot be enabled. A fault in motion is no error: the run ends with
+/// it.
 pub fn run(
     part: &Part,
     setup: &Setup,
@@ -106,8 +107,8 @@ pub fn run(
     Ok(Run { log, ending, simulated })
 }
 
-/// Drives a joint through a part; `look` sees it after every control step, counted from 0. How it ended, and the time that was
-/// simulated, with the joint's start, s.
+/// Drives a joint through a part; `look` sees it after every control step, counted from 0. How it ended, and the time
+/// that was simulated, with the joint's start, s.
 ///
 /// # Errors
 /// What plant or firmware refuse, and a joint that cannot be enabled.

@@ -1,10 +1,10 @@
 //! A network with batch normalisation before each dense layer, and how it folds into one without; host.
 //!
-//! The mobile-robot paper's module is batch normalisation, dense layer, activation (section 2.2.3, figure 3). Every value
-//! that enters a dense layer is standardised, x' = gain (x - mean) / sqrt(variance + epsilon) + shift: in a training step
-//! with the mean and variance of the mini-batch (S. Ioffe and C. Szegedy, 2015, algorithm 1), in use with fixed
-//! ones. A standardisation with fixed statistics is a linear map, so it disappears into the weights and bias of the dense
-//! layer behind it; the firmware never sees it.
+//! The mobile-robot paper's module is batch normalisation, dense layer, activation (section 2.2.3, figure 3). Every
+//! value that enters a dense layer is standardised, x' = gain (x - mean) / sqrt(variance + epsilon) + shift: in a
+//! training step with the mean and variance of the mini-batch (S. Ioffe and C. Szegedy, 2015, algorithm 1), in use with
+//! fixed ones. A standardisation with fixed statistics is a linear map, so it disappears into the weights and bias of
+//! the dense layer behind it; the firmware never sees it.
 
 use super::batch::Batch;
 use super::tanh::tanh;
@@ -107,8 +107,8 @@ impl BatchNormNetwork {
 
     /// Sets the fixed statistics to those of all samples of `batch`, layer after layer, each behind folded ones.
     ///
-    /// Frameworks carry a running average over the last mini-batches instead; that one lags behind the weights and depends
-    /// on the order of the samples, while these are the statistics of the network that is returned.
+    /// Frameworks carry a running average over the last mini-batches instead; that one lags behind the weights and
+    /// depends on the order of the samples, while these are the statistics of the network that is returned.
     pub fn measure_statistics(&mut self, batch: &Batch, bounds: Bounds) {
         let all: Vec<usize> = (0..batch.len()).collect();
         let mut values = MiniBatch::gather(batch, &all).inputs;
@@ -127,9 +127,9 @@ impl BatchNormNetwork {
 
     /// Weights and biases of the network without standardisation that has the same output, as far as `bounds` allow.
     ///
-    /// A value that hardly varies gets a huge weight from standardisation, with a huge bias against it. Where that would
-    /// leave the bounds, the weight is reduced about the value's mean, and then the neuron's weights together: the
-    /// neuron keeps what it has on average and loses steepness.
+    /// A value that hardly varies gets a huge weight from standardisation, with a huge bias against it. Where that
+    /// would leave the bounds, the weight is reduced about the value's mean, and then the neuron's weights
+    /// together: the neuron keeps what it has on average and loses steepness.
     pub fn fold(&self, bounds: Bounds) -> Vec<f64> {
         self.layers().flat_map(|(layer, first)| self.fold_layer(layer, first, bounds)).collect()
     }
@@ -202,7 +202,8 @@ impl BatchNormNetwork {
         traces
     }
 
-    /// Adds one layer's derivatives and returns the slopes of the sums of the layer before (`before`: its tanh outputs).
+    /// Adds one layer's derivatives and returns the slopes of the sums of the layer before (`before`: its tanh
+    /// outputs).
     fn back_propagate(
         &self,
         trace: &LayerTrace,

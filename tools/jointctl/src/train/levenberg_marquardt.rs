@@ -1,8 +1,8 @@
 //! The default trainer: Levenberg-Marquardt with early stopping and several seeds; host.
 //!
-//! After the legged-robot paper, table 3.1 (1000 epochs, gradient threshold 1e-7, mu limit 1e10, mean squared error) and
-//! the toolbox defaults it names: training stops when the validation error has not improved for `max_fail` epochs, and
-//! the weights of the best epoch are kept. An epoch is an accepted step.
+//! After the legged-robot paper, table 3.1 (1000 epochs, gradient threshold 1e-7, mu limit 1e10, mean squared error)
+//! and the toolbox defaults it names: training stops when the validation error has not improved for `max_fail` epochs,
+//! and the weights of the best epoch are kept. An epoch is an accepted step.
 
 use super::normal_equations::NetworkFit;
 use super::weights::{Bounds, nguyen_widrow};
@@ -25,8 +25,8 @@ pub struct Options {
     pub max_epochs: usize,
     /// Epochs without improvement of the validation error after which training stops.
     ///
-    /// The toolbox's 6 ends many runs on a plateau, some before the first improvement: where time allows, ten times that
-    /// finds better networks on recorded joints.
+    /// The toolbox's 6 ends many runs on a plateau, some before the first improvement: where time allows, ten times
+    /// that finds better networks on recorded joints.
     pub max_fail: usize,
     /// Penalty on the sum of squared weights, in units of the normalised mean squared error.
     ///

@@ -6,8 +6,8 @@
 //! - [`batch`] the samples in blocks, [`normal_equations`] the hot loop, [`batch_norm`] layers that fold away,
 //!   [`weights`] first values and bounds of the weights, `wide_vectors` the hot loops for the processor at hand.
 //!
-//! Every trainer returns the network of the epoch with the lowest validation error, of the best seed. The same seeds and
-//! samples give the same network whatever the number of threads: work is cut into fixed pieces and summed in order.
+//! Every trainer returns the network of the epoch with the lowest validation error, of the best seed. The same seeds
+//! and samples give the same network whatever the number of threads: work is cut into fixed pieces and summed in order.
 
 use crate::network::{INPUT_NAMES, INPUTS, InputBox, Network, NetworkError};
 use rayon::prelude::*;

@@ -1,8 +1,8 @@
 //! The legged-robot paper's network, to compare with: one hidden layer of 16 tanh neurons; host, floating point only.
 //!
 //! Section 3.2 and table 3.1 of that paper: a single-layer net with 16 neurons, trained by Levenberg-Marquardt with the
-//! defaults of a numerical toolbox (no penalty on the weights, no bounds). The firmware cannot run it; reports show what
-//! its extra width would have brought.
+//! defaults of a numerical toolbox (no penalty on the weights, no bounds). The firmware cannot run it; reports show
+//! what its extra width would have brought.
 
 use super::levenberg_marquardt::Options;
 use super::weights::Bounds;

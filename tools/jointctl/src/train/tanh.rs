@@ -2,10 +2,10 @@
 //!
 //! The C library's tanh takes about 20 ns and a forward pass consists of little else. This one has neither branch nor
 //! table: tanh |x| = 1 - 2 / (e^{2|x|} + 1) with e^t = 2^k e^r, |r| <= ln(2)/2, and e^r by its Taylor series to r^11
-//! (remainder 0.347^12 / 12! = 6e-15). The error is below 1e-14 in absolute terms: five decades below what would show in a
-//! weight after quantisation, and small against the finite differences that tests compare gradients with. The slope
-//! 1 - y^2 is taken from the same y, so gradient and function agree. It uses only operations that IEEE 754 rounds exactly,
-//! so a training run also does not depend on the host's C library.
+//! (remainder 0.347^12 / 12! = 6e-15). The error is below 1e-14 in absolute terms: five decades below what would show
+//! in a weight after quantisation, and small against the finite differences that tests compare gradients with. The
+//! slope 1 - y^2 is taken from the same y, so gradient and function agree. It uses only operations that IEEE 754 rounds
+//! exactly, so a training run also does not depend on the host's C library.
 
 /// 1.5 * 2^52: adding and subtracting it rounds a number of magnitude below 2^51 to an integer, found in the low bits.
 const ROUND: f64 = 6_755_399_441_055_744.0;

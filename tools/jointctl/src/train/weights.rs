@@ -9,13 +9,13 @@ use rand_chacha::ChaCha8Rng;
 
 /// How far the weights and biases may go.
 ///
-/// The firmware's format needs sum |w| + |b| < 64 for every neuron and |w| < 32 for every weight (DESIGN, number formats).
-/// Bounds of single weights keep the training problem simple (a box); they are chosen so that no neuron can leave the
-/// format whatever its weights do.
+/// The firmware's format needs sum |w| + |b| < 64 for every neuron and |w| < 32 for every weight (DESIGN, number
+/// formats). Bounds of single weights keep the training problem simple (a box); they are chosen so that no neuron can
+/// leave the format whatever its weights do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Bounds {
-    /// In the first layer 62.7 / (number of active inputs + 1), at most 31.9; 8 in all further layers or what their width
-    /// allows.
+    /// In the first layer 62.7 / (number of active inputs + 1), at most 31.9; 8 in all further layers or what their
+    /// width allows.
     Firmware,
     /// Everywhere: for networks that stay in floating point.
     None,
@@ -61,8 +61,8 @@ impl Bounds {
 
 /// First values of all parameters of `shape` after Nguyen and Widrow.
 ///
-/// The weights of a tanh neuron point in a random direction with length 0.7 H^(1/n) (n inputs, H neurons) and its bias is
-/// uniform in +-that length. The linear output starts small, so that the first error is that of no network.
+/// The weights of a tanh neuron point in a random direction with length 0.7 H^(1/n) (n inputs, H neurons) and its bias
+/// is uniform in +-that length. The linear output starts small, so that the first error is that of no network.
 pub fn nguyen_widrow(shape: &Shape, random: &mut ChaCha8Rng) -> Vec<f64> {
     let mut parameters = Vec::with_capacity(shape.parameter_count());
     let hidden = shape.sizes().len() - 2;
@@ -81,8 +81,8 @@ pub fn nguyen_widrow(shape: &Shape, random: &mut ChaCha8Rng) -> Vec<f64> {
     parameters
 }
 
-/// First values uniform in +-1 / sqrt(n), n the inputs of the neuron: the default of the framework that the mobile-robot
-/// paper used.
+/// First values uniform in +-1 / sqrt(n), n the inputs of the neuron: the default of the framework that the
+/// mobile-robot paper used.
 pub fn uniform(shape: &Shape, random: &mut ChaCha8Rng) -> Vec<f64> {
     let mut parameters = Vec::with_capacity(shape.parameter_count());
     for layer in shape.layers() {

@@ -1,14 +1,16 @@
 //! The hot loops of training on vectors of four doubles where the processor has them; host.
 //!
-//! The x86-64 baseline has vectors of two. The loops are compiled once more for AVX2 and change no bit: every sum keeps its
-//! order, and no multiplication is fused with an addition (AVX2 alone has no such instruction, and Rust never fuses).
+//! The x86-64 baseline has vectors of two. The loops are compiled once more for AVX2 and change no bit: every sum keeps
+//! its order, and no multiplication is fused with an addition (AVX2 alone has no such instruction, and Rust never
+//! fuses).
 
 /// A loop that is compiled for several kinds of vectors.
 pub(super) trait Loop {
     /// The result of the loop.
     type Output;
 
-    /// Runs the loop. It and what it calls in its hot part must be `#[inline(always)]`: what is not inlined stays with the baseline.
+    /// Runs the loop. It and what it calls in its hot part must be `#[inline(always)]`: what is not inlined stays with
+    /// the baseline.
     fn run(self) -> Self::Output;
 }
 

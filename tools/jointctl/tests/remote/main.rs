@@ -1,5 +1,5 @@
-//! A joint over a bus: the virtual joint served in real time on buses within this process, driven through the library as the commands
-//! do it. What goes wrong goes wrong in one line, and leaves nothing half done.
+//! A joint over a bus: the virtual joint served in real time on buses within this process, driven through the library
+//! as the commands do it. What goes wrong goes wrong in one line, and leaves nothing half done.
 //!
 //! Most of their time these wait: more of them run at once than there are cores.
 
@@ -19,7 +19,8 @@ mod telemetry;
 
 use libtest_mimic::{Arguments, Trial};
 
-/// Tests at once, where the command line does not say how many. They hardly compute, but a dozen of them keep each other from answering in time.
+/// Tests at once, where the command line does not say how many. They hardly compute, but a dozen of them keep each
+/// other from answering in time.
 const AT_ONCE: usize = 4;
 
 /// The tests of each module. One that is missing is a function that nobody uses, which the compiler tells.

@@ -1,4 +1,5 @@
-//! A joint that belongs to somebody, through the library and the program: what only its owner may do, and how he says that he is.
+//! A joint that belongs to somebody, through the library and the program: what only its owner may do, and how he says
+//! that he is.
 
 use crate::served::{NODE, Served, image, program};
 use bus::client::{Abort, ClientError, Command as Nmt, Target};

@@ -55,7 +55,8 @@ impl Served {
             let parameters = ActuatorParameters::reference().aligned().without_payload();
             let options = Options { node_id, serial, seed: 1 };
             let images = SlotImages::empty().unwrap();
-            // Several joints run in real time beside each other here, and the machine is late for some of them at times.
+            // Several joints run in real time beside each other here, and the machine is late for some of them at
+            // times.
             let mut setup = Setup::of(&parameters);
             setup.configuration.limits.command_deadline = 0.5;
             let mut joint = VirtualNode::new(parameters, &setup, &options, images).unwrap();

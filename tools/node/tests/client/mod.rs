@@ -34,7 +34,8 @@ impl Joint {
         Ok(Self { node, bus: bus::open(bus)? })
     }
 
-    /// Runs `command` with paths of `images` and what `more` says behind its arguments, while the joint is on the bus; what it printed.
+    /// Runs `command` with paths of `images` and what `more` says behind its arguments, while the joint is on the bus;
+    /// what it printed.
     pub fn run(
         &mut self,
         mut command: Command,
@@ -63,8 +64,8 @@ impl Joint {
     }
 }
 
-/// Has clients with joints of their own transfer every length, a share each: `client` runs one that begins with a length and goes on in steps, and
-/// says how many lengths there were.
+/// Has clients with joints of their own transfer every length, a share each: `client` runs one that begins with a
+/// length and goes on in steps, and says how many lengths there were.
 pub fn every_length(client: impl Fn(&str, &str) -> Result<String, Failed> + Sync) -> Result<(), Failed> {
     let share = |first: usize| -> Result<usize, String> {
         let text = client(&first.to_string(), &SHARES.to_string());

@@ -1,5 +1,5 @@
-//! Two joints that share a drive: one hears the other's velocity, and its friction model chooses its parameter set by it (paper 003, section
-//! II.C).
+//! Two joints that share a drive: one hears the other's velocity, and its friction model chooses its parameter set by
+//! it (paper 003, section II.C).
 
 use crate::master::{FIRST, Line, MILLISECOND};
 use joint_firmware::friction::regime::{Criterion, Measure, Selector};

@@ -1,4 +1,5 @@
-//! An image of a kibibyte goes to a joint that moves, by block at 1 Mbit/s, and acts: how long that takes, and that no control step notices.
+//! An image of a kibibyte goes to a joint that moves, by block at 1 Mbit/s, and acts: how long that takes, and that no
+//! control step notices.
 
 use crate::master::{FIRST, Line, MILLISECOND};
 use bus::client::Object;
@@ -8,8 +9,8 @@ use joint_firmware::joint::state_machine::State;
 use node::{PacedEvent, SampleImage};
 use std::time::Duration;
 
-/// What a Cortex-M4 at 170 MHz needs to verify the most expensive image: at most 21 million instructions (docs/cost.md, `host-tests/tests/on_the_core/library.rs`), one a
-/// cycle.
+/// What a Cortex-M4 at 170 MHz needs to verify the most expensive image: at most 21 million instructions (docs/cost.md,
+/// `host-tests/tests/on_the_core/library.rs`), one a cycle.
 const VERIFICATION: Duration = Duration::from_millis(124);
 
 /// Two parameter sets with networks: 1,036 bytes.
@@ -38,7 +39,8 @@ fn a_kibibyte_takes_30_ms_by_block_and_acts_150_ms_after_its_last_byte_without_a
     let last_byte = line.heard.iter().rev().filter(|heard| heard.frame.id() == 0x600 + u16::from(FIRST)).nth(1);
     let last_byte = last_byte.unwrap().ended;
 
-    // Verified and tried in RAM, flash excluded. The task is busy for as long as verification takes; control steps go on.
+    // Verified and tried in RAM, flash excluded. The task is busy for as long as verification takes; control steps go
+    // on.
     line.nodes.node_mut(0).unwrap().occupy(VERIFICATION);
     line.write(FIRST, 0x2212, 1, &[1]);
     line.write(FIRST, 0x2212, 1, &[2]);

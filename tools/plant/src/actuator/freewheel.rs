@@ -8,9 +8,9 @@
 //! J(i) = i' M i / 2 - b' i + sum_k w_k |c_k . i|         w_k = 2/3 V,   c_k: direction of phase k in dq
 //! ```
 //!
-//! J is strictly convex and smooth but for three lines through the origin, so its minimum is one of: the origin (no diode
-//! conducts), one point on each line (one phase floats), or one point for each combination of signs. All are computed and
-//! the least is taken: no case can be missed and nothing chatters at zero.
+//! J is strictly convex and smooth but for three lines through the origin, so its minimum is one of: the origin (no
+//! diode conducts), one point on each line (one phase floats), or one point for each combination of signs. All are
+//! computed and the least is taken: no case can be missed and nothing chatters at zero.
 
 use super::frame::dot;
 

@@ -1,10 +1,11 @@
 //! The three half bridges, averaged over a PWM period, and the heat that they make.
 //!
-//! Dead time: while both transistors of a leg are off, the current picks the diode, so a phase that feeds the motor loses the
-//! dead time's share of the bus voltage and a phase that draws from it gains as much (S.-G. Jeong, M.-H. Park, "The
-//! analysis and compensation of dead-time effects in PWM inverters", IEEE Trans. Industrial Electronics 38(2), 1991). Near
-//! zero current the ripple and the transistors' capacitances smear the edge: linear within the clamping current. A leg at
-//! duty 0 or 1 does not switch and has no dead time. Switching losses and the current ripple itself are not modelled.
+//! Dead time: while both transistors of a leg are off, the current picks the diode, so a phase that feeds the motor
+//! loses the dead time's share of the bus voltage and a phase that draws from it gains as much (S.-G. Jeong, M.-H.
+//! Park, "The analysis and compensation of dead-time effects in PWM inverters", IEEE Trans. Industrial Electronics
+//! 38(2), 1991). Near zero current the ripple and the transistors' capacitances smear the edge: linear within the
+//! clamping current. A leg at duty 0 or 1 does not switch and has no dead time. Switching losses and the current ripple
+//! itself are not modelled.
 
 use super::delay::{Delay, MAXIMUM_DELAY};
 use super::legs::{Leg, Rails};
@@ -122,8 +123,8 @@ impl Inverter {
         self.duties.late()
     }
 
-    /// What the dead time does in a PWM of `period` (s) between `rails`, to windings of `inductance` (H) that are stepped
-    /// by `step` (s).
+    /// What the dead time does in a PWM of `period` (s) between `rails`, to windings of `inductance` (H) that are
+    /// stepped by `step` (s).
     #[must_use]
     pub fn dead_time(&self, rails: &Rails, period: f64, inductance: f64, step: f64) -> DeadTime {
         let share = self.parameters.dead_time / period;

@@ -1,8 +1,8 @@
 //! Bridge, windings, bus, joint and sensors together, one PWM period at a time.
 //!
-//! In a period the windings take several steps (of at most [`LONGEST_STEP`], or [`LONGEST_DIODE_STEP`] where diodes or a
-//! broken lead decide) at the speed that the rotor has at its beginning; then the joint moves on by the period with the
-//! windings' mean torque and losses. Cogging acts on the joint only.
+//! In a period the windings take several steps (of at most [`LONGEST_STEP`], or [`LONGEST_DIODE_STEP`] where diodes or
+//! a broken lead decide) at the speed that the rotor has at its beginning; then the joint moves on by the period with
+//! the windings' mean torque and losses. Cogging acts on the joint only.
 
 use super::accessories::{Accessories, Fitted};
 use super::bus::Bus;
@@ -26,9 +26,9 @@ pub const LONGEST_DIODE_STEP: f64 = 5e-6;
 /// Lowest bus voltage at which the board takes its idle power, V; below it has switched itself off.
 const LOWEST_SUPPLY: f64 = 5.0;
 
-/// Mean powers over the last period, W. Input = copper loss + bridge loss + mechanical + rise of the magnetic energy: to
-/// rounding while all phases are driven; a step in which a diode starts or ends to conduct loses a little of the magnetic
-/// energy.
+/// Mean powers over the last period, W. Input = copper loss + bridge loss + mechanical + rise of the magnetic energy:
+/// to rounding while all phases are driven; a step in which a diode starts or ends to conduct loses a little of the
+/// magnetic energy.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Powers {
     /// From the bus into the bridge; negative while the motor feeds the bus. Neither the board's idle power nor what a
@@ -273,8 +273,8 @@ impl Actuator {
         self.meet_faults();
     }
 
-    /// Steps the windings through one period; returns their mean torque on the rotor (Nm), the powers, and the mean current
-    /// from the positive rail (A).
+    /// Steps the windings through one period; returns their mean torque on the rotor (Nm), the powers, and the mean
+    /// current from the positive rail (A).
     fn advance_windings(&mut self, switching: bool, duties: [f64; 3], period: f64) -> (f64, Powers, f64) {
         let p = &self.parameters;
         let rails = Rails { voltage: self.bus.voltage(), diode_drop: p.inverter.diode_drop };

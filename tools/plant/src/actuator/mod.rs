@@ -1,7 +1,7 @@
 //! The joint with its electrical side, at the control rate: duties in, sensor readings out; host.
 //!
-//! One call of [`Actuator::advance`] is one PWM period. Between two calls, [`Actuator::measure`] gives what a control step
-//! may know. Powers add up in every period, see [`Powers`].
+//! One call of [`Actuator::advance`] is one PWM period. Between two calls, [`Actuator::measure`] gives what a control
+//! step may know. Powers add up in every period, see [`Powers`].
 //!
 //! ```text
 //! duties -> [shadow register] -> legs: quantised, dead time, body diodes, broken leads
@@ -19,7 +19,8 @@
 //! - [`accessories`]: holding brake and brake chopper
 //! - [`current_sensors`], [`rotor_encoder`], [`thermistor`], [`sensors`]: what is measured
 //! - [`faults`]: what can break
-//! - [`parameters`], [`effects`], [`randomised`]: everything that describes an actuator, effects one by one, random actuators
+//! - [`parameters`], [`effects`], [`randomised`]: everything that describes an actuator, effects one by one, random
+//!   actuators
 //! - [`lockstep`]: all of it together
 
 pub mod accessories;

@@ -89,8 +89,8 @@ impl ActuatorParameters {
         }
     }
 
-    /// The same actuator whose rotor, encoder and phases agree from the start: electrical zero and encoder zero at rotor
-    /// angle zero, all counting forward. What a commissioned drive has.
+    /// The same actuator whose rotor, encoder and phases agree from the start: electrical zero and encoder zero at
+    /// rotor angle zero, all counting forward. What a commissioned drive has.
     #[must_use]
     pub fn aligned(mut self) -> Self {
         self.windings.electrical_zero = 0.0;
@@ -140,8 +140,9 @@ impl ActuatorParameters {
         (turns - turns.floor()) * TAU
     }
 
-    /// Peak phase voltage that turns the rotor steadily at the link's `speed` (rad/s) while the torque-producing `current`
-    /// (A) flows, cold and without dead time, V. The linear range of a bridge ends at bus voltage / sqrt(3).
+    /// Peak phase voltage that turns the rotor steadily at the link's `speed` (rad/s) while the torque-producing
+    /// `current` (A) flows, cold and without dead time, V. The linear range of a bridge ends at bus voltage /
+    /// sqrt(3).
     #[must_use]
     pub fn voltage_for(&self, speed: f64, current: f64) -> f64 {
         let electrical = self.windings.pole_pairs as f64 * self.joint.motor.gear_ratio * speed;

@@ -5,10 +5,10 @@
 //! v_q = R i_q + L_q i_q' + w (L_d i_d + psi)    K_t = 3/2 p psi
 //! ```
 //!
-//! with w = p times the rotor's speed (textbook form, for example D. W. Novotny, T. A. Lipo, "Vector Control and Dynamics
-//! of AC Drives", 1996, ch. 2). While every phase is driven they are integrated by the implicit midpoint rule: stable for
-//! every step, and power in = copper loss + torque x speed + change of the magnetic energy holds to rounding. Where
-//! diodes or an open lead decide, the step is that of [`freewheel`](super::freewheel).
+//! with w = p times the rotor's speed (textbook form, for example D. W. Novotny, T. A. Lipo, "Vector Control and
+//! Dynamics of AC Drives", 1996, ch. 2). While every phase is driven they are integrated by the implicit midpoint rule:
+//! stable for every step, and power in = copper loss + torque x speed + change of the magnetic energy holds to
+//! rounding. Where diodes or an open lead decide, the step is that of [`freewheel`](super::freewheel).
 
 use super::frame::{Frame, dot};
 use super::freewheel::ImplicitStep;
@@ -229,8 +229,9 @@ impl Windings {
         [d, q]
     }
 
-    /// Diodes and open leads; returns the mean current of the step. Half a step of backward Euler, continued to its end, is
-    /// the midpoint rule; it is taken where every phase conducts or floats throughout, and backward Euler elsewhere.
+    /// Diodes and open leads; returns the mean current of the step. Half a step of backward Euler, continued to its
+    /// end, is the midpoint rule; it is taken where every phase conducts or floats throughout, and backward Euler
+    /// elsewhere.
     fn floating(
         &mut self,
         legs: &[Leg; 3],
@@ -243,8 +244,8 @@ impl Windings {
         let before = self.current;
         let middle = self.implicit(legs, rails, rotation, resistance, 0.5 * step).solve();
         let after = [2.0 * middle[0] - before[0], 2.0 * middle[1] - before[1]];
-        // Seen from the frame of the middle, a phase that floats throughout starts with what the rotor's turn within half a
-        // step makes of the others' currents.
+        // Seen from the frame of the middle, a phase that floats throughout starts with what the rotor's turn within
+        // half a step makes of the others' currents.
         let turned = 1e-9 + rotation.velocity.abs() * step * (before[0].abs() + before[1].abs());
         let [first, mid, last] = [before, middle, after].map(|current| frame.phases(current));
         let steady = (0..3).all(|k| match legs[k] {

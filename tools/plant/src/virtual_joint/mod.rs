@@ -1,4 +1,5 @@
-//! The firmware's joint running on a virtual actuator: the same control step as in the board's interrupt, one call a PWM period.
+//! The firmware's joint running on a virtual actuator: the same control step as in the board's interrupt, one call a
+//! PWM period.
 //!
 //! - [`setup`]: the configuration that a commissioned joint of given parameters would have
 //! - `signals`: the seam, in the types of both sides

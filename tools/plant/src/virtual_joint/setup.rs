@@ -1,5 +1,5 @@
-//! The configuration of a commissioned joint: what its makers know of motor and gear, limits around what it can do, and gains from its
-//! inertia. Nothing here knows the friction.
+//! The configuration of a commissioned joint: what its makers know of motor and gear, limits around what it can do, and
+//! gains from its inertia. Nothing here knows the friction.
 
 use crate::actuator::ActuatorParameters;
 use joint_firmware::compensation::Request;
@@ -66,7 +66,8 @@ impl Setup {
             damping: 0.0,
             over_current: (1.4 * motor.current_limit) as f32,
             bus_voltage: ((0.6 * parameters.bus.source_voltage) as f32, (1.3 * parameters.bus.source_voltage) as f32),
-            // Two thirds of the way up from the supply's own voltage: the rest is for its rise before the current follows.
+            // Two thirds of the way up from the supply's own voltage: the rest is for its rise before the current
+            // follows.
             regeneration_band: (0.2 * parameters.bus.source_voltage) as f32,
             chopper_voltage: 0.0,
             chopper_share: 0.1,

@@ -52,8 +52,8 @@ pub fn probes(board: &BoardConfiguration) -> Vec<Probe> {
     let (motor, rate) = (board.joint.motor, f64::from(board.bridge.rate));
     let highest = f64::from(board.joint.limits.bus_voltage.1);
     let current_limit = f64::from(motor.current_limit);
-    // 1.5 % of the highest supply, or, where that is more, 0.3 % and what of the dead time is not compensated: all of it without current, three
-    // quarters with much. It takes 4/3 of its part of the period.
+    // 1.5 % of the highest supply, or, where that is more, 0.3 % and what of the dead time is not compensated: all of
+    // it without current, three quarters with much. It takes 4/3 of its part of the period.
     let dead_time = 4.0 / 3.0 * f64::from(board.bridge.dead_time) * rate;
     let part = |uncompensated: f64| highest * (0.003 + uncompensated * dead_time).max(0.015);
     let (small, large) = (part(1.0), part(0.75));
@@ -98,7 +98,8 @@ pub fn probes(board: &BoardConfiguration) -> Vec<Probe> {
         Probe::of("rounds of unexplained voltage", implausible, rounds).counted(f64::from(30 / ROUND) - 1.0).apart(),
     );
 
-    // A current that misses its reference by 2 % of its limit and a quarter of the reference, while the voltage is too high.
+    // A current that misses its reference by 2 % of its limit and a quarter of the reference, while the voltage is too
+    // high.
     let missed = Shows::Fault(Fault::CurrentNotFollowed);
     for reference in [0.1 * current_limit, much] {
         let subject = seen(board, move |error| {

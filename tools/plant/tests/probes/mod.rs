@@ -1,10 +1,12 @@
-//! Probes of numeric limits: a value is held just below its limit, where nothing may show, and just above, where the fault has to; host.
+//! Probes of numeric limits: a value is held just below its limit, where nothing may show, and just above, where the
+//! fault has to; host.
 //!
 //! - `bench`: a joint whose measurements are held
 //! - `table`: the limits of the joint's configuration, each with its probes
 //! - `current_loop`: those of the check that compares the current loop with the motor's equations
 //!
-//! Limits are computed here, from the configuration and from what the documentation says, and not read back from the code that is probed.
+//! Limits are computed here, from the configuration and from what the documentation says, and not read back from the
+//! code that is probed.
 
 mod bench;
 mod current_loop;
@@ -24,7 +26,8 @@ pub struct Probe {
     pub held: u32,
     /// Calls of the subject within which the value just above must show.
     pub within: u32,
-    /// The value just above follows on the one just below in the same subject; otherwise each has a subject of its own.
+    /// The value just above follows on the one just below in the same subject; otherwise each has a subject of its
+    /// own.
     pub follows: bool,
     /// Faults that another limit shows at either value.
     pub beside: &'static [Fault],
@@ -58,7 +61,8 @@ impl Probe {
         Self { name, shows, below: 0.0, above: 0.0, held: 1, within: 1, follows: false, beside, subject }
     }
 
-    /// Probes a limit this far from it on both sides; a negative distance where the permitted side lies above. Just below is held for `held` steps.
+    /// Probes a limit this far from it on both sides; a negative distance where the permitted side lies above. Just
+    /// below is held for `held` steps.
     fn around(self, limit: f64, distance: f64, held: u32) -> Self {
         let within = match self.shows {
             Shows::Fault(fault) => crate::rig::table::documented(fault).steps,

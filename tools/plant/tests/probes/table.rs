@@ -44,7 +44,8 @@ fn held(
     }
 }
 
-/// A value that is there from the joint's first step on, and looked at from "operation enabled" on, with so much torque asked for, Nm.
+/// A value that is there from the joint's first step on, and looked at from "operation enabled" on, with so much torque
+/// asked for, Nm.
 fn from_the_start(
     board: &Board,
     torque: f64,
@@ -67,7 +68,8 @@ fn from_the_start(
     }
 }
 
-/// Torque that is asked for and made, a round of the motion loop a call, while a value is held in a joint that is enabled; with the value, Nm.
+/// Torque that is asked for and made, a round of the motion loop a call, while a value is held in a joint that is
+/// enabled; with the value, Nm.
 fn asking(board: &Board, set: impl Fn(&mut Bench, f64) -> f64 + Copy + 'static) -> impl Fn() -> Subject + 'static {
     let board = *board;
     move || {
@@ -364,8 +366,8 @@ fn torque(board: &Board) -> Vec<Probe> {
     probes
 }
 
-/// The probed configuration with each of its limits a little lower, by its name, with how that limit shows. A new limit does not compile before it is
-/// in here.
+/// The probed configuration with each of its limits a little lower, by its name, with how that limit shows. A new limit
+/// does not compile before it is in here.
 pub fn with_each_limit_moved(board: &Board) -> Vec<(&'static str, Shows, Board)> {
     let board = probed(board);
     let limits = board.joint.limits;

@@ -1,4 +1,5 @@
-//! The tables of docs/faults.md as the tests read them: what the documentation promises is what they measure against; host.
+//! The tables of docs/faults.md as the tests read them: what the documentation promises is what they measure against;
+//! host.
 
 use joint_firmware::joint::fault::{Fault, Reaction};
 

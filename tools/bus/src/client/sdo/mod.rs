@@ -1,11 +1,13 @@
-//! SDO client: expedited, segmented and block transfers in both directions, CiA 301 section 7.2.4; no I/O, time passed in, host.
+//! SDO client: expedited, segmented and block transfers in both directions, CiA 301 section 7.2.4; no I/O, time passed
+//! in, host.
 //!
-//! A [`Transfer`] is one reading or writing of one object. Send what [`Transfer::poll`] gives, give what the node answers to [`Transfer::receive`], until
-//! [`Transfer::outcome`]. Time is a [`Duration`] since any instant that stays the same.
+//! A [`Transfer`] is one reading or writing of one object. Send what [`Transfer::poll`] gives, give what the node
+//! answers to [`Transfer::receive`], until [`Transfer::outcome`]. Time is a [`Duration`] since any instant that stays
+//! the same.
 //!
-//! Lost frames: in a block they are sent again, as the protocol provides. Everywhere else the transfer ends by time-out with nothing
-//! half done, as it may be unknown whether the node acted; whoever asked decides whether to ask again. What comes late, of a transfer
-//! before, is passed over where it can be told apart: by its command or by its object.
+//! Lost frames: in a block they are sent again, as the protocol provides. Everywhere else the transfer ends by time-out
+//! with nothing half done, as it may be unknown whether the node acted; whoever asked decides whether to ask again.
+//! What comes late, of a transfer before, is passed over where it can be told apart: by its command or by its object.
 
 mod crc;
 mod download;
@@ -26,8 +28,8 @@ const SEGMENT: usize = 7;
 /// Which protocol carries the data.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Method {
-    /// Writing: expedited up to 4 bytes, segmented up to 28, then block; segmented where the node has no block transfer. Reading: as
-    /// the node answers a plain request, expedited or segmented, which every node can.
+    /// Writing: expedited up to 4 bytes, segmented up to 28, then block; segmented where the node has no block
+    /// transfer. Reading: as the node answers a plain request, expedited or segmented, which every node can.
     #[default]
     Automatic,
     /// Segmented, also what would fit into one frame. Reading: a node answers up to 4 bytes expedited all the same.
@@ -98,8 +100,8 @@ pub struct Transfer {
     /// When the node was last heard, or sent something to answer.
     active: Duration,
     started: bool,
-    /// The request that begins the transfer, to be sent again once: a transfer that somebody left half done makes the node refuse the
-    /// first request after it, and the second one begins anew.
+    /// The request that begins the transfer, to be sent again once: a transfer that somebody left half done makes the
+    /// node refuse the first request after it, and the second one begins anew.
     again: Option<Message>,
 }
 
@@ -173,7 +175,8 @@ impl Transfer {
         }
         let [command, ..] = *message;
         if command == ABORT {
-            // One that names another object ends a transfer before this one, late. Some nodes name none within a transfer.
+            // One that names another object ends a transfer before this one, late. Some nodes name none within a
+            // transfer.
             let &[_, low, high, sub_index, a, b, c, d] = message;
             if !names(message, self.object) && (low, high, sub_index) != (0, 0, 0) {
                 return;

@@ -69,8 +69,8 @@ impl Upload {
         matches!(self.phase, Phase::Block { sequence: 1.., last: false })
     }
 
-    /// The rest of the block was lost: confirms what came, so that the node sends the rest. Where nothing of the block came, the loss may be
-    /// that of the last confirmation, and confirming again could be taken for this block's.
+    /// The rest of the block was lost: confirms what came, so that the node sends the rest. Where nothing of the block
+    /// came, the loss may be that of the last confirmation, and confirming again could be taken for this block's.
     pub(super) fn acknowledge_after_silence(&mut self) -> Option<Message> {
         self.may_acknowledge().then(|| self.acknowledge()).flatten()
     }

@@ -1,7 +1,7 @@
 //! The CAN bus as the controller meets it: who sends when, how long a frame takes, who acknowledges.
 //!
-//! Source: ISO 11898-1. [`CanLine`] is what a board offers to the controller; [`Line`] is one with a single controller and whatever the host
-//! sends: arbitration, exact numbers of bits with their stuffing, and disturbances on demand.
+//! Source: ISO 11898-1. [`CanLine`] is what a board offers to the controller; [`Line`] is one with a single controller
+//! and whatever the host sends: arbitration, exact numbers of bits with their stuffing, and disturbances on demand.
 
 use super::super::time::Instant;
 use std::collections::VecDeque;
@@ -29,7 +29,8 @@ impl CanFrame {
         (id < 1 << 11).then_some(Self { id, extended: false, remote: false, length: data.len() as u8, data: bytes })
     }
 
-    /// Order in arbitration: the lower wins. Identifier, then remote and extended frames behind their standard data twins.
+    /// Order in arbitration: the lower wins. Identifier, then remote and extended frames behind their standard data
+    /// twins.
     fn priority(&self) -> u64 {
         let (base, low) = if self.extended { (self.id >> 18, self.id & 0x3_ffff) } else { (self.id, 0) };
         u64::from(base) << 21

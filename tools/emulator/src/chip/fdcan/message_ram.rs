@@ -1,4 +1,5 @@
-//! The message RAM of a controller: filters, receive FIFOs, transmit buffers. RM0440, 44.3.4 "Message RAM" and 44.3.5 to 44.3.10.
+//! The message RAM of a controller: filters, receive FIFOs, transmit buffers. RM0440, 44.3.4 "Message RAM" and 44.3.5
+//! to 44.3.10.
 
 use super::line::CanFrame;
 
@@ -49,8 +50,8 @@ impl MessageRam {
         }
     }
 
-    /// What the filters and the global configuration RXGFC make of a frame; none where it is rejected (44.3.5 "Acceptance filter").
-    /// `extended_mask` is XIDAM.
+    /// What the filters and the global configuration RXGFC make of a frame; none where it is rejected (44.3.5
+    /// "Acceptance filter"). `extended_mask` is XIDAM.
     pub fn accept(&self, frame: &CanFrame, global: u32, extended_mask: u32) -> Option<Accepted> {
         let (reject_remote, unmatched, filters) = match frame.extended {
             false => (global >> 1 & 1, global >> 4 & 3, global >> 16 & 0x1f),

@@ -1,13 +1,14 @@
 //! FDCAN1 with classic frames: RM0440, chapter 44.
 //!
-//! Modelled: initialisation and protected registers, bit timing, filters, both receive FIFOs, transmit FIFO and queue, cancellation,
-//! timestamps, error counters and states, bus-off with its recovery, both interrupt lines. A frame takes the bits that it has.
+//! Modelled: initialisation and protected registers, bit timing, filters, both receive FIFOs, transmit FIFO and queue,
+//! cancellation, timestamps, error counters and states, bus-off with its recovery, both interrupt lines. A frame takes
+//! the bits that it has.
 //!
-//! Not modelled, and refused: frames of CAN FD, loopback, monitoring, restricted operation, no retransmission, transmit pause, transmit events,
-//! priority messages, the RAM watchdog, the time-out counter, low power.
+//! Not modelled, and refused: frames of CAN FD, loopback, monitoring, restricted operation, no retransmission, transmit
+//! pause, transmit events, priority messages, the RAM watchdog, the time-out counter, low power.
 //!
-//! Assumption: a request that comes while a frame is under way takes part in the next arbitration; cancelling does not touch a frame
-//! that is being sent.
+//! Assumption: a request that comes while a frame is under way takes part in the next arbitration; cancelling does not
+//! touch a frame that is being sent.
 
 pub mod line;
 mod message_ram;

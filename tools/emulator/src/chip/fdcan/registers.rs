@@ -49,7 +49,8 @@ pub const EW: u32 = 1 << 18;
 pub const BO: u32 = 1 << 19;
 pub const PEA: u32 = 1 << 21;
 
-/// Flags of IR by the group that ILS gives a line: both FIFOs, successful messages, transmit FIFO, miscellaneous, line errors, protocol errors.
+/// Flags of IR by the group that ILS gives a line: both FIFOs, successful messages, transmit FIFO, miscellaneous, line
+/// errors, protocol errors.
 pub const GROUPS: [u32; 7] = [0x7, 0x38, 0x1c0, 0x1e00, 0xe000, 0x3_0000, 0xfc_0000];
 
 pub const PSR_EP: u32 = 1 << 5;

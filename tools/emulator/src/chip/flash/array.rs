@@ -1,7 +1,8 @@
 //! The cells of the flash: double words with their error correction, and what a loss of power makes of them.
 //!
-//! RM0440, 3.3.2 and 5.3.2 "Error code correction": eight check bits a double word, so a double word is written once after an erase.
-//! What a cell holds whose programming or erasing did not end is in no document; [`Torn`] lists what storage has to survive.
+//! RM0440, 3.3.2 and 5.3.2 "Error code correction": eight check bits a double word, so a double word is written once
+//! after an erase. What a cell holds whose programming or erasing did not end is in no document; [`Torn`] lists what
+//! storage has to survive.
 
 use super::super::memory;
 use crate::bus::Width;
@@ -155,7 +156,8 @@ impl Array {
         Some((memory::load(&self.bytes, offset as usize, width)?, wrong))
     }
 
-    /// Whether a double word may be programmed: erased, or overwritten by zeros (3.3.7 "Main memory programming sequences").
+    /// Whether a double word may be programmed: erased, or overwritten by zeros (3.3.7 "Main memory programming
+    /// sequences").
     pub fn accepts(&self, word: u32, value: u64) -> bool {
         value == 0 || !self.written[word as usize]
     }

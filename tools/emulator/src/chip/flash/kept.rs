@@ -1,4 +1,5 @@
-//! Pages of the flash as bytes, to be kept while the emulator does not run: each double word with its state, torn ones included.
+//! Pages of the flash as bytes, to be kept while the emulator does not run: each double word with its state, torn ones
+//! included.
 
 use super::array::{DOUBLE_WORD, Part, Torn};
 use super::{Array, Flash};

@@ -1,12 +1,14 @@
-//! FLASH, the interface of the embedded flash: RM0440, chapter 3 (category 3, STM32G474) and chapter 5 (category 2, STM32G431).
+//! FLASH, the interface of the embedded flash: RM0440, chapter 3 (category 3, STM32G474) and chapter 5 (category 2,
+//! STM32G431).
 //!
-//! Keys, standard programming, page erase, error flags, error correction with its interrupt, the user options of OPTR. Not modelled: fast programming, mass
-//! erase, other option bytes, write and read protection, power-down; nor what the options do, but for the number of banks as delivered.
+//! Keys, standard programming, page erase, error flags, error correction with its interrupt, the user options of OPTR.
+//! Not modelled: fast programming, mass erase, other option bytes, write and read protection, power-down; nor what the
+//! options do, but for the number of banks as delivered.
 //!
 //! Assumptions:
 //! - Programming and erasing take the datasheet's typical times (DS12288, "Flash memory characteristics").
-//! - The accelerator's caches are not simulated: an access costs all of the wait states, as if each missed. That is the slowest that it can be,
-//!   and it is the same on every run; what has to be quick lies in SRAM.
+//! - The accelerator's caches are not simulated: an access costs all of the wait states, as if each missed. That is the
+//!   slowest that it can be, and it is the same on every run; what has to be quick lies in SRAM.
 //! - An address in ECCR counts bytes from the bank's start (3.7.7; unconfirmed).
 
 mod array;
@@ -154,7 +156,8 @@ impl Flash {
         }
     }
 
-    /// Back to reset. What an operation under way leaves is undefined (3.3.6): here a double error wherever it had begun to work.
+    /// Back to reset. What an operation under way leaves is undefined (3.3.6): here a double error wherever it had
+    /// begun to work.
     pub fn reset(&mut self) {
         self.stop(Torn::Error);
         self.block.reset();
@@ -181,7 +184,8 @@ impl Flash {
         (self.cut, self.fails) = (None, None);
     }
 
-    /// Lets the power go in the middle of an operation: the `operation`th double word or page from now on, counted from 1.
+    /// Lets the power go in the middle of an operation: the `operation`th double word or page from now on, counted from
+    /// 1.
     pub fn cut_at(&mut self, operation: u64, kind: Torn) {
         self.cut = Some(Cut { operation: self.operations.saturating_add(operation), kind });
     }
@@ -214,8 +218,8 @@ impl Flash {
         self.rewritten.take()
     }
 
-    /// Offsets that cannot be read, and until when; none where all can be. One bank stalls its readers as a whole, of two banks the one
-    /// that is worked on (3.3.5 "Read-while-write").
+    /// Offsets that cannot be read, and until when; none where all can be. One bank stalls its readers as a whole, of
+    /// two banks the one that is worked on (3.3.5 "Read-while-write").
     pub fn stall(&self) -> Option<(Range<u32>, Instant)> {
         self.busy.as_ref().map(|busy| (busy.bank.clone(), busy.until))
     }

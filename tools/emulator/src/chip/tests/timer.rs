@@ -21,8 +21,8 @@ fn bench() -> Bench {
     bench
 }
 
-/// TIM1 as the firmware has it: centre-aligned mode 2, PWM mode 1 preloaded on channels 1 to 3, PWM mode 2 on channel 4 one count before
-/// the top, dead time of 136 cycles, system break; outputs off, counter stopped.
+/// TIM1 as the firmware has it: centre-aligned mode 2, PWM mode 1 preloaded on channels 1 to 3, PWM mode 2 on channel 4
+/// one count before the top, dead time of 136 cycles, system break; outputs off, counter stopped.
 fn bridge() -> Bench {
     let mut bench = bench();
     // PA8, PA9, PA10, PA12: function 6; PC13, PB15: function 4.

@@ -1,7 +1,8 @@
 //! A timer's counter: computed from the core's cycles between two turns, not ticked.
 //!
-//! RM0440, 28.3.2 "Counter modes", 29.3.2 and 30.4.2. Centre-aligned, the counter runs from 0 to the top and back, with an overflow when it
-//! reaches the top and an underflow when it reaches 0: a period of twice the top. Counting up, it starts over after the top.
+//! RM0440, 28.3.2 "Counter modes", 29.3.2 and 30.4.2. Centre-aligned, the counter runs from 0 to the top and back, with
+//! an overflow when it reaches the top and an underflow when it reaches 0: a period of twice the top. Counting up, it
+//! starts over after the top.
 
 /// A counter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,7 +29,8 @@ impl Counter {
         Self { count: 0, up: true, since: 0, tick: 1, top, centred: false, running: false }
     }
 
-    /// Cycle of the next turn: overflow or underflow. A counter with a top of 0 stands still (ARR, "the counter is blocked").
+    /// Cycle of the next turn: overflow or underflow. A counter with a top of 0 stands still (ARR, "the counter is
+    /// blocked").
     pub const fn turn(&self) -> u64 {
         if !self.running || self.top == 0 {
             return u64::MAX;
@@ -55,8 +57,8 @@ impl Counter {
         self.since + counts as u64 * self.tick
     }
 
-    /// Moves on to a cycle that is not behind the next turn. Returns the values that were reached: none, or from the first to the last,
-    /// in the direction of the count.
+    /// Moves on to a cycle that is not behind the next turn. Returns the values that were reached: none, or from the
+    /// first to the last, in the direction of the count.
     pub fn advance(&mut self, cycle: u64) -> Option<(u32, u32)> {
         if !self.running || self.top == 0 || cycle < self.since + self.tick {
             return None;

@@ -1,7 +1,7 @@
 //! The encoder mode of a timer: RM0440, 29.3.21 "Encoder interface mode".
 //!
-//! Every edge of both inputs counts; the direction follows from which came first. The inputs' filters are not modelled: the board says what
-//! passed them.
+//! Every edge of both inputs counts; the direction follows from which came first. The inputs' filters are not modelled:
+//! the board says what passed them.
 
 use super::super::wiring::Quadrature;
 

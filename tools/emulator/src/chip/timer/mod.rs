@@ -1,10 +1,11 @@
 //! TIM1 (RM0440, chapter 28), TIM2 to TIM5 (29) and TIM15 (30).
 //!
-//! Modelled: counting up and centre-aligned, prescaler, preload, repetition counter, update held off by UDIS, output compare in both PWM
-//! modes, TRGO and TRGO2 from an update or OC4REF, complementary outputs with dead time, break from the chip's own alarms and the BKIN
-//! input, the encoder mode that counts every edge with capture of the index.
+//! Modelled: counting up and centre-aligned, prescaler, preload, repetition counter, update held off by UDIS, output
+//! compare in both PWM modes, TRGO and TRGO2 from an update or OC4REF, complementary outputs with dead time, break from
+//! the chip's own alarms and the BKIN input, the encoder mode that counts every edge with capture of the index.
 //!
-//! Not modelled, and refused: counting down, one-pulse mode, DMA, slave modes, input capture but for the index, break 2, locks.
+//! Not modelled, and refused: counting down, one-pulse mode, DMA, slave modes, input capture but for the index, break
+//! 2, locks.
 //!
 //! Assumptions where the manual's figures leave room:
 //! - An event acts in the cycle in which the counter shows the value; its way to other peripherals is counted there.
@@ -282,8 +283,8 @@ impl Timer {
         })
     }
 
-    /// A store by the core of what is kept for the next update and changes nothing before it: most of what a program writes to a timer that runs.
-    /// False where it is something else, and has to be a [`write`](Self::write).
+    /// A store by the core of what is kept for the next update and changes nothing before it: most of what a program
+    /// writes to a timer that runs. False where it is something else, and has to be a [`write`](Self::write).
     #[inline]
     pub fn prepare(&mut self, offset: u32, value: u32) -> bool {
         let prepares = match offset {
@@ -388,7 +389,8 @@ impl Timer {
         self.block.get(register) >> (3 + 8 * (channel & 1)) & 1 != 0
     }
 
-    /// EGR: UG starts over and loads the preloaded values; it flags an update unless URS says that only turns do (28.6.6).
+    /// EGR: UG starts over and loads the preloaded values; it flags an update unless URS says that only turns do
+    /// (28.6.6).
     fn generate(&mut self, value: u32, cycle: u64) -> Result<(), Refusal> {
         self.block.write(EGR, value)?;
         if value & 1 != 0 {

@@ -1,5 +1,5 @@
-//! A timer's outputs: RM0440, 28.3.11 to 28.3.18 "PWM edge-aligned and centre-aligned", "Complementary outputs and dead-time insertion",
-//! "Using the break function", "Output control bits" (table of 28.6.11).
+//! A timer's outputs: RM0440, 28.3.11 to 28.3.18 "PWM edge-aligned and centre-aligned", "Complementary outputs and
+//! dead-time insertion", "Using the break function", "Output control bits" (table of 28.6.11).
 
 use super::super::variant::TimerOutput;
 use super::super::wiring::{Gate, Leg, Pwm};
@@ -31,8 +31,8 @@ impl Timer {
         self.block.get_or_zero(register) >> (8 * (channel & 1)) & 0xff
     }
 
-    /// Level of a channel's reference, OCxREF: in PWM mode 1 active below the compare value counting up, and up to it counting down; in mode 2
-    /// the other way round (28.6.7, OC1M).
+    /// Level of a channel's reference, OCxREF: in PWM mode 1 active below the compare value counting up, and up to it
+    /// counting down; in mode 2 the other way round (28.6.7, OC1M).
     pub(super) fn reference(&self, channel: usize) -> bool {
         let (count, compare) = (self.counter.count, self.compare[channel]);
         let below = if self.counter.up { count < compare } else { count <= compare };
@@ -137,7 +137,8 @@ impl Timer {
 
     /// BDTR. While a break is active the outputs cannot be switched on (28.3.17).
     ///
-    /// The BKIN input is on after reset; no pin carries it here, so it reads low, which the polarity after reset takes for a break.
+    /// The BKIN input is on after reset; no pin carries it here, so it reads low, which the polarity after reset takes
+    /// for a break.
     pub(super) fn write_break(&mut self, value: u32) -> Result<(), Refusal> {
         self.block.write(BDTR, value)?;
         self.judge_break();

@@ -54,8 +54,8 @@ pub const BKINE: u32 = 1 << 0;
 pub const MMS_UPDATE: u32 = 2;
 pub const MMS_REFERENCE4: u32 = 7;
 
-/// CR1: one-pulse mode, UIFREMAP and dithering are refused. CR2: preloaded control bits, TI1S. DIER: DMA, COM and trigger interrupts, index.
-/// CCMR: the fourth mode bit, clearing by ETR, fast enable.
+/// CR1: one-pulse mode, UIFREMAP and dithering are refused. CR2: preloaded control bits, TI1S. DIER: DMA, COM and
+/// trigger interrupts, index. CCMR: the fourth mode bit, clearing by ETR, fast enable.
 const ADVANCED: &[Register] = &[
     register(CR1, "CR1", 0, 0x0000_03f7, 0x0000_1808),
     register(CR2, "CR2", 0, 0x00f5_5f70, 0x0205_208d),

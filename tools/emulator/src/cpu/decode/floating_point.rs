@@ -1,4 +1,5 @@
-//! Floating point: what the coprocessors 10 and 11 are on this core (A6.4 to A6.7). Arithmetic in double precision is undefined.
+//! Floating point: what the coprocessors 10 and 11 are on this core (A6.4 to A6.7). Arithmetic in double precision is
+//! undefined.
 
 use super::{Decoded, Refused, bad, bits, unless};
 use crate::bus::Bus;

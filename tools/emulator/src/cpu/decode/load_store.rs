@@ -151,7 +151,8 @@ pub(super) fn single<B: Bus>(address: u32, first: u32, second: u32) -> Decoded<B
         let (before, up, change) = (bits(second, 10, 10), bits(second, 9, 9) == 1, bits(second, 8, 8));
         match (before, change) {
             (0, 0) => return Err(Refused::Unknown),
-            // Also what loads and stores without privilege: the same without a memory protection unit, but for the core's own registers.
+            // Also what loads and stores without privilege: the same without a memory protection unit, but for the
+            // core's own registers.
             (1, 0) => (OFFSET, signed(up, near), up && t == 15),
             (1, _) => (BEFORE, signed(up, near), n == t),
             _ => (AFTER, signed(up, near), n == t),

@@ -1,4 +1,5 @@
-//! From half-words to operations: which instruction an encoding is, and whether its outcome is defined (ARM DDI 0403, A5 and A7.7).
+//! From half-words to operations: which instruction an encoding is, and whether its outcome is defined (ARM DDI 0403,
+//! A5 and A7.7).
 
 mod branch;
 mod data_processing;

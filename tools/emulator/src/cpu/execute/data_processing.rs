@@ -19,7 +19,8 @@ pub(in crate::cpu) const ADC: u8 = 10;
 pub(in crate::cpu) const SBC: u8 = 11;
 pub(in crate::cpu) const SUB: u8 = 13;
 pub(in crate::cpu) const RSB: u8 = 14;
-/// Numbers that the encodings leave free: the second operand alone, and its complement; a multiplication, which narrow code numbers here.
+/// Numbers that the encodings leave free: the second operand alone, and its complement; a multiplication, which narrow
+/// code numbers here.
 pub(in crate::cpu) const MOV: u8 = 5;
 pub(in crate::cpu) const MVN: u8 = 6;
 pub(in crate::cpu) const MUL: u8 = 7;
@@ -31,7 +32,8 @@ pub(in crate::cpu) const OUTSIDE_IT: u8 = 2;
 /// Flags alone, no result.
 pub(in crate::cpu) const TEST: u8 = 3;
 
-/// Where the second operand comes from: `immediate` with `x` for the carry; register m; register m shifted by `immediate`, with kind `x`.
+/// Where the second operand comes from: `immediate` with `x` for the carry; register m; register m shifted by
+/// `immediate`, with kind `x`.
 pub(in crate::cpu) const CONSTANT: u8 = 0;
 pub(in crate::cpu) const REGISTER: u8 = 1;
 pub(in crate::cpu) const SHIFTED: u8 = 2;

@@ -18,7 +18,8 @@ pub(in crate::cpu) const fn loads(what: u8) -> bool {
     what >= LDRSB
 }
 
-/// How the address is formed: register n and constant; n and register m shifted left; a constant alone; n changed before or after.
+/// How the address is formed: register n and constant; n and register m shifted left; a constant alone; n changed
+/// before or after.
 pub(in crate::cpu) const OFFSET: u8 = 0;
 pub(in crate::cpu) const INDEXED: u8 = 1;
 pub(in crate::cpu) const ABSOLUTE: u8 = 2;
@@ -334,7 +335,8 @@ pub(in crate::cpu) fn strd<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>)
     cpu.go_on(rest)
 }
 
-/// LDREX: loads, and marks the address as its own. With a single core the monitor has no address (B.3.4.5 leaves its size open).
+/// LDREX: loads, and marks the address as its own. With a single core the monitor has no address (B.3.4.5 leaves its
+/// size open).
 pub(in crate::cpu) fn load_exclusive<B: Bus, const BYTES: u32>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     cpu.at(rest);
     let address = cpu.get(o.n).wrapping_add(o.immediate);

@@ -1,6 +1,8 @@
-//! What instructions do, by group. Operands were checked by `decode`; the names are the architecture's (ARM DDI 0403, A7.7).
+//! What instructions do, by group. Operands were checked by `decode`; the names are the architecture's (ARM DDI 0403,
+//! A7.7).
 
-/// The function of a condition that only decoding knows; 14 and more always hold. What else it is generic over comes before.
+/// The function of a condition that only decoding knows; 14 and more always hold. What else it is generic over comes
+/// before.
 macro_rules! by_condition {
     ($function:ident $(<$($before:ident),+>)?, $condition:expr) => {
         match $condition {

@@ -1,8 +1,9 @@
-//! Pairs of instructions that compilers put one behind the other, executed as one step of a stretch: a jump less whose target the host has to
-//! guess, which takes longer than most of what the instructions do.
+//! Pairs of instructions that compilers put one behind the other, executed as one step of a stretch: a jump less whose
+//! target the host has to guess, which takes longer than most of what the instructions do.
 //!
-//! Both remain steps of their own, and count as such: a stretch that ends between them executes the first alone. Moves in IT blocks are one
-//! step with what decides them in the same way. Which of all these there are was chosen by how often the boards' programs come across them.
+//! Both remain steps of their own, and count as such: a stretch that ends between them executes the first alone. Moves
+//! in IT blocks are one step with what decides them in the same way. Which of all these there are was chosen by how
+//! often the boards' programs come across them.
 
 use super::branch::branch_if_zero;
 use super::data_processing::{ADD, CONSTANT, MOV, NEVER, OUTSIDE_IT, REGISTER, SUB, TEST, operate, set_upper_half};
@@ -18,7 +19,8 @@ use crate::bus::Bus;
 use crate::cpu::Cpu;
 use crate::cpu::operation::{Done, Execute, Operands, Part, Rest};
 
-/// What executes two instructions one behind the other; none where they are no pair. `second` are the operands of the second.
+/// What executes two instructions one behind the other; none where they are no pair. `second` are the operands of the
+/// second.
 pub(in crate::cpu) fn pair_of<B: Bus>(parts: (Part, Part), second: Operands) -> Option<Execute<B>> {
     Some(match parts {
         (Part::CompareConstant, Part::Branch) => by_condition!(compare_constant_and_branch, second.x),
@@ -42,7 +44,8 @@ pub(in crate::cpu) fn pair_of<B: Bus>(parts: (Part, Part), second: Operands) -> 
     })
 }
 
-/// What executes a move of an IT block if a condition holds, beginning with the step before it; none where the instruction is no move.
+/// What executes a move of an IT block if a condition holds, beginning with the step before it; none where the
+/// instruction is no move.
 pub(in crate::cpu) fn conditional_of<B: Bus>(condition: u8, part: Part) -> Option<Execute<B>> {
     Some(match part {
         Part::Constant | Part::NarrowConstant => by_condition!(move_if<MOVE_CONSTANT>, condition),
@@ -52,7 +55,8 @@ pub(in crate::cpu) fn conditional_of<B: Bus>(condition: u8, part: Part) -> Optio
     })
 }
 
-/// What sets the flags before such a move and executes it as well; none where `parts` are none of both. Of VCMP, VMRS lies between.
+/// What sets the flags before such a move and executes it as well; none where `parts` are none of both. Of VCMP, VMRS
+/// lies between.
 pub(in crate::cpu) fn compared_of<B: Bus>(parts: (Part, Part), condition: u8) -> Option<Execute<B>> {
     macro_rules! what {
         ($flags:ident) => {

@@ -1,10 +1,11 @@
-//! Conversions: integers, fixed point, half precision (FPToFixed, FixedToFP, FPHalfToSingle, FPSingleToHalf of ARM DDI 0403, A2.5).
+//! Conversions: integers, fixed point, half precision (FPToFixed, FixedToFP, FPHalfToSingle, FPSingleToHalf of ARM DDI
+//! 0403, A2.5).
 
 use super::exact::{HALF, Kind, SINGLE, flushed, invalid, round_to, shifted, sign, unpack};
 use super::{ALTERNATIVE_HALF, DEFAULT_NAN, DEFAULT_NAN_MODE, INEXACT, INVALID, OVERFLOW, Rounding, Status};
 
-/// Fixed point of `bits` bits in all, `fraction` of them behind the point, with or without sign; saturated, and extended to 32 bits by its
-/// sign. `rounding` is the mode's where it is None.
+/// Fixed point of `bits` bits in all, `fraction` of them behind the point, with or without sign; saturated, and
+/// extended to 32 bits by its sign. `rounding` is the mode's where it is None.
 pub fn to_fixed(
     value: u32,
     bits: u32,
@@ -17,7 +18,8 @@ pub fn to_fixed(
         true => (0, (1i64 << bits) - 1),
         false => (-(1i64 << (bits - 1)), (1i64 << (bits - 1)) - 1),
     };
-    // The host's own conversion, where nothing is left to flag: a double has room for every number of 24 bits, wherever its point is.
+    // The host's own conversion, where nothing is left to flag: a double has room for every number of 24 bits, wherever
+    // its point is.
     if status.is_usual() && rounding == Some(Rounding::Zero) && fraction <= 32 {
         let scaled = f64::from(f32::from_bits(value)) * (1u64 << fraction) as f64;
         // Saturated where it is too large, which is out of range then.

@@ -112,8 +112,8 @@ pub(super) fn round(negative: bool, exponent: i32, mantissa: u128, status: &mut 
     sign(negative) | if away { INFINITY } else { INFINITY - 1 }
 }
 
-/// Exponent and fraction without sign, and whether that is more than the format has; underflow and inexactness are flagged, unless
-/// it overflows.
+/// Exponent and fraction without sign, and whether that is more than the format has; underflow and inexactness are
+/// flagged, unless it overflows.
 pub(super) fn round_to(
     format: Format,
     rounding: Rounding,

@@ -1,8 +1,9 @@
-//! Single-precision arithmetic as the floating-point unit does it, to the bit: rounding modes, NaNs, flush to zero, exception flags.
+//! Single-precision arithmetic as the floating-point unit does it, to the bit: rounding modes, NaNs, flush to zero,
+//! exception flags.
 //!
-//! ARM DDI 0403, A2.5 and its pseudo-code. The host's arithmetic is the same where the mode is the usual one, the result is
-//! a normal number (or exact) and nothing is left to flag: that is nearly always, because the inexact flag is sticky. Everything else takes the
-//! way of `exact`, which computes with integers.
+//! ARM DDI 0403, A2.5 and its pseudo-code. The host's arithmetic is the same where the mode is the usual one, the
+//! result is a normal number (or exact) and nothing is left to flag: that is nearly always, because the inexact flag is
+//! sticky. Everything else takes the way of `exact`, which computes with integers.
 
 mod convert;
 mod exact;
@@ -78,14 +79,15 @@ impl Status {
         self.0 |= flags;
     }
 
-    /// Whether the host's result is the unit's: nothing could be flagged that is not, and nothing be rounded otherwise. A result of the
-    /// smallest exponent may have been rounded up to it, which is an underflow.
+    /// Whether the host's result is the unit's: nothing could be flagged that is not, and nothing be rounded otherwise.
+    /// A result of the smallest exponent may have been rounded up to it, which is an underflow.
     #[inline(always)]
     fn trusts(self, result: u32) -> bool {
         self.is_usual() && (result & 0x7f80_0000).wrapping_sub(0x0100_0000) < 0x7e80_0000
     }
 
-    /// The same of a sum, and of a product with zero: those are exact where they are small, so that no finite one is an underflow.
+    /// The same of a sum, and of a product with zero: those are exact where they are small, so that no finite one is an
+    /// underflow.
     #[inline(always)]
     fn trusts_finite(self, result: u32) -> bool {
         self.is_usual() && result & 0x7f80_0000 != 0x7f80_0000

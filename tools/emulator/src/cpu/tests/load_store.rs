@@ -6,7 +6,8 @@ use crate::cpu::End;
 #[test]
 fn loads_extend_and_stores_cut() {
     let mut cpu = machine(&[
-        // ldrsb r1, [r0, r7]; ldrsh r2, [r0, r7]; ldrb r3, [r0, #0]; ldrh r4, [r0, #0]; strb r5, [r0, #4]; strh r5, [r0, #8]
+        // ldrsb r1, [r0, r7]; ldrsh r2, [r0, r7]; ldrb r3, [r0, #0]; ldrh r4, [r0, #0]; strb r5, [r0, #4]; strh r5,
+        // [r0, #8]
         0x57c1, 0x5fc2, 0x7803, 0x8804, 0x7105, 0x8105,
     ]);
     cpu.set_register(0, DATA);

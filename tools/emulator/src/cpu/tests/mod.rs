@@ -1,4 +1,5 @@
-//! What the core does, by group of instructions, and with exceptions and faults. Values are from the architecture's pseudo-code.
+//! What the core does, by group of instructions, and with exceptions and faults. Values are from the architecture's
+//! pseudo-code.
 
 mod data_processing;
 mod dsp;

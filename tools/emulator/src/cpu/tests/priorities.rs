@@ -4,7 +4,8 @@ use super::{AIRCR, complete, enable, finish, handler, machine, pend, place, read
 use crate::cpu::{Cpu, End};
 use crate::memory::Memory;
 
-/// A core on which interrupts 0 to 3 are enabled with these priorities; their handlers are breakpoints of their number and return.
+/// A core on which interrupts 0 to 3 are enabled with these priorities; their handlers are breakpoints of their number
+/// and return.
 fn with_priorities(priorities: [u8; 4]) -> Cpu<Memory> {
     let mut cpu = machine(&[0xbf00]);
     for (n, priority) in priorities.into_iter().enumerate() {

@@ -1,4 +1,5 @@
-//! Stretches, and what is translated of them, against single steps: the same registers, flags, memory, cycles and counts, wherever a run ends.
+//! Stretches, and what is translated of them, against single steps: the same registers, flags, memory, cycles and
+//! counts, wherever a run ends.
 
 use super::{DATA, START, machine, steps_to, with_floating_point};
 use crate::cpu::{Cpu, End};
@@ -14,7 +15,8 @@ const PIECES: &[&[u16]] = &[
     &[0x2802],
     &[0x4288],
     &[0x00c2],
-    // ldr r0, [r7]; str r1, [r7, #4]; ldr r1, [r7, #4]; ldr.w r3, [r7, #1], which is not aligned; ldr r2, [pc, #4], from flash
+    // ldr r0, [r7]; str r1, [r7, #4]; ldr r1, [r7, #4]; ldr.w r3, [r7, #1], which is not aligned; ldr r2, [pc, #4],
+    // from flash
     &[0x6838],
     &[0x6079],
     &[0x6879],
@@ -38,10 +40,12 @@ const PIECES: &[&[u16]] = &[
     &[0xe9d7, 0x1200],
     &[0xe9c7, 0x0102],
     &[0xbf1c, 0xf8d7, 0x1005, 0x683a],
-    // ldrd r1, r2, [pc, #8], from flash; movs r4, #0, msr control, r4: the floating-point unit has to be prepared again
+    // ldrd r1, r2, [pc, #8], from flash; movs r4, #0, msr control, r4: the floating-point unit has to be prepared
+    // again
     &[0xe9df, 0x1202],
     &[0x2400, 0xf384, 0x8814],
-    // vmov s0, r0; vldr s1, [r7]; vadd.f32 s0, s0, s1; vcmp.f32 s0, #0; vmrs apsr_nzcv, fpscr; vpush {s0, s1}; vpop {s1, s2}; vstr s2, [r7, #12]
+    // vmov s0, r0; vldr s1, [r7]; vadd.f32 s0, s0, s1; vcmp.f32 s0, #0; vmrs apsr_nzcv, fpscr; vpush {s0, s1}; vpop
+    // {s1, s2}; vstr s2, [r7, #12]
     &[0xee00, 0x0a10],
     &[0xedd7, 0x0a00],
     &[0xee30, 0x0a20],
@@ -50,8 +54,9 @@ const PIECES: &[&[u16]] = &[
     &[0xed2d, 0x0a02],
     &[0xecfd, 0x0a02],
     &[0xed87, 0x1a03],
-    // Pairs: movw r2, #0x1234, movt r2, #0x5678; ldr r0, [r7], ldr r1, [r7, #4]; ldr r0, [r7], ldr.w r1, [r7, #6], which is not aligned;
-    // str r0, [r7], str r2, [r7, #12]; dmb, cbz r0 over a nop; cmp r0, #3, bhs over a nop; subs r1, #1, bne over a nop
+    // Pairs: movw r2, #0x1234, movt r2, #0x5678; ldr r0, [r7], ldr r1, [r7, #4]; ldr r0, [r7], ldr.w r1, [r7, #6],
+    // which is not aligned; str r0, [r7], str r2, [r7, #12]; dmb, cbz r0 over a nop; cmp r0, #3, bhs over a nop;
+    // subs r1, #1, bne over a nop
     &[0xf241, 0x2234, 0xf2c5, 0x6278],
     &[0x6838, 0x6879],
     &[0x6838, 0xf8d7, 0x1006],
@@ -60,8 +65,8 @@ const PIECES: &[&[u16]] = &[
     &[0x2803, 0xd200, 0xbf00],
     &[0x3901, 0xd100, 0xbf00],
     // vmov.f32 s0, s1, vmov.f32 s2, s0; vmul.f32 s0, s1, s2, vmul.f32 s1, s0, s0; vldr s0, [r7], vldr s1, [r7, #8];
-    // vstr s0, [r7, #8], vstr s1, [r7]; vldr s0, [r7], vldr s1, [pc, #8], from flash; add.w r5, r7, #4, vldr s2, [r5]; the same of
-    // r8, which is where the code begins
+    // vstr s0, [r7, #8], vstr s1, [r7]; vldr s0, [r7], vldr s1, [pc, #8], from flash; add.w r5, r7, #4, vldr s2, [r5];
+    // the same of r8, which is where the code begins
     &[0xeeb0, 0x0a60, 0xeeb0, 0x1a40],
     &[0xee20, 0x0a81, 0xee60, 0x0a00],
     &[0xed97, 0x0a00, 0xedd7, 0x0a02],
@@ -69,15 +74,15 @@ const PIECES: &[&[u16]] = &[
     &[0xed97, 0x0a00, 0xeddf, 0x0a02],
     &[0xf107, 0x0504, 0xed95, 0x1a00],
     &[0xf108, 0x0504, 0xed95, 0x1a00],
-    // push {r0, r1}, add r5, sp, #4, pop {r1, r2}; vmov.f32 s0, s1, vldr s2, [r7, #4]; vldr s0, [r7], vadd.f32 s1, s0, s2;
-    // vldr s1, [r7, #4], vmul.f32 s0, s1, s1
+    // push {r0, r1}, add r5, sp, #4, pop {r1, r2}; vmov.f32 s0, s1, vldr s2, [r7, #4]; vldr s0, [r7], vadd.f32 s1, s0,
+    // s2; vldr s1, [r7, #4], vmul.f32 s0, s1, s1
     &[0xb403, 0xad01, 0xbc06],
     &[0xeeb0, 0x0a60, 0xed97, 0x1a01],
     &[0xed97, 0x0a00, 0xee70, 0x0a01],
     &[0xedd7, 0x0a01, 0xee20, 0x0aa0],
-    // Moves behind what sets the flags: cmp r0, #2, ite ne, movne r1, #7, moveq r1, r2; cmp r0, r1, it lt, movlt r0, r1;
-    // cmp r1, #0, it mi, vmovmi.f32 s0, s1; vcmp.f32 s0, s1, vmrs, it gt, movgt r0, #4; the same, it ls, vmovls.f32 s1, s0;
-    // vmrs, itt hi, movhi r2, r0, addhi r2, #1
+    // Moves behind what sets the flags: cmp r0, #2, ite ne, movne r1, #7, moveq r1, r2; cmp r0, r1, it lt, movlt r0,
+    // r1; cmp r1, #0, it mi, vmovmi.f32 s0, s1; vcmp.f32 s0, s1, vmrs, it gt, movgt r0, #4; the same, it ls,
+    // vmovls.f32 s1, s0; vmrs, itt hi, movhi r2, r0, addhi r2, #1
     &[0x2802, 0xbf14, 0x2107, 0x4611],
     &[0x4288, 0xbfb8, 0x4608],
     &[0x2900, 0xbf48, 0xeeb0, 0x0a60],

@@ -1,12 +1,13 @@
-//! What is translated against single steps, with random instructions of those that are: registers, flags, memory, cycles and counts.
+//! What is translated against single steps, with random instructions of those that are: registers, flags, memory,
+//! cycles and counts.
 
 use super::{DATA, START, machine, steps_to, with_floating_point};
 use crate::cpu::{Cpu, End};
 use crate::memory::Memory;
 use proptest::prelude::*;
 
-/// Encodings by their fixed bits: mask and bits of an instruction's half-words; of the others, random ones are filled in. r7 is the address of data that
-/// is a multiple of 4, and is not changed.
+/// Encodings by their fixed bits: mask and bits of an instruction's half-words; of the others, random ones are filled
+/// in. r7 is the address of data that is a multiple of 4, and is not changed.
 const KINDS: &[(&str, u32, u32)] = &[
     ("shift by a constant, narrow", 0xffff_e000, 0x0000),
     ("shift by a constant, narrow", 0xffff_e000, 0x0000),
@@ -79,7 +80,8 @@ fn instruction((kind, random): (usize, u32)) -> Vec<u16> {
     }
 }
 
-/// All of them many times around; a breakpoint follows. What changes r7 or the stack pointer is left out, as is what is not defined.
+/// All of them many times around; a breakpoint follows. What changes r7 or the stack pointer is left out, as is what is
+/// not defined.
 fn looped(instructions: &[(usize, u32)], registers: &[u32; 7], floats: &[u32; 8], usual: bool) -> Cpu<Memory> {
     let mut code = Vec::new();
     for halves in instructions.iter().map(|chosen| instruction(*chosen)) {

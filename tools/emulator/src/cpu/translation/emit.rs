@@ -1,8 +1,8 @@
 //! A region as a function: its blocks, what time they take, and how it is left.
 //!
-//! Registers are variables, and written to the core as well (`registers`); flags are written where the function is left (`leaving`). Cycles and
-//! instructions are counted together, the latter in the upper half of a word, once for each block. A block begins only if its last instruction begins
-//! before something is due.
+//! Registers are variables, and written to the core as well (`registers`); flags are written where the function is left
+//! (`leaving`). Cycles and instructions are counted together, the latter in the upper half of a word, once for each
+//! block. A block begins only if its last instruction begins before something is due.
 
 use super::region::{LEAST, Place, Region};
 use super::{Action, Fields, Instruction, Left};
@@ -382,7 +382,8 @@ impl Emitter<'_, '_> {
         Some(true)
     }
 
-    /// Goes to where a register says, after something else; exceptions' returns and what is no Thumb code are left to be called.
+    /// Goes to where a register says, after something else; exceptions' returns and what is no Thumb code are left to
+    /// be called.
     pub fn branch_to(&mut self, target: Value, cost: u64, before: impl FnOnce(&mut Self)) {
         let (one, returns) = (self.constant(1), self.constant(0xf000_0000));
         let thumb = self.b.ins().band(target, one);

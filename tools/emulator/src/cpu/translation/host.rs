@@ -97,10 +97,10 @@ impl Compiler {
     }
 }
 
-/// Executes one instruction, which lies at `address`, for a function that has counted `spent` so far. `how` has what is known of the core: whether the
-/// instruction before loaded or stored one register, IT state, IT state behind it. The cycles up to which what is translated may go on; 0 where the
-/// function is to be left, with the core as it is: what follows does not lie at `next`, something has changed, or something is due before
-/// more than the `remaining` cycles.
+/// Executes one instruction, which lies at `address`, for a function that has counted `spent` so far. `how` has what is
+/// known of the core: whether the instruction before loaded or stored one register, IT state, IT state behind it. The
+/// cycles up to which what is translated may go on; 0 where the function is to be left, with the core as it is: what
+/// follows does not lie at `next`, something has changed, or something is due before more than the `remaining` cycles.
 pub(super) extern "C" fn call_one<B: Bus>(
     cpu: *mut Cpu<B>,
     spent: u64,
@@ -109,7 +109,8 @@ pub(super) extern "C" fn call_one<B: Bus>(
     how: u32,
     remaining: u32,
 ) -> u32 {
-    // SAFETY: only translated functions call this, with the core that `Function::run` was given, which nothing else uses meanwhile.
+    // SAFETY: only translated functions call this, with the core that `Function::run` was given, which nothing else
+    // uses meanwhile.
     let cpu = unsafe { &mut *cpu };
     cpu.now = cpu.now.wrapping_add(spent & 0xffff_ffff);
     cpu.instructions = cpu.instructions.wrapping_add(spent >> 32);
@@ -149,9 +150,10 @@ impl Function {
             return Left::Call;
         }
         let start = memory.as_mut_ptr();
-        // SAFETY: the mapping holds a whole function with this signature, which the compiler made of `emit::function`, and lives for as long as
-        // `self`. It reads and writes fields of the core, at the offsets that the compiler of this program gives, and of memory only what lies
-        // within the length that it was compiled for, which it has: each access is checked before. Both are borrowed for the call alone.
+        // SAFETY: the mapping holds a whole function with this signature, which the compiler made of `emit::function`,
+        // and lives for as long as `self`. It reads and writes fields of the core, at the offsets that the
+        // compiler of this program gives, and of memory only what lies within the length that it was compiled
+        // for, which it has: each access is checked before. Both are borrowed for the call alone.
         let left = unsafe {
             let function = std::mem::transmute::<*const u8, Translated<B>>(self.begin);
             function(cpu, start)

@@ -64,7 +64,8 @@ impl Emitter<'_, '_> {
         self.b.switch_to_block(on);
     }
 
-    /// The instruction is called, instead of what is translated, if something is `unusual`. Nothing has changed up to there.
+    /// The instruction is called, instead of what is translated, if something is `unusual`. Nothing has changed up to
+    /// there.
     pub fn call_if(&mut self, unusual: Value) {
         let aside = match self.aside {
             Some(aside) => aside,
@@ -148,8 +149,8 @@ impl Emitter<'_, '_> {
         (self.compared, self.compared_floats, self.ready, self.usual) = (None, None, false, false);
     }
 
-    /// Calls the instruction. The function is left if something else follows than what is translated, or too early for the `remaining` cycles of
-    /// the block.
+    /// Calls the instruction. The function is left if something else follows than what is translated, or too early for
+    /// the `remaining` cycles of the block.
     pub fn call(&mut self, follows: Place, remaining: u32) {
         for flag in 0..4 {
             let value = self.get_flag(flag);

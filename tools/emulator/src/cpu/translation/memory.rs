@@ -126,8 +126,8 @@ impl Emitter<'_, '_> {
         Some(self.b.ins().iadd(memory, place))
     }
 
-    /// Where in the host's memory values of `bytes` bytes lie, so many of them, which have to be a multiple of those. The
-    /// function is left if they do not, or lie elsewhere, or are code that is stored to.
+    /// Where in the host's memory values of `bytes` bytes lie, so many of them, which have to be a multiple of those.
+    /// The function is left if they do not, or lie elsewhere, or are code that is stored to.
     pub fn checked(&mut self, address: Value, bytes: u32, values: u32, stores: bool) -> Value {
         let start = self.constant(SRAM);
         let offset = self.b.ins().isub(address, start);

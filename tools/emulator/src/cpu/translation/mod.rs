@@ -1,13 +1,14 @@
 //! Translation: code that runs often, as functions of the host.
 //!
-//! A *region* is what is reached from one address by branches whose targets are known (`region`). It becomes a function that keeps registers
-//! and flags in the host's own (`emit` and what it uses), compiled by Cranelift (`host`). The function does what is common itself. An access that memory
-//! does not answer at once, a floating-point result that the host's arithmetic may not give, an instruction that is not translated: it calls for
-//! those, one at a time, with the core as if all before had been executed one by one, and goes on if nothing else has to be done. It is left before a
+//! A *region* is what is reached from one address by branches whose targets are known (`region`). It becomes a function
+//! that keeps registers and flags in the host's own (`emit` and what it uses), compiled by Cranelift (`host`). The
+//! function does what is common itself. An access that memory does not answer at once, a floating-point result that the
+//! host's arithmetic may not give, an instruction that is not translated: it calls for those, one at a time, with the
+//! core as if all before had been executed one by one, and goes on if nothing else has to be done. It is left before a
 //! block that may last until something is due; then stretches go on.
 //!
-//! Whether anything is translated changes no result: `tests/translation.rs` and `tests/stretches.rs` compare it with single steps, and the tests of the
-//! boards whole runs with and without it.
+//! Whether anything is translated changes no result: `tests/translation.rs` and `tests/stretches.rs` compare it with
+//! single steps, and the tests of the boards whole runs with and without it.
 
 mod arithmetic;
 mod emit;
@@ -196,8 +197,8 @@ impl Translations {
         self.after
     }
 
-    /// The rest behind the last translation, in which what is often come across waits, is not over. Never where everything
-    /// is translated at once.
+    /// The rest behind the last translation, in which what is often come across waits, is not over. Never where
+    /// everything is translated at once.
     pub fn rests(&self) -> bool {
         self.after > 0 && self.rests.is_some_and(|until| Instant::now() < until)
     }
@@ -276,15 +277,15 @@ impl<B: Bus> Source for Core<'_, B> {
 }
 
 impl<B: Bus> Cpu<B> {
-    /// So often code is come across before it is translated, 4096 times if nothing else is said; none for never. What is translated already stays so.
-    /// No result depends on it.
+    /// So often code is come across before it is translated, 4096 times if nothing else is said; none for never. What
+    /// is translated already stays so. No result depends on it.
     pub fn set_translation(&mut self, after: Option<u32>) {
         self.code.translations.after = after.unwrap_or(TRANSLATED);
     }
 
-    /// A rest behind each translation, so many times as long as it took, for who keeps up with a clock: code that is come
-    /// across equally often is translated one function behind the other otherwise, seconds at a stretch. No result depends
-    /// on it.
+    /// A rest behind each translation, so many times as long as it took, for who keeps up with a clock: code that is
+    /// come across equally often is translated one function behind the other otherwise, seconds at a stretch. No
+    /// result depends on it.
     pub fn set_rest_between_translations(&mut self, times: u32) {
         self.code.translations.rest = Some(times);
     }

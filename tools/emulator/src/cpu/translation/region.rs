@@ -1,4 +1,5 @@
-//! Which instructions are translated together: those that are reached from an address by branches whose targets are known.
+//! Which instructions are translated together: those that are reached from an address by branches whose targets are
+//! known.
 
 use super::{Action, Instruction, Source, Word};
 use crate::cpu::operation::{Flow, behind};
@@ -14,7 +15,8 @@ const LARGEST: usize = 256;
 /// So many are translated again where another function begins.
 const SMALL: usize = 48;
 
-/// What is known of the core before an instruction: where it is, whether the instruction before loaded or stored one register, IT state.
+/// What is known of the core before an instruction: where it is, whether the instruction before loaded or stored one
+/// register, IT state.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub(super) struct Place {
     pub address: u32,
@@ -29,7 +31,8 @@ impl Place {
     }
 }
 
-/// The instructions, where blocks of them begin, and what else there is to know of them. What is translated depends on nothing else.
+/// The instructions, where blocks of them begin, and what else there is to know of them. What is translated depends on
+/// nothing else.
 #[derive(Clone, PartialEq, Eq, Hash)]
 pub(super) struct Region {
     pub entry: u32,
@@ -111,7 +114,8 @@ impl Region {
         })
     }
 
-    /// The instructions of the block at a place, each with its address: up to where another begins, or one that is not translated.
+    /// The instructions of the block at a place, each with its address: up to where another begins, or one that is not
+    /// translated.
     pub fn block(&self, begin: u32) -> Vec<(u32, Instruction)> {
         let mut block = Vec::new();
         let mut address = begin;

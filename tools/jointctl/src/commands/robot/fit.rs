@@ -13,7 +13,8 @@ use std::path::PathBuf;
 pub struct RobotFit {
     /// Description of the recording, which names the robot (docs/robot.md)
     recording: PathBuf,
-    /// Folder for images, URDF, parameters and reports; other files in it are left alone [default: the description's name]
+    /// Folder for images, URDF, parameters and reports; other files in it are left alone [default: the description's
+    /// name]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Permission to replace.

@@ -27,7 +27,8 @@ pub struct Simulated {
     /// Torque of a load at the joint, Nm, and what friction adds to it on the way up.
     pub load: [f64; 2],
     pub torque_gain: f64,
-    /// Inertia at the joint, kg m^2, that a motion in velocity mode speeds up, Coulomb friction, Nm, and viscous friction, Nm s/rad.
+    /// Inertia at the joint, kg m^2, that a motion in velocity mode speeds up, Coulomb friction, Nm, and viscous
+    /// friction, Nm s/rad.
     pub swung: [f64; 3],
     /// Control steps so far.
     pub step: u32,

@@ -232,7 +232,8 @@ impl Seen<'_> {
                 efforts += self.samples.effort[i] * self.samples.effort[i];
             }
             let correlation = both / (squares * residuals).sqrt().max(f64::MIN_POSITIVE);
-            // A heavy run among light ones makes the light ones' residuals go with the acceleration, too: the median tells which.
+            // A heavy run among light ones makes the light ones' residuals go with the acceleration, too: the median
+            // tells which.
             let share = match group.and_then(|group| apart.get(group)) {
                 Some(apart) => apart.abs() * (squares / efforts.max(f64::MIN_POSITIVE)).sqrt(),
                 None => both.abs() / (squares * efforts).sqrt().max(f64::MIN_POSITIVE),
