@@ -16,7 +16,7 @@ use libtest_mimic::{Arguments, Failed, Trial};
 use page::Row;
 use python::baselines::PACKAGES;
 use rayon::iter::{IndexedParallelIterator, IntoParallelRefIterator, ParallelIterator};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 fn main() {
     let arguments = Arguments::from_args();

@@ -11,7 +11,7 @@ use jointctl::fit::Options as JointOptions;
 use jointctl::progress::Silent;
 use jointctl::robot::{FittedRobot, Options, fit, record};
 use libtest_mimic::{Arguments, Failed, Trial};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Seconds of training; None: all of both recordings.
 const TRAINING: [Option<f64>; 3] = [None, Some(16.0), Some(8.0)];

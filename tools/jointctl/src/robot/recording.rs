@@ -58,7 +58,7 @@ pub enum RobotFitError {
     },
     /// The robot's files.
     #[error(transparent)]
-    Robot(#[from] RobotError),
+    Robot(Box<RobotError>),
     /// The samples of one joint.
     #[error("{}: joint {joint}: {source}", path.display())]
     Dataset {
@@ -67,7 +67,7 @@ pub enum RobotFitError {
         /// The joint.
         joint: String,
         /// What is wrong.
-        source: DatasetError,
+        source: Box<DatasetError>,
     },
     /// A joint that did not move.
     #[error(
@@ -94,11 +94,11 @@ pub enum RobotFitError {
         /// Position or speed, with a verb.
         quantity: &'static str,
         /// Its values, with unit.
-        found: String,
+        found: Box<str>,
         /// The limit, with unit.
-        limit: String,
+        limit: Box<str>,
         /// The remedy.
-        remedy: String,
+        remedy: Box<str>,
     },
     /// The samples of two joints are not the same rows.
     #[error(
@@ -133,6 +133,12 @@ pub enum RobotFitError {
         /// What is wrong.
         source: crate::fit::FitError,
     },
+}
+
+impl From<RobotError> for RobotFitError {
+    fn from(error: RobotError) -> Self {
+        Self::Robot(Box::new(error))
+    }
 }
 
 /// All joints of a robot at the same times.
@@ -229,7 +235,7 @@ pub fn record(path: &Path, environment: Environment) -> Result<Recording, RobotF
             DatasetError::Constant { signal: "position", .. } => {
                 RobotFitError::Still { path: path.clone(), joint, speed: 0.0 }
             }
-            source => RobotFitError::Dataset { path: path.clone(), joint, source },
+            source => RobotFitError::Dataset { path: path.clone(), joint, source: Box::new(source) },
         })?;
         one.warnings.retain(|warning| !OF_ONE_JOINT.contains(&warning.check));
         prepared.push(one);
@@ -285,6 +291,7 @@ fn check(recording: &Recording, path: &Path) -> Result<(), RobotFitError> {
         let beyond = beyond_limits(&recording.robot, j, prepared, speed);
         if let Some((quantity, found, limit)) = beyond {
             let remedy = remedy(&recording.robot.tree.joints[j], &prepared.description.columns.position);
+            let [found, limit, remedy] = [found, limit, remedy].map(String::into_boxed_str);
             return Err(RobotFitError::BeyondLimits { path: path(), joint, quantity, found, limit, remedy });
         }
     }

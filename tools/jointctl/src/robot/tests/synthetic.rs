@@ -41,11 +41,11 @@ pub struct Truth {
 /// two joints, every fourth with rotor inertias that its file states.
 pub fn robot(seed: u64) -> Truth {
     let joints = 2 + seed as usize % 11;
-    let tree = tree(Shape { joints, branches: seed % 2 == 0, prismatic: 0.2, armature: false }, seed);
+    let tree = tree(Shape { joints, branches: seed.is_multiple_of(2), prismatic: 0.2, armature: false }, seed);
     let mut random = ChaCha8Rng::seed_from_u64(1000 + seed);
     let ratio = |joint: &rigid_body::Joint| if joint.kind == JointKind::Prismatic { 200.0 } else { 20.0 };
     let mut coupling = DMatrix::from_diagonal(&DVector::from_iterator(joints, tree.joints.iter().map(ratio)));
-    if seed % 3 == 0 {
+    if seed.is_multiple_of(3) {
         coupling[(joints - 1, joints - 2)] = ratio(&tree.joints[joints - 2]);
     }
     let rotors: Vec<f64> = (0..joints).map(|_| random.random_range(0.5e-4..2e-4)).collect();
