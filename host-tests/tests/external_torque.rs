@@ -6,6 +6,9 @@ use host_tests::in_the_loop::{for_seeds, median};
 use host_tests::samples::{count, every};
 use host_tests::touched::{Touch, Wrong, touched, untouched};
 
+/// Median and worst.
+type Spread = (f64, f64);
+
 /// Joints.
 const JOINTS: (u64, u64) = (8, 20);
 /// Threshold of a collision, as a part of the torque limit.
@@ -13,7 +16,7 @@ const THRESHOLD: f64 = 0.03;
 
 /// Errors of friction and load as parts of the truth, and with them the RMS of the external torque's error at rest and
 /// in moves, % of the torque limit, median and worst of docs/external-torque.md.
-const ERRORS: [(f64, f64, (f64, f64), (f64, f64)); 4] = [
+const ERRORS: [(f64, f64, Spread, Spread); 4] = [
     (0.0, 0.0, (0.9, 9.8), (0.7, 10.1)),
     (0.3, 0.0, (1.1, 10.1), (1.0, 10.1)),
     (0.0, 0.3, (1.6, 8.0), (2.3, 7.7)),
@@ -24,7 +27,7 @@ const COVERED: f64 = 99.4;
 
 /// Touches, and time until they are found and torque by then, s and % of the torque limit, median and worst of
 /// docs/external-torque.md.
-const TOUCHES: [(Touch, (f64, f64), (f64, f64)); 5] = [
+const TOUCHES: [(Touch, Spread, Spread); 5] = [
     (Touch::Push(0.2), (0.0105, 0.038), (20.0, 20.0)),
     (Touch::Push(0.4), (0.007, 0.013), (40.0, 40.0)),
     (Touch::Wall(2.0), (0.0495, 0.150), (17.4, 33.6)),

@@ -5,7 +5,7 @@
 //! Newey, K. West, A Simple, Positive Semi-Definite, Heteroskedasticity and Autocorrelation Consistent Covariance
 //! Matrix, 1987, with stationary noise). rho is tapered linearly, which keeps T positive semidefinite.
 //!
-//! The taper ends at [`REACH`] times the correlation time 1 + 2 sum rho (A. Sokal, Monte Carlo Methods in Statistical
+//! The taper ends at `REACH` times the correlation time 1 + 2 sum rho (A. Sokal, Monte Carlo Methods in Statistical
 //! Mechanics, 1997, section 3). A longer one would resolve the spectrum near the motion's own frequencies, where least
 //! squares has taken noise out of the residuals. All of it is scaled to the longest correlation time that a sum without
 //! taper reaches: the taper alone states errors that are too small.
