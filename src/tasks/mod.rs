@@ -192,7 +192,7 @@ async fn log() {
                 state_name(telemetry.state),
                 telemetry.statusword(),
                 // Bits as in object 2021h:4.
-                report.latched.bits(),
+                report.latched.bits() >> 1,
                 telemetry.bus_voltage,
                 telemetry.motion.position,
                 report.phase_currents.a,

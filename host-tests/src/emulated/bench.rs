@@ -7,6 +7,7 @@ use emulator::cpu::{End, Watch};
 use emulator::emulation::Emulation;
 use emulator::program::Program;
 use emulator::rtt::Messages;
+use joint_firmware::joint::fault::Fault;
 use libtest_mimic::Failed;
 use plant::ActuatorParameters;
 use std::sync::Arc;
@@ -172,6 +173,22 @@ impl<W: Wired> Bench<W> {
         line.trim_start_matches("joint: ").split(',').next().unwrap_or_default().to_owned()
     }
 
+    /// Faults that the log tells of, all lines together: bit n - 1 for fault n.
+    pub fn faults(&self) -> u32 {
+        faults_in(&self.log())
+    }
+
+    /// The log tells of a fault.
+    ///
+    /// # Errors
+    /// It does not; with the log.
+    pub fn expect_fault(&self, fault: Fault) -> Result<(), Failed> {
+        match self.faults() >> (fault as u32 - 1) & 1 {
+            1 => Ok(()),
+            _ => Err(format!("the log does not tell \"{fault}\":\n{}", self.log()).into()),
+        }
+    }
+
     /// The log says something.
     ///
     /// # Errors
@@ -187,4 +204,10 @@ impl<W: Wired> Bench<W> {
     pub fn board(&mut self) -> &mut W {
         self.emulation.cpu.bus.wiring_mut()
     }
+}
+
+/// Faults of all lines of a log: bit n - 1 for fault n.
+pub fn faults_in(log: &str) -> u32 {
+    let told = log.lines().filter_map(|line| line.split_once("faults 0x")?.1.split(',').next());
+    told.filter_map(|bits| u32::from_str_radix(bits, 16).ok()).fold(0, |all, bits| all | bits)
 }

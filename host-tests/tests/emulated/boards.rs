@@ -4,6 +4,7 @@
 use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired};
 use host_tests::emulated::Bench;
 use host_tests::emulated::bench::{actuator, program};
+use joint_firmware::joint::fault::Fault as JointFault;
 use libtest_mimic::{Failed, Trial};
 use plant::actuator::Fault;
 
@@ -40,7 +41,7 @@ fn starts<W: Wired>(bench: &mut Bench<W>, rate: u32, idle: &str) -> Result<(), F
     bench.run(0.1)?;
     bench.emulation.cpu.clear_exception_times();
     bench.run(SETTLED - 0.1)?;
-    bench.expect(&format!("{}: control steps at {rate} Hz", W::NAME))?;
+    bench.expect(&format!("control steps at {rate} Hz"))?;
     let times = bench.emulation.cpu.exception_times().get(&CONTROL).ok_or("no control interrupt")?;
     let (expected, period) = (f64::from(rate) * (SETTLED - 0.1), 170_000_000 / u64::from(rate));
     println!("{}: {} control interrupts, {} to {} cycles of {period}", W::NAME, times.count, times.least, times.most);
@@ -50,7 +51,7 @@ fn starts<W: Wired>(bench: &mut Bench<W>, rate: u32, idle: &str) -> Result<(), F
     bench.expect("overruns: 0, switching: false, stopped: false")?;
     bench.expect("torn words 0")?;
     let state = bench.state();
-    if state != idle || bench.log().contains("fault:") {
+    if state != idle || bench.faults() != 0 {
         return Err(format!("{state} instead of {idle}:\n{}", bench.log()).into());
     }
     // 18 V and room temperature, by parts of another description than the firmware's constants.
@@ -99,7 +100,7 @@ fn supply() -> Result<(), Failed> {
         bench.run(0.2)?;
         bench.board().drivetrain().actuator_mut().inject(Fault::SourceVoltage(40.0))?;
         bench.run(SETTLED - 0.2)?;
-        bench.expect("fault: supply voltage too high")?;
+        bench.expect_fault(JointFault::OverVoltage)?;
         if bench.state() == "fault" { Ok(()) } else { Err(bench.log().into()) }
     }
     over(esc1()?)?;

@@ -143,7 +143,7 @@ fn on_time<W: Observed>(name: &str, board: fn(Drivetrain) -> W) -> Result<(), Fa
         if load != LOADS[0].0 && part < FULL {
             bad.push(format!("{load}: the bus is only {part} full"));
         }
-        let faulty = !bench.board().drivetrain().is_switching() || bench.log().contains("fault:");
+        let faulty = !bench.board().drivetrain().is_switching() || bench.faults() != 0;
         if faulty || !bench.emulation.resets().is_empty() {
             bad.push(format!("{load}: {:?}\n{}", bench.emulation.resets(), bench.log()));
         }

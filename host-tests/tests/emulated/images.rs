@@ -115,7 +115,7 @@ fn takes_an_image<W: Observed>(name: &str, board: impl FnOnce(Drivetrain) -> W) 
     if read != bytes {
         return Err(format!("{} other bytes than the {} stored", read.len(), bytes.len()).into());
     }
-    if bench.log().contains("fault:") {
+    if bench.faults() != 0 {
         return Err(bench.log().into());
     }
     let used = used.max(stack.used(&mut bench.emulation)?.0);

@@ -9,6 +9,7 @@ use emulator::program::Program;
 use host_tests::emulated::Bench;
 use host_tests::emulated::bench::program;
 use host_tests::emulated::master::{heard, send};
+use joint_firmware::joint::fault::Fault;
 use joint_firmware::joint::state_machine::State;
 use libtest_mimic::{Failed, Trial};
 use node::{FlashFile, Workbench};
@@ -94,12 +95,12 @@ fn on_the_moteus() -> Result<(), Failed> {
     at.say(&["thermistor-open", "driver-fault line"], 1.1)?;
     equal(at.bench.board().inputs().thermistor_open && at.bench.board().inputs().driver_fault, true)?;
     at.bench.run(0.0)?;
-    at.bench.expect("fault: temperature sensor open or shorted")?;
-    at.bench.expect("fault: gate driver fault")?;
+    at.bench.expect_fault(Fault::TemperatureSensor)?;
+    at.bench.expect_fault(Fault::BridgeDriver)?;
     at.say(&["thermistor-open off", "driver-fault off", "encoder-open"], 1.1)?;
     equal(at.bench.board().inputs().thermistor_open || at.bench.board().inputs().driver_fault, false)?;
     at.bench.run(0.0)?;
-    at.bench.expect("fault: encoder does not answer")?;
+    at.bench.expect_fault(Fault::EncoderLost)?;
     at.say(&["encoder-open off"], 0.0)?;
     equal(at.bench.board().inputs().encoder_line, None)?;
 

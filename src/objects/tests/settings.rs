@@ -228,7 +228,7 @@ fn the_whole_record_comes_back_and_fits() {
     let update = Update { node_id: None, application: Part::Kept, communication: Part::New((9, &communication)) };
     let mut dated = [0; RECORD];
     let length = update.encode(Some(&record), false, &mut dated).unwrap();
-    assert_eq!((length, communication_parameters(Some(&dated[..length]), 9)), (1_312, communication));
+    assert_eq!((length, communication_parameters(Some(&dated[..length]), 9)), (1_333, communication));
     assert_eq!(Stored::decode(&[2], &BOARD.joint), None);
     assert_eq!(Stored::decode(&[2, 255, 0], &BOARD.joint), None);
     assert_eq!(Stored::decode(&[1, 255, 0], &BOARD.joint), Some(Stored::NOTHING));

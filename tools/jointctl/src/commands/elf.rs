@@ -1,7 +1,7 @@
 //! A board's program on an emulated board on a CAN bus.
 
 use super::CommandError;
-use super::on_board::{Behind, Board};
+use super::bench::{Behind, Board};
 use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired};
 use emulator::chip::time::Instant;
 use emulator::emulation::Emulation;

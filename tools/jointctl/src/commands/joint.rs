@@ -1,7 +1,7 @@
 //! The arguments that say which joint a command works on: its configuration, and the actuator that stands for it.
 
 use super::CommandError;
-use super::on_board::Behind;
+use super::bench::Behind;
 use crate::joint_text;
 use clap::Args;
 use plant::ActuatorParameters;

@@ -1,8 +1,8 @@
 //! Arguments of `jointctl sim --elf`: a board's program, as it is flashed, on an emulated board on a CAN bus.
 
 use super::CommandError;
-use clap::{Args, ValueEnum};
-use plant::ActuatorParameters;
+use super::bench::{Behind, Board};
+use clap::Args;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
@@ -21,27 +21,6 @@ pub struct OnBoard {
     /// the commands. Each is answered in one line
     #[arg(long, value_name = "FILE", requires = "elf")]
     commands: Option<PathBuf>,
-}
-
-/// The boards.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub enum Board {
-    #[value(name = "b-g431b-esc1")]
-    BG431BEsc1,
-    #[value(name = "moteus-r4")]
-    MoteusR4,
-}
-
-/// What is behind a board.
-#[derive(Debug)]
-#[cfg_attr(not(feature = "emulator"), allow(dead_code, reason = "the emulator alone reads it"))]
-pub enum Behind {
-    /// The reference actuator at a low voltage, aligned, with the board's usual encoder.
-    Reference,
-    /// An actuator with the board's usual encoder, as it is mounted there.
-    Actuator(Box<ActuatorParameters>),
-    /// An actuator with its encoder's counts too.
-    Described(Box<ActuatorParameters>),
 }
 
 impl OnBoard {
