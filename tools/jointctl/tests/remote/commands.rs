@@ -158,8 +158,20 @@ fn finished(child: &mut Child) -> (Option<i32>, String) {
     (code, text)
 }
 
+/// A robot of two joints.
+const ARM: &str = "<robot name='arm'><link name='base'/>
+<joint name='one' type='revolute'><parent link='base'/><child link='a'/><axis xyz='0 1 0'/><limit lower='-1' upper='1' velocity='2'/></joint>
+<link name='a'><inertial><mass value='2'/><inertia ixx='.02' ixy='0' ixz='0' iyy='.02' iyz='0' izz='.01'/></inertial></link>
+<joint name='two' type='revolute'><parent link='a'/><child link='b'/><origin xyz='0 0 .3'/><axis xyz='1 0 0'/>
+<limit lower='-1' upper='1' velocity='2'/></joint>
+<link name='b'><inertial><origin xyz='0 .1 .1'/><mass value='1'/><inertia ixx='.01' ixy='0' ixz='0' iyy='.01' iyz='0' izz='.01'/></inertial>
+</link></robot>";
+
 pub fn every_table_is_json_where_that_is_asked_for() {
     let desk = Desk::new();
+    for (name, text) in [("arm.urdf", ARM), ("robot.toml", "urdf = 'arm.urdf'\n[joint.one]\n[joint.two]\n")] {
+        std::fs::write(desk.folder.path().join(name), text).unwrap();
+    }
     // Joints without node ids, which `address` finds.
     let port = bus::free_port().unwrap();
     let _others = Served::on(&format!("slcan:listen://127.0.0.1:{port}"), &[NO_NODE_ID]);
@@ -170,6 +182,7 @@ pub fn every_table_is_json_where_that_is_asked_for() {
         "evaluate demo/friction.img demo/dataset.toml --json".into(),
         "image inspect demo/friction.img --json".into(),
         "sim --scenario slow-reversal --json".into(),
+        "robot excite robot.toml --out motion --acceleration 5 --draws 4 --rounds 1 --duration 8 --json".into(),
         "get --list --json".into(),
         on_bus("get limits --json"),
         on_bus("info --json"),
