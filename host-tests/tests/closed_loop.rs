@@ -98,9 +98,9 @@ fn found(seed: u64) -> Result<Found, String> {
     })
 }
 
-/// Limit of a median: that of all joints, and of half of them 15 % more.
+/// Limit of a median: that of all joints, and of half of them 25 % more.
 fn middle(limit: f64) -> f64 {
-    if every() { limit } else { 1.15 * limit }
+    if every() { limit } else { 1.25 * limit }
 }
 
 /// Median and worst.
