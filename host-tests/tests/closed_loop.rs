@@ -193,6 +193,6 @@ fn the_torque_that_friction_takes_is_given_back_and_slow_reversals_track() {
         let left: Vec<f64> = torque_mode.iter().map(left).collect();
         let found = (median(left.clone()), left.iter().fold(0.0f64, |worst, left| worst.max(*left)));
         println!("torque mode, {what}: {:.1} % of friction left (median), worst {:.1} %", found.0, found.1);
-        assert!(found.0 <= middle(limit) && found.1 <= worst, "torque mode, {what}: {found:?} %");
+        assert!(held(found, (limit, worst)), "torque mode, {what}: {found:?} %");
     }
 }
