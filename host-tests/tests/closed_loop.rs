@@ -3,8 +3,8 @@
 //! slow reversals track, what is left in torque mode and in the cold is as published, and adaptation makes up for
 //! friction that has changed.
 //!
-//! Ten joints are judged, three of them in service, where the worst counts; with `JOINT_SAMPLES=all` all twenty, and
-//! the median in service, too.
+//! Ten joints are judged, three of them in service; there and in torque mode the worst counts. With `JOINT_SAMPLES=all`
+//! all twenty are judged, and the median counts, too.
 
 use host_tests::in_the_loop::{InTorqueMode, Moved, RandomJoint, for_seeds, median};
 use host_tests::samples::{count, every};
