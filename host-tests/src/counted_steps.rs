@@ -1,4 +1,4 @@
-//! What the parts of a control step cost on the board's core: the program `step` of the probe on the emulator's core,
+//! Cost of the parts of a control step on the board's core: the program `step` of the probe on the emulator's core,
 //! every instruction told apart by the compiler's line tables.
 //!
 //! An instruction counts for the innermost of the functions below that it was inlined into, and what they call out of

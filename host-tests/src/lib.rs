@@ -1,4 +1,4 @@
-//! What several scenarios share: friction parameters and joint states drawn from a seed, the friction model once more
+//! Parts that several scenarios share: friction parameters and joint states drawn from a seed, the friction model once more
 //! in arithmetic too wide to overflow, images as bytes, joints in the loop: commissioned, driven, left alone; and the
 //! boards' programs on emulated boards.
 

@@ -1,4 +1,4 @@
-//! How many instructions each part of a control step may take: one file a board below `.ci/instructions`, kept with the
+//! Instructions that each part of a control step may take: one file a board below `.ci/instructions`, kept with the
 //! code.
 //!
 //! Counts are exact and the same in every run, so a limit is what the code takes now, by the compiler that the file

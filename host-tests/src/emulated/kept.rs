@@ -1,4 +1,4 @@
-//! What a board's flash holds when it is switched on: the stored configuration and a friction image, in the slots that
+//! Content of a board's flash at power-up: the stored configuration and a friction image, in the slots that
 //! the program reads (`src/tasks/connection/store.rs`).
 
 use super::observed::Observed;

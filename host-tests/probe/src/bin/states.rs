@@ -1,7 +1,7 @@
 //! Friction on a Cortex-M4F: takes images and batches of states from whoever emulates the core, and leaves every
 //! evaluation in memory.
 //!
-//! What is exchanged lies at the symbols below; a breakpoint hands over. `bkpt 1`: an image is wanted. `bkpt 2`: a
+//! Exchanged data lie at the symbols below; a breakpoint hands over. `bkpt 1`: an image is wanted. `bkpt 2`: a
 //! batch is wanted; r0 is 1 if the image was decoded and its golden vectors hold. `bkpt 3`: as 2, and the last batch
 //! has been evaluated.
 #![no_std]
