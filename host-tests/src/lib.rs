@@ -1,6 +1,6 @@
-//! Parts that several scenarios share: friction parameters and joint states drawn from a seed, the friction model once more
-//! in arithmetic too wide to overflow, images as bytes, joints in the loop: commissioned, driven, left alone; and the
-//! boards' programs on emulated boards.
+//! Parts that several scenarios share: friction parameters and joint states drawn from a seed, the friction model once
+//! more in arithmetic too wide to overflow, images as bytes, joints in the loop: commissioned, driven, left alone; and
+//! the boards' programs on emulated boards.
 
 pub mod bare_core;
 pub mod bare_metal;
