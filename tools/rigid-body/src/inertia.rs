@@ -113,19 +113,20 @@ impl LinkInertia {
         matrix
     }
 
+    /// The body of a pseudo-inertia (Wensing 2018, eq. 13).
+    pub fn from_pseudo_inertia(matrix: &Matrix4<f64>) -> Self {
+        let second: Matrix3<f64> = matrix.fixed_view::<3, 3>(0, 0).into();
+        Self {
+            mass: matrix[(3, 3)],
+            first_moment: matrix.fixed_view::<3, 1>(0, 3).into(),
+            inertia: Matrix3::identity() * second.trace() - second,
+        }
+    }
+
     /// True where a body of positive density can have these parameters.
     pub fn is_physical(&self) -> bool {
         self.mass > 0.0 && self.pseudo_inertia().cholesky().is_some()
     }
-}
-
-/// Derivatives of the pseudo-inertia by the ten parameters: it is their linear combination.
-pub fn pseudo_inertia_basis() -> [Matrix4<f64>; PARAMETERS] {
-    std::array::from_fn(|k| {
-        let mut unit = [0.0; PARAMETERS];
-        unit[k] = 1.0;
-        LinkInertia::from_parameters(&unit).pseudo_inertia()
-    })
 }
 
 /// Wrench of a link as a linear function of its parameters: 6 x 10, moment above force. The arguments are those of

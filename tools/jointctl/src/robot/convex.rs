@@ -5,11 +5,16 @@
 //! pseudo-inertia of a link and P0 that of the prior (T. Lee, P. Wensing, F. Park, Geometric Robot Dynamic
 //! Identification: A Convex Programming Approach, 2020). The logarithm keeps P positive definite. A rotor inertia J
 //! has gamma (J / J0 - log J) likewise. Friction is free.
+//!
+//! A step is computed in coordinates of its own at every point: P = L (1 + T) L^T with L L^T = P of the point and T
+//! symmetric, J times 1 + t. There the logarithm's Hessian is gamma times the identity however thin a link becomes. In
+//! the parameters themselves it grows with the inverse square of P's smallest eigenvalue and hides the sum of squares
+//! in rounding.
 
 use super::equations::{Layout, Normal};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix4};
 use rigid_body::Robot;
-use rigid_body::inertia::{LinkInertia, PARAMETERS, pseudo_inertia_basis};
+use rigid_body::inertia::{LinkInertia, PARAMETERS};
 use rigid_body::mass_matrix::motion_subspace;
 
 /// Spread that is added to the prior's mass in every direction, m: a link of points or rods becomes a body.
@@ -28,7 +33,6 @@ const DECREMENT: f64 = 1e-9;
 pub struct Prior {
     links: Vec<Matrix4<f64>>,
     rotors: Vec<Option<f64>>,
-    parameters: Vec<f64>,
 }
 
 impl Prior {
@@ -39,49 +43,48 @@ impl Prior {
             (0..3).for_each(|i| pseudo[(i, i)] += link.mass * SPREAD * SPREAD);
             pseudo
         };
-        let links: Vec<Matrix4<f64>> = robot.tree.joints.iter().map(|joint| widened(&joint.link)).collect();
+        let links = robot.tree.joints.iter().map(|joint| widened(&joint.link)).collect();
         let rotor = |(j, joint): (usize, &rigid_body::Joint)| {
             let axis = motion_subspace(joint);
             let own = axis.dot(&(joint.link.spatial() * axis)).max(1e-6) / robot.coupling[(j, j)].powi(2).max(1e-12);
             robot.drives[j].rotor_inertia.is_none().then_some(ROTOR * own)
         };
         let rotors = robot.tree.joints.iter().enumerate().map(rotor).collect();
-        let basis = pseudo_inertia_basis();
-        // The parameters whose pseudo-inertia is the widened one.
-        let parameters = links.iter().flat_map(|pseudo| parameters(pseudo, &basis)).collect();
-        Self { links, rotors, parameters }
+        Self { links, rotors }
     }
-}
 
-/// Parameters of a pseudo-inertia.
-fn parameters(pseudo: &Matrix4<f64>, basis: &[Matrix4<f64>; PARAMETERS]) -> Vec<f64> {
-    let gram = DMatrix::from_fn(PARAMETERS, PARAMETERS, |a, b| basis[a].dot(&basis[b]));
-    let right = DVector::from_fn(PARAMETERS, |a, _| basis[a].dot(pseudo));
-    gram.lu().solve(&right).map_or_else(|| vec![0.0; PARAMETERS], |x| x.iter().copied().collect())
+    /// The prior's own parameters; friction is zero.
+    fn unknowns(&self, layout: Layout) -> DVector<f64> {
+        let mut x = DVector::zeros(layout.unknowns());
+        for (j, link) in self.links.iter().enumerate() {
+            let parameters = LinkInertia::from_pseudo_inertia(link).parameters();
+            x.rows_mut(PARAMETERS * j, PARAMETERS).copy_from_slice(&parameters);
+        }
+        for (k, rotor) in self.rotors.iter().enumerate() {
+            x[layout.inertial() + k] = rotor.unwrap_or(0.0);
+        }
+        x
+    }
 }
 
 /// The minimum. `normal` is the sum over the joints, each divided by its noise squared. None where Newton's method
-/// does not get there.
+/// does not get there: the prior is not physical, or a number is not finite.
 pub fn solve(normal: &Normal, layout: Layout, prior: &Prior, gamma: f64) -> Option<DVector<f64>> {
-    let task = Task { normal, layout, prior, gamma, basis: pseudo_inertia_basis() };
-    let mut x = DVector::zeros(layout.unknowns());
-    x.rows_mut(0, layout.inertial()).copy_from_slice(&prior.parameters);
-    for (k, rotor) in prior.rotors.iter().enumerate() {
-        x[layout.inertial() + k] = rotor.unwrap_or(0.0);
-    }
+    let inverses = prior.links.iter().map(|link| Some(link.cholesky()?.inverse())).collect::<Option<_>>()?;
+    let task = Task { normal, layout, prior, inverses, gamma };
+    let mut x = prior.unknowns(layout);
     let mut cost = task.cost(&x)?;
     for _ in 0..STEPS {
-        let (gradient, hessian) = task.derivatives(&x)?;
-        let scale: Vec<f64> = hessian.diagonal().iter().map(|d| 1.0 / d.max(1e-30).sqrt()).collect();
-        let n = scale.len();
-        let scaled = DMatrix::from_fn(n, n, |a, b| hessian[(a, b)] * scale[a] * scale[b]);
-        let right = DVector::from_fn(n, |i, _| -gradient[i] * scale[i]);
-        let step = factor(&scaled)?.solve(&right);
-        let step = DVector::from_fn(n, |i, _| step[i] * scale[i]);
+        let coordinates = task.coordinates(&x)?;
+        let (gradient, hessian) = task.derivatives(&x, &coordinates)?;
+        let scale = hessian.diagonal().map(|d| 1.0 / d.max(1e-30).sqrt());
+        let scaled = DMatrix::from_fn(scale.len(), scale.len(), |a, b| hessian[(a, b)] * scale[a] * scale[b]);
+        let step = factor(&scaled)?.solve(&-gradient.component_mul(&scale)).component_mul(&scale);
         let decrement = -gradient.dot(&step);
         if decrement < DECREMENT * (1.0 + cost.abs()) {
             return Some(x);
         }
+        let step = coordinates * step;
         let mut length = 1.0;
         loop {
             let next = &x + length * &step;
@@ -98,8 +101,7 @@ pub fn solve(normal: &Normal, layout: Layout, prior: &Prior, gamma: f64) -> Opti
     Some(x)
 }
 
-/// Factor of a scaled Hessian. More is added where rounding hides the prior behind a large sum of squares: the step is
-/// still one of descent.
+/// Factor of a scaled Hessian. More is added where rounding leaves it indefinite: the step is still one of descent.
 fn factor(scaled: &DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
     DAMPING.into_iter().find_map(|damping| {
         let mut damped = scaled.clone();
@@ -119,23 +121,36 @@ pub fn links(unknowns: &DVector<f64>, layout: Layout) -> Vec<LinkInertia> {
         .collect()
 }
 
+/// Symmetric 4 x 4 matrices that are orthonormal: their combinations are all symmetric ones.
+fn symmetric() -> [Matrix4<f64>; PARAMETERS] {
+    let entries = (0..4).flat_map(|row| (row..4).map(move |column| (row, column)));
+    let mut all = [Matrix4::zeros(); PARAMETERS];
+    for (matrix, (row, column)) in all.iter_mut().zip(entries) {
+        let value = if row == column { 1.0 } else { std::f64::consts::FRAC_1_SQRT_2 };
+        matrix[(row, column)] = value;
+        matrix[(column, row)] = value;
+    }
+    all
+}
+
 struct Task<'a> {
     normal: &'a Normal,
     layout: Layout,
     prior: &'a Prior,
+    /// Inverse of each link's pseudo-inertia of the prior.
+    inverses: Vec<Matrix4<f64>>,
     gamma: f64,
-    basis: [Matrix4<f64>; PARAMETERS],
 }
 
 impl Task<'_> {
     /// The cost; None outside of what is physical.
     fn cost(&self, x: &DVector<f64>) -> Option<f64> {
         let mut cost = 0.5 * self.normal.residual(x);
-        for (link, prior) in links(x, self.layout).iter().zip(&self.prior.links) {
+        for (link, inverse) in links(x, self.layout).iter().zip(&self.inverses) {
             let pseudo = link.pseudo_inertia();
             let root = pseudo.cholesky()?;
             let log = 2.0 * (0..4).map(|i| root.l()[(i, i)].ln()).sum::<f64>();
-            cost += self.gamma * ((prior.try_inverse()? * pseudo).trace() - log);
+            cost += self.gamma * ((inverse * pseudo).trace() - log);
         }
         for (k, prior) in self.prior.rotors.iter().enumerate() {
             let rotor = x[self.layout.inertial() + k];
@@ -149,27 +164,43 @@ impl Task<'_> {
         Some(cost)
     }
 
-    fn derivatives(&self, x: &DVector<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
-        let mut gradient = &self.normal.matrix * x - &self.normal.right;
-        let mut hessian = self.normal.matrix.clone();
-        for (j, (link, prior)) in links(x, self.layout).iter().zip(&self.prior.links).enumerate() {
-            let inverse = link.pseudo_inertia().try_inverse()?;
-            let of_prior = prior.try_inverse()?;
-            let by: Vec<Matrix4<f64>> = self.basis.iter().map(|basis| inverse * basis).collect();
-            for a in 0..PARAMETERS {
-                let at = PARAMETERS * j + a;
-                gradient[at] += self.gamma * ((of_prior * self.basis[a]).trace() - by[a].trace());
-                for b in 0..PARAMETERS {
-                    hessian[(at, PARAMETERS * j + b)] += self.gamma * (by[a] * by[b]).trace();
-                }
+    /// Derivatives of the unknowns by the coordinates at a point: unknowns x coordinates.
+    fn coordinates(&self, x: &DVector<f64>) -> Option<DMatrix<f64>> {
+        let mut derivatives = DMatrix::identity(x.len(), x.len());
+        for (j, link) in links(x, self.layout).iter().enumerate() {
+            let root = link.pseudo_inertia().cholesky()?.l();
+            for (k, direction) in symmetric().iter().enumerate() {
+                let change = LinkInertia::from_pseudo_inertia(&(root * direction * root.transpose()));
+                let mut column = derivatives.column_mut(PARAMETERS * j + k);
+                column.rows_mut(PARAMETERS * j, PARAMETERS).copy_from_slice(&change.parameters());
+            }
+        }
+        for (k, prior) in self.prior.rotors.iter().enumerate() {
+            let at = self.layout.inertial() + k;
+            derivatives[(at, at)] = if prior.is_some() { x[at] } else { 1.0 };
+        }
+        Some(derivatives)
+    }
+
+    /// Gradient and Hessian of the cost by the coordinates at a point.
+    fn derivatives(&self, x: &DVector<f64>, coordinates: &DMatrix<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let mut gradient = coordinates.tr_mul(&(&self.normal.matrix * x - &self.normal.right));
+        let mut hessian = coordinates.tr_mul(&(&self.normal.matrix * coordinates));
+        for (j, (link, inverse)) in links(x, self.layout).iter().zip(&self.inverses).enumerate() {
+            let root = link.pseudo_inertia().cholesky()?.l();
+            let weighted = root.tr_mul(inverse) * root;
+            for (k, direction) in symmetric().iter().enumerate() {
+                let at = PARAMETERS * j + k;
+                gradient[at] += self.gamma * (weighted.dot(direction) - direction.trace());
+                hessian[(at, at)] += self.gamma;
             }
         }
         for (k, prior) in self.prior.rotors.iter().enumerate() {
             let at = self.layout.inertial() + k;
             match prior {
                 Some(prior) => {
-                    gradient[at] += self.gamma * (1.0 / prior - 1.0 / x[at]);
-                    hessian[(at, at)] += self.gamma / (x[at] * x[at]);
+                    gradient[at] += self.gamma * (x[at] / prior - 1.0);
+                    hessian[(at, at)] += self.gamma;
                 }
                 None => hessian[(at, at)] += 1.0,
             }

@@ -64,7 +64,6 @@ fn weighted(rows: &Rows, solution: &Solution) -> Normal {
 }
 
 #[test]
-#[ignore = "the convex fit finds no minimum for some robots with little noise"]
 fn every_link_and_rotor_is_physical_whatever_the_prior_its_weight_and_the_noise() {
     let checked: usize = (0..ROBOTS)
         .into_par_iter()
