@@ -3,9 +3,10 @@
 mod configured;
 mod guarded;
 
-use super::emergency::{Emergency, LOST, LOST_BIT, Reports, of_refusal};
+use super::emergency::{Emergency, LOST, LOST_BIT, Reports, fault_of, of_refusal};
+use super::fault_log::{self, FaultLogging, LOGS};
 use super::field::{
-    ConfigurationField, Field, HardwareField, ImageField, OpenLoopField, OwnerField, ProfileParameter, Range,
+    ConfigurationField, Field, HardwareField, ImageField, LogField, OpenLoopField, OwnerField, ProfileParameter, Range,
     ResetField, SetPoint, StorageField,
 };
 use super::images::{Circumstances, Failure, Images, StoredImages, abort};
@@ -34,6 +35,7 @@ use crate::motor::open_loop::Window;
 use crate::parameters::authentication::{CHALLENGE, STAGING, TAG};
 use crate::parameters::life_cycle::{Action, LifeCycle, Refusal};
 use crate::parameters::slots::SlotError;
+use crate::reset_record::LastReset;
 use core::cell::Cell;
 use heapless::Deque;
 
@@ -72,6 +74,7 @@ pub struct Objects<'a, P> {
     reports: Reports,
     profile_modes: [ProfileModes; PROFILE_MODES],
     emergencies: Deque<Emergency, WAITING>,
+    logging: [FaultLogging; LOGS as usize],
 }
 
 impl<'a, P: Program> Objects<'a, P> {
@@ -84,6 +87,7 @@ impl<'a, P: Program> Objects<'a, P> {
         }
         shared.rate(&configuration);
         shared.lock(lost);
+        let powered_up = LOGS && program.last_reset().causes & LastReset::POWER != 0;
         let objects = Self {
             shared,
             program,
@@ -105,6 +109,7 @@ impl<'a, P: Program> Objects<'a, P> {
             reports: Reports::default(),
             profile_modes: [ProfileModes::NOTHING; PROFILE_MODES],
             emergencies: Deque::new(),
+            logging: [const { FaultLogging::new() }; LOGS as usize].map(|logging| logging.started(powered_up)),
         };
         objects.publish();
         objects
@@ -152,7 +157,13 @@ impl<'a, P: Program> Objects<'a, P> {
         while !self.emergencies.is_full()
             && let Some(emergency) = self.reports.next(observed, &self.program.hardware().driver, now)
         {
+            if LOGS && let Some(fault) = fault_of(emergency.code) {
+                self.log(emergency.code, fault as u8);
+            }
             self.report(emergency);
+        }
+        for logging in &mut self.logging {
+            logging.poll(now, &mut self.program);
         }
         self.follow_profile();
         self.publish();
@@ -219,6 +230,13 @@ impl<'a, P: Program> Objects<'a, P> {
         let _ = self.emergencies.push_back(emergency);
     }
 
+    /// Has the log that outlives the power tell of it.
+    fn log(&mut self, code: u16, fault: u8) {
+        for logging in &mut self.logging {
+            logging.note(code, fault, self.now);
+        }
+    }
+
     /// Damaged parts of the storage: bits as of EMCY [`LOST`].
     fn damaged(&self) -> u8 {
         self.program.damaged() | u8::from(self.shared.is_locked()) << 1
@@ -271,6 +289,7 @@ impl<'a, P: Program> Objects<'a, P> {
             Field::Image(ImageField::Staging) => self.images.life().length() as u32,
             Field::Owner(OwnerField::Challenge) => CHALLENGE as u32,
             Field::History => self.program.history(history::length).unwrap_or(0),
+            Field::Log(_) if LOGS => fault_log::length(&self.program),
             Field::Reset(_) => last_reset::place(&self.program.last_reset()).len() as u32,
             _ => 0,
         }
@@ -303,7 +322,9 @@ impl<'a, P: Program> Objects<'a, P> {
             Field::Hardware(part) => hardware::get(&self.program.hardware(), part).into(),
             Field::Storage(StorageField::Damaged) => self.damaged().into(),
             Field::Storage(StorageField::StoresLeft) => self.stores.left().into(),
-            Field::Server | Field::History => 0,
+            Field::Log(LogField::PowerUps) if LOGS => self.program.power_ups().into(),
+            Field::Log(LogField::Missed) => self.logging.first().map_or(0, FaultLogging::missed).into(),
+            Field::Server | Field::History | Field::Log(_) => 0,
         }
     }
 
@@ -388,6 +409,7 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
                 challenge.is_some_and(|bytes| history::copy(&bytes, offset, out))
             }
             Field::History => self.program.history(|steps| history::read(steps, offset, out)).unwrap_or(false),
+            Field::Log(LogField::Faults) if LOGS => fault_log::read(&self.program, offset, out),
             Field::Reset(ResetField::Place) => {
                 history::copy(last_reset::place(&self.program.last_reset()), offset, out)
             }
@@ -533,6 +555,7 @@ impl<P: Program> ObjectDictionary for Objects<'_, P> {
                 if !self.told_reset && state == NmtState::PreOperational {
                     self.told_reset = true;
                     if let Some(emergency) = last_reset::emergency(&self.program.last_reset()) {
+                        self.log(emergency.code, 0);
                         self.report(emergency);
                     }
                     let damaged = self.damaged();

@@ -46,6 +46,19 @@ pub enum Field {
     Hardware(HardwareField),
     /// State of the storage.
     Storage(StorageField),
+    /// Log of faults that outlives the power.
+    Log(LogField),
+}
+
+/// A part of the log.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LogField {
+    /// Number of power-ups.
+    PowerUps,
+    /// Faults that are not in it.
+    Missed,
+    /// Its newest faults, a stream.
+    Faults,
 }
 
 /// A part of the storage's state.

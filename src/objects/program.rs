@@ -6,6 +6,7 @@ use crate::joint::configuration::{BridgeConfiguration, Configuration, Configurat
 use crate::joint::history::History;
 use crate::motor::open_loop::Window;
 use crate::parameters::authentication::CHALLENGE;
+use crate::parameters::fault_log::LoggedFault;
 use crate::parameters::guard::Guard;
 use crate::parameters::slots::SlotError;
 use crate::reset_record::LastReset;
@@ -65,6 +66,25 @@ pub trait Program {
 
     /// Why the program started; the same until the next start, but for the stops in a row.
     fn last_reset(&self) -> LastReset;
+
+    /// Appends a fault to the log that outlives the power: error code, number of the fault, time since the start, s.
+    /// False where it cannot.
+    fn log_fault(&mut self, _code: u16, _fault: u8, _time: u32) -> bool {
+        false
+    }
+
+    /// Has the log count this power-up, unless it has.
+    fn count_power_up(&mut self) {}
+
+    /// The log's newest faults, the newest first.
+    fn logged_faults(&self) -> impl Iterator<Item = LoggedFault> {
+        core::iter::empty()
+    }
+
+    /// Number of power-ups, this one included; 0 where nobody counts them.
+    fn power_ups(&self) -> u32 {
+        0
+    }
 
     /// What the board tells of its hardware. Where there is none, all zero.
     fn hardware(&self) -> Hardware {

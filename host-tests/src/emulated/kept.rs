@@ -8,7 +8,7 @@ use emulator::program::Program;
 use joint_firmware::compensation::Request;
 use joint_firmware::joint::configuration::Configuration;
 use joint_firmware::objects::{DEFAULT_RANGES, Part, RECORD, Update};
-use joint_firmware::parameters::slots::{BLANK, Layout, PAGE_WORDS, SlotFlash, Slots};
+use joint_firmware::parameters::slots::{BLANK, Layout, PAGE, PAGE_WORDS, SlotFlash, Slots};
 use libtest_mimic::Failed;
 use node::flash::Flash;
 use plant::ActuatorParameters;
@@ -24,7 +24,7 @@ pub fn configuration<W: Observed>(actuator: &ActuatorParameters, node: u8, reque
     configuration
 }
 
-/// Pages of the program's parameters.
+/// Pages of the program's slots.
 const PAGES: usize = 6;
 
 /// What is kept.
@@ -60,7 +60,9 @@ impl Kept<'_> {
         let length = update.encode(None, false, &mut record).ok_or("the record does not fit")?;
         store(2, 2, &record[..length])?;
 
-        let start = program.symbol("__parameters_start").ok_or("the program names no parameters")?.address;
+        // Before them lies the log of faults, where a program has one.
+        let end = program.symbol("__parameters_end").ok_or("the program names no parameters")?.address;
+        let start = end - (PAGES * PAGE) as u32;
         for word in 0..PAGES * PAGE_WORDS {
             let bytes = flash.read(word).map_err(|error| format!("{error:?}"))?;
             let written = bytes != BLANK;

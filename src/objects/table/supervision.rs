@@ -1,6 +1,6 @@
-//! 2300h to 2304h: what is left of a fault, and of what stopped the program; what the board tells of its hardware.
+//! 2300h to 2305h: what is left of a fault, and of what stopped the program; what the board tells of its hardware.
 
-use super::super::field::{HardwareField as H, ResetField, StorageField};
+use super::super::field::{HardwareField as H, LogField, ResetField, StorageField};
 use super::*;
 
 room! {
@@ -52,5 +52,13 @@ room! {
              stays in switch on disabled until 1010h:1 or 3 has stored a configuration or 1011h:1 or 3 restored the defaults; 2 what guards the joint: nothing that needs its owner is taken. EMCY 6310h and bit 7 of 1001h say so"
         2, "stores left", U8, RO, UNMAPPED, Field::Storage(StorageField::StoresLeft); "", 1.0, ANY;
             "How often what 1010h, 1011h, LSS and 2212h:1 (commit, roll back) store may still be written, so that nobody wears the flash out: 32 after power-up, and one more each hour; no reset gives one back. A configuration that is stored already costs none, and is done at once"
+    }
+    0x2305 "fault log" {
+        1, "power-ups", U32, RO, UNMAPPED, Field::Log(LogField::PowerUps); "", 1.0, ANY;
+            "Number of power-ups, this one included. One that ends within 10 s without a fault is not counted; resets are none"
+        2, "faults not logged", U16, RO, UNMAPPED, Field::Log(LogField::Missed); "", 1.0, ANY;
+            "Since the start: those that came too many at a time, so that no storm of faults wears the flash out (two after power-up, and one more a minute; eight more wait), or that the flash refused; at 65535 it stays"
+        3, "logged faults", Domain, RO, UNMAPPED, Field::Log(LogField::Faults); "", 1.0, ANY;
+            "The newest 16 that were kept, the newest first, 12 bytes each: error code (u16, as in EMCY), number of the fault (0: what stopped the program, or the watchdog), reserved, number of the power-up (u32), time since the program started (u32, s)"
     }
 }

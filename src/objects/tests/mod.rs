@@ -4,6 +4,7 @@ mod attacks;
 mod client;
 mod documentation;
 mod evidence;
+mod fault_log;
 mod hardware;
 mod hostile;
 mod images;
@@ -25,6 +26,7 @@ use crate::joint::history::History;
 use crate::motor::open_loop::Window;
 use crate::parameters::authentication::{CHALLENGE, STAGING};
 use crate::parameters::certificate::Limits;
+use crate::parameters::fault_log::LoggedFault;
 use crate::parameters::guard::Guard;
 use crate::parameters::image::{Effort, Target};
 use crate::parameters::life_cycle::{LifeCycle, Requirements};
@@ -68,6 +70,11 @@ pub struct Memory {
     pub stores_left: Option<u8>,
     /// Number of records that were.
     pub stores: u32,
+    /// Log of faults, and whether the flash takes them.
+    pub logged: Vec<LoggedFault>,
+    pub logs: bool,
+    /// How often this power-up was counted.
+    pub counted: u32,
 }
 
 impl Default for Memory {
@@ -90,6 +97,9 @@ impl Default for Memory {
             options_set: 0,
             stores_left: None,
             stores: 0,
+            logged: Vec::new(),
+            logs: true,
+            counted: 0,
         }
     }
 }
@@ -157,6 +167,25 @@ impl Program for Memory {
 
     fn last_reset(&self) -> LastReset {
         self.reset
+    }
+
+    fn log_fault(&mut self, code: u16, fault: u8, time: u32) -> bool {
+        if self.logs {
+            self.logged.insert(0, LoggedFault { code, fault, power_up: 7, time });
+        }
+        self.logs
+    }
+
+    fn count_power_up(&mut self) {
+        self.counted += 1;
+    }
+
+    fn logged_faults(&self) -> impl Iterator<Item = LoggedFault> {
+        self.logged.iter().copied()
+    }
+
+    fn power_ups(&self) -> u32 {
+        7
     }
 
     fn hardware(&self) -> Hardware {

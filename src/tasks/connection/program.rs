@@ -15,6 +15,7 @@ use joint_firmware::motor::open_loop::Window;
 use joint_firmware::motor::thermal::ThermalSettings;
 use joint_firmware::objects::{NotConfigured, Program, Start};
 use joint_firmware::parameters::authentication::CHALLENGE;
+use joint_firmware::parameters::fault_log::LoggedFault;
 use joint_firmware::parameters::guard::Guard;
 use joint_firmware::parameters::image::Image;
 use joint_firmware::parameters::slots::SlotError;
@@ -183,6 +184,22 @@ impl Program for BoardProgram {
 
     fn last_reset(&self) -> LastReset {
         board::faults::last_reset()
+    }
+
+    fn log_fault(&mut self, code: u16, fault: u8, time: u32) -> bool {
+        self.store.log_fault(code, fault, time)
+    }
+
+    fn count_power_up(&mut self) {
+        self.store.count_power_up();
+    }
+
+    fn logged_faults(&self) -> impl Iterator<Item = LoggedFault> {
+        self.store.logged_faults()
+    }
+
+    fn power_ups(&self) -> u32 {
+        self.store.power_ups()
     }
 
     fn hardware(&self) -> Hardware {

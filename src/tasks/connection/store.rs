@@ -1,19 +1,24 @@
 //! What the board keeps in flash: friction images, the stored record of objects, the key with what guards it. Thread
 //! mode.
 //!
-//! | pages | kind | content |
+//! | pages from the end | kind | content |
 //! |---|---|---|
-//! | 0, 1 | 1 | friction image |
-//! | 2, 3 | 2 | record of object 1010h ([`Stored`](joint_firmware::objects::Stored)) |
-//! | 4, 5 | 3 | what guards the joint ([`Guard`]) |
+//! | 8, 7 | | log of faults, where the program has one ([`FaultLog`]) |
+//! | 6, 5 | 1 | friction image |
+//! | 4, 3 | 2 | record of object 1010h ([`Stored`](joint_firmware::objects::Stored)) |
+//! | 2, 1 | 3 | what guards the joint ([`Guard`]) |
 
+use crate::board::faults;
 use crate::board::flash::Parameters;
 use joint_firmware::objects::StoredImages;
+use joint_firmware::objects::fault_log::LOGS;
 use joint_firmware::parameters::Summary;
 use joint_firmware::parameters::authentication::STAGING;
+use joint_firmware::parameters::fault_log::{FaultLog, LoggedFault};
 use joint_firmware::parameters::guard::{GUARD, Guard};
 use joint_firmware::parameters::image::Image;
 use joint_firmware::parameters::slots::{Layout, Slot, SlotError, Slots, WriteError};
+use joint_firmware::reset_record::LastReset;
 
 /// The pairs of slots.
 pub struct Store {
@@ -21,6 +26,7 @@ pub struct Store {
     images: Slots,
     records: Slots,
     guards: Slots,
+    log: [FaultLog; LOGS as usize],
 }
 
 /// Two pages from page `first` on.
@@ -30,9 +36,13 @@ const fn layout(first: usize, kind: u32) -> Layout {
         None => panic!("a slot has at least one page"),
     }
 }
-const IMAGES: Layout = layout(0, 1);
-const RECORDS: Layout = layout(2, 2);
-const GUARDS: Layout = layout(4, 3);
+/// Page of the log.
+const LOG: usize = 0;
+/// First page of the slots, which lie at the end.
+const SLOTS: usize = 2 * LOGS as usize;
+const IMAGES: Layout = layout(SLOTS, 1);
+const RECORDS: Layout = layout(SLOTS + 2, 2);
+const GUARDS: Layout = layout(SLOTS + 4, 3);
 
 impl Store {
     /// Finds out what the pages hold, and decides what a loss of power left undecided.
@@ -40,7 +50,11 @@ impl Store {
         let images = Slots::open(&mut flash, IMAGES)?;
         let records = Slots::open(&mut flash, RECORDS)?;
         let guards = Slots::open(&mut flash, GUARDS)?;
-        Ok(Self { flash, images, records, guards })
+        let log = core::array::from_fn(|_| {
+            let powered_up = faults::last_reset().causes & LastReset::POWER != 0;
+            FaultLog::open(&mut flash, LOG, powered_up)
+        });
+        Ok(Self { flash, images, records, guards, log })
     }
 
     /// What the image slots hold.
@@ -118,6 +132,31 @@ impl Store {
     /// True where an image is damaged.
     pub fn has_damaged_image(&self) -> bool {
         self.images.is_damaged()
+    }
+
+    /// Appends a fault to the log: error code, number, and time since the start, s.
+    pub fn log_fault(&mut self, code: u16, fault: u8, time: u32) -> bool {
+        let Self { flash, log, .. } = self;
+        log.iter_mut().all(|log| log.append(flash, code, fault, time).is_ok())
+    }
+
+    /// Has the log count this power-up.
+    pub fn count_power_up(&mut self) {
+        let Self { flash, log, .. } = self;
+        for log in log {
+            // Where the flash refuses it the next fault tries again.
+            let _ = log.keep_power_up(flash);
+        }
+    }
+
+    /// The log's newest faults, the newest first.
+    pub fn logged_faults(&self) -> impl Iterator<Item = LoggedFault> {
+        self.log.iter().flat_map(FaultLog::newest).copied()
+    }
+
+    /// Number of power-ups.
+    pub fn power_ups(&self) -> u32 {
+        self.log.first().map_or(0, FaultLog::power_ups)
     }
 
     /// Keeps what guards the joint.

@@ -8,6 +8,7 @@ use joint_firmware::joint::history::History;
 use joint_firmware::motor::open_loop::Window;
 use joint_firmware::objects::{NotConfigured, Program, STORES, Start};
 use joint_firmware::parameters::authentication::CHALLENGE;
+use joint_firmware::parameters::fault_log::{FaultLog, LoggedFault};
 use joint_firmware::parameters::guard::Guard;
 use joint_firmware::parameters::slots::SlotError;
 use joint_firmware::reset_record::LastReset;
@@ -19,6 +20,8 @@ pub struct VirtualProgram {
     /// Prepared, for the next control step.
     pub next: Option<Active>,
     pub storage: Storage,
+    /// Of the pages in the storage.
+    log: FaultLog,
     /// The open loop's last window.
     pub window: Window,
     /// The steps before the latched fault.
@@ -30,11 +33,12 @@ pub struct VirtualProgram {
 }
 
 impl VirtualProgram {
-    pub fn new(bridge: BridgeConfiguration, storage: Storage) -> Self {
+    pub fn new(bridge: BridgeConfiguration, mut storage: Storage) -> Self {
         Self {
             bridge,
             next: None,
             window: Window::NOTHING,
+            log: storage.fault_log(true),
             storage,
             history: None,
             reset: false,
@@ -105,6 +109,23 @@ impl Program for VirtualProgram {
 
     fn history<R>(&self, read: impl FnOnce(&History) -> R) -> Option<R> {
         self.history.as_ref().map(read)
+    }
+
+    fn log_fault(&mut self, code: u16, fault: u8, time: u32) -> bool {
+        self.log.append(self.storage.log(), code, fault, time).is_ok()
+    }
+
+    fn count_power_up(&mut self) {
+        // Where it is refused the next fault tries again.
+        let _ = self.log.keep_power_up(self.storage.log());
+    }
+
+    fn logged_faults(&self) -> impl Iterator<Item = LoggedFault> {
+        self.log.newest().copied()
+    }
+
+    fn power_ups(&self) -> u32 {
+        self.log.power_ups()
     }
 
     fn last_reset(&self) -> LastReset {

@@ -3,6 +3,7 @@
 
 use crate::flash::Flash;
 use crate::images::SlotImages;
+use joint_firmware::parameters::fault_log::FaultLog;
 use joint_firmware::parameters::guard::Guard;
 use joint_firmware::parameters::slots::{Layout, PAGE, SlotError, Slots};
 use std::path::Path;
@@ -73,6 +74,8 @@ pub struct Storage {
     pub(crate) images: SlotImages,
     configuration: Record,
     guard: Record,
+    /// Pages of the log of faults.
+    log: Flash,
 }
 
 impl Storage {
@@ -90,7 +93,7 @@ impl Storage {
     /// None in practice: an erased flash can be written.
     pub fn with(images: SlotImages) -> Result<Self, SlotError> {
         let [configuration, guard] = [CONFIGURATION, GUARD].map(Record::empty);
-        Ok(Self { images, configuration: configuration?, guard: guard? })
+        Ok(Self { images, configuration: configuration?, guard: guard?, log: Flash::erased(2) })
     }
 
     /// What a folder holds, one file for each content; all that is stored is in the files at once. The folder is made
@@ -105,6 +108,7 @@ impl Storage {
             images: SlotImages::open(flash("images.bin")?)?,
             configuration: Record::open(flash("configuration.bin")?, CONFIGURATION)?,
             guard: Record::open(flash("guard.bin")?, GUARD)?,
+            log: flash("faults.bin")?,
         })
     }
 
@@ -128,6 +132,16 @@ impl Storage {
 
     pub(crate) fn store_configuration(&mut self, record: &[u8]) -> Result<(), SlotError> {
         self.configuration.store(record)
+    }
+
+    /// The log of faults, after a power-up or another start.
+    pub(crate) fn fault_log(&mut self, powered_up: bool) -> FaultLog {
+        FaultLog::open(&mut self.log, 0, powered_up)
+    }
+
+    /// Pages of the log.
+    pub(crate) fn log(&mut self) -> &mut Flash {
+        &mut self.log
     }
 
     /// What guards the joint. Where it is damaged the joint is locked, and that is kept, as a board does.

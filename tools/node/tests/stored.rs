@@ -1,4 +1,4 @@
-//! Storage of a joint: damaged records, stores in a loop. Simulated time; the files of `--storage`.
+//! Storage of a joint: damaged records, stores in a loop, faults that outlive the power. Simulated time; the files of `--storage`.
 
 mod master;
 
@@ -6,6 +6,8 @@ use bus::client::sdo::Failure;
 use bus::client::{Abort, Command};
 use joint_firmware::joint::state_machine::State;
 use joint_firmware::objects::STORES;
+use joint_firmware::objects::fault_log::decode;
+use joint_firmware::parameters::fault_log::LoggedFault;
 use master::Master;
 use node::{SampleImage, Storage};
 use std::path::Path;
@@ -125,4 +127,42 @@ fn who_stores_in_a_loop_is_stopped_before_the_flash_is_worn_out_and_a_reset_of_t
     let mut master = start(folder.path());
     assert_eq!(master.number(0x1017, 0), 999 + i64::from(STORES));
     assert_eq!(master.number(LEFT.0, LEFT.1), i64::from(STORES));
+}
+
+/// A master that falls silent in motion, and its fault acknowledged; the log afterwards.
+fn fails(master: &mut Master) -> Vec<LoggedFault> {
+    assert_eq!(tries_to_enable(master), State::OperationEnabled);
+    master.wait(3_000);
+    assert_eq!(master.state(), State::Fault);
+    logged(master)
+}
+
+fn logged(master: &mut Master) -> Vec<LoggedFault> {
+    decode(&master.upload(0x2305, 3)).collect()
+}
+
+#[test]
+fn faults_outlive_the_power_with_the_number_of_the_power_up_and_the_time_since_the_start() {
+    let folder = tempfile::tempdir().unwrap();
+    for power_up in 1..=6 {
+        let mut master = start(folder.path());
+        assert_eq!(master.number(0x2305, 1), power_up);
+        let before = logged(&mut master);
+        assert_eq!(before.len() as i64, 2 * ((power_up - 1) / 2));
+        // Every other time nothing fails, and the joint runs for as long as it takes to be counted.
+        if power_up % 2 == 1 {
+            master.wait(10_100);
+            continue;
+        }
+        let once = fails(&mut master);
+        assert_eq!(once[1..], before);
+        let twice = fails(&mut master);
+        assert_eq!(twice[1..], once);
+        for fault in &twice[..2] {
+            assert_eq!((fault.code, fault.fault, i64::from(fault.power_up)), (0x8100, 14, power_up));
+        }
+        let [first, second] = [once[0].time, twice[0].time];
+        assert!(first <= 1 && (second - first).abs_diff(3) <= 1, "{first} s, {second} s");
+        assert_eq!(master.number(0x2305, 2), 0);
+    }
 }

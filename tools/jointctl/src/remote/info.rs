@@ -7,9 +7,14 @@ use super::image::{ImageStatus, StoredImage};
 use super::joint::RemoteJoint;
 use super::motion;
 use super::value::Value;
+use bus::client::{Abort, ClientError};
 use joint_firmware::joint::adaptation::{Factors, Learning, Report};
-use joint_firmware::objects::field::{Actual, Field, ImageField, OwnerField, ResetField, SetPoint, StorageField};
+use joint_firmware::joint::fault::Fault;
+use joint_firmware::objects::field::{
+    Actual, Field, ImageField, LogField, OwnerField, ResetField, SetPoint, StorageField,
+};
 use joint_firmware::objects::settings::Setting;
+use joint_firmware::objects::{emergency, fault_log};
 use joint_firmware::parameters::life_cycle::State;
 use std::fmt::Write;
 
@@ -69,6 +74,9 @@ pub fn page(joint: &RemoteJoint) -> Result<String, RemoteError> {
     line("life cycle", life(state, left));
     line("authentication", authentication(joint)?);
     line("storage", storage(joint)?);
+    let logged = logged(joint)?;
+    line("fault log", logged.0);
+    logged.1.into_iter().for_each(|fault| line("", fault));
     let setting = |setting| show(joint, Field::Setting(setting));
     let compensation = |setting| show(joint, Field::AtOnce(setting));
     line(
@@ -287,6 +295,41 @@ fn storage(joint: &RemoteJoint) -> Result<String, RemoteError> {
     let damaged = damaged.collect::<Vec<_>>().join(", ");
     let found = if damaged.is_empty() { "whole".to_owned() } else { format!("damaged: {damaged}") };
     Ok(format!("{found}; {left} stores left"))
+}
+
+/// Faults of the log that are shown.
+const SHOWN: usize = 3;
+
+/// Object 2305h in words, and its newest faults.
+fn logged(joint: &RemoteJoint) -> Result<(String, Vec<String>), RemoteError> {
+    let object = Entry::of(Field::Log(LogField::Faults)).object;
+    let bytes = match joint.node().upload(object.index, object.sub_index) {
+        Err(ClientError::Aborted { abort: Abort::NO_OBJECT, .. }) => {
+            return Ok(("none, for want of room".into(), Vec::new()));
+        }
+        bytes => bytes?,
+    };
+    let raw = |part| joint.raw(Field::Log(part));
+    let faults: Vec<_> = fault_log::decode(&bytes).collect();
+    let mut text = format!("{} faults, {} power-ups", faults.len(), raw(LogField::PowerUps)?);
+    let missed = raw(LogField::Missed)?;
+    if missed > 0 {
+        let _ = write!(text, "; {missed} more came too fast to be kept");
+    }
+    if faults.len() > SHOWN {
+        let _ = write!(text, "; the newest {SHOWN}:");
+    }
+    let shown = faults.iter().take(SHOWN).map(|logged| {
+        let fault = Fault::ALL.into_iter().find(|fault| *fault as u8 == logged.fault);
+        let name = match (fault, logged.code) {
+            (Some(fault), _) => drive::list(&[fault]),
+            (None, emergency::WATCHDOG) => format!("stopped by the watchdog ({:04X}h)", logged.code),
+            (None, emergency::STOPPED) => format!("stopped by the program ({:04X}h)", logged.code),
+            (None, code) => format!("error {code:04X}h"),
+        };
+        format!("{name}, {} s after the start, power-up {}", logged.time, logged.power_up)
+    });
+    Ok((text, shown.collect()))
 }
 
 fn model(number: u64) -> &'static str {

@@ -157,6 +157,7 @@ pub fn the_page_says_what_an_engineer_looks_for_first() {
         "serial number 12",
         "state           disabled (switch on disabled)",
         "faults          none",
+        "fault log       0 faults, 1 power-ups",
         " V\n",
         "winding ",
         "image           none",

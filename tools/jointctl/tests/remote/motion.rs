@@ -4,7 +4,7 @@ use crate::served::{NODE, Served};
 use joint_firmware::joint::state_machine::State;
 use joint_firmware::joint::{Command, Mode};
 use jointctl::remote::motion::{Motion, Observation, Outcome};
-use jointctl::remote::{Entry, RemoteError, RemoteJoint, Stream, configuration};
+use jointctl::remote::{Entry, RemoteError, RemoteJoint, Stream, configuration, info};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 
@@ -121,6 +121,13 @@ pub fn a_master_that_dies_leaves_a_fault_that_is_named_and_acknowledged_only_whe
     );
     let acknowledged = Motion { acknowledge: true, ..motion(command, 0.1) };
     assert_eq!(run(&again, &acknowledged).unwrap().0.state, State::SwitchOnDisabled);
+    // What was acknowledged is in the log still.
+    let page = info::page(&again).unwrap();
+    assert!(page.contains("fault log       1 faults, 1 power-ups\n"), "{page}");
+    assert!(
+        page.contains("command deadline missed (8100h), ") && page.contains(" s after the start, power-up 1\n"),
+        "{page}"
+    );
 }
 
 pub fn disable_stops_a_joint_that_somebody_else_moves() {
