@@ -66,10 +66,10 @@ fn sessions() -> Result<(), Failed> {
     expect("somebody is at a board whose supply has just come", bench.number(NODE, 0x2215, 9)?, 1)?;
     give(&mut bench)?;
     expect("the owner", owner(&mut bench)?, key()?.id())?;
+    let mut responses = Vec::new();
     for power_ups in 0..2 {
         expect("a setting without a session", limits(&mut bench).is_ok(), false)?;
         let mut challenges = BTreeSet::new();
-        let mut responses = Vec::new();
         for _ in 0..3 {
             challenges.insert(challenge(&mut bench)?.random);
             responses.push(respond(&mut bench, Purpose::Session)?);
@@ -78,8 +78,9 @@ fn sessions() -> Result<(), Failed> {
             expect("a setting after the session", limits(&mut bench).is_ok(), false)?;
         }
         expect("challenges that differ", challenges.len(), 3)?;
-        for response in responses {
-            let replayed = bench.download(NODE, 0x2215, 7, &response).is_ok();
+        // Those of the power-up before, too.
+        for response in &responses {
+            let replayed = bench.download(NODE, 0x2215, 7, response).is_ok();
             expect("a response that is replayed", replayed, false)?;
         }
         expect("power-ups with the same owner", owner(&mut bench)?, key()?.id()).map_err(|_| power_ups.to_string())?;

@@ -14,6 +14,7 @@ use host_tests::emulated::master::Heard;
 use host_tests::emulated::power::Writing;
 use joint_firmware::compensation::Request;
 use joint_firmware::friction::regime::Selector;
+use joint_firmware::parameters::authentication::Key;
 use libtest_mimic::{Failed, Trial};
 use node::SampleImage;
 use rand::{RngExt, SeedableRng};
@@ -34,6 +35,7 @@ const LONGEST: f64 = 0.4;
 pub fn trials() -> Vec<Trial> {
     vec![
         Trial::test("an_image_is_the_old_one_or_the_new_one", || survives(&Content::IMAGE)),
+        Trial::test("a_signed_image_comes_after_its_floor_or_not_at_all", || survives(&Content::SIGNED)),
         Trial::test("a_configuration_is_the_old_one_or_the_new_one", || survives(&Content::CONFIGURATION)),
         Trial::test("the_first_key_is_there_or_not", || survives(&Content::KEY)),
     ]
@@ -51,6 +53,8 @@ struct Content {
     /// Brings content number so and so up to the last request, which makes the program write it and is not sent.
     request: fn(&mut Board, u32) -> Result<Heard, Failed>,
     read: fn(&mut Board) -> Result<Read, Failed>,
+    /// How many of the first objects are kept before the others, in a store of their own.
+    first: usize,
 }
 
 /// A request of 8 bytes to the node's SDO server.
@@ -95,6 +99,28 @@ impl Content {
             }
             Ok(vec![version, slot, image])
         },
+        first: 0,
+    };
+
+    /// An owned joint's: the version floor, then the image.
+    const SIGNED: Self = Self {
+        name: "signed image",
+        before: 1,
+        request: |bench, number| {
+            let key = Key::new(std::array::from_fn(|i| i as u8 + 1))?;
+            if bench.upload(NODE, 0x2215, 1)? == [0] {
+                bench.download(NODE, 0x2215, 6, &key.to_bytes())?;
+            }
+            stage(bench, number, &key.sign(&sample(number)))?;
+            bench.download(NODE, 0x2212, 1, &[1])?;
+            Ok(request([0x2F, 0x12, 0x22, 1, 3, 0, 0, 0]))
+        },
+        read: |bench| {
+            let floor = bench.upload(NODE, 0x2215, 3)?;
+            let image = (Self::IMAGE.read)(bench)?;
+            Ok([vec![floor], image].concat())
+        },
+        first: 1,
     };
 
     const CONFIGURATION: Self = Self {
@@ -115,6 +141,7 @@ impl Content {
             Ok(request([0x23, 0x10, 0x10, 1, b's', b'a', b'v', b'e']))
         },
         read: |bench| SETTINGS.iter().map(|(index, sub_index, ..)| bench.upload(NODE, *index, *sub_index)).collect(),
+        first: 0,
     };
 
     const KEY: Self = Self {
@@ -144,7 +171,16 @@ impl Content {
             Err("a key has five segments".into())
         },
         read: |bench| (1..=4).map(|sub_index| bench.upload(NODE, 0x2215, sub_index)).collect(),
+        first: 0,
     };
+}
+
+impl Content {
+    /// What a loss of power on the way from one content to another may leave.
+    fn permitted(&self, old: &Read, new: &Read) -> [Read; 3] {
+        let between = new.iter().take(self.first).chain(old.iter().skip(self.first)).cloned().collect();
+        [old.clone(), between, new.clone()]
+    }
 }
 
 /// Image number so and so, of a typical length.
@@ -187,17 +223,17 @@ struct Case<'a> {
 
 impl Case<'_> {
     /// Starts after a loss of power; what is there has to be one of `permitted`.
-    fn start(&mut self, permitted: &[&Read]) -> Result<Read, Failed> {
+    fn start(&mut self, permitted: &[Read]) -> Result<Read, Failed> {
         self.bench.restart(NODE)?;
         self.find(permitted)
     }
 
     /// What is there has to be one of `permitted`, and the joint able to move.
-    fn find(&mut self, permitted: &[&Read]) -> Result<Read, Failed> {
+    fn find(&mut self, permitted: &[Read]) -> Result<Read, Failed> {
         let found = (self.content.read)(&mut self.bench)?;
         let fault = self.bench.upload(NODE, 0x603F, 0)?;
         self.note()?;
-        if !permitted.contains(&&found) {
+        if !permitted.contains(&found) {
             return Err(format!("found {found:x?} instead of one of {permitted:x?}").into());
         }
         if fault != [0, 0] {
@@ -227,19 +263,19 @@ impl Case<'_> {
         self.tally.stores += 1;
         match stored == before {
             true => Err("what is stored afterwards changes nothing".into()),
-            false => self.start(&[&stored]).map(drop),
+            false => self.start(&[stored]).map(drop),
         }
     }
 
     /// A second loss of power, in one of the starts that follow the first one or in the store after them.
-    fn lose_power_again(&mut self, old: &Read, new: &Read, random: &mut ChaCha8Rng) -> Result<(), Failed> {
+    fn lose_power_again(&mut self, permitted: &[Read], random: &mut ChaCha8Rng) -> Result<(), Failed> {
         self.tally.second_cuts += 1;
         // A start has six operations at most, and none where nothing is to be decided.
         let operation = random.random_range(1..=4);
         self.bench.power_up();
         if !self.bench.cut(operation, self.torn, 0.02)? {
             self.bench.booted(NODE)?;
-            let found = self.find(&[old, new])?;
+            let found = self.find(permitted)?;
             let request = (self.content.request)(&mut self.bench, 20)?;
             self.bench.exchange(request.0, &request.1, 0.0)?;
             // As far as one knows before it is stored, it changes what is there.
@@ -249,11 +285,11 @@ impl Case<'_> {
             if !self.bench.cut(random.random_range(1..=operations), self.torn, LONGEST)? {
                 return Err("the power did not go a second time".into());
             }
-            let found = self.start(&[&found, &next])?;
-            return self.start(&[&found]).map(drop);
+            let found = self.start(&self.content.permitted(&found, &next))?;
+            return self.start(&[found]).map(drop);
         }
-        let found = self.start(&[old, new])?;
-        self.start(&[&found]).map(drop)
+        let found = self.start(permitted)?;
+        self.start(&[found]).map(drop)
     }
 }
 
@@ -310,16 +346,17 @@ fn judge(case: &mut Case, old: &Read, new: &Read, mark: bool, random: &mut ChaCh
     }
     let followed = mark || random.random_ratio(1, FOLLOWED);
     let before = followed.then(|| case.bench.clone());
-    let found = case.start(&[old, new])?;
+    let permitted = case.content.permitted(old, new);
+    let found = case.start(&permitted)?;
     case.tally.old += u64::from(found == *old);
     case.tally.new += u64::from(found == *new);
-    case.start(&[&found])?;
+    case.start(&[found])?;
     if random.random_ratio(1, FOLLOWED) {
         case.store(9)?;
     }
     if let Some(before) = before {
         case.bench = before;
-        case.lose_power_again(old, new, random)?;
+        case.lose_power_again(&permitted, random)?;
     }
     Ok(())
 }
