@@ -79,6 +79,7 @@ impl Retrain {
         progress.finish();
         let outcome = outcome?;
         let version = outcome.status.active.map_or(0, |image| image.version);
+        outcome.load.iter().for_each(|difference| eprintln!("warning: {difference}"));
         if self.json {
             let judged = |on: &Shown| serde_json::json!({ "residual": on.residual, "tracking": on.tracking });
             let value = serde_json::json!({
@@ -87,6 +88,7 @@ impl Retrain {
                 "before": judged(&outcome.before),
                 "after": judged(&outcome.after),
                 "shadow": outcome.before.shadow,
+                "load": outcome.load,
                 "report": out.join("report.json"),
             });
             println!("{value:#}");
@@ -94,6 +96,9 @@ impl Retrain {
         }
         println!("{} samples recorded, {} SYNCs without one", outcome.samples.0, outcome.samples.1);
         println!("{}", verdict(&outcome.fitted.report).sentence);
+        if let Some(uncertainty) = &outcome.fitted.report.uncertainty {
+            println!("{}.", uncertainty.sentence());
+        }
         println!("\n{:<34}{:>10}{:>10}", "on the joint, RMS", "before", "now");
         let (before, after) = (outcome.before, outcome.after);
         for (name, before, after) in [

@@ -13,7 +13,8 @@
 //! - [`image`]: the life of a parameter image, [`refusal`] its numbers in words; [`configuration`]: settings, stored
 //!   and restored
 //! - [`commission`]: the objects of a joint for its commissioning
-//! - [`record`]: samples as a data set; [`retrain`]: a joint's friction learned anew, from excitation to commit
+//! - [`record`]: samples as a data set; [`retrain`]: a joint's friction learned anew, from excitation to commit;
+//!   [`load_check`]: the load that it shows against the configured one
 //! - [`address`]: node ids for new joints; [`info`]: a joint on one page
 
 pub mod address;
@@ -25,6 +26,7 @@ pub mod error;
 pub mod image;
 pub mod info;
 pub mod joint;
+pub mod load_check;
 pub mod motion;
 mod owner;
 pub mod pdo;

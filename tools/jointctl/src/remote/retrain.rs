@@ -20,6 +20,7 @@ use super::entry::Entry;
 use super::error::RemoteError;
 use super::image::{ImageStatus, Use};
 use super::joint::RemoteJoint;
+use super::load_check::{LoadDifference, configured, differences};
 use super::record::{SIGNALS, description};
 use super::route::{Route, Travelled};
 use super::value::Value;
@@ -171,6 +172,8 @@ pub struct Outcome {
     pub fitted: Fitted,
     /// Samples of the excitation, and SYNCs without one.
     pub samples: (usize, u64),
+    /// Inertia and gravity that are not the configured ones.
+    pub load: Vec<LoadDifference>,
     /// With what was stored before, or without any compensation: the better of the motions before and after the new
     /// image's.
     pub before: Shown,
@@ -245,6 +248,7 @@ impl Round {
         let mut prepared = prepare(&self.out.join("dataset.toml"))?;
         let fitted = fit(&mut prepared, &Options { version, ..self.options.clone() }, progress)?;
         write(&fitted)?;
+        let load = differences(&configured(joint)?, &fitted.report.parameters);
         if !running() {
             return Err(RetrainError::Interrupted { node });
         }
@@ -273,7 +277,7 @@ impl Round {
         }
         let status = joint.use_image(&upload, Use::Commit, progress)?;
         tidy.staged = false;
-        Ok(Outcome { fitted, samples, before, after, status })
+        Ok(Outcome { fitted, samples, load, before, after, status })
     }
 
     /// Refuses what can be seen to fail before anything moves; the version of the new image.

@@ -9,10 +9,11 @@ use joint_firmware::parameters::life_cycle::State as Life;
 use jointctl::fit::Options;
 use jointctl::presets::Preset;
 use jointctl::progress::Silent;
+use jointctl::remote::configuration::set;
 use jointctl::remote::image::Use;
 use jointctl::remote::record::{Pace, Recorder, SIGNALS, description};
 use jointctl::remote::retrain::{RetrainError, Round};
-use jointctl::remote::{RemoteError, Stream};
+use jointctl::remote::{Entry, RemoteError, Stream, Value};
 use std::path::Path;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
@@ -31,10 +32,16 @@ pub fn a_round_lowers_what_is_unexplained_and_commits_a_newer_version() {
     // What a joint has before: a friction that is not its own.
     joint.upload_image(&image(6, 0.05, 0), Use::Commit, &Silent).unwrap();
     let requested = request();
+    // An inertia that is twice that of the joint, as with a torque constant that is half the true one.
+    let inertia = served.inertia();
+    set(&joint, &[(Entry::of(Field::Setting(Setting::LoadInertia)), Value::Real(2.0 * inertia))]).unwrap();
     let outcome = round(folder.path()).run(&joint, &|| true, &|_| Ok(()), &Silent).unwrap();
     let (before, after) = (outcome.before, outcome.after);
     assert!(after.residual < 0.7 * before.residual, "{before:?} {after:?}");
     assert!(before.shadow > 0.0, "{before:?}");
+    let [load] = outcome.load.as_slice() else { panic!("{:?}", outcome.load) };
+    assert_eq!((load.quantity, load.configured as f32), ("inertia", 2.0 * inertia as f32));
+    assert!((load.measured / inertia - 1.0).abs() < 0.15, "{load:?}, {inertia}");
     assert_eq!((outcome.status.state, outcome.status.active.unwrap().version), (Life::Active, 7));
     assert_eq!(outcome.status.previous.unwrap().version, 6);
     assert_eq!((joint.state().unwrap(), request()), (State::SwitchOnDisabled, requested));

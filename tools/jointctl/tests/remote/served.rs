@@ -85,6 +85,11 @@ impl Served {
         Self { bus, stop, threads: vec![thread] }
     }
 
+    /// Inertia of such a joint, kg m².
+    pub fn inertia(&self) -> f64 {
+        ActuatorParameters::reference().aligned().without_payload().joint.inertia()
+    }
+
     pub fn bus(&self) -> &str {
         &self.bus
     }
