@@ -267,6 +267,9 @@ pub fn print_summary(prepared: &Prepared, fitted: &Fitted, out: &Path) {
     if let NetworkOutcome::Rejected { reason } = &report.network {
         println!("Network left out: {reason}.");
     }
+    if let Some(uncertainty) = &report.uncertainty {
+        println!("{}.", uncertainty.sentence());
+    }
     println!("{}", verdict(report).sentence);
     println!("{} samples. Written: {}", prepared.samples.len(), out.join("report.html").display());
 }

@@ -10,6 +10,7 @@ mod learn;
 mod problem;
 mod summary;
 mod trainer;
+mod uncertainty;
 mod uncovered;
 mod unseen;
 
@@ -253,6 +254,7 @@ pub fn fit(prepared: &mut Prepared, options: &Options, progress: &dyn Progress) 
         errors,
         fixed_point: Some(difference),
         training: learned.curves.clone(),
+        uncertainty: uncertainty::uncertainty(samples, &prepared.folds, physical, &fixed),
         certificate: summary::certificate_items(&built.certificate, &built.image, &worst, &units),
         test: summary::test_samples(prepared, &rigid, physical, &learned, &fixed),
     };

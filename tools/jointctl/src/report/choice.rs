@@ -30,6 +30,7 @@ pub fn choice(report: &Report) -> Markup {
             }
         }
         @if !terms.is_empty() { p { "Terms of the chosen model: " (terms.join(", ")) "." } }
+        @if let Some(uncertainty) = &report.uncertainty { p { (uncertainty.sentence()) "." } }
         @if !notes.is_empty() { ul { @for note in notes { li { (note) } } } }
     }
 }

@@ -61,6 +61,11 @@ pub fn report(samples: usize) -> Report {
         errors: vec![ErrorTable { test_set: "other speeds".into(), rows }],
         fixed_point: Some(FixedPointDifference { rms: 0.00021, max: 0.00093, max_percent_of_full_scale: 0.057 }),
         training: (0..5).map(|seed| curve(seed, seed == 1)).collect(),
+        uncertainty: Some(Uncertainty {
+            value: 0.23,
+            worst: "backward at 5 to 10 % of the greatest speed, run 2 left out".into(),
+            cells: 30,
+        }),
         certificate: certificate(),
         test,
     }

@@ -51,11 +51,37 @@ pub struct Report {
     pub fixed_point: Option<FixedPointDifference>,
     /// Training of the network, one curve for each seed.
     pub training: Vec<TrainingCurve>,
+    /// Part of the image's friction that the joint may not have. None where the recording does not tell.
+    pub uncertainty: Option<Uncertainty>,
     /// The certificate of the image, item by item.
     pub certificate: Vec<CertificateItem>,
     /// Samples of all test sets, for the figures. Not part of the JSON file.
     #[serde(skip)]
     pub test: TestSamples,
+}
+
+/// Part of an image's friction that the joint may not have, for `compensation.uncertainty`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Uncertainty {
+    /// The part, 0.1 to 1.
+    pub value: f64,
+    /// Where it was found.
+    pub worst: String,
+    /// Directions, speeds and loads of motions that were judged.
+    pub cells: usize,
+}
+
+impl Uncertainty {
+    /// What it is and what to do with it.
+    pub fn sentence(&self) -> String {
+        let Self { value, worst, cells } = self;
+        format!(
+            "Friction is at least {:.0} % of the image's on motions that were left out (least: {worst}; {cells} means over \
+             directions, speeds and loads). compensation.uncertainty = {value} lets torque mode give as much wherever the \
+             joint moves; add what friction may lose later",
+            100.0 * (1.0 - value)
+        )
+    }
 }
 
 /// Names of the units, as printed on axes and in tables.
