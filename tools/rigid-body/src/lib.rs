@@ -11,6 +11,7 @@
 //! | [`newton_euler`] | tau from q, v, a |
 //! | [`regressor`], [`base_parameters`] | tau as a linear function of phi, and which combinations of phi it shows |
 //! | [`mass_matrix`], [`articulated_body`] | the mass matrix, and a from q, v, tau |
+//! | [`mjcf`] | the robot for MuJoCo |
 //! | [`random_tree`] | robots to test with |
 //!
 //! Algorithms: R. Featherstone, Rigid Body Dynamics Algorithms, 2008, tables 5.1, 6.2 and 7.1; pseudo-inertia: P.
@@ -23,6 +24,7 @@ pub mod drives;
 pub mod inertia;
 pub mod limits;
 pub mod mass_matrix;
+pub mod mjcf;
 pub mod newton_euler;
 pub mod placement;
 pub mod random_tree;

@@ -1,7 +1,8 @@
-//! Files of an identified robot: for each joint image and report, for the controller URDF and parameters; host.
+//! Files of an identified robot: for each joint image and report, for the controller URDF, MJCF and parameters; host.
 
 use super::evaluate;
 use super::fit::FittedRobot;
+use super::page::page;
 use super::recording::Recording;
 use crate::commands::CommandError;
 use crate::commands::fit::bytes;
@@ -9,13 +10,14 @@ use crate::image_text;
 use crate::output::{OutputFile, write_directory};
 use crate::report::render;
 use rigid_body::inertia::NAMES;
+use rigid_body::mjcf::{JointFriction, mjcf};
 use rigid_body::urdf::{LinkValues, with_values};
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::Path;
 
 /// Files of a fit, but for those of its joints.
-pub const FILES: [&str; 3] = ["robot.urdf", "parameters.toml", "robot.json"];
+pub const FILES: [&str; 5] = ["robot.html", "robot.urdf", "mujoco.xml", "parameters.toml", "robot.json"];
 
 /// Writes everything into `out`, all or nothing.
 pub fn write(out: &Path, recording: &Recording, fitted: &FittedRobot) -> Result<(), CommandError> {
@@ -28,32 +30,64 @@ pub fn write(out: &Path, recording: &Recording, fitted: &FittedRobot) -> Result<
         files.push(OutputFile::new(folder.join("friction.img"), bytes(&one.image, out)?));
         files.push(OutputFile::new(folder.join("friction.toml"), image_text::to_text(&one.image)));
     }
+    files.push(OutputFile::new("robot.html", page(recording, fitted)?));
     files.push(OutputFile::new("robot.urdf", urdf(recording, fitted)?));
+    files.push(OutputFile::new("mujoco.xml", model(recording, fitted)));
     files.push(OutputFile::new("parameters.toml", parameters(recording, fitted)));
     files.push(OutputFile::new("robot.json", summary(recording, fitted).to_string()));
     Ok(write_directory(out, &files)?)
 }
 
-/// The URDF with the identified inertias, and with the viscous and Coulomb friction of the simplest model as `damping`
-/// and `friction` (URDF has no more), on the joint's side.
+/// Viscous and Coulomb friction of the simplest model, on the joints' side: all that URDF and MJCF have.
+fn friction(recording: &Recording, fitted: &FittedRobot) -> Vec<JointFriction> {
+    let (solution, rows) = &fitted.bodies.simplest;
+    let gains = recording.robot.gains();
+    let joint = |j: usize| {
+        let at = rows.layout.rigid() + rows.layout.friction.width() * j;
+        let of_joint = |effort: f64| (effort * gains[(j, j)]).max(0.0);
+        JointFriction { damping: of_joint(solution.unknowns[at]), frictionloss: of_joint(solution.unknowns[at + 1]) }
+    };
+    (0..recording.robot.tree.len()).map(joint).collect()
+}
+
+/// The URDF with the identified inertias, and friction as `damping` and `friction`.
 pub fn urdf(recording: &Recording, fitted: &FittedRobot) -> Result<String, CommandError> {
     let robot = &recording.robot;
-    let (solution, rows) = &fitted.bodies.simplest;
-    let gains = robot.gains();
-    let values: Vec<LinkValues> = (0..robot.tree.len())
-        .map(|j| {
-            let at = rows.layout.rigid() + rows.layout.friction.width() * j;
-            let of_joint = |effort: f64| (effort * gains[(j, j)]).max(0.0);
-            LinkValues {
-                joint: robot.tree.joints[j].name.clone(),
-                link: robot.links[j].clone(),
-                inertia: fitted.links[j],
-                damping: of_joint(solution.unknowns[at]),
-                friction: of_joint(solution.unknowns[at + 1]),
-            }
-        })
-        .collect();
-    with_values(&recording.urdf, "robot.urdf", &values).map_err(|error| CommandError::Robot(error.into()))
+    let values = friction(recording, fitted).into_iter().enumerate().map(|(j, friction)| LinkValues {
+        joint: robot.tree.joints[j].name.clone(),
+        link: robot.links[j].clone(),
+        inertia: fitted.links[j],
+        damping: friction.damping,
+        friction: friction.frictionloss,
+    });
+    with_values(&recording.urdf, "robot.urdf", &values.collect::<Vec<_>>())
+        .map_err(|error| CommandError::Robot(error.into()))
+}
+
+/// The robot for MuJoCo: identified inertias, rotors as `armature`, friction as `damping` and `frictionloss`; with what
+/// is lost by it.
+pub fn model(recording: &Recording, fitted: &FittedRobot) -> String {
+    let robot = &recording.robot;
+    let rotors = robot.rotor_matrix(&fitted.rotors);
+    let mut tree = robot.tree.clone();
+    for (j, joint) in tree.joints.iter_mut().enumerate() {
+        (joint.link, joint.armature) = (fitted.links[j], rotors[(j, j)]);
+    }
+    let coupled = (0..tree.len()).any(|row| (0..row).any(|column| rotors[(row, column)] != 0.0));
+    let [simplest, _, image] = fitted.mean_percent();
+    let mut remark = format!(
+        "Identified by jointctl {}. Viscous and Coulomb friction alone leave {simplest:.2} % of the effort on test samples (mean \
+         over the joints), the images {image:.2} %:",
+        env!("CARGO_PKG_VERSION")
+    );
+    for joint in &fitted.errors {
+        let part = |error: f64| 100.0 * error / joint.effort;
+        let _ = write!(remark, "\n{}: {:.2} and {:.2} %", joint.joint, part(joint.simplest), part(joint.image));
+    }
+    if coupled {
+        remark += "\nMotors that move several joints couple these by their rotors' inertia; MJCF has no term for that.";
+    }
+    mjcf(&tree, &robot.links, &friction(recording, fitted), &robot.limits, &remark)
 }
 
 /// Parameters of the controller as TOML.
@@ -97,27 +131,11 @@ pub fn table(fitted: &FittedRobot) -> String {
 /// Errors, parameters with standard errors and how they were chosen.
 pub fn summary(recording: &Recording, fitted: &FittedRobot) -> Value {
     let bodies = &fitted.bodies;
-    let rigid = bodies.rows.layout.rigid();
-    let base: Vec<Value> = bodies
-        .base
-        .solved
-        .iter()
-        .zip(&bodies.base.standard_errors)
-        .filter(|(column, _)| **column < rigid)
-        .map(|(&column, error)| {
-            let n = recording.robot.tree.len();
-            let name = match column.checked_sub(10 * n) {
-                Some(rotor) => format!("rotor of {}", recording.robot.tree.joints[rotor].name),
-                None => format!("{} of {}", NAMES[column % 10], recording.robot.links[column / 10]),
-            };
-            json!({ "parameter": name, "value": bodies.base.unknowns[column], "standard_error": error })
-        })
-        .collect();
     let [simplest, rigid_bodies, images] = fitted.mean_percent();
     json!({
         "errors": fitted.errors,
         "mean_relative_percent": { "simplest": simplest, "bodies": rigid_bodies, "images": images },
-        "base_parameters": base,
+        "base_parameters": fitted.base_parameters(&recording.robot),
         "bodies": evaluate::bodies(recording, fitted),
         "condition": bodies.base.condition,
         "choice": bodies.notes,

@@ -8,7 +8,8 @@ use crate::evaluate::rmse;
 use crate::fit::{Fitted, Options as JointOptions};
 use crate::progress::Progress;
 use crate::report::Role;
-use rigid_body::LinkInertia;
+use rigid_body::inertia::{NAMES, PARAMETERS};
+use rigid_body::{LinkInertia, Robot};
 use serde::Serialize;
 
 /// Choices of a fit.
@@ -54,7 +55,35 @@ pub struct FittedRobot {
     pub errors: Vec<JointErrors>,
 }
 
+/// A base parameter as least squares found it.
+#[derive(Clone, Debug, Serialize)]
+pub struct BaseParameter {
+    /// The parameter that stands for the combination, with its link.
+    #[serde(rename = "parameter")]
+    pub name: String,
+    /// SI units.
+    pub value: f64,
+    /// Infinite, in JSON null, where the motion leaves it open.
+    pub standard_error: f64,
+}
+
 impl FittedRobot {
+    /// All base parameters.
+    pub fn base_parameters(&self, robot: &Robot) -> Vec<BaseParameter> {
+        let (base, layout) = (&self.bodies.base, self.bodies.rows.layout);
+        let name = |column: usize| match column.checked_sub(layout.inertial()) {
+            Some(rotor) => format!("rotor of {}", robot.tree.joints[rotor].name),
+            None => format!("{} of {}", NAMES[column % PARAMETERS], robot.links[column / PARAMETERS]),
+        };
+        let rigid = base.solved.iter().zip(&base.standard_errors).filter(|(column, _)| **column < layout.rigid());
+        let parameter = |(&column, &standard_error): (&usize, &f64)| BaseParameter {
+            name: name(column),
+            value: base.unknowns[column],
+            standard_error,
+        };
+        rigid.map(parameter).collect()
+    }
+
     /// Means over the joints of the errors in % of the effort's RMS: simplest model, rigid bodies, images.
     pub fn mean_percent(&self) -> [f64; 3] {
         let mean = |error: fn(&JointErrors) -> f64| {
