@@ -6,7 +6,7 @@
 
 use crate::contact::Contact;
 use crate::error::{ParameterError, within};
-use crate::friction::{Bristles, Surroundings};
+use crate::friction::{Bristles, FrictionStep, Surroundings};
 use crate::parameters::JointParameters;
 use crate::thermal::Heat;
 
@@ -38,6 +38,18 @@ pub struct State {
     pub friction_loss: f64,
     /// Temperatures of winding and housing, °C.
     pub heat: Heat,
+}
+
+/// What answers to a torque on the link in the next step, before its velocity is known: the torque that is there
+/// already, and inertia and slope of the friction that stand against a change.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Answer {
+    /// Motor torque less friction and gravity at the velocity before, Nm.
+    pub torque: f64,
+    /// Inertia of rotor and link, kg m².
+    pub inertia: f64,
+    /// Slope of the friction over the velocity, Nm s/rad.
+    pub slope: f64,
 }
 
 /// A virtual joint in motion.
@@ -145,15 +157,32 @@ impl Joint {
         }
     }
 
+    /// What answers to a torque on the link over the next `step` (s, at most [`MAXIMUM_STEP`]) under `motor_torque` (Nm
+    /// at the link); contacts aside.
+    #[must_use]
+    pub fn answer(&self, motor_torque: f64, step: f64) -> Answer {
+        let friction = self.next_friction(step);
+        let gravity = self.parameters.load.gravity_torque(self.state.position);
+        Answer {
+            torque: motor_torque - gravity - friction.torque(self.state.velocity),
+            inertia: self.parameters.inertia(),
+            slope: friction.slope(),
+        }
+    }
+
+    /// The friction of the next step.
+    fn next_friction(&self, step: f64) -> FrictionStep {
+        let State { position, velocity, gear_torque, heat, .. } = self.state;
+        let surroundings = Surroundings { position, gear_torque, temperature: heat.housing };
+        self.bristles.prepare(&self.parameters.friction, velocity, &surroundings, step)
+    }
+
     fn step(&mut self, motor_torque: f64, copper_loss: f64, external_torque: f64, step: f64) {
+        let friction = self.next_friction(step);
         let parameters = &self.parameters;
         let state = &mut self.state;
         let inertia = parameters.inertia();
         let before = state.velocity;
-
-        let surroundings =
-            Surroundings { position: state.position, gear_torque: state.gear_torque, temperature: state.heat.housing };
-        let friction = self.bristles.prepare(&parameters.friction, before, &surroundings, step);
         let mut load_torque = parameters.load.gravity_torque(state.position) - external_torque;
 
         // The friction is a straight line over the new velocity, so the implicit step is one division.

@@ -32,11 +32,13 @@
 //! - [`fourier`], [`excitation`]: the motions that are recorded
 //! - [`parameters`], [`randomised`]: everything that describes a joint, and joints drawn at random
 //! - [`virtual_joint`]: the firmware's own control step, closed over the actuator
+//! - [`arm`]: several of them on one tree of links
 //! - [`error`]: what is refused, and the range that would not be
 
 #![forbid(unsafe_code)]
 
 pub mod actuator;
+pub mod arm;
 pub mod contact;
 pub mod error;
 pub mod excitation;
@@ -54,6 +56,7 @@ pub mod virtual_joint;
 mod noise;
 
 pub use actuator::{Actuator, ActuatorParameters};
+pub use arm::Arm;
 pub use error::ParameterError;
 pub use excitation::Excitation;
 pub use joint::Joint;

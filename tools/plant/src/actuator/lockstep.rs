@@ -15,7 +15,7 @@ use super::sensors::{DriveSample, DriveSensors, Sensed};
 use super::windings::{Rotation, Windings};
 use crate::contact::Contact;
 use crate::error::{ParameterError, within};
-use crate::joint::{Joint, State};
+use crate::joint::{Answer, Joint, State};
 
 /// Longest step of the windings while the bridge drives them, s.
 pub const LONGEST_STEP: f64 = 2.5e-5;
@@ -71,6 +71,14 @@ pub struct ActuatorState {
     pub bus_energy: f64,
     /// Powers of the last period.
     pub powers: Powers,
+}
+
+/// What the electrical half of a period leaves for the mechanical one.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Driven {
+    /// Torque of the motor at the link, before friction, Nm.
+    torque: f64,
+    powers: Powers,
 }
 
 /// A virtual actuator in operation.
@@ -249,6 +257,15 @@ impl Actuator {
     /// # Panics
     /// With another period.
     pub fn advance(&mut self, bridge_switching: bool, duties: [f64; 3], external_torque: f64, period: f64) {
+        let driven = self.drive(bridge_switching, duties, period);
+        self.follow(driven, external_torque, period);
+    }
+
+    /// The electrical half of a period: bridge, windings and supply, by the velocity before it.
+    ///
+    /// # Panics
+    /// With a period outside of [`Self::advance`]'s range.
+    pub(crate) fn drive(&mut self, bridge_switching: bool, duties: [f64; 3], period: f64) -> Driven {
         assert!((1e-6..=1e-3).contains(&period), "a PWM period of {period} s");
         let duties = self.inverter.load(duties);
         let (torque, powers, rail_current) = self.advance_windings(bridge_switching, duties, period);
@@ -264,8 +281,19 @@ impl Actuator {
         self.inverter.heat(powers.bridge_loss + idle * self.bus.voltage(), ambient, period);
 
         let cogging = self.parameters.windings.cogging.torque(self.state.rotor_angle);
-        let link_torque = (torque + cogging) * self.parameters.joint.motor.gear_ratio;
-        self.joint.drive(link_torque, powers.copper_loss, external_torque + self.faults.external_torque, period);
+        Driven { torque: (torque + cogging) * self.parameters.joint.motor.gear_ratio, powers }
+    }
+
+    /// What answers to a torque on the link in the mechanical half.
+    pub(crate) fn answer(&self, driven: &Driven, period: f64) -> Answer {
+        let answer = self.joint.answer(driven.torque, period);
+        Answer { torque: answer.torque + self.faults.external_torque, ..answer }
+    }
+
+    /// The mechanical half of a period.
+    pub(crate) fn follow(&mut self, driven: Driven, external_torque: f64, period: f64) {
+        let Driven { torque, powers } = driven;
+        self.joint.drive(torque, powers.copper_loss, external_torque + self.faults.external_torque, period);
 
         self.state.time += period;
         self.observe(powers);

@@ -7,8 +7,10 @@
 pub mod setup;
 mod signals;
 
+use crate::actuator::lockstep::Driven;
 use crate::actuator::{Actuator, ActuatorParameters};
 use crate::error::ParameterError;
+use crate::joint::Answer;
 use joint_firmware::friction::FrictionModel;
 use joint_firmware::joint::active::SLOW_RATE;
 use joint_firmware::joint::adaptation::{self, Adaptation, LOOK_RATE};
@@ -166,6 +168,12 @@ impl VirtualJoint {
 
     /// One control step, then one PWM period of physics with an external torque (Nm at the link).
     pub fn step(&mut self, demand: &Demand, external_torque: f64) -> Telemetry {
+        let driven = self.drive(demand);
+        self.follow(driven, external_torque)
+    }
+
+    /// The control step, and the electrical half of the period.
+    pub(crate) fn drive(&mut self, demand: &Demand) -> Driven {
         self.measured = signals::measurements(&self.actuator.measure(), self.overrun);
         self.overrun = false;
         let demand = &self.bearing(demand);
@@ -179,7 +187,17 @@ impl VirtualJoint {
         let duties = self.bridge.duties;
         let duties = [duties.a, duties.b, duties.c].map(f64::from);
         let switching = self.bridge.state == BridgeState::Switching;
-        self.actuator.advance(switching, duties, external_torque, self.period);
+        self.actuator.drive(switching, duties, self.period)
+    }
+
+    /// What answers to a torque on the link in the mechanical half.
+    pub(crate) fn answer(&self, driven: &Driven) -> Answer {
+        self.actuator.answer(driven, self.period)
+    }
+
+    /// The mechanical half of the period, and what the firmware's tasks do behind a control step.
+    pub(crate) fn follow(&mut self, driven: Driven, external_torque: f64) -> Telemetry {
+        self.actuator.follow(driven, external_torque, self.period);
         self.steps += 1;
         if self.steps.is_multiple_of(self.slow_divider) {
             self.winding.step(self.joint.take_mean_square_current(), self.measured.winding_temperature);

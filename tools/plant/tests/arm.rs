@@ -1,0 +1,114 @@
+//! An arm of virtual joints: its joints move as the rigid bodies say, and one alone moves as a virtual joint does.
+
+use joint_firmware::joint::state_machine::Controlword;
+use joint_firmware::joint::{Command, Demand, Mode};
+use nalgebra::{Matrix3, Unit, Vector3};
+use plant::arm::{Arm, ArmError, EVERY};
+use plant::load::{GRAVITY, LoadParameters};
+use plant::virtual_joint::Setup;
+use plant::{ActuatorParameters, VirtualJoint};
+use rigid_body::mass_matrix::mass_matrix;
+use rigid_body::newton_euler::inverse_dynamics;
+use rigid_body::random_tree::{Shape, tree};
+use rigid_body::{Joint, JointKind, LinkInertia, Placement, Tree};
+
+const NOTHING: LoadParameters = LoadParameters { inertia: 0.0, mass: 0.0, length: 0.0 };
+
+/// A joint without a link, configured for the one that it had.
+fn bare(seed: u64) -> VirtualJoint {
+    let parameters = ActuatorParameters::reference().aligned();
+    let setup = Setup::of(&parameters);
+    let mut bare = parameters;
+    bare.joint.load = NOTHING;
+    VirtualJoint::new(bare, &setup, 25.0, seed).unwrap()
+}
+
+fn torque(torque: f64, sequence: u32) -> Demand {
+    let command = Command { mode: Mode::Torque, torque: torque as f32, ..Command::default() };
+    Demand { controlword: Controlword::ENABLE_OPERATION, command, sequence, ..Demand::default() }
+}
+
+#[test]
+fn one_joint_with_the_links_of_a_pendulum_moves_as_the_virtual_joint_with_that_load() {
+    let parameters = ActuatorParameters::reference().aligned().with_payload(2.0, 0.4);
+    let LoadParameters { inertia, mass, length } = parameters.joint.load;
+    let centre = Vector3::new(0.0, 0.0, -length);
+    let mut link = LinkInertia::from_centre(mass, centre, Matrix3::zeros());
+    link.inertia += Matrix3::identity() * inertia;
+    let joint = Joint {
+        name: "pendulum".into(),
+        parent: None,
+        placement: Placement::identity(),
+        kind: JointKind::Revolute,
+        axis: Unit::new_normalize(Vector3::y()),
+        link,
+        armature: 0.0,
+    };
+    let tree = Tree { joints: vec![joint], gravity: Vector3::new(0.0, 0.0, -GRAVITY) };
+    let setup = Setup::of(&parameters);
+    let mut alone = VirtualJoint::new(parameters, &setup, 25.0, 1).unwrap();
+    let mut bare = parameters;
+    bare.joint.load = NOTHING;
+    let mut arm = Arm::new(tree, vec![VirtualJoint::new(bare, &setup, 25.0, 1).unwrap()]).unwrap();
+    alone.enable().unwrap();
+    arm.enable().unwrap();
+    let (mut apart, mut furthest) = (0.0f64, 0.0f64);
+    for n in 0..20_000u32 {
+        let demand = torque(0.4 * parameters.joint.motor.torque_limit() * (0.0005 * f64::from(n)).sin(), n / 20);
+        alone.step(&demand, 0.0);
+        arm.step(&[demand], &[]);
+        let [position, reference] = [&arm.joints()[0], &alone].map(|joint| joint.actuator().state().joint.position);
+        apart = apart.max((position - reference).abs());
+        furthest = furthest.max(reference.abs());
+    }
+    // The arm looks at gravity every few periods, and held its link while the offsets were measured.
+    assert!(furthest > 0.3 && apart < 2e-3 * furthest, "{apart} of {furthest} rad");
+}
+
+#[test]
+fn accelerations_are_those_of_the_rigid_bodies_under_motor_friction_and_external_torques() {
+    const JOINTS: usize = 4;
+    let tree = tree(Shape { joints: JOINTS, branches: false, prismatic: 0.0, armature: false }, 5);
+    let mut arm = Arm::new(tree.clone(), (0..JOINTS as u64).map(bare).collect()).unwrap();
+    arm.enable().unwrap();
+    let rotors: Vec<f64> = arm.joints().iter().map(|joint| joint.actuator().parameters().joint.inertia()).collect();
+    let external = [3.0, 0.0, -2.0, 1.0];
+    // Steps of holding count.
+    let (mut checked, mut moved) = (0, 0.0f64);
+    for n in 0..4_000u32 {
+        let [q, v] = arm.state();
+        let demand = |i: usize| torque(5.0 * (0.003 * f64::from(n) + i as f64).sin(), n / 20);
+        arm.step(&std::array::from_fn::<_, JOINTS, _>(demand), &external);
+        let [_, after] = arm.state();
+        let states: Vec<_> = arm.joints().iter().map(|joint| joint.actuator().state().joint).collect();
+        let a: Vec<f64> = states.iter().map(|state| state.acceleration).collect();
+        let inertial = inverse_dynamics(&tree, &q, &v, &a);
+        let left = |i: usize| {
+            let torques = states[i].motor_torque - states[i].friction_torque + external[i];
+            inertial[i] + rotors[i] * a[i] - torques
+        };
+        let worst = (0..JOINTS).fold(0.0, |worst: f64, i| worst.max(left(i).abs()));
+        // Exact where links were looked at in this very step; which of the four that is follows from the start.
+        checked += u32::from(worst < 1e-6);
+        assert!(worst < 0.5, "step {n}: {worst} Nm are left");
+        moved = after.iter().fold(moved, |most, v| most.max(v.abs()));
+    }
+    assert!(u64::from(checked) >= 4_000 / EVERY && moved > 0.2, "{checked} steps exact, {moved} rad/s");
+    // Links matter: the joints' own inertia alone is a part of it.
+    let [q, _] = arm.state();
+    assert!(mass_matrix(&tree, &q)[(0, 0)] > 0.2 * rotors[0]);
+}
+
+#[test]
+fn what_is_no_arm_is_refused() {
+    let two = tree(Shape { joints: 2, branches: false, prismatic: 0.0, armature: true }, 1);
+    let refused = |tree: &Tree, joints: Vec<VirtualJoint>| Arm::new(tree.clone(), joints).err().unwrap();
+    assert_eq!(refused(&two, vec![bare(1)]), ArmError::Count(2, 1));
+    let mut slides = two.clone();
+    slides.joints[1].kind = JointKind::Prismatic;
+    assert_eq!(refused(&slides, vec![bare(1), bare(2)]), ArmError::Slides(1));
+    let parameters = ActuatorParameters::reference().aligned();
+    let loaded = VirtualJoint::new(parameters, &Setup::of(&parameters), 25.0, 1).unwrap();
+    assert_eq!(refused(&two, vec![bare(1), loaded]), ArmError::Loaded(1));
+    assert!(refused(&slides, vec![bare(1), bare(2)]).to_string().contains("slides"));
+}
