@@ -14,6 +14,8 @@ pub struct Commissioned {
     pub model: FrictionModel,
     /// Whether a network is part of it.
     pub network: bool,
+    /// Part of its friction that the joint may not have, as the fit states it.
+    pub uncertainty: Option<f32>,
 }
 
 /// Excites, records, fits.
@@ -27,5 +29,6 @@ pub fn commission(parameters: &ActuatorParameters, setup: &Setup, seed: u64) -> 
     let fitted = fit(&mut prepared, &options, &Silent).map_err(|error| error.to_string())?;
     let model = FrictionModel::new(&fitted.image.friction, setup.bridge.motion_rate());
     let network = fitted.image.friction.sets.iter().any(|set| set.network.is_some());
-    Ok(Commissioned { model, network })
+    let uncertainty = fitted.report.uncertainty.map(|uncertainty| uncertainty.value as f32);
+    Ok(Commissioned { model, network, uncertainty })
 }

@@ -75,6 +75,8 @@ pub struct RandomJoint {
 pub struct InTorqueMode {
     /// The command holds gravity, a hand leads the joint.
     pub guided: f64,
+    /// The same with the uncertainty that the fit states.
+    pub guided_known: f64,
     /// A controller holds gravity and moves the joint, 1,000 times a second, and tells which is which.
     pub moved: f64,
     /// The same without telling.
@@ -205,15 +207,22 @@ impl RandomJoint {
     /// # Errors
     /// A fault on the way.
     pub fn in_torque_mode(&self, variant: &Variant) -> Result<InTorqueMode, String> {
-        let left = |by_hand, told| self.led(variant, by_hand, told);
-        Ok(InTorqueMode { guided: left(true, true)?, moved: left(false, true)?, moved_untold: left(false, false)? })
+        let default = self.off.configuration.compensation.uncertainty;
+        let left = |by_hand, told| self.led(variant, by_hand, told, default);
+        Ok(InTorqueMode {
+            guided: left(true, true)?,
+            guided_known: self.led(variant, true, true, self.found.uncertainty.unwrap_or(default))?,
+            moved: left(false, true)?,
+            moved_untold: left(false, false)?,
+        })
     }
 
     /// Friction that is left, % of its RMS, while a hand or the command leads the joint; the command tells its push or
     /// not.
-    fn led(&self, variant: &Variant, by_hand: bool, told: bool) -> Result<f64, String> {
+    fn led(&self, variant: &Variant, by_hand: bool, told: bool, uncertainty: f32) -> Result<f64, String> {
         let failed = |error: String| format!("joint {}, {}, torque mode: {error}", self.seed, variant.name);
-        let setup = self.off.compensating(Request::PhysicalAndNetwork);
+        let mut setup = self.off.compensating(Request::PhysicalAndNetwork);
+        setup.configuration.compensation.uncertainty = uncertainty;
         let joint = variant.enabled(&self.parameters, &setup, Some(self.found.model.clone()), WARMTH, 99);
         let mut joint = joint.map_err(|error| failed(error.to_string()))?;
         let (plant, limits) = (&self.parameters.joint, &self.parameters.joint.limits);

@@ -2,6 +2,7 @@
 //! it does by itself. Judged by energy.
 
 use crate::borne::configured;
+use crate::commission::Commissioned;
 use crate::driving::{COMMAND_STEPS, follow, moves};
 use crate::informed::informed;
 use crate::variant::{DEFAULT, Variant, measured};
@@ -114,13 +115,15 @@ impl Alone {
     }
 }
 
-/// The past of a joint that is left alone.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Experience {
-    /// Nothing.
-    None,
-    /// It moved on command, with adaptation on.
-    Moved,
+/// What a joint that is left alone knows of its friction.
+#[derive(Clone, Copy)]
+pub enum Knowledge<'a> {
+    /// A model with every parameter wrong by [`ERROR`].
+    Wrong,
+    /// The same, after motion on command with adaptation on.
+    Experienced,
+    /// Its own image, with the uncertainty that its fit states.
+    Image(&'a Commissioned),
 }
 
 /// Learned friction of a joint that has moved over its travel.
@@ -159,7 +162,7 @@ pub fn run(
     seed: u64,
     alone: Alone,
     variant: Option<&Variant>,
-    experience: Experience,
+    knowledge: Knowledge,
     steps: u32,
 ) -> Result<Seen, String> {
     let mut parameters = ActuatorParameters::randomised(seed).aligned();
@@ -175,7 +178,8 @@ pub fn run(
     let wrong = parameters.joint.friction.scaled(&factors).map_err(|error| error.to_string())?;
     let compensates = variant.is_some();
     // Where a way leads there, it ends in the same state with compensation and without.
-    let request = if compensates || alone.gravity().is_some() { Request::Physical } else { Request::Off };
+    let acts = if matches!(knowledge, Knowledge::Image(_)) { Request::PhysicalAndNetwork } else { Request::Physical };
+    let request = if compensates || alone.gravity().is_some() { acts } else { Request::Off };
     let mut setup = Setup::of(&parameters).compensating(request);
     measured(&mut setup.configuration);
     let bears = alone.gravity().map_or(0.0, Gravity::factor);
@@ -187,11 +191,18 @@ pub fn run(
             ..configured(&parameters, bears.abs())
         };
     }
-    let model = FrictionModel::new(&informed(&parameters, &wrong), setup.bridge.motion_rate());
+    let model = match knowledge {
+        Knowledge::Image(found) => {
+            setup.configuration.compensation.uncertainty =
+                found.uncertainty.unwrap_or(setup.configuration.compensation.uncertainty);
+            found.model.clone()
+        }
+        _ => FrictionModel::new(&informed(&parameters, &wrong), setup.bridge.motion_rate()),
+    };
     let variant = variant.unwrap_or(&DEFAULT);
     let mut joint =
         variant.enabled(&parameters, &setup, Some(model.clone()), 0.0, seed).map_err(|error| error.to_string())?;
-    if request != Request::Off && experience == Experience::Moved {
+    if request != Request::Off && matches!(knowledge, Knowledge::Experienced) {
         joint.set_adaptation(learned(&parameters, &setup, &model, variant, seed)?);
     }
 
@@ -309,24 +320,23 @@ const SETTLING: u32 = 6_000;
 const LAST: u32 = 10_000;
 
 /// Joint `seed` in situations with a compensation: the largest drift, rad, and what moved by itself.
-pub fn judged(seed: u64, situations: &[Alone], variant: &Variant, experience: Experience) -> (f64, Vec<String>) {
+pub fn judged(seed: u64, situations: &[Alone], variant: &Variant, knowledge: Knowledge) -> (f64, Vec<String>) {
     let (mut drift, mut bad) = (0.0f64, Vec::new());
     for &alone in situations {
         // With less friction a joint creeps for longer. What is a limit cycle goes on; creep comes to rest.
         let (short, long) = if alone.gravity().is_some() { (STEPS.0, SWINGING) } else { STEPS };
-        let (largest, moves) = compared(seed, alone, variant, experience, short);
+        let (largest, moves) = compared(seed, alone, variant, knowledge, short);
         drift = drift.max(largest);
         if moves.is_some() {
-            bad.extend(compared(seed, alone, variant, experience, long).1);
+            bad.extend(compared(seed, alone, variant, knowledge, long).1);
         }
     }
     (drift, bad)
 }
 
 /// The drift with compensation, and what joint and compensation did where that moves by itself.
-fn compared(seed: u64, alone: Alone, variant: &Variant, experience: Experience, steps: u32) -> (f64, Option<String>) {
-    let (with, without) =
-        (run(seed, alone, Some(variant), experience, steps), run(seed, alone, None, experience, steps));
+fn compared(seed: u64, alone: Alone, variant: &Variant, knowledge: Knowledge, steps: u32) -> (f64, Option<String>) {
+    let (with, without) = (run(seed, alone, Some(variant), knowledge, steps), run(seed, alone, None, knowledge, steps));
     let moves = match (&with, &without) {
         (Ok(with), Ok(without)) => moves_by_itself(alone, with, without),
         _ => true,

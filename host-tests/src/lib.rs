@@ -23,4 +23,5 @@ pub mod samples;
 pub mod states;
 pub mod touched;
 pub mod variant;
+pub mod virtual_arm;
 pub mod wide;

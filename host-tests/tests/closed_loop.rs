@@ -3,10 +3,11 @@
 //! slow reversals track, what is left in torque mode and in the cold is as published, and adaptation makes up for
 //! friction that has changed.
 //!
-//! Ten joints are judged, three of them in service; there and in torque mode the worst counts. With `JOINT_SAMPLES=all`
+//! Six joints are judged, two of them in service; there and in torque mode the worst counts. With `JOINT_SAMPLES=all`
 //! all twenty are judged, and the median counts, too.
 
 use host_tests::in_the_loop::{InTorqueMode, Moved, RandomJoint, for_seeds, median};
+use host_tests::left_alone::{Alone, Knowledge, judged};
 use host_tests::samples::{count, every};
 use host_tests::variant::{ADAPTIVE, DEFAULT};
 use plant::friction_factors::FrictionFactors;
@@ -14,9 +15,9 @@ use plant::friction_factors::FrictionFactors;
 /// Seed of the first random joint.
 const FIRST: u64 = 1;
 /// Joints: in the test command, and in all.
-const JOINTS: (u64, u64) = (10, 20);
+const JOINTS: (u64, u64) = (6, 20);
 /// Joints in service, likewise.
-const SERVED: (u64, u64) = (3, 20);
+const SERVED: (u64, u64) = (2, 20);
 /// Largest relative torque error with compensation, median and worst, %: 4.0 and 10.6 of docs/results-loop.md, and a
 /// tenth of them.
 const TORQUE_ERROR: (f64, f64) = (4.4, 11.7);
@@ -28,7 +29,7 @@ const COLD: (f64, f64) = (11.7, 32.9);
 
 /// Friction left in torque mode at most, led by hand, and moved by a command that tells its offset and one that does
 /// not, median and worst, %: docs/results-loop.md's figures and a tenth of them.
-const TORQUE_MODE: [(f64, f64); 3] = [(69.6, 74.1), (10.3, 44.1), (68.9, 70.3)];
+const TORQUE_MODE: [(f64, f64); 4] = [(69.6, 74.1), (99.0, 99.0), (10.3, 44.1), (68.9, 70.3)];
 
 /// Torque errors in service, moves and slow reversals, median and worst, %, with adaptation: docs/adaptation.md's
 /// figures and a tenth of them. As commissioned; all of friction's torques times 0.7, 1.3, 0.4 and 2; viscous friction
@@ -63,6 +64,9 @@ struct Found {
     /// Without compensation, and with it.
     moved: [Moved; 2],
     torque_mode: InTorqueMode,
+    /// The uncertainty that its fit states, and what moved by itself with it.
+    uncertainty: Option<f32>,
+    moved_by_itself: Vec<String>,
     /// Torque errors from 0 °C, without compensation and with it, %.
     cold: [f64; 2],
     /// Where it was judged in service.
@@ -86,6 +90,8 @@ fn found(seed: u64) -> Result<Found, String> {
     Ok(Found {
         moved: [joint.without()?, joint.with(&DEFAULT)?],
         torque_mode: joint.in_torque_mode(&DEFAULT)?,
+        uncertainty: joint.found.uncertainty,
+        moved_by_itself: judged(seed, &Alone::ALL, &DEFAULT, Knowledge::Image(&joint.found)).1,
         cold: joint.in_the_cold(&DEFAULT)?,
         served: serves
             .then(|| {
@@ -98,7 +104,7 @@ fn found(seed: u64) -> Result<Found, String> {
     })
 }
 
-/// Limit of a median: that of all joints, and of half of them 25 % more.
+/// Limit of a median: that of all joints, and of a part of them 25 % more.
 fn middle(limit: f64) -> f64 {
     if every() { limit } else { 1.25 * limit }
 }
@@ -178,17 +184,18 @@ fn the_torque_that_friction_takes_is_given_back_and_slow_reversals_track() {
         println!("torque error from 0 °C, {}: median {:.1} %, worst {:.1} %", ["off", "on"][with], found.0, found.1);
         found
     });
-    assert!(
-        median_error <= middle(COLD.0) && worst <= COLD.1,
-        "from 0 °C: torque error {median_error} % median, {worst} % worst"
-    );
+    assert!(held((median_error, worst), COLD), "from 0 °C: torque error {median_error} % median, {worst} % worst");
     assert!(cold.iter().all(|[off, on]| on < off), "better off from 0 °C: {cold:?}");
     type Left = fn(&InTorqueMode) -> f64;
-    let left: [(&str, Left); 3] = [
+    let left: [(&str, Left); 4] = [
         ("led by hand", |left| left.guided),
+        ("led by hand, uncertainty as stated", |left| left.guided_known),
         ("moved, offset told", |left| left.moved),
         ("moved, offset not told", |left| left.moved_untold),
     ];
+    println!("uncertainty: {:?}", found.iter().map(|found| found.uncertainty).collect::<Vec<_>>());
+    let moved: Vec<&String> = found.iter().flat_map(|found| &found.moved_by_itself).collect();
+    assert!(moved.is_empty(), "{moved:?}");
     for ((what, left), (limit, worst)) in left.iter().zip(TORQUE_MODE) {
         let left: Vec<f64> = torque_mode.iter().map(left).collect();
         let found = (median(left.clone()), left.iter().fold(0.0f64, |worst, left| worst.max(*left)));

@@ -4,7 +4,7 @@
 //! `JOINT_SAMPLES=all` judges every joint of the published figures, else the first fifth of them.
 
 use host_tests::in_the_loop::for_seeds;
-use host_tests::left_alone::{Alone, ERROR, Experience, judged};
+use host_tests::left_alone::{Alone, ERROR, Knowledge, judged};
 use host_tests::samples::count;
 use host_tests::variant::{ADAPTIVE, DEFAULT, Variant};
 
@@ -17,26 +17,26 @@ const EXPERIENCED: (u64, u64) = (40, 200);
 
 #[test]
 fn no_joint_starts_to_move_or_keeps_moving_by_itself() {
-    leave_alone(JOINTS, &Alone::ALL, &DEFAULT, Experience::None);
+    leave_alone(JOINTS, &Alone::ALL, &DEFAULT, Knowledge::Wrong);
 }
 
 #[test]
 fn neither_does_one_whose_feedforward_bears_a_gravity_that_is_wrong_by_30_percent_or_reversed() {
-    leave_alone(BEARING, &Alone::BEARING, &DEFAULT, Experience::None);
+    leave_alone(BEARING, &Alone::BEARING, &DEFAULT, Knowledge::Wrong);
 }
 
 #[test]
 fn neither_does_one_that_has_learned_its_friction_before() {
-    leave_alone(EXPERIENCED, &Alone::ALL, &ADAPTIVE, Experience::Moved);
+    leave_alone(EXPERIENCED, &Alone::ALL, &ADAPTIVE, Knowledge::Experienced);
 }
 
-fn leave_alone((part, all): (u64, u64), situations: &[Alone], variant: &Variant, experience: Experience) {
+fn leave_alone((part, all): (u64, u64), situations: &[Alone], variant: &Variant, knowledge: Knowledge<'static>) {
     let joints = count(part, all);
-    let judged = for_seeds(0..joints, |seed| judged(seed, situations, variant, experience));
+    let judged = for_seeds(0..joints, |seed| judged(seed, situations, variant, knowledge));
     let drift = judged.iter().fold(0.0f64, |largest, (drift, _)| largest.max(*drift));
     let bad: Vec<String> = judged.into_iter().flat_map(|(_, bad)| bad).collect();
     println!(
-        "{joints} joints, {experience:?}, model wrong by {ERROR} in every parameter: largest drift {drift:.2e} rad, bad {} of {}",
+        "{joints} joints, model wrong by {ERROR} in every parameter: largest drift {drift:.2e} rad, bad {} of {}",
         bad.len(),
         joints as usize * situations.len()
     );
