@@ -169,6 +169,11 @@ impl Telemetry {
         self.put_back()
     }
 
+    /// Ends without a change of the PDOs: for another client that has changed them meanwhile.
+    pub fn leave(mut self) {
+        self.ended = true;
+    }
+
     fn put_back(&mut self) -> Result<(), RemoteError> {
         if std::mem::replace(&mut self.ended, true) {
             return Ok(());
