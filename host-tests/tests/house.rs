@@ -11,13 +11,14 @@ use syn::visit::{self, Visit};
 use syn::{Attribute, Item, UseTree};
 
 /// Sources of each crate.
-const CRATES: [&str; 9] = [
+const CRATES: [&str; 10] = [
     "src",
     "host-tests/src",
     "tools/bus/src",
     "tools/emulator/src",
     "tools/jointctl/src",
     "tools/node/src",
+    "tools/panel/src",
     "tools/plant/src",
     "tools/python/src",
     "tools/rigid-body/src",

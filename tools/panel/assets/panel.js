@@ -1,0 +1,274 @@
+// The page: messages of the joint to its parts, buttons to questions.
+
+import { Joint } from "./joint.js";
+import { Plots } from "./plot.js";
+import * as tables from "./tables.js";
+
+const by = (id) => document.getElementById(id);
+const number = (id) => {
+  const value = by(id).valueAsNumber;
+  if (!Number.isFinite(value)) throw new Error(`${id.replace("-", ", ")}: a number is wanted`);
+  return value;
+};
+const plots = new Plots(by("plots"));
+const objects = new tables.Objects(by("objects"), () => { by("set").disabled = objects.changes.size === 0; });
+const slow = new Map();
+const panel = { plots, problems: [], latest: (name) => plots.latest(name), isHeld: () => joint.held };
+let node = null;
+window.panel = panel;
+window.addEventListener("error", (event) => panel.problems.push(event.message));
+
+function log(text, bad) {
+  const line = document.createElement("li"), list = by("log");
+  line.textContent = `${new Date().toLocaleTimeString()}  ${text}`;
+  if (bad) line.className = "bad";
+  list.prepend(line);
+  while (list.childElementCount > 300) list.lastElementChild.remove();
+}
+
+function alert(text) {
+  by("alert").textContent = text ?? "";
+  by("alert").hidden = !text;
+  if (text) log(text, true);
+}
+
+function badge(id, text, kind) {
+  by(id).textContent = text;
+  by(id).className = `badge ${kind ?? ""}`;
+  by(id).hidden = text === "";
+}
+
+const take = {
+  connection(state) {
+    if (state === "open") return;
+    badge("state", "not connected", "bad");
+    alert("The connection to the server is gone: the server has stopped the joint. Load this page anew.");
+    by("moves").disabled = true;
+  },
+  hello(hello) {
+    node = hello.node;
+    document.title = `Joint ${node}`;
+    by("title").textContent = `Joint ${node}`;
+    plots.begin(hello.signals);
+    alert(null);
+  },
+  role(role) {
+    badge("role", role === "commands" ? "this page commands" : "this page looks on", "quiet");
+    by("moves").disabled = role !== "commands";
+  },
+  live(live) {
+    plots.push(live);
+    by("lost").textContent = live.lost ? `${live.lost} samples lost` : "";
+  },
+  event(event) {
+    plots.mark(event);
+    if (event.kind === "state") badge("state", event.text, event.text.includes("fault") ? "bad" : "");
+    if (event.kind === "faults") badge("faults", event.text === "none" ? "" : event.text, "bad");
+    log(`${event.t.toFixed(3)} s  ${event.kind}: ${event.text}`, event.kind === "emcy");
+  },
+  slow({ title: text, name, shown }) {
+    if (!slow.has(name)) {
+      const entry = document.createElement("div"), title = document.createElement("dt");
+      slow.set(name, document.createElement("dd"));
+      title.textContent = text;
+      entry.append(title, slow.get(name));
+      by("values").append(entry);
+    }
+    slow.get(name).textContent = shown;
+  },
+  motion({ moving, reason, state }) {
+    if (moving) {
+      log("moving");
+      return;
+    }
+    joint.release();
+    lift();
+    log(`stopped: ${reason}; ${state}`);
+  },
+  stopped({ state, error }) {
+    log(error ? `STOP: ${error}` : `STOP: ${state}`, Boolean(error));
+  },
+  silent(silent) {
+    alert(silent ? "No live values: the joint is not OPERATIONAL. Look again starts it." : null);
+  },
+  failure: alert,
+  error: alert,
+};
+
+const wanted = /^#node=(\d{1,3})$/.exec(location.hash);
+const joint = new Joint(wanted ? wanted[1] : "default", (kind, value) => take[kind]?.(value));
+addEventListener("hashchange", () => location.reload());
+
+// A button's question; an error goes where it is seen.
+function on(id, act, event = "click") {
+  by(id).addEventListener(event, async () => {
+    try {
+      await act();
+      alert(null);
+    } catch (error) {
+      alert(error.message);
+    }
+  });
+}
+
+function save(name, text) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(new Blob([text]));
+  link.download = name;
+  link.click();
+  URL.revokeObjectURL(link.href);
+}
+
+// Motions, each for as long as its button or key is held.
+const MOTIONS = {
+  "jog-back": () => ({ jog: { velocity: -number("jog-velocity") } }),
+  "jog-forward": () => ({ jog: { velocity: number("jog-velocity") } }),
+  sine: () => ({ sine: { amplitude: number("sine-amplitude"), frequency: number("sine-frequency") } }),
+  steps: () => ({ steps: { step: number("steps-step"), dwell: number("steps-dwell") } }),
+  impedance: () => ({ impedance: {
+    offset: number("impedance-offset"), stiffness: number("impedance-stiffness"), damping: number("impedance-damping"),
+  } }),
+};
+const KEYS = { ArrowLeft: "jog-back", ArrowRight: "jog-forward" };
+
+function lift() {
+  for (const button of document.querySelectorAll(".held")) button.classList.remove("held");
+}
+
+function letGo() {
+  joint.release();
+  lift();
+}
+
+async function press(id) {
+  if (by("moves").disabled) return;
+  try {
+    const asked = joint.press(MOTIONS[id](), by("reset").checked);
+    by(id).classList.add("held");
+    await asked;
+    alert(null);
+  } catch (error) {
+    letGo();
+    alert(error.message);
+  }
+}
+
+for (const id of Object.keys(MOTIONS)) {
+  const button = by(id);
+  button.addEventListener("pointerdown", (event) => {
+    if (event.button !== 0) return;
+    button.setPointerCapture(event.pointerId);
+    press(id);
+  });
+  for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) button.addEventListener(end, letGo);
+  button.addEventListener("contextmenu", (event) => event.preventDefault());
+}
+
+const types = (target) => target instanceof Element && target.closest("input:not([type=checkbox]), select, textarea");
+addEventListener("keydown", (event) => {
+  // STOP, whatever has the focus.
+  if (event.code === "Space") {
+    event.preventDefault();
+    joint.stop();
+    lift();
+    return;
+  }
+  const id = KEYS[event.code];
+  if (!id || event.repeat || event.ctrlKey || event.altKey || event.metaKey || types(event.target)) return;
+  event.preventDefault();
+  press(id);
+}, true);
+addEventListener("keyup", (event) => {
+  if (KEYS[event.code]) letGo();
+});
+addEventListener("blur", letGo);
+addEventListener("pagehide", letGo);
+document.addEventListener("visibilitychange", letGo);
+by("stop").addEventListener("pointerdown", () => {
+  joint.stop();
+  lift();
+});
+// Without a pointer: by the keyboard, or by what reads the page aloud.
+by("stop").addEventListener("click", (event) => {
+  if (event.detail === 0) joint.stop();
+});
+
+plots.changed = () => {
+  by("pause").setAttribute("aria-pressed", String(plots.end !== null));
+};
+by("pause").onclick = () => {
+  if (plots.end === null) plots.pause(); else plots.live();
+  plots.changed();
+};
+by("window").onchange = () => {
+  plots.span = Number(by("window").value);
+  plots.draw();
+};
+on("csv", async () => save(`joint-${node}.csv`, await joint.ask("csv")));
+on("look", () => joint.ask("look"));
+
+on("load-checklist", async () => tables.checklist(by("checklist"), await joint.ask("checklist")));
+on("load-scan", async () => tables.joints(by("joints"), await joint.ask("scan"), node));
+
+const show = () => objects.show(by("find").value, by("only-settings").checked);
+const read = async () => {
+  objects.set(await joint.ask("objects"));
+  show();
+};
+by("find").oninput = show;
+by("only-settings").onchange = show;
+on("load-objects", read);
+on("set", async () => {
+  const done = await joint.ask({ set: { values: [...objects.changes] } });
+  for (const { name, shown } of done) log(`${name} is ${shown}`);
+  await read();
+});
+on("store", async () => {
+  await joint.ask("store");
+  log("stored");
+});
+on("export", async () => save(`joint-${node}.toml`, await joint.ask("export")));
+on("import", async () => {
+  const [file] = by("import").files;
+  by("import").value = "";
+  const done = file ? await joint.ask({ import: { text: await file.text() } }) : [];
+  const changed = done.map(({ name, shown }) => `${name} ${shown}`).join(", ");
+  log(changed ? `${file.name}: ${changed}` : "nothing differs");
+  await read();
+}, "change");
+
+const told = (state) => {
+  tables.images(by("images"), state);
+  by("requested").value = String(state.requested);
+};
+const usage = (name) => (name === "shadow" || name === "trial" ? { [name]: number("image-time") } : name);
+let uploaded = null;
+on("load-images", async () => told(await joint.ask("images")));
+on("requested", async () => {
+  if (by("requested").value === "") return;
+  await joint.ask({ set: { values: [["requested-model", by("requested").value]] } });
+  told(await joint.ask("images"));
+}, "change");
+by("image").onchange = () => { uploaded = null; };
+for (const name of ["verify", "shadow", "trial", "commit"]) {
+  on(name, async () => {
+    const [file] = by("image").files;
+    if (!file) throw new Error("choose an image file first");
+    // The same file again is taken a step further without being sent.
+    if (uploaded === file && name !== "verify") {
+      told(await joint.ask({ use: { usage: usage(name) } }));
+    } else {
+      const image = [...new Uint8Array(await file.arrayBuffer())];
+      told(await joint.ask({ upload: { image, usage: usage(name) } }));
+      uploaded = file;
+    }
+    log(`${file.name}: ${name}`);
+  });
+}
+on("discard", async () => {
+  uploaded = null;
+  told(await joint.ask("discard"));
+});
+on("roll-back", async () => told(await joint.ask("roll-back")));
+panel.plots.count = () => plots.strokes;
+panel.plots.drawn = () => plots.frames;

@@ -1,0 +1,109 @@
+// Tables of the page. What comes from a joint is set as text.
+
+function cell(row, text, kind) {
+  const made = row.insertCell();
+  if (text instanceof Node) made.append(text); else made.textContent = text ?? "";
+  if (kind) made.className = kind;
+  return made;
+}
+
+function heads(body, names) {
+  body.replaceChildren();
+  const row = body.insertRow();
+  for (const name of names) {
+    const made = document.createElement("th");
+    made.scope = "col";
+    made.textContent = name;
+    row.append(made);
+  }
+}
+
+export function checklist(body, items) {
+  heads(body, ["", "", "found", "to do"]);
+  for (const { name, done, found, remedy } of items) {
+    const row = body.insertRow();
+    cell(row, done ? "✓" : "missing", done ? "good" : "bad");
+    cell(row, name);
+    cell(row, found);
+    cell(row, remedy, "quiet");
+  }
+}
+
+export function joints(body, list, own) {
+  heads(body, ["node", "name", "state", "faults", "supply", "winding", "bridge"]);
+  for (const joint of list) {
+    const row = body.insertRow(), link = document.createElement("a");
+    link.href = `#node=${joint.node}`;
+    link.target = "_blank";
+    link.rel = "noopener";
+    link.textContent = joint.node;
+    cell(row, joint.node === own ? `${own} (this page)` : link, "number");
+    if (joint.error) {
+      cell(row, joint.error, "bad").colSpan = 6;
+      continue;
+    }
+    cell(row, joint.name);
+    cell(row, joint.state);
+    cell(row, joint.faults, joint.faults === "none" ? "" : "bad");
+    for (const key of ["supply", "winding", "bridge"]) cell(row, joint[key], "number");
+  }
+}
+
+export function images(body, told) {
+  const words = (image) => image
+    ? `version ${image.version}, ${image.model}, CRC-32 ${image.checksum}, slot ${image.slot}` : "none";
+  heads(body, ["", ""]);
+  for (const [name, text] of [["life cycle", told.life], ["in use", words(told.active)],
+    ["previous", words(told.previous)], ["acting model", told.acting], ["shadow RMS", told.shadow]]) {
+    const row = body.insertRow();
+    cell(row, name, "quiet");
+    cell(row, text);
+  }
+}
+
+// Objects with a field for each that can be written; `changes` holds what was typed, by name.
+export class Objects {
+  constructor(body, changed) {
+    this.body = body;
+    this.changed = changed;
+    this.list = [];
+    this.changes = new Map();
+  }
+
+  set(list) {
+    this.list = list;
+    this.changes.clear();
+    this.changed();
+  }
+
+  show(find, settingsAlone) {
+    heads(this.body, ["name", "value", "", "unit", "range", "meaning"]);
+    const wanted = find.toLowerCase();
+    for (const object of this.list) {
+      if (settingsAlone && !object.setting) continue;
+      if (!`${object.name} ${object.object} ${object.text}`.toLowerCase().includes(wanted)) continue;
+      const row = this.body.insertRow(), name = cell(row, object.name);
+      name.title = object.object;
+      cell(row, object.shown, "number");
+      cell(row, object.writable ? this.field(object, row) : "");
+      cell(row, object.unit);
+      cell(row, object.limits ? object.limits.join(" to ") : "", "number");
+      cell(row, object.text, "quiet");
+      row.classList.toggle("changed", this.changes.has(object.name));
+    }
+  }
+
+  field(object, row) {
+    const field = document.createElement("input");
+    field.setAttribute("aria-label", `new value of ${object.name}`);
+    field.placeholder = "new value";
+    field.value = this.changes.get(object.name) ?? "";
+    field.oninput = () => {
+      if (field.value.trim() === "") this.changes.delete(object.name);
+      else this.changes.set(object.name, field.value);
+      row.classList.toggle("changed", this.changes.has(object.name));
+      this.changed();
+    };
+    return field;
+  }
+}

@@ -1,0 +1,347 @@
+//! The thread: orders, supervision of a motion, live values, in turn.
+
+use super::pages::Pages;
+use super::watch::Watch;
+use super::{Order, Setup};
+use crate::hold::{Hold, LIMIT};
+use crate::message::Ask;
+use crate::motion::{Motion, RATE, Steered};
+use crate::slow::Slow;
+use crate::{checklist, learning, scan, settings};
+use bus::client::{Command as Nmt, NmtState, Target};
+use joint_firmware::joint::state_machine::State;
+use joint_firmware::objects::field::{Actual, Field};
+use jointctl::remote::{RemoteError, RemoteJoint, Stream, drive};
+use serde_json::{Value, json};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::Receiver;
+use std::time::{Duration, Instant};
+
+/// Longest wait for an order: how soon a hold that is over is noticed here. The stream of set-points notices it with
+/// the next set-point.
+const TURN: Duration = Duration::from_millis(5);
+/// The same where nobody looks.
+const IDLE: Duration = Duration::from_millis(50);
+/// Between two looks at a joint that moves.
+const LOOK: Duration = Duration::from_millis(50);
+/// Between two slow values.
+const SLOW: Duration = Duration::from_millis(100);
+/// Between two attempts to find a joint that does not answer.
+const AGAIN: Duration = Duration::from_secs(2);
+
+/// A motion for a page.
+struct Moving {
+    stream: Stream,
+    page: u64,
+    hold: Arc<Hold>,
+    number: u64,
+    looked: Instant,
+}
+
+pub struct Worker {
+    setup: Setup,
+    orders: Receiver<Order>,
+    stop: Arc<AtomicBool>,
+    over: Arc<AtomicBool>,
+    pages: Pages,
+    joint: Option<RemoteJoint>,
+    watch: Option<Watch>,
+    slow: Slow,
+    moving: Option<Moving>,
+    /// The image that a page uploaded last, for its next steps.
+    uploaded: Vec<u8>,
+    /// When a joint that did not answer is asked again, and when the next slow value is read.
+    due: Instant,
+}
+
+impl Worker {
+    pub fn new(setup: Setup, orders: Receiver<Order>, stop: Arc<AtomicBool>, over: Arc<AtomicBool>) -> Self {
+        Self {
+            setup,
+            orders,
+            stop,
+            over,
+            pages: Pages::default(),
+            joint: None,
+            watch: None,
+            slow: Slow::default(),
+            moving: None,
+            uploaded: Vec::new(),
+            due: Instant::now(),
+        }
+    }
+
+    pub fn run(mut self) {
+        while !self.over.load(Ordering::Relaxed) {
+            let wait = if self.pages.is_empty() { IDLE } else { TURN };
+            let order = self.orders.recv_timeout(wait);
+            self.pages.forget();
+            self.obey_stop();
+            self.supervise();
+            match order {
+                Ok(Order::Attach { page, hold, tell }) => {
+                    self.pages.attach(page, hold, tell);
+                    self.greet(page);
+                }
+                Ok(Order::Ask { page, id, ask }) => {
+                    let answer = match self.answer(page, ask) {
+                        Ok(done) => json!({ "answer": id, "done": done }),
+                        Err(error) => json!({ "answer": id, "error": error }),
+                    };
+                    self.pages.tell_one(page, &answer);
+                }
+                Err(_) => {}
+            }
+            if self.pages.is_empty() {
+                self.rest();
+                continue;
+            }
+            self.look();
+        }
+        self.rest();
+    }
+
+    /// Leaves the joint as it was found.
+    fn rest(&mut self) {
+        self.end_motion("nobody looks any more");
+        if let Some(watch) = self.watch.take() {
+            // Nobody is left to be told.
+            let _ = watch.end();
+        }
+        self.joint = None;
+        self.due = Instant::now();
+    }
+
+    fn greet(&mut self, page: u64) {
+        if let Some(hello) = self.hello() {
+            self.pages.tell_one(page, &hello);
+        }
+    }
+
+    fn hello(&self) -> Option<Value> {
+        let signals = self.watch.as_ref()?.signals();
+        let limit = LIMIT.as_millis() as u64;
+        Some(json!({ "hello": { "node": self.setup.node, "signals": signals, "held_ms": limit } }))
+    }
+
+    /// Finds the joint, takes what it sends, reads a slow value where one is due.
+    fn look(&mut self) {
+        let Some(joint) = self.joint.clone() else {
+            if Instant::now() >= self.due {
+                self.open();
+            }
+            return;
+        };
+        if let Some(watch) = &mut self.watch {
+            let pages = &mut self.pages;
+            if let Err(error) = watch.look(&mut |message| pages.tell(&message)) {
+                self.pages.tell(&json!({ "failure": error.to_string() }));
+                if let Some(watch) = self.watch.take() {
+                    watch.leave();
+                }
+            }
+        }
+        let alone = self.watch.as_ref().is_some_and(|watch| !watch.is_shared());
+        if alone && Instant::now() >= self.due {
+            self.due = Instant::now() + SLOW;
+            match self.slow.next(&joint) {
+                Ok(None) => {}
+                Ok(Some(value)) => self.pages.tell(&json!({ "slow": value })),
+                Err(error) => {
+                    self.due = Instant::now() + AGAIN;
+                    self.pages.tell(&json!({ "failure": error.to_string() }));
+                }
+            }
+        }
+    }
+
+    fn open(&mut self) {
+        self.due = Instant::now() + AGAIN;
+        let found = RemoteJoint::on(&self.setup.network, self.setup.node).map(|joint| match &self.setup.key {
+            Some(key) => joint.owned_by(key.clone()),
+            None => joint,
+        });
+        match found {
+            Ok(joint) => {
+                self.joint = Some(joint);
+                self.due = Instant::now();
+                if let Err(error) = self.watch_anew() {
+                    self.pages.tell(&json!({ "failure": error.to_string() }));
+                }
+            }
+            Err(error) => self.pages.tell(&json!({ "failure": error.to_string() })),
+        }
+    }
+
+    fn watch_anew(&mut self) -> Result<(), RemoteError> {
+        let Some(joint) = &self.joint else { return Ok(()) };
+        if let Some(watch) = self.watch.take() {
+            watch.end()?;
+        }
+        self.watch = Some(Watch::begin(&self.setup, joint)?);
+        if let Some(hello) = self.hello() {
+            self.pages.tell(&hello);
+        }
+        Ok(())
+    }
+
+    /// STOP of any page: along the same way as the end of a motion, or whoever moves the joint.
+    fn obey_stop(&mut self) {
+        if !self.stop.load(Ordering::Relaxed) {
+            return;
+        }
+        if let Some(moving) = &self.moving {
+            // The stream stands still from now on, whatever comes after.
+            moving.hold.release();
+        }
+        self.stop.store(false, Ordering::Relaxed);
+        if self.moving.is_some() {
+            self.end_motion("STOP");
+            return;
+        }
+        let told = match &self.joint {
+            Some(joint) => stop(joint, self.watch.is_some()),
+            // A joint that has not answered yet may still hear.
+            None => {
+                let sent = self.setup.network.command(Nmt::EnterPreOperational, Target::Node(self.setup.node));
+                sent.map(|()| "sent; the joint has not answered yet".to_owned()).map_err(RemoteError::from)
+            }
+        };
+        self.pages.tell(&match told {
+            Ok(state) => json!({ "stopped": { "state": state } }),
+            Err(error) => json!({ "stopped": { "error": error.to_string() } }),
+        });
+    }
+
+    /// Ends a motion that is not held any more, or that the joint does not follow.
+    fn supervise(&mut self) {
+        let Some(moving) = &mut self.moving else { return };
+        let ended = if self.pages.hold(moving.page).is_none() {
+            Some("the page is gone".to_owned())
+        } else if !moving.hold.is_held(moving.number, Instant::now()) {
+            Some("not held any more".to_owned())
+        } else if moving.looked.elapsed() >= LOOK {
+            moving.looked = Instant::now();
+            moving.stream.check().err().map(|error| error.to_string())
+        } else {
+            None
+        };
+        if let Some(reason) = ended {
+            self.end_motion(&reason);
+        }
+    }
+
+    /// Brakes and disables, as `jointctl move` does at its end.
+    fn end_motion(&mut self, reason: &str) {
+        let Some(moving) = self.moving.take() else { return };
+        moving.hold.end(moving.number);
+        let state = moving.stream.end();
+        if state.is_ok() {
+            self.operate();
+        }
+        let state = state.map_or_else(|error| error.to_string(), |state| drive::name(state).to_owned());
+        self.pages.tell(&json!({ "motion": { "moving": false, "reason": reason, "state": state } }));
+    }
+
+    /// Has the joint send TPDOs again: the end of a stream leaves it PRE-OPERATIONAL, with its controlword forgotten.
+    fn operate(&mut self) {
+        if let (Some(joint), Some(_)) = (&self.joint, &self.watch)
+            && let Err(error) = joint.nmt(Nmt::Start, NmtState::Operational)
+        {
+            self.pages.tell(&json!({ "failure": error.to_string() }));
+        }
+    }
+
+    fn answer(&mut self, page: u64, ask: Ask) -> Result<Value, String> {
+        if ask.changes() && self.pages.commander() != Some(page) {
+            return Err("another page commands this joint; this one looks on, and may stop it".into());
+        }
+        if self.moving.is_some() && ask != Ask::Csv {
+            return Err("the joint moves: this waits until it stands".into());
+        }
+        let node = self.setup.node;
+        let Some(joint) = self.joint.clone() else { return Err(format!("node {node} has not answered yet")) };
+        let (stop, ended) = (Arc::clone(&self.stop), Arc::clone(&self.over));
+        let over = move || stop.load(Ordering::Relaxed) || ended.load(Ordering::Relaxed);
+        let words = |error: RemoteError| error.to_string();
+        match ask {
+            Ask::Held { .. } | Ask::Release | Ask::Stop => Ok(Value::Null),
+            Ask::Move { hold, motion, reset } => {
+                self.begin_motion(&joint, page, hold, motion, reset).map(|()| Value::Null)
+            }
+            Ask::Scan => scan::scan(&self.setup.network, &over).map_err(words),
+            Ask::Checklist => {
+                let items = checklist::checklist(&joint).map_err(words)?;
+                serde_json::to_value(items).map_err(|error| error.to_string())
+            }
+            Ask::Look => self.watch_anew().map(|()| Value::Null).map_err(words),
+            Ask::Csv => match &self.watch {
+                Some(watch) => Ok(watch.csv().into()),
+                None => Err("there are no live values; Look begins them".into()),
+            },
+            Ask::Objects => settings::objects(&joint, &over),
+            Ask::Set { values } => settings::set(&joint, &values).map_err(words),
+            Ask::Store => settings::store(&joint).map_err(words),
+            Ask::Export => settings::export(&joint, &over).map(Value::from),
+            Ask::Import { text } => settings::import(&joint, &text, &over),
+            Ask::Images => learning::images(&joint).map_err(words),
+            Ask::Upload { image, usage } => {
+                let told = learning::upload(&joint, &image, usage).map_err(words);
+                self.uploaded = image;
+                told
+            }
+            Ask::Use { usage } => learning::go_on(&joint, &self.uploaded, usage).map_err(words),
+            Ask::RollBack => learning::roll_back(&joint).map_err(words),
+            Ask::Discard => learning::discard(&joint).map_err(words),
+        }
+    }
+
+    fn begin_motion(
+        &mut self,
+        joint: &RemoteJoint,
+        page: u64,
+        number: u64,
+        motion: Motion,
+        reset: bool,
+    ) -> Result<(), String> {
+        let words = |error: RemoteError| error.to_string();
+        let position = || joint.number(Field::Actual(Actual::Position)).map_err(words);
+        motion.check(joint, position()?).map_err(words)?;
+        let Some(hold) = self.pages.hold(page) else { return Err("the page is gone".into()) };
+        let let_go = || "let go before the joint was enabled: nothing moved".to_owned();
+        if !hold.is_held(number, Instant::now()) {
+            return Err(let_go());
+        }
+        // Enabling takes some time, in which the joint is held where it is.
+        let begun = Stream::begin(joint, motion.mode(), RATE, reset).map_err(words);
+        let (stream, from) = match begun.and_then(|stream| Ok((stream, position()?))) {
+            Ok(begun) => begun,
+            Err(error) => {
+                self.operate();
+                return Err(error);
+            }
+        };
+        let mut steered = Steered::new(motion, from);
+        let (held, stop) = (Arc::clone(&hold), Arc::clone(&self.stop));
+        stream.play(move |elapsed| {
+            let held = held.is_held(number, Instant::now()) && !stop.load(Ordering::Relaxed);
+            steered.next(elapsed, held)
+        });
+        self.moving = Some(Moving { stream, page, hold, number, looked: Instant::now() });
+        self.pages.tell(&json!({ "motion": { "moving": true } }));
+        Ok(())
+    }
+}
+
+/// Brakes and switches off, whoever commands the joint. Where nothing was under current before, it goes on to send live
+/// values; otherwise it stays PRE-OPERATIONAL, where no other client's set-points count.
+fn stop(joint: &RemoteJoint, watched: bool) -> Result<String, RemoteError> {
+    let off = |state| matches!(state, State::SwitchOnDisabled | State::Fault | State::NotReadyToSwitchOn);
+    let before = joint.state();
+    let state = joint.disable()?;
+    if watched && before.is_ok_and(off) {
+        joint.nmt(Nmt::Start, NmtState::Operational)?;
+    }
+    Ok(drive::name(state).to_owned())
+}

@@ -1,0 +1,41 @@
+//! Joints on a bus, each on one line; host.
+
+use bus::client::Network;
+use joint_firmware::objects::field::{Actual, Field};
+use jointctl::remote::present::{PATIENCE, present};
+use jointctl::remote::{RemoteError, RemoteJoint, drive, info};
+use serde_json::{Value, json};
+
+/// Everybody who answers; `over` ends the search.
+///
+/// # Errors
+/// The bus; a node that does not answer twice is told in its line.
+pub fn scan(network: &Network, over: &dyn Fn() -> bool) -> Result<Value, RemoteError> {
+    let mut lines = Vec::new();
+    for node in present(network, PATIENCE)? {
+        if over() {
+            break;
+        }
+        lines.push(match RemoteJoint::on(network, node).and_then(|joint| line(&joint)) {
+            Ok(line) => line,
+            Err(error) => json!({ "node": node, "error": error.to_string() }),
+        });
+    }
+    Ok(lines.into())
+}
+
+fn line(joint: &RemoteJoint) -> Result<Value, RemoteError> {
+    let text = |index| joint.node().upload(index, 0).map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
+    let shown = |actual| info::show(joint, Field::Actual(actual));
+    let faults = joint.faults()?;
+    Ok(json!({
+        "node": joint.id(),
+        "name": text(0x1008)?,
+        "program": text(0x100A)?,
+        "state": drive::name(joint.state()?),
+        "faults": if faults.is_empty() { "none".to_owned() } else { drive::list(&faults) },
+        "supply": shown(Actual::BusVoltage)?,
+        "winding": shown(Actual::WindingTemperature)?,
+        "bridge": shown(Actual::BridgeTemperature)?,
+    }))
+}

@@ -1,0 +1,81 @@
+//! Values that change slowly, read one by one beside the live ones; host.
+
+use crate::absent::is_absent;
+use bus::client::ClientError;
+use joint_firmware::objects::field::{Actual, Field};
+use joint_firmware::objects::settings::Setting;
+use jointctl::remote::refusal::image_state;
+use jointctl::remote::{Entry, RemoteError, RemoteJoint};
+use serde_json::{Value, json};
+
+/// What is read in turn, and its title.
+const FIELDS: [(&str, Field); 15] = [
+    ("winding", Field::Actual(Actual::WindingTemperature)),
+    ("bridge", Field::Actual(Actual::BridgeTemperature)),
+    ("gear", Field::Actual(Actual::GearTemperature)),
+    ("supply", Field::Actual(Actual::BusVoltage)),
+    ("requested model", Field::AtOnce(Setting::Request)),
+    ("acting model", Field::Actual(Actual::ActingModel)),
+    ("reason", Field::Actual(Actual::Reason)),
+    ("left trained range", Field::Actual(Actual::Violations)),
+    ("shadow RMS", Field::Actual(Actual::ShadowRms)),
+    ("learning", Field::Actual(Actual::Learning)),
+    ("friction factor", Field::Actual(Actual::AdaptedFactor)),
+    ("added viscous friction", Field::Actual(Actual::AdaptedViscous)),
+    ("collisions", Field::Actual(Actual::Collisions)),
+    ("staged image", Field::Actual(Actual::ImageState)),
+    ("image version", Field::Actual(Actual::ImageVersion)),
+];
+
+/// Reads one value at a time.
+#[derive(Debug)]
+pub struct Slow {
+    entries: Vec<(&'static str, Entry)>,
+    next: usize,
+}
+
+impl Default for Slow {
+    fn default() -> Self {
+        Self { entries: FIELDS.map(|(title, field)| (title, Entry::of(field))).to_vec(), next: 0 }
+    }
+}
+
+/// Numbers that stand for words.
+fn words(field: Field, number: Option<f64>) -> Option<String> {
+    let number = number? as u64;
+    match field {
+        Field::Actual(Actual::ImageState) => image_state(number as u8).map(|state| format!("{state:?}").to_lowercase()),
+        _ => None,
+    }
+}
+
+impl Slow {
+    /// The next value, for a page; none where the joint has no such object, which is not asked for again.
+    ///
+    /// # Errors
+    /// The bus, or no answer.
+    pub fn next(&mut self, joint: &RemoteJoint) -> Result<Option<Value>, RemoteError> {
+        let Some(&(title, entry)) = self.entries.get(self.next) else {
+            self.next = 0;
+            return Ok(None);
+        };
+        match joint.read(entry) {
+            Ok(value) => {
+                self.next += 1;
+                let known = (!entry.is_unknown(&value)).then(|| value.json());
+                let shown = words(entry.object.field, value.number()).unwrap_or_else(|| entry.show(&value));
+                Ok(Some(json!({ "title": title, "name": entry.name(), "value": known, "shown": shown })))
+            }
+            Err(error) if is_absent(&error) => {
+                self.entries.remove(self.next);
+                Ok(None)
+            }
+            // Asked again at its next turn.
+            Err(RemoteError::Client(ClientError::OtherClient { .. })) => {
+                self.next += 1;
+                Ok(None)
+            }
+            Err(error) => Err(error),
+        }
+    }
+}

@@ -1,0 +1,67 @@
+//! The page's server from a page's side: a WebSocket client, a virtual joint served in real time, a browser where there
+//! is one. Tests wait for what the joint or the server says, however long the machine takes for it.
+
+mod browser;
+mod page;
+mod parts;
+mod safety;
+mod security;
+mod served;
+
+use libtest_mimic::{Arguments, Trial};
+
+/// Tests at once, where the command line does not say how many: their joints run in real time.
+const AT_ONCE: usize = 3;
+
+/// The tests of each module. One that is missing is a function that nobody uses, which the compiler tells.
+macro_rules! trials {
+    ($($module:ident { $($(#[$where:meta])? $test:ident,)+ })+) => {
+        Vec::from([$($($(#[$where])? Trial::test(concat!(stringify!($module), "::", stringify!($test)), || {
+            $module::$test();
+            Ok(())
+        }),)+)+])
+    };
+}
+
+fn main() {
+    let mut arguments = Arguments::from_args();
+    arguments.test_threads.get_or_insert(AT_ONCE);
+    let mut trials = trials! {
+        parts {
+            live_values_and_states_come_as_the_joint_is_jogged_and_the_table_holds_them,
+            every_motion_goes_where_it_was_asked_to_go_and_ends_disabled,
+            a_motion_beyond_a_limit_is_refused_by_name,
+            joints_on_the_bus_and_what_they_miss_are_listed,
+            a_fault_is_told_with_its_emcy,
+            objects_are_read_set_stored_exported_and_imported,
+            an_image_is_shadowed_tried_discarded_committed_and_rolled_back,
+            another_client_that_takes_the_tpdos_ends_the_live_values_until_they_are_asked_for,
+        }
+        safety {
+            a_page_that_is_gone_leaves_the_joint_disabled_and_the_next_one_commands,
+            held_messages_that_stop_coming_stop_the_joint,
+            stop_stops_whoever_asks_for_it,
+            a_second_page_looks_and_may_not_change_anything,
+            what_is_not_a_message_stops_the_joint_and_is_told_in_words,
+            another_master_at_the_same_time_ends_in_a_joint_that_is_disabled,
+            a_button_that_is_let_go_before_the_joint_is_enabled_moves_nothing,
+            a_server_that_ends_stops_the_joint,
+            #[cfg(unix)] a_program_that_is_terminated_stops_the_joint_and_one_that_is_killed_leaves_it_to_its_deadline,
+        }
+        security {
+            other_hosts_and_origins_are_refused,
+            no_path_leads_beyond_the_table,
+            every_answer_forbids_other_sources_and_frames,
+            beyond_this_machine_a_token_is_wanted_once,
+            requests_that_are_not_as_they_should_be_are_refused_and_the_server_goes_on,
+        }
+    };
+    let name = "browser::the_page_shows_values_that_move_and_the_joint_stands_once_the_button_is_let_go";
+    let browser = Trial::test(name, || {
+        browser::the_page_shows_values_that_move_and_the_joint_stands_once_the_button_is_let_go();
+        Ok(())
+    });
+    // A browser is a large package: where there is none it is said by name; with CI set it is required.
+    trials.push(browser.with_ignored_flag(std::env::var_os("CI").is_none() && !browser::is_there()));
+    libtest_mimic::run(&arguments, trials).exit();
+}
