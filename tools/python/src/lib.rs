@@ -27,6 +27,13 @@ pub const CANOPEN: Packages = Packages {
 pub const DCF_TOOLS: Packages =
     Packages { folder: "python-dcf", install: &["dcf-tools==2.4.2"], import: "dcf, dcfgen" };
 
+/// MCAP's and Apache Arrow's own readers and writers.
+pub const LOGS: Packages = Packages {
+    folder: "python-logs",
+    install: &["mcap==1.6.0", "pyarrow==26.0.1"],
+    import: "mcap.reader, mcap.writer, pyarrow.parquet",
+};
+
 impl Packages {
     /// A Python that finds them, in a virtual environment below a test's temporary folder that is made once. None
     /// without Python, without its module `venv`, or where the packages cannot be installed.
