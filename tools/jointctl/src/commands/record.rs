@@ -3,9 +3,11 @@
 use super::CommandError;
 use super::force::Force;
 use super::remote::{Where, catch_interrupts, running};
+use crate::dataset::DatasetError;
+use crate::dataset::load::is_log;
 use crate::output::{OutputFile, write_directory};
 use crate::progress::{Progress, Terminal};
-use crate::remote::record::{Pace, Recorder, SIGNALS, description};
+use crate::remote::record::{Pace, Recorder, Recording, SIGNALS, description};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -23,7 +25,7 @@ pub struct Record {
     /// Which joint.
     #[command(flatten)]
     on: Where,
-    /// Table to write; dataset.toml is written beside it. Neither may exist, unless --force is given
+    /// Table to write: CSV, or by its ending .mcap or .parquet (feature `logs`); dataset.toml is written beside it. Neither may exist, unless --force is given
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// How long, s [default: until Ctrl-C]
@@ -56,6 +58,9 @@ impl Record {
         };
         let folder = self.out.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         self.force.permits_in(folder, &[name, DESCRIPTION])?;
+        if is_log(&self.out) && cfg!(not(feature = "logs")) {
+            return Err(DatasetError::WithoutLogs { file: self.out.clone() }.into());
+        }
         let joint = self.on.joint()?;
         catch_interrupts()?;
         let pace = if self.follow { Pace::Follow } else { Pace::Send(self.rate) };
@@ -85,7 +90,7 @@ impl Record {
         }
         let recording = recorder.end()?;
         progress.finish();
-        let table = OutputFile::new(name, recording.table());
+        let table = OutputFile::new(name, table(&recording, &self.out, joint.id())?);
         let description = OutputFile::new(DESCRIPTION, description(joint.id(), name));
         write_directory(folder, &[table, description])?;
         println!(
@@ -99,4 +104,22 @@ impl Record {
         println!("Written: {}, {}", self.out.display(), folder.join(DESCRIPTION).display());
         Ok(())
     }
+}
+
+/// The recording in the format that the ending of the file's name says.
+#[cfg(feature = "logs")]
+fn table(recording: &Recording, path: &Path, node: u8) -> Result<Vec<u8>, DatasetError> {
+    let Some(format) = logs::Format::of(path) else { return Ok(recording.table().into()) };
+    let since = recording.samples.first().map_or(Duration::ZERO, |first| first.at.elapsed());
+    let began = std::time::SystemTime::now().checked_sub(since);
+    let began = began.and_then(|began| began.duration_since(std::time::UNIX_EPOCH).ok()).unwrap_or_default();
+    let table = logs::Table::of_numbers(recording.columns());
+    let start = u64::try_from(began.as_nanos()).unwrap_or_default();
+    Ok(logs::encode(&table, format, &format!("/joint{node}"), start)?)
+}
+
+/// The recording as CSV.
+#[cfg(not(feature = "logs"))]
+fn table(recording: &Recording, _: &Path, _: u8) -> Result<Vec<u8>, DatasetError> {
+    Ok(recording.table().into())
 }

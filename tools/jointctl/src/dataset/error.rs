@@ -268,6 +268,18 @@ pub enum DatasetError {
         /// What to look at.
         hint: String,
     },
+    /// MCAP or Parquet.
+    #[cfg(feature = "logs")]
+    #[error(transparent)]
+    Log(#[from] ::logs::LogError),
+    /// MCAP or Parquet, and a program without them.
+    #[error(
+        "{}: this jointctl was built without MCAP and Parquet: cargo install or cargo run with --features logs", file.display()
+    )]
+    WithoutLogs {
+        /// The file.
+        file: PathBuf,
+    },
     /// A column that tells motions apart is missing or has one value.
     #[error(transparent)]
     Groups(#[from] NoGroups),

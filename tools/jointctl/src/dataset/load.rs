@@ -1,4 +1,5 @@
-//! Files to raw columns: where the files are, gzip, CSV, numbers and texts, the table of runs, the digest; host.
+//! Files to raw columns: where the files are, gzip, CSV, numbers and texts, the table of runs, the digest; host. Logs in
+//! MCAP and Parquet: `logs`.
 //!
 //! Only the columns that the description names are kept. Nothing is corrected here: the first field that does not
 //! hold what it should is an error with file, line and column.
@@ -7,6 +8,7 @@ use super::description::Source;
 use super::error::DatasetError;
 use sha2::{Digest, Sha256};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -39,7 +41,8 @@ impl TextColumn {
         TextColumn { words, codes, index }
     }
 
-    fn push(&mut self, field: &[u8]) {
+    /// Adds a row.
+    pub fn push(&mut self, field: &[u8]) {
         let code = match self.index.get(field) {
             Some(&code) => code,
             None => {
@@ -115,11 +118,37 @@ pub fn root(source: &Source, description: &Path, environment: Environment) -> Re
     }
 }
 
-/// Reads a whole file and adds its bytes, as they are on disk, to the digest.
-pub fn read(path: &Path, digest: &mut Sha256) -> Result<Vec<u8>, DatasetError> {
-    let bytes = std::fs::read(path).map_err(|source| DatasetError::Unreadable { file: path.to_owned(), source })?;
-    digest.update(&bytes);
-    Ok(bytes)
+/// True for a file whose name ends as that of a log.
+pub fn is_log(path: &Path) -> bool {
+    let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
+    ["mcap", "parquet"].iter().any(|name| ending.eq_ignore_ascii_case(name))
+}
+
+/// A file whose bytes, as they are on disk, are in the digest.
+pub enum Content {
+    /// A CSV text.
+    Csv(Vec<u8>),
+    /// MCAP or Parquet, of which only columns are read.
+    Log,
+}
+
+/// Reads a file of a data set and adds its bytes to the digest; of a log the columns are read later.
+pub fn open(path: &Path, digest: &mut Sha256) -> Result<Content, DatasetError> {
+    let unreadable = |source| DatasetError::Unreadable { file: path.to_owned(), source };
+    if !is_log(path) {
+        let bytes = std::fs::read(path).map_err(unreadable)?;
+        digest.update(&bytes);
+        return Ok(Content::Csv(bytes));
+    }
+    let mut file = File::open(path).map_err(unreadable)?;
+    let mut piece = vec![0; 1 << 16];
+    loop {
+        let length = file.read(&mut piece).map_err(unreadable)?;
+        if length == 0 {
+            return Ok(Content::Log);
+        }
+        digest.update(&piece[..length]);
+    }
 }
 
 /// The bytes of a gzip file decompressed; any other bytes as they are.

@@ -10,6 +10,7 @@ pub mod description;
 mod error;
 pub mod lag;
 pub mod load;
+mod logs;
 mod observed;
 mod prepare;
 pub mod recordings;

@@ -3,7 +3,8 @@
 use super::condition_keys::{Condition, Value};
 use super::description::{Description, Rule};
 use super::error::DatasetError;
-use super::load::{self, Environment, Table, TextColumn, Wanted};
+use super::load::{self, Content, Environment, Table, TextColumn, Wanted};
+use super::logs;
 use sha2::{Digest, Sha256};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -49,15 +50,21 @@ impl Recordings {
         let mut digest = Sha256::new();
         digest.update(text.as_bytes());
         let files: Vec<PathBuf> = source.files.iter().map(|file| root.join(file)).collect();
-        let contents = files.iter().map(|file| load::read(file, &mut digest)).collect::<Result<Vec<_>, _>>()?;
+        let contents = files.iter().map(|file| load::open(file, &mut digest)).collect::<Result<Vec<_>, _>>()?;
 
         let mut wanted = wanted(description);
         let mut conditions: Vec<String> = Vec::new();
         let mut per_run = None;
         if let Some(name) = &source.runs {
             let file = root.join(name);
-            let text = load::decompress(load::read(&file, &mut digest)?, &file)?;
-            let header = load::header(&text, &file, source)?;
+            let content = match load::open(&file, &mut digest)? {
+                Content::Csv(bytes) => Content::Csv(load::decompress(bytes, &file)?),
+                Content::Log => Content::Log,
+            };
+            let header = match &content {
+                Content::Csv(text) => load::header(text, &file, source)?,
+                Content::Log => logs::header(&file)?,
+            };
             let label = description.columns.run.clone().unwrap_or_else(|| "run".to_owned());
             let mut found = Wanted {
                 numbers: wanted.numbers.iter().filter(|name| header.contains(name)).cloned().collect(),
@@ -72,16 +79,24 @@ impl Recordings {
             found.texts.extend(header.iter().cloned());
             found.texts.insert(label.clone());
             let mut table = Table::default();
-            load::append(&mut table, &text, &file, source, &[], &found, &[])?;
+            match content {
+                Content::Csv(text) => load::append(&mut table, &text, &file, source, &[], &found, &[])?,
+                Content::Log => logs::append(&mut table, &file, &[], &found, &[])?,
+            }
             per_run = Some((file, label, header, table));
         }
 
         let elsewhere = per_run.as_ref().map_or(&[] as &[String], |(_, _, header, _)| header);
         let mut table = Table::default();
-        for (file, bytes) in files.iter().zip(contents) {
-            let text = load::decompress(bytes, file)?;
-            let missing_text = &description.clean.missing_text;
-            load::append(&mut table, &text, file, source, missing_text, &wanted, elsewhere)?;
+        let missing_text = &description.clean.missing_text;
+        for (file, content) in files.iter().zip(contents) {
+            match content {
+                Content::Csv(bytes) => {
+                    let text = load::decompress(bytes, file)?;
+                    load::append(&mut table, &text, file, source, missing_text, &wanted, elsewhere)?;
+                }
+                Content::Log => logs::append(&mut table, file, missing_text, &wanted, elsewhere)?,
+            }
         }
         let runs = group(&table, description);
         if let Some((file, label, _, per_run)) = per_run {

@@ -132,6 +132,19 @@ impl Recording {
         }
     }
 
+    /// The columns of the table by name, with the values as they came; NaN where nothing measures.
+    pub fn columns(&self) -> Vec<(&'static str, Vec<f64>)> {
+        let first = self.samples.first().map(|sample| sample.at);
+        let since =
+            |sample: &Sample| first.map_or(0.0, |first| sample.at.saturating_duration_since(first).as_secs_f64());
+        let time = self.samples.iter().map(since).collect();
+        let column = |(name, _, actual)| {
+            let values = self.column(actual);
+            (name, if values.is_empty() { vec![f64::NAN; self.samples.len()] } else { values })
+        };
+        [("time_s", time)].into_iter().chain(COLUMNS.map(column)).collect()
+    }
+
     /// The table: a header and a row a sample. What is not a number is left empty.
     pub fn table(&self) -> String {
         let mut text = String::from("time_s");
@@ -182,7 +195,16 @@ mod tests {
              0.000000,1.000000,2.00000,3.0000,\n\
              0.004000,-1.500000,0.25000,-0.5000,25.0\n"
         );
+        let columns = recording.columns();
+        assert_eq!(columns.iter().map(|(name, _)| *name).collect::<Vec<_>>(), recording_header(&recording));
+        assert_eq!(columns[..2], [("time_s", vec![0.0, 0.004]), ("position_rad", vec![1.0, -1.5])]);
+        assert!(columns[4].1[0].is_nan() && columns[4].1[1] == 25.04);
         assert_eq!((recording.unanswered(), recording.duration()), (3, 0.004));
         assert_eq!(recording.column(Actual::Position), [1.0, -1.5]);
+    }
+
+    fn recording_header(recording: &Recording) -> Vec<String> {
+        let table = recording.table();
+        table.lines().next().unwrap_or_default().split(',').map(str::to_owned).collect()
     }
 }

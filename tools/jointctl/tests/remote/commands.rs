@@ -93,6 +93,17 @@ pub fn a_joint_is_looked_at_set_moved_and_fed_from_the_command_line() {
     desk.prints(&["monitor", "--once"], &["state           disabled", "position      ", "gear "]);
     desk.prints(&["record", "--out", "log.csv", "--duration", "1"], &[" samples in ", "Written: log.csv"]);
     desk.misunderstands(&["record", "--out", "log.csv", "--duration", "1"], &["log.csv exists; --force replaces"]);
+    for log in ["log.mcap", "log.parquet"] {
+        let arguments = ["record", "--out", log, "--duration", "0.5", "--force"];
+        desk.prints(&arguments, &[" samples in ", &format!("Written: {log}")]);
+        let wanted = logs::Wanted::numbers(["time_s", "position_rad", "measured_torque_Nm"]);
+        let table = logs::read(&desk.folder.path().join(log), &wanted).unwrap();
+        table.all_finite(log.as_ref()).unwrap();
+        let times = table.number("time_s").unwrap();
+        assert!(times[0] == 0.0 && times.last() > Some(&0.2), "{log}: {times:?}");
+        let described = std::fs::read_to_string(desk.folder.path().join("dataset.toml")).unwrap();
+        assert!(described.contains(&format!("files = [\"{log}\"]")), "{described}");
+    }
     desk.prints(&["upload", "first.img", "--commit"], &["version 1 is stored; in use"]);
     desk.prints(&["upload", "second.img"], &["version 1 is stored; an image is verified", "Not in use"]);
     desk.prints(&["upload", "second.img", "--trial", "60"], &["on trial for another "]);
