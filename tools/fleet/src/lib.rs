@@ -1,0 +1,16 @@
+//! A fleet of joints on one machine: which joints have changed, since when, and in which way; host.
+//!
+//! A data set of a fleet is a folder of Parquet, `joint=NAME/day=YYYY-MM-DD/*.parquet` ([`partition`]). Of each joint
+//! and day [`sums`] keeps what a linear model needs, some hundred numbers; the rows are not read again. From the sums:
+//! parameters by day ([`estimate`]), and a finding for each joint ([`finding`]).
+//!
+//! [`night`] does it for a folder: in parallel, going on where it was interrupted, with the same bytes whatever the
+//! number of threads.
+
+pub mod estimate;
+pub mod finding;
+pub mod night;
+pub mod partition;
+pub mod stored;
+pub mod sums;
+pub mod windows;

@@ -1,0 +1,209 @@
+//! Rows of a recording to equations of a linear model, without differentiating: the momentum balance over a window; host.
+//!
+//! ```text
+//! integral of torque dt = I (v1 - v0) + integral of (g_s sin q + g_c cos q + o + F_c sign v + f_v v) dt
+//! ```
+//!
+//! Divided by the window's duration, everything is a mean torque in Nm. Windows in which the joint turns round or is
+//! slower than [`SLOWEST`] are left out: at standstill friction is whatever it has to be.
+
+use logs::{LogError, Table, Wanted};
+use std::path::Path;
+
+/// Unknowns of the model, in this order.
+pub const NAMES: [&str; 6] = ["inertia", "gravity_sine", "gravity_cosine", "offset", "dry", "viscous"];
+/// Number of unknowns.
+pub const UNKNOWNS: usize = NAMES.len();
+/// Place of the offset.
+pub const OFFSET: usize = 3;
+/// Columns of a recording: time, s; position, rad; velocity, rad/s; torque at the joint's side of the gear, Nm.
+pub const COLUMNS: [&str; 4] = ["time_s", "position_rad", "velocity_rad_s", "torque_Nm"];
+/// Temperature of the gear, °C; a column that may be absent.
+pub const TEMPERATURE: &str = "temperature_C";
+/// Duration of a window, s.
+pub const WINDOW: f64 = 0.04;
+/// Speed below which a window is left out, rad/s.
+pub const SLOWEST: f64 = 0.03;
+/// Longest time between two rows of a window, s; a longer one is a gap.
+pub const LONGEST_PERIOD: f64 = 0.01;
+/// Longest time within one file, s: a file is of one day.
+pub const LONGEST_FILE: f64 = 86_400.0;
+
+/// One equation: the mean torque, and what each unknown is multiplied by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Window {
+    /// Factors of the unknowns.
+    pub row: [f64; UNKNOWNS],
+    /// Mean torque, Nm.
+    pub torque: f64,
+    /// Duration, s.
+    pub duration: f64,
+}
+
+/// The recording of a file.
+#[derive(Clone, Debug, Default)]
+pub struct Recorded {
+    /// Equations, in time.
+    pub windows: Vec<Window>,
+    /// Time of all rows, gaps left out, s.
+    pub seconds: f64,
+    /// Mean temperature, °C; NaN where there is none.
+    pub temperature: f64,
+}
+
+/// Why a file is not used.
+#[derive(Debug, thiserror::Error)]
+pub enum BadFile {
+    /// The file, a column, or a value.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// A clock that jumps.
+    #[error("{file} row {row}: the clock jumps from {from} to {to} s: {limit}")]
+    Clock {
+        /// Name of the file.
+        file: String,
+        /// The row behind the jump, from 1.
+        row: usize,
+        /// Time of the row before, s.
+        from: f64,
+        /// Time of the row, s.
+        to: f64,
+        /// What is expected.
+        limit: &'static str,
+    },
+}
+
+/// Reads the windows of a file.
+///
+/// # Errors
+/// [`BadFile`] with file, column and row.
+pub fn read(path: &Path) -> Result<Recorded, BadFile> {
+    let warm = logs::columns(path)?.iter().any(|name| name == TEMPERATURE);
+    let table = logs::read(path, &Wanted::numbers(COLUMNS.into_iter().chain(warm.then_some(TEMPERATURE))))?;
+    table.all_finite(path)?;
+    let file = path.file_name().unwrap_or_default().to_string_lossy();
+    of_table(&table, &file)
+}
+
+/// The windows of a table whose values are finite; `file` is told in an error.
+///
+/// # Errors
+/// [`BadFile::Clock`].
+pub fn of_table(table: &Table, file: &str) -> Result<Recorded, BadFile> {
+    let [time, position, velocity, torque] = COLUMNS.map(|name| table.number(name).unwrap_or_default());
+    check_clock(time, file)?;
+    let mut recorded =
+        Recorded { temperature: mean(table.number(TEMPERATURE).unwrap_or_default()), ..Recorded::default() };
+    let mut first = 0;
+    for last in 1..time.len() {
+        let period = time[last] - time[last - 1];
+        if period > LONGEST_PERIOD {
+            first = last;
+            continue;
+        }
+        recorded.seconds += period;
+        let duration = time[last] - time[first];
+        // Rows whose times are rounded: the window ends at the row that is nearest.
+        if duration < WINDOW - 0.5 * period {
+            continue;
+        }
+        let slowest = velocity[first..=last].iter().fold(f64::INFINITY, |least, v| least.min(v.abs()));
+        let forward = velocity[first] > 0.0;
+        if slowest >= SLOWEST && velocity[first..=last].iter().all(|v| (*v > 0.0) == forward) {
+            let over = |value: &dyn Fn(usize) -> f64| {
+                let trapezium = |at: usize| 0.5 * (value(at) + value(at + 1)) * (time[at + 1] - time[at]);
+                (first..last).map(trapezium).sum::<f64>() / duration
+            };
+            let row = [
+                (velocity[last] - velocity[first]) / duration,
+                over(&|at| position[at].sin()),
+                over(&|at| position[at].cos()),
+                1.0,
+                if forward { 1.0 } else { -1.0 },
+                over(&|at| velocity[at]),
+            ];
+            recorded.windows.push(Window { row, torque: over(&|at| torque[at]), duration });
+        }
+        first = last;
+    }
+    Ok(recorded)
+}
+
+fn check_clock(time: &[f64], file: &str) -> Result<(), BadFile> {
+    let jump = |at: usize, limit| {
+        Err(BadFile::Clock { file: file.to_owned(), row: at + 1, from: time[at - 1], to: time[at], limit })
+    };
+    for at in 1..time.len() {
+        if time[at] <= time[at - 1] {
+            return jump(at, "expected time to increase");
+        }
+        if time[at] - time[0] > LONGEST_FILE {
+            return jump(at, "expected at most 86400 s in a file");
+        }
+    }
+    Ok(())
+}
+
+fn mean(values: &[f64]) -> f64 {
+    // NaN without a value.
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A joint that follows the model exactly, for `rows` rows of 4 ms.
+    fn exact(rows: usize) -> Table {
+        let mut columns: [Vec<f64>; 4] = Default::default();
+        for row in 0..rows {
+            let t = row as f64 * 0.004;
+            let (q, v, a) = ((3.0 * t).sin(), 3.0 * (3.0 * t).cos(), -9.0 * (3.0 * t).sin());
+            let torque = 0.5 * a + 2.0 * q.sin() + 0.1 * q.cos() + 0.2 + 1.5 * v.signum() + 0.3 * v;
+            columns.iter_mut().zip([t, q, v, torque]).for_each(|(column, value)| column.push(value));
+        }
+        Table::of_numbers(COLUMNS.into_iter().zip(columns))
+    }
+
+    #[test]
+    fn a_window_is_the_momentum_balance_of_the_model() {
+        let recorded = of_table(&exact(2_500), "a").unwrap();
+        assert!(recorded.windows.len() > 200, "{}", recorded.windows.len());
+        for window in &recorded.windows {
+            let model: f64 = window.row.iter().zip([0.5, 2.0, 0.1, 0.2, 1.5, 0.3]).map(|(a, b)| a * b).sum();
+            // The trapezium rule over 4 ms.
+            assert!((model - window.torque).abs() < 1e-3, "{window:?}");
+            assert!((window.duration - WINDOW).abs() < 1e-9);
+        }
+        assert!((recorded.seconds - 9.996).abs() < 1e-9 && recorded.temperature.is_nan());
+    }
+
+    #[test]
+    fn no_window_spans_a_gap_a_reversal_or_a_standstill() {
+        let mut table = exact(2_500);
+        let whole = of_table(&table, "a").unwrap().windows.len();
+        table.numbers[0].1[1_000..].iter_mut().for_each(|time| *time += LONGEST_PERIOD);
+        assert!(of_table(&table, "a").unwrap().windows.len() < whole);
+        let mut slow = exact(2_500);
+        slow.numbers[2].1.iter_mut().for_each(|v| *v = SLOWEST * 0.999);
+        assert!(of_table(&slow, "a").unwrap().windows.is_empty());
+        slow.numbers[2].1.iter_mut().for_each(|v| *v = SLOWEST);
+        assert!(of_table(&slow, "a").unwrap().windows.len() > 240);
+        slow.numbers[2].1.iter_mut().enumerate().for_each(|(row, v)| *v = if row % 5 == 0 { -1.0 } else { 1.0 });
+        assert!(of_table(&slow, "a").unwrap().windows.is_empty());
+    }
+
+    #[test]
+    fn a_clock_that_jumps_is_told_with_row_and_limit() {
+        let mut table = exact(100);
+        table.numbers[0].1[50] = table.numbers[0].1[49];
+        let error = of_table(&table, "a.parquet").unwrap_err().to_string();
+        assert_eq!(error, "a.parquet row 51: the clock jumps from 0.196 to 0.196 s: expected time to increase");
+        let mut table = exact(100);
+        table.numbers[0].1[99] = LONGEST_FILE;
+        assert!(of_table(&table, "a").is_ok());
+        table.numbers[0].1[99] = LONGEST_FILE + 1e-3;
+        let error = of_table(&table, "a").unwrap_err().to_string();
+        assert!(error.ends_with("86400.001 s: expected at most 86400 s in a file"), "{error}");
+    }
+}

@@ -1,0 +1,177 @@
+//! Forty virtual joints over ten days: every change is found and named, bad partitions cost nothing but themselves, and
+//! the tables are the same bytes whatever the number of threads and interruptions.
+
+mod fleet_of_joints;
+
+use fleet::finding::{Finding, Kind, findings};
+use fleet::night::{Night, night};
+use fleet_of_joints::{DAYS, JOINTS, day, joint};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// The fleet's files, made once.
+fn data() -> &'static Path {
+    static DATA: OnceLock<PathBuf> = OnceLock::new();
+    DATA.get_or_init(|| {
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("virtual-fleet");
+        let _ = fs::remove_dir_all(&folder);
+        fleet_of_joints::write(&folder);
+        folder
+    })
+}
+
+/// The same files in a folder of a test's own.
+fn copy() -> tempfile::TempDir {
+    let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
+    let mut waiting = vec![data().to_owned()];
+    while let Some(from) = waiting.pop() {
+        for entry in fs::read_dir(from).unwrap() {
+            let path = entry.unwrap().path();
+            let to = folder.path().join(path.strip_prefix(data()).unwrap());
+            if path.is_dir() {
+                fs::create_dir_all(&to).unwrap();
+                waiting.push(path);
+            } else {
+                fs::hard_link(&path, &to).unwrap();
+            }
+        }
+    }
+    folder
+}
+
+fn whole(folder: &Path, threads: usize) -> Night {
+    night(folder, threads, &|| true).unwrap()
+}
+
+/// Every file of the sums with its bytes.
+fn sums(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    let mut waiting = vec![folder.join("_sums")];
+    while let Some(from) = waiting.pop() {
+        for entry in fs::read_dir(from).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                waiting.push(path);
+            } else {
+                found.insert(path.strip_prefix(folder).unwrap().to_owned(), fs::read(&path).unwrap());
+            }
+        }
+    }
+    found
+}
+
+fn of<'a>(findings: &'a [Finding], number: usize) -> &'a Finding {
+    findings.iter().find(|finding| finding.joint == joint(number)).unwrap()
+}
+
+#[test]
+fn every_joint_that_changed_is_found_with_kind_and_day_and_no_other() {
+    let folder = copy();
+    let findings = findings(&whole(folder.path(), 0).entries);
+    for finding in &findings {
+        println!("{} {:?} {:?} {} {:?}", finding.joint, finding.kind, finding.since, finding.reason, finding.change);
+    }
+    let expected = BTreeMap::from([
+        (5, Kind::Drifted),
+        (11, Kind::Drifted),
+        (17, Kind::Drifted),
+        (23, Kind::FrictionFell),
+        (29, Kind::Broken),
+        (35, Kind::WrongConfiguration),
+        (37, Kind::WrongConfiguration),
+        (39, Kind::NotEnoughMotion),
+    ]);
+    assert_eq!(findings.len(), JOINTS);
+    for number in 0..JOINTS {
+        let found = of(&findings, number);
+        let kind = expected.get(&number).copied().unwrap_or(Kind::Healthy);
+        assert_eq!(found.kind, kind, "{}: {} {:?}", found.joint, found.reason, found.change);
+    }
+    for number in [11, 23, 29, 35, 37] {
+        assert_eq!(of(&findings, number).since.as_deref(), Some(day(5).as_str()), "{}", joint(number));
+    }
+    assert!(of(&findings, 35).reason.contains("torque constant"));
+    assert!(of(&findings, 37).reason.contains("sign"));
+    let change = of(&findings, 11).change.unwrap();
+    assert!((change.friction - 1.4).abs() < 0.1 && (change.rigid - 1.0).abs() < 0.05, "{change:?}");
+    let change = of(&findings, 35).change.unwrap();
+    assert!((change.rigid - 0.8).abs() < 0.02 && (change.friction - 0.8).abs() < 0.05, "{change:?}");
+    // What is worst comes first.
+    assert!(findings.windows(2).all(|pair| pair[0].kind <= pair[1].kind));
+}
+
+#[test]
+fn bad_partitions_are_named_and_the_rest_of_the_joint_is_used() {
+    let folder = copy();
+    fs::create_dir_all(folder.path().join("lost+found")).unwrap();
+    let night = whole(folder.path(), 0);
+    let bad: Vec<(&str, &str, &str)> = night
+        .entries
+        .iter()
+        .filter(|entry| !entry.defect.is_empty())
+        .map(|entry| (entry.joint.as_str(), entry.day.as_str(), entry.defect.as_str()))
+        .collect();
+    let parts = [
+        (2, 3, "is no Parquet file"),
+        (3, 4, "row 1001, column \"torque_Nm\": NaN"),
+        (4, 2, "no column \"torque_Nm\"; available: time_s"),
+        (6, 5, "row 1501: the clock jumps from"),
+        (7, 8, "the same bytes as day=2026-01-08"),
+        (8, 6, "log.parquet: the same bytes as log-2.parquet"),
+    ];
+    assert_eq!(bad.len(), parts.len(), "{bad:?}");
+    for ((number, at, part), (name, date, defect)) in parts.into_iter().zip(bad) {
+        assert_eq!((name, date), (joint(number).as_str(), day(at).as_str()));
+        assert!(defect.contains(part), "{defect}");
+        let path = folder.path().to_str().unwrap();
+        assert!(!defect.contains(path) || part.contains("same"), "{defect}");
+    }
+    assert_eq!(night.entries.len(), JOINTS * DAYS);
+    assert_eq!(night.misplaced.len(), 1, "{:?}", night.misplaced);
+    let findings = findings(&night.entries);
+    for (number, ..) in parts {
+        assert_eq!((of(&findings, number).bad_days, of(&findings, number).days.len()), (1, DAYS));
+    }
+}
+
+#[test]
+fn one_thread_four_threads_and_an_interrupted_night_give_the_same_bytes() {
+    let (one, four, interrupted) = (copy(), copy(), copy());
+    assert_eq!(whole(one.path(), 1).read, JOINTS * DAYS);
+    whole(four.path(), 4);
+    let left = AtomicUsize::new(150);
+    let more = || left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(1)).is_ok();
+    let first = night(interrupted.path(), 4, &more).unwrap();
+    assert_eq!(first.read, 150);
+    assert!(!interrupted.path().join("_sums/all.parquet").exists());
+    // A process that was killed while it wrote: half of a table, which is made anew, and a file that is none.
+    let half = interrupted.path().join("_sums").join(format!("joint={}", joint(0))).join("day=2026-01-01.parquet");
+    fs::create_dir_all(half.parent().unwrap()).unwrap();
+    fs::write(&half, b"PAR1 half").unwrap();
+    let second = whole(interrupted.path(), 4);
+    assert!(second.kept >= 149 && second.kept + second.read == JOINTS * DAYS, "{} {}", second.kept, second.read);
+    let expected = sums(one.path());
+    assert_eq!(expected.len(), JOINTS * DAYS + 1);
+    for folder in [&four, &interrupted] {
+        let found = sums(folder.path());
+        assert!(found.keys().eq(expected.keys()));
+        assert!(found == expected, "the bytes differ");
+    }
+}
+
+#[test]
+fn what_is_unchanged_is_not_read_again_and_what_changed_is() {
+    let folder = copy();
+    whole(folder.path(), 0);
+    let again = whole(folder.path(), 0);
+    assert_eq!((again.read, again.kept), (0, JOINTS * DAYS));
+    let from = folder.path().join(format!("joint={}/day={}/log.parquet", joint(0), day(1)));
+    let to = folder.path().join(format!("joint={}/day={}/log.parquet", joint(1), day(1)));
+    fs::remove_file(&to).unwrap();
+    fs::copy(from, to).unwrap();
+    let changed = whole(folder.path(), 0);
+    assert_eq!((changed.read, changed.kept), (1, JOINTS * DAYS - 1));
+}
