@@ -4,7 +4,7 @@ use clap::Command;
 
 /// What a command is called below `jointctl`, and lines as one types them. `JOINTCTL_BUS` and `JOINTCTL_NODE` stand for
 /// `--bus` and `--node`.
-const EXAMPLES: [(&str, &[&str]); 38] = [
+const EXAMPLES: [(&str, &[&str]); 41] = [
     ("demo", &["jointctl demo", "jointctl demo --seed 7 --out demo-7"]),
     ("fit", &["jointctl fit elbow.toml", "jointctl fit elbow.toml --all"]),
     ("evaluate", &["jointctl evaluate elbow/friction.img other.toml"]),
@@ -23,6 +23,12 @@ const EXAMPLES: [(&str, &[&str]); 38] = [
         "robot evaluate",
         &["jointctl robot evaluate arm second.toml", "jointctl robot evaluate arm recording.toml --test"],
     ),
+    ("fleet sums", &["jointctl fleet sums /data/fleet"]),
+    (
+        "fleet status",
+        &["jointctl fleet status /data/fleet", "jointctl fleet status /data/fleet --page fleet.html --json"],
+    ),
+    ("fleet retrain", &["jointctl fleet retrain /data/fleet --out new --images stored --key fleet.key"]),
     ("image inspect", &["jointctl image inspect elbow/friction.img"]),
     ("image verify", &["jointctl image verify elbow/friction.signed --key joint.key"]),
     ("image convert", &["jointctl image convert elbow/friction.img friction.toml"]),

@@ -14,6 +14,7 @@ pub mod evaluate;
 mod examples;
 pub mod excite;
 pub mod fit;
+pub mod fleet;
 mod force;
 pub mod image;
 pub mod joint;
@@ -53,6 +54,9 @@ pub enum Command {
     /// All joints of a robot: excite, identify from one recording, judge on another
     #[command(subcommand)]
     Robot(robot::RobotCommand),
+    /// Many joints over many days: sums, and which of them have changed
+    #[command(subcommand)]
+    Fleet(fleet::FleetCommand),
     /// Inspect, verify or convert a parameter image
     #[command(subcommand)]
     Image(image::ImageCommand),
@@ -212,6 +216,10 @@ pub enum CommandError {
     /// A round of learning on a joint.
     #[error(transparent)]
     Retrain(#[from] crate::remote::retrain::RetrainError),
+    /// Sums of a fleet.
+    #[cfg(feature = "logs")]
+    #[error(transparent)]
+    Fleet(#[from] ::fleet::night::NightError),
     /// Somebody ended what was under way.
     #[error("{0}")]
     Interrupted(String),
@@ -240,6 +248,7 @@ pub fn run(arguments: Arguments) -> Result<(), CommandError> {
         Command::Fit(fit) => fit.run(),
         Command::Evaluate(evaluate) => evaluate.run(),
         Command::Robot(robot) => robot.run(),
+        Command::Fleet(fleet) => fleet.run(),
         Command::Image(image) => image.run(),
         Command::Key(key) => key.run(),
         Command::Sign(sign) => sign.run(),

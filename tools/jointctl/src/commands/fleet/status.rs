@@ -1,0 +1,98 @@
+//! `jointctl fleet sums` and `jointctl fleet status`.
+
+use super::{Folder, Status, page};
+use crate::commands::CommandError;
+use crate::commands::remote::{catch_interrupts, running};
+use crate::output::write_file;
+use crate::progress::{Progress, Terminal};
+use ::fleet::finding::{Finding, findings};
+use ::fleet::night::{Night, night};
+use serde_json::json;
+use std::fmt::Write;
+
+impl Folder {
+    /// Runs `fleet sums`.
+    pub fn run(&self) -> Result<(), CommandError> {
+        let night = self.night()?;
+        println!("{}", summary(&night));
+        Ok(())
+    }
+
+    /// Sums of everything.
+    pub(super) fn night(&self) -> Result<Night, CommandError> {
+        catch_interrupts()?;
+        let progress = Terminal::new();
+        progress.stage("sum up");
+        let night = night(&self.folder, self.threads, &running)?;
+        progress.finish();
+        if !running() {
+            let text = "interrupted: what was summed up stays, the same command goes on from there".to_owned();
+            return Err(CommandError::Interrupted(text));
+        }
+        for bad in &night.misplaced {
+            eprintln!("warning: {}: {}", bad.path.display(), bad.reason);
+        }
+        for bad in night.entries.iter().filter(|entry| !entry.defect.is_empty()) {
+            eprintln!("warning: joint={}/day={} is left out: {}", bad.joint, bad.day, bad.defect);
+        }
+        Ok(night)
+    }
+}
+
+impl Status {
+    /// Runs `fleet status`.
+    pub fn run(&self) -> Result<(), CommandError> {
+        self.force.permits(&self.page)?;
+        let night = self.fleet.night()?;
+        let findings = findings(&night.entries);
+        if let Some(path) = &self.page {
+            write_file(path, page::page(&findings, &night).as_bytes())?;
+        }
+        if self.json {
+            let misplaced: Vec<_> =
+                night.misplaced.iter().map(|bad| json!({ "path": bad.path, "reason": bad.reason })).collect();
+            let bad = night.entries.iter().filter(|entry| !entry.defect.is_empty()).count();
+            println!(
+                "{}",
+                json!({ "joints": findings, "partitions": night.entries.len(), "bad_partitions": bad, "misplaced": misplaced })
+            );
+            return Ok(());
+        }
+        print!("{}", table(&findings));
+        println!("{}", summary(&night));
+        if let Some(path) = &self.page {
+            println!("Written: {}", path.display());
+        }
+        Ok(())
+    }
+}
+
+/// One line about the partitions.
+fn summary(night: &Night) -> String {
+    let bad = night.entries.iter().filter(|entry| !entry.defect.is_empty()).count();
+    format!(
+        "{} partitions: {} summed up, {} known, {bad} bad; {} misplaced",
+        night.entries.len(),
+        night.read,
+        night.kept,
+        night.misplaced.len()
+    )
+}
+
+/// The joints, a line each.
+fn table(findings: &[Finding]) -> String {
+    let mut text = format!("{:<16}{:<20}{:<12}{:>9}  reason\n", "joint", "finding", "since", "bad days");
+    for joint in findings {
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            text,
+            "{:<16}{:<20}{:<12}{:>9}  {}",
+            joint.joint,
+            joint.kind.words(),
+            joint.since.as_deref().unwrap_or("-"),
+            joint.bad_days,
+            joint.reason
+        );
+    }
+    text
+}

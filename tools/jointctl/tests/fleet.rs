@@ -1,0 +1,75 @@
+//! `jointctl fleet` on a virtual fleet: the page and the table name the joints that changed, and new images are kept
+//! where they are better.
+
+#[path = "../../fleet/tests/fleet_of_joints/mod.rs"]
+mod fleet_of_joints;
+
+use serde_json::Value;
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn jointctl(folder: &Path, arguments: &[&str]) -> Output {
+    let output = Command::new(env!("CARGO_BIN_EXE_jointctl")).current_dir(folder).args(arguments).output().unwrap();
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{arguments:?}: {error}");
+    output
+}
+
+fn json(output: &Output) -> Value {
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+#[test]
+fn the_page_names_what_changed_and_only_better_images_are_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    fleet_of_joints::write(&folder.path().join("fleet"));
+
+    let status = jointctl(folder.path(), &["fleet", "status", "fleet", "--page", "fleet.html"]);
+    let text = String::from_utf8_lossy(&status.stdout).into_owned();
+    assert!(text.contains("400 partitions: 400 summed up, 0 known, 6 bad; 0 misplaced"), "{text}");
+    let errors = String::from_utf8_lossy(&status.stderr).into_owned();
+    assert!(errors.contains("joint=j02/day=2026-01-04 is left out: "), "{errors}");
+    let page = std::fs::read_to_string(folder.path().join("fleet.html")).unwrap();
+    let named = [("j11", "drifted"), ("j23", "friction fell"), ("j29", "broken"), ("j35", "wrong configuration")];
+    for (joint, words) in named {
+        let line = text.lines().find(|line| line.starts_with(joint)).unwrap();
+        assert!(line.contains(words) && line.contains("2026-01-06"), "{line}");
+        assert!(page.contains(&format!("<td>{joint}</td><td>{words}</td><td>2026-01-06</td>")), "{joint}");
+    }
+    assert!(page.contains("8 of 40 joints have a finding") && page.contains("color-mix"), "the page");
+
+    let retrain = ["fleet", "retrain", "fleet", "--out", "new", "--json"];
+    let outcomes = json(&jointctl(folder.path(), &retrain));
+    let outcome = |outcomes: &Value, joint: &str| {
+        let joints = outcomes["joints"].as_array().unwrap();
+        joints.iter().find(|outcome| outcome["joint"] == joint).unwrap_or_else(|| panic!("{joint}: {outcomes}")).clone()
+    };
+    for joint in ["j11", "j17", "j23"] {
+        let found = outcome(&outcomes, joint);
+        let [before, after] = ["before_nm", "after_nm"].map(|key| found[key].as_f64().unwrap());
+        println!("{joint}: {before:.4} to {after:.4} Nm");
+        assert!(found["kept"] == true && after < 0.98 * before && found["version"] == 2, "{found}");
+        let verified = jointctl(folder.path(), &["image", "verify", &format!("new/{joint}/friction.img")]);
+        assert!(!verified.stdout.is_empty());
+    }
+    for joint in outcomes["joints"].as_array().unwrap() {
+        let there = folder.path().join("new").join(joint["joint"].as_str().unwrap()).join("friction.img").exists();
+        assert_eq!(joint["kept"], there, "{joint}");
+    }
+
+    // The joints have the new images: another one is no better, and the joints keep what they have. With a key, nothing
+    // is signed that is not kept.
+    jointctl(folder.path(), &["key", "new", "fleet.key"]);
+    let again = ["fleet", "retrain", "fleet", "--out", "again", "--images", "new", "--key", "fleet.key", "--json"];
+    let outcomes = json(&jointctl(folder.path(), &again));
+    for joint in ["j11", "j17", "j23"] {
+        let found = outcome(&outcomes, joint);
+        assert!(found["kept"] == false && found["version"] == 2, "{found}");
+        assert!(found["reason"].as_str().unwrap().starts_with("not kept: "), "{found}");
+        assert!(!folder.path().join("again").join(joint).exists());
+    }
+    let signed = ["fleet", "retrain", "fleet", "--out", "signed", "--key", "fleet.key"];
+    jointctl(folder.path(), &signed);
+    let key = ["image", "verify", "signed/j11/friction.signed", "--key", "fleet.key"];
+    assert!(!jointctl(folder.path(), &key).stdout.is_empty());
+}
