@@ -69,10 +69,9 @@ fn table() -> Table {
 
 /// The runs: one row each.
 fn runs() -> Table {
-    let mut table = Table::of_numbers([("time_s", vec![0.0, 1.0])]);
-    table.texts =
-        vec![("run".into(), ["0", "1"].into_iter().collect()), ("place".into(), ["hall", "lab"].into_iter().collect())];
-    table
+    let column = |words: [&str; 2]| words.into_iter().collect::<Texts>();
+    let texts = vec![("run".to_owned(), column(["0", "1"])), ("place".to_owned(), column(["hall", "lab"]))];
+    Table { texts, ..Table::default() }
 }
 
 fn csv(table: &Table) -> Vec<u8> {
@@ -90,17 +89,18 @@ fn csv(table: &Table) -> Vec<u8> {
     text.into_bytes()
 }
 
-/// Writes table and runs in the format that the name says, and the description of them.
+/// Writes table and runs in the format that the name says, and the description of them. Runs have no times: those of an
+/// MCAP are Parquet.
 fn write(folder: &Path, file: &str, table: &Table, description: &str) -> PathBuf {
-    let bytes = |table: &Table| match Format::of(Path::new(file)) {
+    let bytes = |table: &Table, file: &str| match Format::of(Path::new(file)) {
         Some(format) => encode(table, format, "/joint", 1_700_000_000_000_000_000).unwrap(),
         None => csv(table),
     };
-    std::fs::write(folder.join(file), bytes(table)).unwrap();
-    std::fs::write(folder.join(format!("runs-{file}")), bytes(&runs())).unwrap();
+    let per_run = if file == "log.csv" { "runs.csv" } else { "runs.parquet" };
+    std::fs::write(folder.join(file), bytes(table, file)).unwrap();
+    std::fs::write(folder.join(per_run), bytes(&runs(), per_run)).unwrap();
     let described = folder.join(format!("{file}.toml"));
-    let text = description.replace("FILE", file).replace("RUNS", &format!("runs-{file}"));
-    std::fs::write(&described, text).unwrap();
+    std::fs::write(&described, description.replace("FILE", file).replace("RUNS", per_run)).unwrap();
     described
 }
 

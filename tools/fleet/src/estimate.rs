@@ -29,7 +29,8 @@ pub struct Estimate {
     pub torque: f64,
 }
 
-/// Solves the sums; none where there are fewer than [`FEWEST`] windows, or the motion does not determine the parameters.
+/// Solves the sums; none where there are fewer than [`FEWEST`] windows, or the motion does not determine the
+/// parameters.
 pub fn estimate(sums: &Sums) -> Option<Estimate> {
     let finite = sums.products.iter().chain(&sums.with_torque).all(|sum| sum.is_finite());
     if !finite || sums.windows < FEWEST {
@@ -60,8 +61,8 @@ pub fn estimate(sums: &Sums) -> Option<Estimate> {
     })
 }
 
-/// Parts of the torque that the parameters `one` and `other` give over the same motion, as the factor of `other` that is
-/// nearest to `one` in the mean of squares; `which` are the unknowns of the part. None without such a torque.
+/// Parts of the torque that the parameters `one` and `other` give over the same motion, as the factor of `other` that
+/// is nearest to `one` in the mean of squares; `which` are the unknowns of the part. None without such a torque.
 pub fn factor(sums: &Sums, which: &[usize], one: &Estimate, other: &Estimate) -> Option<f64> {
     let squares = product(sums, which, other, other);
     (squares > 0.0).then(|| product(sums, which, one, other) / squares)

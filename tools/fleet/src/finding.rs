@@ -1,8 +1,8 @@
 //! What is wrong with a joint, from the parameters of its days; host.
 //!
 //! The reference is the sums of the first days, the present those of the last ones. Between them, over the motion of
-//! the present: the factor of the rigid torque (inertia and gravity), of friction, of dry and of viscous friction, and of
-//! what is left. A torque constant or gear ratio that is wrong scales all of the torque, a change of friction leaves
+//! the present: the factor of the rigid torque (inertia and gravity), of friction, of dry and of viscous friction, and
+//! of what is left. A torque constant or gear ratio that is wrong scales all of the torque, a change of friction leaves
 //! inertia and gravity alone, and a broken gear leaves more that no parameter explains.
 //!
 //! Limits were chosen on virtual joints (tests/virtual_fleet.rs), not on a fleet of hardware.
@@ -12,8 +12,8 @@ use crate::stored::Entry;
 use crate::sums::Sums;
 use serde::Serialize;
 
-/// Unknowns of the rigid torque, with the offset, which a gravity that hardly changes looks like; of friction; of dry and
-/// of viscous friction.
+/// Unknowns of the rigid torque, with the offset, which a gravity that hardly changes looks like; of friction; of dry
+/// and of viscous friction.
 const RIGID: [usize; 4] = [0, 1, 2, 3];
 const FRICTION: [usize; 2] = [4, 5];
 const DRY: [usize; 1] = [4];
@@ -31,7 +31,8 @@ pub const DRIFT: f64 = 0.15;
 pub const OFFSET_DRIFT: f64 = 0.3;
 /// Change of the rigid torque, as a part of it, from which the configuration is wrong.
 pub const SCALE: f64 = 0.1;
-/// Factor of the residual, beside that of more friction, from which a joint is broken: ripple grows along with friction.
+/// Factor of the residual, beside that of more friction, from which a joint is broken: ripple grows along with
+/// friction.
 pub const BROKEN: f64 = 2.0;
 /// Least residual that the factor refers to, as a part of the torque's RMS.
 pub const LEAST_RESIDUAL: f64 = 0.01;

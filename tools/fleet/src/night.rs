@@ -1,8 +1,9 @@
-//! One night's work on a folder: sums of every partition that is new or has changed, and all of them as one table; host.
+//! One night's work on a folder: sums of every partition that is new or has changed, and all of them as one table;
+//! host.
 //!
-//! A partition is the unit of work: one thread reads its files in the order of their names. Sums are joined by joint and
-//! day. The bytes of all tables therefore depend on the data alone, not on the number of threads, nor on how often the
-//! work was interrupted.
+//! A partition is the unit of work: one thread reads its files in the order of their names. Sums are joined by joint
+//! and day. The bytes of all tables therefore depend on the data alone, not on the number of threads, nor on how often
+//! the work was interrupted.
 
 use crate::estimate::estimate;
 use crate::partition::{FolderError, Misplaced, Partition, fingerprint, partitions};

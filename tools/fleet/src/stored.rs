@@ -1,7 +1,7 @@
 //! Sums of a partition as a small Parquet table of one row, with what they are of; host.
 //!
-//! Columns: the numbers of [`Sums::names`]; `joint`, `day`; `source`, name, size and SHA-256 of each file; `defect`, why
-//! the partition is not used, or nothing.
+//! Columns: the numbers of [`Sums::names`]; `joint`, `day`; `source`, name, size and SHA-256 of each file; `defect`,
+//! why the partition is not used, or nothing.
 
 use crate::partition::Partition;
 use crate::sums::Sums;

@@ -1,4 +1,5 @@
-//! Rows of a recording to equations of a linear model, without differentiating: the momentum balance over a window; host.
+//! Rows of a recording to equations of a linear model, without differentiating: the momentum balance over a window;
+//! host.
 //!
 //! ```text
 //! integral of torque dt = I (v1 - v0) + integral of (g_s sin q + g_c cos q + o + F_c sign v + f_v v) dt

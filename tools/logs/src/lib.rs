@@ -1,8 +1,8 @@
 //! Recordings as tables of named columns in MCAP (what robots log) and Parquet (what fleets are archived in); host.
 //!
-//! A [`Table`] has columns of `f64`, and where it is asked for, columns of text. A missing value is NaN. Readers stream:
-//! memory is that of the columns asked for and of one chunk or row batch. [`Format::of`] tells the format by the ending
-//! of a file's name.
+//! A [`Table`] has columns of `f64`, and where it is asked for, columns of text. A missing value is NaN. Readers
+//! stream: memory is that of the columns asked for and of one chunk or row batch. [`Format::of`] tells the format by
+//! the ending of a file's name.
 //!
 //! MCAP: messages of channels in JSON (message encoding `json`), one message a row; see [`mcap_log`]. Parquet: flat
 //! numeric and text columns, nulls allowed; see [`parquet_log`].
@@ -41,8 +41,8 @@ pub fn columns(path: &Path) -> Result<Vec<String>, LogError> {
     }
 }
 
-/// The bytes of a file with this table. `topic` and `start`, time of [`TIME`] 0 in ns since 1970, are those of an MCAP's
-/// messages.
+/// The bytes of a file with this table. `topic` and `start`, time of [`TIME`] 0 in ns since 1970, are those of an
+/// MCAP's messages.
 ///
 /// # Errors
 /// [`LogError::Shape`].

@@ -1,7 +1,7 @@
 //! Other people's programs: what this crate writes is read by PyPI's `mcap` and `pyarrow`, and the other way round.
 //!
-//! Without Python, or where they cannot be installed, these are reported as ignored by name; with `CI` set they run, and
-//! fail.
+//! Without Python, or where they cannot be installed, these are reported as ignored by name; with `CI` set they run,
+//! and fail.
 
 use libtest_mimic::{Arguments, Failed, Trial};
 use logs::{Format, Table, Wanted, encode, read};

@@ -1,5 +1,5 @@
-//! MCAP and Parquet among the files of a data set: the columns of the crate `logs` as rows of the same table as those of
-//! CSV; host. Without the feature `logs` such a file is refused.
+//! MCAP and Parquet among the files of a data set: the columns of the crate `logs` as rows of the same table as those
+//! of CSV; host. Without the feature `logs` such a file is refused.
 
 use super::error::DatasetError;
 use super::load::{Table, Wanted};

@@ -9,6 +9,7 @@ mod status;
 
 use super::CommandError;
 use super::force::Force;
+use crate::presets::Preset;
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
 
@@ -68,6 +69,9 @@ pub struct Retrain {
     /// Sign the images that are kept with this key
     #[arg(long, value_name = "FILE")]
     key: Option<PathBuf>,
+    /// Physical model, as of `fit`; repeatable [default: coulomb-viscous and full]
+    #[arg(long, value_name = "NAME")]
+    preset: Vec<Preset>,
     /// Try networks too, as `fit` does; takes longer
     #[arg(long)]
     network: bool,

@@ -1,5 +1,5 @@
-//! `jointctl fleet retrain`: a new image for each joint whose friction has changed, kept where it is better on days that
-//! neither image has seen.
+//! `jointctl fleet retrain`: a new image for each joint whose friction has changed, kept where it is better on days
+//! that neither image has seen.
 
 use super::Retrain;
 use crate::commands::CommandError;
@@ -13,7 +13,6 @@ use crate::joint_model::{firmware_states, fixed_point, regimes, rigid_efforts};
 use crate::key_file;
 use crate::output::{OutputFile, write_directory};
 use crate::pre_sliding;
-use crate::presets::Preset;
 use crate::progress::Silent;
 use crate::quantize::full_scale::from_q16;
 use crate::samples::Part;
@@ -167,9 +166,10 @@ impl Retrain {
     }
 
     fn options(&self, version: u32) -> Options {
-        let presets = vec![Preset::CoulombViscous, Preset::Full];
-        let trainer = if self.network { Options::default().trainer } else { None };
-        Options { presets, trainer, version, ..Options::default() }
+        let usual = Options::default();
+        let presets = if self.preset.is_empty() { usual.presets.clone() } else { self.preset.clone() };
+        let trainer = if self.network { usual.trainer } else { None };
+        Options { presets, trainer, version, ..usual }
     }
 
     /// Days to learn from and days to be judged by as one data set.
