@@ -25,7 +25,8 @@ pub struct Record {
     /// Which joint.
     #[command(flatten)]
     on: Where,
-    /// Table to write: CSV, or by its ending .mcap or .parquet (feature `logs`); dataset.toml is written beside it. Neither may exist, unless --force is given
+    /// Table to write: CSV, or by its ending .mcap or .parquet (feature `logs`); dataset.toml is written beside it.
+    /// Neither may exist, unless --force is given
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// How long, s [default: until Ctrl-C]

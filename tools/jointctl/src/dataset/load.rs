@@ -1,5 +1,5 @@
-//! Files to raw columns: where the files are, gzip, CSV, numbers and texts, the table of runs, the digest; host. Logs in
-//! MCAP and Parquet: `logs`.
+//! Files to raw columns: where the files are, gzip, CSV, numbers and texts, the table of runs, the digest; host. Logs
+//! in MCAP and Parquet: `logs`.
 //!
 //! Only the columns that the description names are kept. Nothing is corrected here: the first field that does not
 //! hold what it should is an error with file, line and column.
