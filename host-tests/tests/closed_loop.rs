@@ -29,7 +29,7 @@ const COLD: (f64, f64) = (11.7, 32.9);
 
 /// Friction left in torque mode at most, led by hand, and moved by a command that tells its offset and one that does
 /// not, median and worst, %: docs/results-loop.md's figures and a tenth of them.
-const TORQUE_MODE: [(f64, f64); 4] = [(69.6, 74.1), (99.0, 99.0), (10.3, 44.1), (68.9, 70.3)];
+const TORQUE_MODE: [(f64, f64); 3] = [(69.6, 74.1), (10.3, 44.1), (68.9, 70.3)];
 
 /// Torque errors in service, moves and slow reversals, median and worst, %, with adaptation: docs/adaptation.md's
 /// figures and a tenth of them. As commissioned; all of friction's torques times 0.7, 1.3, 0.4 and 2; viscous friction
@@ -69,8 +69,6 @@ struct Found {
     moved_by_itself: Vec<String>,
     /// Torque errors from 0 °C, without compensation and with it, %.
     cold: [f64; 2],
-    /// Where it was judged in service.
-    served: Option<Served>,
 }
 
 /// A joint in service.
@@ -81,26 +79,29 @@ struct Served {
     touched: [f64; 2],
 }
 
+fn commissioned(seed: u64) -> Result<RandomJoint, String> {
+    RandomJoint::commissioned(seed).map_err(|error| format!("joint {seed}: {error}"))
+}
+
 fn found(seed: u64) -> Result<Found, String> {
-    let joint = RandomJoint::commissioned(seed).map_err(|error| format!("joint {seed}: {error}"))?;
-    let in_service = |(_, factors): &(_, FrictionFactors)| {
-        Ok::<_, String>([joint.in_service(&DEFAULT, factors)?, joint.in_service(&ADAPTIVE, factors)?])
-    };
-    let serves = seed < FIRST + count(SERVED.0, SERVED.1);
+    let joint = commissioned(seed)?;
     Ok(Found {
         moved: [joint.without()?, joint.with(&DEFAULT)?],
         torque_mode: joint.in_torque_mode(&DEFAULT)?,
         uncertainty: joint.found.uncertainty,
         moved_by_itself: judged(seed, &Alone::ALL, &DEFAULT, Knowledge::Image(&joint.found)).1,
         cold: joint.in_the_cold(&DEFAULT)?,
-        served: serves
-            .then(|| {
-                Ok::<_, String>(Served {
-                    by_factors: factors().iter().map(in_service).collect::<Result<_, _>>()?,
-                    touched: [joint.touched(&ADAPTIVE, false)?, joint.touched(&ADAPTIVE, true)?],
-                })
-            })
-            .transpose()?,
+    })
+}
+
+fn served(seed: u64) -> Result<Served, String> {
+    let joint = commissioned(seed)?;
+    let by = |(_, factors): &(_, FrictionFactors)| {
+        Ok::<_, String>([joint.in_service(&DEFAULT, factors)?, joint.in_service(&ADAPTIVE, factors)?])
+    };
+    Ok(Served {
+        by_factors: factors().iter().map(by).collect::<Result<_, _>>()?,
+        touched: [joint.touched(&ADAPTIVE, false)?, joint.touched(&ADAPTIVE, true)?],
     })
 }
 
@@ -120,8 +121,10 @@ fn held((middle, worst): (f64, f64), limits: (f64, f64)) -> bool {
     (!every() || middle <= limits.0) && worst <= limits.1
 }
 
-/// Adaptation in service is as published.
-fn adapts(found: &[&Served]) {
+#[test]
+fn adaptation_makes_up_for_friction_that_has_changed_and_a_hand_changes_little() {
+    let found: Vec<Served> =
+        for_seeds(FIRST..FIRST + count(SERVED.0, SERVED.1), served).into_iter().map(Result::unwrap).collect();
     println!("torque errors in service [%]: moves, slow reversals, median (worst)");
     for (n, (what, _)) in factors().iter().enumerate() {
         let row = |with: usize| {
@@ -157,7 +160,6 @@ fn the_torque_that_friction_takes_is_given_back_and_slow_reversals_track() {
     let rows: Vec<[Moved; 2]> = found.iter().map(|found| found.moved).collect();
     let torque_mode: Vec<InTorqueMode> = found.iter().map(|found| found.torque_mode).collect();
     let cold: Vec<[f64; 2]> = found.iter().map(|found| found.cold).collect();
-    adapts(&found.iter().filter_map(|found| found.served.as_ref()).collect::<Vec<_>>());
     println!("joint  moves: torque error [%]   slow reversals: RMS position error [mrad]");
     for (seed, moved) in seeds.zip(&rows) {
         let [slow_before, slow_after] = moved.map(|moved| 1e3 * moved.reversals.tracking);
@@ -187,15 +189,22 @@ fn the_torque_that_friction_takes_is_given_back_and_slow_reversals_track() {
     assert!(held((median_error, worst), COLD), "from 0 °C: torque error {median_error} % median, {worst} % worst");
     assert!(cold.iter().all(|[off, on]| on < off), "better off from 0 °C: {cold:?}");
     type Left = fn(&InTorqueMode) -> f64;
-    let left: [(&str, Left); 4] = [
+    let left: [(&str, Left); 3] = [
         ("led by hand", |left| left.guided),
-        ("led by hand, uncertainty as stated", |left| left.guided_known),
         ("moved, offset told", |left| left.moved),
         ("moved, offset not told", |left| left.moved_untold),
     ];
-    println!("uncertainty: {:?}", found.iter().map(|found| found.uncertainty).collect::<Vec<_>>());
-    let moved: Vec<&String> = found.iter().flat_map(|found| &found.moved_by_itself).collect();
-    assert!(moved.is_empty(), "{moved:?}");
+    for found in &found {
+        let InTorqueMode { guided, guided_known, .. } = found.torque_mode;
+        println!(
+            "led by hand, uncertainty {:?}: {guided:.1} -> {guided_known:.1} % of friction left",
+            found.uncertainty
+        );
+        // The default bears 0.6: what is stated to be less leaves less.
+        let less = found.uncertainty.is_some_and(|stated| stated < 0.6);
+        assert!(if less { guided_known < guided } else { guided_known >= guided }, "{guided} {guided_known}");
+        assert!(found.moved_by_itself.is_empty(), "with the stated uncertainty: {:?}", found.moved_by_itself);
+    }
     for ((what, left), (limit, worst)) in left.iter().zip(TORQUE_MODE) {
         let left: Vec<f64> = torque_mode.iter().map(left).collect();
         let found = (median(left.clone()), left.iter().fold(0.0f64, |worst, left| worst.max(*left)));

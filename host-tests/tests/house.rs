@@ -11,7 +11,7 @@ use syn::visit::{self, Visit};
 use syn::{Attribute, Item, UseTree};
 
 /// Sources of each crate.
-const CRATES: [&str; 11] = [
+const CRATES: [&str; 12] = [
     "src",
     "host-tests/src",
     "tools/bus/src",

@@ -1,7 +1,7 @@
 //! Compensation never moves a joint by itself: over many random joints, with a model that is wrong by 50 % in every
 //! parameter and sensors up to two periods late, a joint that is not commanded to move does not start, and one that was
 //! pushed comes to rest: free, held by a spring of its own or of its master's, with a payload that swings or is borne.
-//! `JOINT_SAMPLES=all` judges every joint of the published figures, else the first fifth of them.
+//! `JOINT_SAMPLES=all` judges every joint of the published figures, else the first tenth of them.
 
 use host_tests::in_the_loop::for_seeds;
 use host_tests::left_alone::{Alone, ERROR, Knowledge, judged};
@@ -9,11 +9,11 @@ use host_tests::samples::count;
 use host_tests::variant::{ADAPTIVE, DEFAULT, Variant};
 
 /// Random joints: a part, and all.
-const JOINTS: (u64, u64) = (200, 1000);
+const JOINTS: (u64, u64) = (100, 1000);
 /// Random joints whose feedforward bears their payload.
-const BEARING: (u64, u64) = (20, 100);
+const BEARING: (u64, u64) = (10, 100);
 /// Random joints that have learned before.
-const EXPERIENCED: (u64, u64) = (40, 200);
+const EXPERIENCED: (u64, u64) = (20, 200);
 
 #[test]
 fn no_joint_starts_to_move_or_keeps_moving_by_itself() {

@@ -3,7 +3,7 @@
 mod configured;
 mod guarded;
 
-use super::emergency::{Emergency, LOST, LOST_BIT, Reports, fault_of, of_refusal};
+use super::emergency::{Emergency, LOST, LOST_BIT, Reports, of_refusal};
 use super::fault_log::{self, FaultLogging, LOGS};
 use super::field::{
     ConfigurationField, Field, HardwareField, ImageField, LogField, OpenLoopField, OwnerField, ProfileParameter, Range,
@@ -157,12 +157,10 @@ impl<'a, P: Program> Objects<'a, P> {
         while !self.emergencies.is_full()
             && let Some(emergency) = self.reports.next(observed, &self.program.hardware().driver, now)
         {
-            if LOGS && let Some(fault) = fault_of(emergency.code) {
-                self.log(emergency.code, fault as u8);
-            }
             self.report(emergency);
         }
         for logging in &mut self.logging {
+            logging.observe(observed.latched, now);
             logging.poll(now, &mut self.program);
         }
         self.follow_profile();

@@ -46,11 +46,6 @@ pub struct Emergency {
     pub information: [u8; 5],
 }
 
-/// The joint's fault that an error code stands for.
-pub(super) fn fault_of(code: u16) -> Option<Fault> {
-    Fault::ALL.into_iter().find(|fault| fault.error_code() == code)
-}
-
 /// The bit of the error register, CiA 301 section 7.5.2.2.
 const fn register_bit(fault: Fault) -> u8 {
     match fault {

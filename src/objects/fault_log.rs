@@ -6,6 +6,7 @@
 //! is lost.
 
 use super::program::Program;
+use crate::joint::fault::Faults;
 use crate::parameters::fault_log::{LOGGED, LoggedFault};
 use heapless::Deque;
 
@@ -34,6 +35,8 @@ pub(super) struct FaultLogging {
     /// Code, number of the fault, and when it came, s.
     waiting: Deque<(u16, u8, u32), WAITING>,
     missed: u16,
+    /// Faults of the last look: what is latched anew is logged, whether or not the bus takes an EMCY of it.
+    seen: Faults,
     /// The power-up has been counted, or there was none.
     counted: bool,
 }
@@ -41,12 +44,20 @@ pub(super) struct FaultLogging {
 impl FaultLogging {
     /// Nothing waits, and nothing may be written yet.
     pub(super) const fn new() -> Self {
-        Self { left: 0, since: 0, waiting: Deque::new(), missed: 0, counted: true }
+        Self { left: 0, since: 0, waiting: Deque::new(), missed: 0, seen: Faults::NONE, counted: true }
     }
 
     /// After a start: `powered_up` where the supply came.
     pub(super) fn started(self, powered_up: bool) -> Self {
         Self { left: if powered_up { FIRST } else { 0 }, counted: !powered_up, ..self }
+    }
+
+    /// The latched faults at `now` ms: those that were not there before have come.
+    pub(super) fn observe(&mut self, latched: Faults, now: u64) {
+        let seen = core::mem::replace(&mut self.seen, latched);
+        for fault in latched.iter().filter(|fault| !seen.contains(*fault)) {
+            self.note(fault.error_code(), fault as u8, now);
+        }
     }
 
     /// A fault has come, at `now` ms; `fault` is its number, 0 for what is none of the joint's.

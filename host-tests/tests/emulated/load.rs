@@ -1,4 +1,5 @@
-//! The feedforward of the load on the flashed programs: the moteus r4 bears what it is told, and the B-G431B-ESC1 has no such object.
+//! The feedforward of the load on the flashed programs: the moteus r4 bears what it is told, and the B-G431B-ESC1 has
+//! no such object.
 
 use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4};
 use host_tests::emulated::bench::{actuator, program};

@@ -29,7 +29,7 @@ use std::collections::BTreeSet;
 use std::sync::OnceLock;
 
 /// Certified images: in the test command, and in all.
-const IMAGES: (u64, u64) = (40, 160);
+const IMAGES: (u64, u64) = (20, 160);
 /// Batches of states for each of them: 1,024,000 states of all images, for each board's way of compiling.
 const BATCHES: usize = 25;
 

@@ -1,4 +1,5 @@
-//! Storage of a joint: damaged records, stores in a loop, faults that outlive the power. Simulated time; the files of `--storage`.
+//! Storage of a joint: damaged records, stores in a loop, faults that outlive the power. Simulated time; the files of
+//! `--storage`.
 
 mod master;
 

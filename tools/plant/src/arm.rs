@@ -7,8 +7,8 @@
 //! (M + R + dt diag(s)) dv = dt (motor - friction(v) - h + external)
 //! ```
 //!
-//! which is the backward Euler step of [`crate::joint`], for all joints at once. Each joint then makes that step itself,
-//! under the torque that the others exert on its link. M and h are computed anew every [`EVERY`] periods.
+//! which is the backward Euler step of [`crate::joint`], for all joints at once. Each joint then makes that step
+//! itself, under the torque that the others exert on its link. M and h are computed anew every [`EVERY`] periods.
 
 use crate::joint::{Answer, MAXIMUM_STEP};
 use crate::virtual_joint::VirtualJoint;

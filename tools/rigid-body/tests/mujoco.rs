@@ -56,7 +56,7 @@ fn as_mujoco(python: Option<&Path>) -> Result<(), Failed> {
     }
     let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join("mujoco-cases.json");
     std::fs::write(&file, serde_json::to_vec(&cases)?)?;
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/mujoco.py");
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/accelerations.py");
     let output = Command::new(python).arg(script).arg(&file).output()?;
     if !output.status.success() {
         return Err(String::from_utf8_lossy(&output.stderr).into_owned().into());

@@ -1,10 +1,10 @@
 //! Part of an image's friction that the joint may not have: what the energy guard has to know (docs/energy-guard.md);
 //! host.
 //!
-//! Compensation is passive at an instant where it is at most (1 - u) times the image's friction, u such that the joint's
-//! friction is at least that. u is measured on motions that were left out: the friction in the effort over that of the
-//! model, mean over each direction, range of speeds and kind of load. One period of a ripple averages out, as its work
-//! does.
+//! Compensation is passive at an instant where it is at most (1 - u) times the image's friction, u such that the
+//! joint's friction is at least that. u is measured on motions that were left out: the friction in the effort over that
+//! of the model, mean over each direction, range of speeds and kind of load. One period of a ripple averages out, as
+//! its work does.
 
 use crate::choice::Folds;
 use crate::identify::Identified;

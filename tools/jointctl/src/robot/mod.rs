@@ -9,7 +9,8 @@
 //!    regularisation, by motions that were left out.
 //! 4. [`joints`]: the torque of the rigid bodies is the theoretical torque of each joint, and the pipeline of one joint
 //!    does the rest: terms, pre-sliding, network, certificate, fixed point.
-//! 5. [`mod@fit`] is the whole way, [`files`] its output, [`page`] the page of it; [`mod@evaluate`] judges that output on another recording.
+//! 5. [`mod@fit`] is the whole way, [`files`] its output, [`page`] the page of it; [`mod@evaluate`] judges that output
+//!    on another recording.
 //!
 //! [`excite`] finds the motion of all joints that such a recording should be of.
 //!

@@ -173,7 +173,8 @@ pub fn requests_that_are_not_as_they_should_be_are_refused_and_the_server_goes_o
     page.send(Message::text(padded(LONGEST)));
     assert!(page.answer_to(900).is_ok());
     page.send(Message::text(padded(LONGEST + 1)));
-    assert!(page.closed().is_some_and(|said| said.contains("Message too long: 262145 > 262144")));
+    // Its rest is not read, so that TCP may reset the connection before the words have arrived.
+    assert!(page.closed().is_none_or(|said| said.contains("Message too long: 262145 > 262144")));
     // More questions than may wait are refused, not kept.
     let mut page = Page::open(address);
     let ids = (0..400).map(|_| page.tell(json!("checklist"))).collect::<Vec<_>>();
