@@ -72,7 +72,7 @@ fn cells(samples: &Samples) -> Vec<Option<Cell>> {
         (counts(samples, i) && speed >= SLOWEST).then(|| Cell {
             backward: velocity < 0.0,
             speed: SPEEDS.iter().filter(|edge| speed >= **edge).count(),
-            load: match load.abs() < LOADED * heaviest {
+            load: match load.abs() <= LOADED * heaviest {
                 true => Load::Small,
                 false if load * velocity > 0.0 => Load::Driving,
                 false => Load::Braking,
