@@ -158,8 +158,8 @@ mod tests {
     #[test]
     fn sums_of_parts_are_the_sums_of_the_whole() {
         let (mut whole, part) = (recorded(600, 0.1), recorded(300, 0.1));
-        let mut joined = Sums::of(&[part.clone()], |_| None);
-        joined.add(&Sums::of(&[part.clone()], |_| None));
+        let mut joined = Sums::of(std::slice::from_ref(&part), |_| None);
+        joined.add(&Sums::of(std::slice::from_ref(&part), |_| None));
         whole.windows = [part.windows.clone(), part.windows].concat();
         let (one, other) = (estimate(&joined).unwrap(), estimate(&Sums::of(&[whole], |_| None)).unwrap());
         assert!(one.values.iter().zip(other.values).all(|(a, b)| (a - b).abs() < 1e-9));

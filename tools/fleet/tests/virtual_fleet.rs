@@ -63,7 +63,7 @@ fn sums(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     found
 }
 
-fn of<'a>(findings: &'a [Finding], number: usize) -> &'a Finding {
+fn of(findings: &[Finding], number: usize) -> &Finding {
     findings.iter().find(|finding| finding.joint == joint(number)).unwrap()
 }
 

@@ -12,16 +12,19 @@ use std::process::Command;
 const ROWS: usize = 3_000;
 const START: u64 = 1_700_000_000_000_000_000;
 
+/// A test with its name.
+type Named = (&'static str, fn(&Path) -> Result<(), Failed>);
+
 fn main() {
     let arguments = Arguments::from_args();
     let must_run = std::env::var_os("CI").is_some();
     let python = if arguments.list { None } else { LOGS.python(env!("CARGO_TARGET_TMPDIR")) };
     let ignored = !must_run && python.is_none();
-    let trial = |(name, test): (&str, fn(&Path) -> Result<(), Failed>)| {
+    let trial = |(name, test): Named| {
         let python = python.clone();
         Trial::test(name, move || test(LOGS.required(python.as_deref())?)).with_ignored_flag(ignored)
     };
-    let tests: [(&str, fn(&Path) -> Result<(), Failed>); 5] = [
+    let tests: [Named; 5] = [
         ("the_mcap_package_reads_every_value_time_and_schema", mcap_reads),
         ("pyarrow_reads_every_value_and_null", pyarrow_reads),
         ("compressed_and_plain_mcap_of_the_package_is_read", mcap_written),

@@ -124,7 +124,7 @@ fn of_passes(passes: &[(f64, f64)]) -> Option<f64> {
     let n = passes.len() as f64;
     let left: f64 = passes.iter().map(|pass| (pass.0 - ratio * pass.1).powi(2)).sum();
     let error = (left * n / (n - 1.0)).sqrt() / model;
-    (model > 0.0).then(|| 1.0 - ratio + DEVIATIONS * error)
+    (model > 0.0).then_some(1.0 - ratio + DEVIATIONS * error)
 }
 
 /// The uncertainty of a model: the largest excess over all motions that were left out, each by the model that was
@@ -197,7 +197,7 @@ mod tests {
         assert!((excess - 0.3).abs() < 1e-9, "{excess}");
         assert_eq!(cell.name(), "backward at 70 % of the greatest speed");
         // The same mean with runs that scatter by a tenth: half of it is the standard error of four passes' mean.
-        let scatter = |i: usize| if samples.run[i] % 2 == 0 { 0.1 } else { -0.1 };
+        let scatter = |i: usize| if samples.run[i].is_multiple_of(2) { 0.1 } else { -0.1 };
         let (_, excess) = worst(&samples, |i| Some((model(i) * (0.7 + scatter(i)), model(i))));
         let error = 0.1 * (4.0f64 / 3.0).sqrt() / 2.0;
         assert!((excess - (0.3 + 2.0 * error)).abs() < 1e-9, "{excess}");

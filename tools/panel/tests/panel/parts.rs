@@ -135,8 +135,8 @@ pub fn a_fault_is_told_with_its_emcy() {
         message["event"]["text"].as_str().filter(|_| message["event"]["kind"] == json!("emcy")).map(str::to_owned)
     });
     assert!(emcy.starts_with("node 5: EMCY 3"), "{emcy}");
-    let faults = page.seen.iter().filter(|message| message["event"]["kind"] == json!("faults"));
-    let last = faults.last().map(|message| message["event"]["text"].as_str().unwrap().to_owned());
+    let mut faults = page.seen.iter().filter(|message| message["event"]["kind"] == json!("faults"));
+    let last = faults.next_back().map(|message| message["event"]["text"].as_str().unwrap().to_owned());
     let told = last.filter(|text| text != "none").unwrap_or_else(|| {
         page.until(|message| {
             let event = message.get("event").filter(|event| event["kind"] == json!("faults"))?;
