@@ -1,6 +1,6 @@
 //! Faults on their way to the log that outlives the power, and object 2305h; the task.
 //!
-//! Two after power-up, one more a minute, [`MOST`] at a time; none that a reset would give back. Those that come sooner
+//! Two after power-up, one more a minute, eight at a time; none that a reset would give back. Those that come sooner
 //! wait, as many as there is room for, and are counted beyond that. A joint that does nothing but fail needs nine years
 //! to wear the log's pages out, a supply that comes and goes once a second nineteen days, and with the log nothing else
 //! is lost.

@@ -11,7 +11,6 @@ mod faults;
 mod full_bus;
 mod gate_driver;
 mod images;
-mod load;
 mod oscillator;
 mod outputs;
 mod ownership;
@@ -20,7 +19,6 @@ mod receive_interrupt;
 mod same_run;
 mod settings;
 mod settling;
-mod stored;
 mod supported_modes;
 mod workbench;
 
@@ -41,7 +39,6 @@ fn main() {
         gate_driver::trials(),
         boards::trials(),
         images::trials(),
-        load::trials(),
         oscillator::trials(),
         outputs::trials(),
         ownership::trials(),
@@ -49,7 +46,6 @@ fn main() {
         same_run::trials(),
         settings::trials(),
         settling::trials(),
-        stored::trials(),
         supported_modes::trials(),
         workbench::trials(),
     ];
