@@ -48,7 +48,7 @@ pub struct ArmMotion {
 }
 
 impl ArmMotion {
-    /// Fourier series of random coefficients, a joint each, within [`FASTEST`] and [`FURTHEST`].
+    /// Fourier series of random coefficients, a joint each, within 2.5 rad/s and 0.8 rad.
     pub fn random(duration: f64, seed: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut draw = || (0..5).map(|_| random.random_range(-1.0..1.0)).collect::<Vec<f64>>();
