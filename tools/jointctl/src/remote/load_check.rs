@@ -48,7 +48,7 @@ impl fmt::Display for LoadDifference {
 
 /// What is configured, with the payload; zero where the joint has no such objects.
 pub fn configured(joint: &RemoteJoint) -> Result<Load, RemoteError> {
-    let setting = |setting| match joint.number(Field::Setting(setting)) {
+    let setting = |setting| match joint.number(Field::AtOnce(setting)) {
         Err(RemoteError::Client(ClientError::Aborted { abort: Abort::NO_OBJECT, .. })) => Ok(0.0),
         other => other.map(|value| value as f32),
     };

@@ -34,7 +34,7 @@ pub fn a_round_lowers_what_is_unexplained_and_commits_a_newer_version() {
     let requested = request();
     // An inertia that is twice that of the joint, as with a torque constant that is half the true one.
     let inertia = served.inertia();
-    set(&joint, &[(Entry::of(Field::Setting(Setting::LoadInertia)), Value::Real(2.0 * inertia))]).unwrap();
+    set(&joint, &[(Entry::of(Field::AtOnce(Setting::LoadInertia)), Value::Real(2.0 * inertia))]).unwrap();
     let outcome = round(folder.path()).run(&joint, &|| true, &|_| Ok(()), &Silent).unwrap();
     let (before, after) = (outcome.before, outcome.after);
     assert!(after.residual < 0.7 * before.residual, "{before:?} {after:?}");
