@@ -15,8 +15,9 @@ use std::process::Command;
 
 const MUJOCO: Packages =
     Packages { folder: "python-mujoco", install: &["mujoco==3.3.7", "numpy==2.3.5"], import: "mujoco, numpy" };
-/// Largest departure, relative to the largest acceleration.
-const MARGIN: f64 = 1e-9;
+/// Largest departure, relative to the largest acceleration: MuJoCo finds the principal axes of every link itself, to some
+/// 1e-7.
+const MARGIN: f64 = 1e-6;
 
 #[derive(Deserialize)]
 struct Answer {
@@ -69,7 +70,7 @@ fn as_mujoco(python: Option<&Path>) -> Result<(), Failed> {
         let mass: f64 = tree.joints.iter().map(|joint| joint.link.mass).sum();
         let most = expected.iter().fold(1.0, |most: f64, x| most.max(x.abs()));
         let worst = answer.acceleration.iter().zip(expected).fold(0.0, |worst: f64, (a, b)| worst.max((a - b).abs()));
-        let same = answer.joints == tree.len() && (answer.mass / mass - 1.0).abs() < MARGIN;
+        let same = answer.joints == tree.len() && (answer.mass / mass - 1.0).abs() < 1e-9;
         if !same || worst.is_nan() || worst > MARGIN * most {
             return Err(format!("{} joints: {worst:e} of {most}, {} kg of {mass}", tree.len(), answer.mass).into());
         }
