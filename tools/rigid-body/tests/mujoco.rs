@@ -15,8 +15,8 @@ use std::process::Command;
 
 const MUJOCO: Packages =
     Packages { folder: "python-mujoco", install: &["mujoco==3.3.7", "numpy==2.3.5"], import: "mujoco, numpy" };
-/// Largest departure, relative to the largest acceleration: MuJoCo finds the principal axes of every link itself, to some
-/// 1e-7.
+/// Largest departure, relative to the largest acceleration: MuJoCo finds the principal axes of every link itself, to
+/// some 1e-7.
 const MARGIN: f64 = 1e-6;
 
 #[derive(Deserialize)]
