@@ -10,8 +10,8 @@
 //! DBC) come from it. [`field`] is what an object can be about. The rest has one idea a file: [`Observed`] and its
 //! scaling, [`settings`] of the configuration, [`Operation`] for the modes, `profile_positions` and `profile_modes` for
 //! those in which positions have a hand-shake and an end, [`Images`] for the life cycle, [`Ownership`] for key and
-//! sessions, [`Stored`] for what 1010h keeps, [`Start`] for what a joint begins with, [`emergency`] for codes, [`fault_log`]
-//! for what outlives the power.
+//! sessions, [`Stored`] for what 1010h keeps, [`Start`] for what a joint begins with, [`emergency`] for codes,
+//! [`fault_log`] for what outlives the power.
 //!
 //! ```text
 //!  receive interrupt   image.at(now); image.observe(&observed)

@@ -30,6 +30,8 @@ fn the_page_names_what_changed_and_only_better_images_are_kept() {
     let errors = String::from_utf8_lossy(&status.stderr).into_owned();
     assert!(errors.contains("joint=j02/day=2026-01-04 is left out: "), "{errors}");
     let page = std::fs::read_to_string(folder.path().join("fleet.html")).unwrap();
+    let told = json(&jointctl(folder.path(), &["fleet", "status", "fleet", "--json"]));
+    assert!(told.to_string().contains("j11"), "{told}");
     let named = [("j11", "drifted"), ("j23", "friction fell"), ("j29", "broken"), ("j35", "wrong configuration")];
     for (joint, words) in named {
         let line = text.lines().find(|line| line.starts_with(joint)).unwrap();
