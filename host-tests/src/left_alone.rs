@@ -115,7 +115,7 @@ impl Alone {
     }
 }
 
-/// What a joint that is left alone knows of its friction.
+/// Knowledge that a joint that is left alone has of its friction.
 #[derive(Clone, Copy)]
 pub enum Knowledge<'a> {
     /// A model with every parameter wrong by [`ERROR`].

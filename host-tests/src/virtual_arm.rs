@@ -152,7 +152,7 @@ fn demand(command: Command, sequence: u32) -> Demand {
     Demand { controlword: Controlword::ENABLE_OPERATION, command, sequence, ..Demand::default() }
 }
 
-/// What an owner identified.
+/// An identified arm.
 pub struct IdentifiedArm {
     /// Links, and rotor inertias on the joints' side.
     tree: Tree,
@@ -165,7 +165,7 @@ pub struct IdentifiedArm {
 /// Records the arm and identifies it.
 ///
 /// # Errors
-/// What plant, firmware or fit refuse.
+/// Refusals of plant, firmware or fit.
 pub fn identified() -> Result<IdentifiedArm, String> {
     let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
     let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).map_err(|e| e.to_string());
@@ -187,7 +187,7 @@ pub fn identified() -> Result<IdentifiedArm, String> {
     Ok(IdentifiedArm { tree, rotors: fitted.rotors.clone(), models, percent: fitted.mean_percent() })
 }
 
-/// What a data sheet says of the links: masses and centres are a third off.
+/// Links by their data sheet: masses a third too large, centres a fifth too near.
 fn prior() -> Tree {
     let mut tree = links();
     for joint in &mut tree.joints {

@@ -53,7 +53,7 @@ struct Content {
     /// Brings content number so and so up to the last request, which makes the program write it and is not sent.
     request: fn(&mut Board, u32) -> Result<Heard, Failed>,
     read: fn(&mut Board) -> Result<Read, Failed>,
-    /// How many of the first objects are kept before the others, in a store of their own.
+    /// Number of the first objects, which are kept before the others in a store of their own.
     first: usize,
 }
 
