@@ -3,7 +3,7 @@
 //! This library is everything of it that knows no register; `main.rs`, `board` and `tasks` are the program around it. A
 //! measurement takes this way: [`sensors`] (what a raw word means), [`joint`] (faults, state machine, motion),
 //! [`friction`] and [`compensation`] (what friction will take of the torque), [`motor`] (the current loop). Commands
-//! and settings come through [`canopen`] (the protocol) and [`objects`] (this joint's), images through [`parameters`].
+//! and settings come through [`canopen_node`] (the protocol) and [`objects`] (this joint's), images through [`parameters`].
 //!
 //! # Where code runs
 //!
@@ -21,7 +21,6 @@
 #![cfg_attr(not(test), no_std)]
 #![deny(unsafe_code)]
 
-pub mod canopen;
 pub mod compensation;
 pub mod default_configuration;
 #[allow(unsafe_code)]

@@ -11,8 +11,9 @@ use syn::visit::{self, Visit};
 use syn::{Attribute, Item, UseTree};
 
 /// Sources of each crate.
-const CRATES: [&str; 12] = [
+const CRATES: [&str; 13] = [
     "src",
+    "crates/canopen-node/src",
     "host-tests/src",
     "tools/bus/src",
     "tools/emulator/src",
@@ -27,20 +28,19 @@ const CRATES: [&str; 12] = [
 ];
 
 /// Folders of comments that are held to their width.
-const COMMENTED: [&str; 4] = ["src", "host-tests", "tools", "fuzz"];
+const COMMENTED: [&str; 5] = ["src", "crates", "host-tests", "tools", "fuzz"];
 /// Columns of a comment, at most: `max_width` of rustfmt.toml.
 const WIDTH: usize = 120;
 
 /// Rooms of the firmware and the rooms that each may name; the boards' program (`main`, `tasks`, `board`) may name all.
-const ROOMS: [(&str, &[&str]); 8] = [
-    ("canopen", &[]),
+const ROOMS: [(&str, &[&str]); 7] = [
     ("motor", &["sine"]),
     ("friction", &["dsp", "quantity", "sine"]),
     ("compensation", &["friction", "quantity"]),
     ("sensors", &["motor"]),
     ("parameters", &["dsp", "friction", "quantity"]),
     ("joint", &["compensation", "dsp", "friction", "motor", "quantity", "sensors", "sine"]),
-    ("objects", &["canopen", "compensation", "hardware", "joint", "motor", "parameters", "quantity", "reset_record"]),
+    ("objects", &["compensation", "hardware", "joint", "motor", "parameters", "quantity", "reset_record"]),
 ];
 
 /// Arrows that close a circle, to be taken away: crate, from, to. Others are not added.

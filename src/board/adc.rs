@@ -60,7 +60,7 @@ impl Sequence<'_> {
         for &(channel, time) in self.channels {
             match channel {
                 0..=9 => adc.smpr().modify(|w| w.set_smp(channel.into(), time)),
-                _ => adc.smpr2().modify(|w| w.set_smp(usize::from(channel) - 10, time)),
+                _ => adc.smpr2().modify(|w| w.set_smp(usize::from(channel.min(18)) - 10, time)),
             }
         }
         // Without the queue: the sequence stays armed as written.
@@ -69,7 +69,7 @@ impl Sequence<'_> {
             w.set_jl(self.channels.len() as u8 - 1);
             w.set_jextsel(self.trigger);
             w.set_jexten(Exten::RISING_EDGE);
-            for (rank, &(channel, _)) in self.channels.iter().enumerate() {
+            for (rank, &(channel, _)) in (0..4).zip(self.channels) {
                 w.set_jsq(rank, channel);
             }
         });

@@ -12,6 +12,7 @@
 
 use super::control;
 use super::shared::Publisher;
+use canopen_node::{Buffers, Frame, PDOS, Receiver, Route, TransmitQueue, bit_timing};
 use core::cell::{Cell, RefCell, UnsafeCell};
 use core::mem::MaybeUninit;
 use core::num::{NonZeroU8, NonZeroU16};
@@ -23,12 +24,12 @@ use embassy_stm32::can::filter::{Action, FilterType, StandardFilter, StandardFil
 use embassy_stm32::can::{CanConfigurator, IT0InterruptHandler, IT1InterruptHandler, RxPin, TxPin};
 use embassy_stm32::interrupt::typelevel::{Binding, FDCAN1_IT0, FDCAN1_IT1};
 use embassy_stm32::interrupt::{InterruptExt, Priority};
+use embassy_stm32::pac::can::regs::Txbar;
 use embassy_stm32::peripherals::FDCAN1;
 use embassy_stm32::{Peri, interrupt, pac};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
 use embassy_time::Instant;
-use joint_firmware::canopen::{self, Buffers, Frame, PDOS, Receiver, Route, TransmitQueue, bit_timing};
 use joint_firmware::joint::Demand;
 use joint_firmware::joint::configuration::CollisionReaction;
 use joint_firmware::joint::load_feedforward::LOADS;
@@ -64,7 +65,7 @@ static COLLISION: AtomicU32 = AtomicU32::new(0);
 
 /// Everything that the receive interrupt owns.
 struct Bus {
-    shared: &'static canopen::Shared,
+    shared: &'static canopen_node::Shared,
     receiver: Receiver<'static>,
     image: JointImage<'static>,
     demand: Publisher<Demand>,
@@ -153,7 +154,7 @@ pub fn configure(
 /// Takes part in the bus from now on. Called once.
 pub fn start(
     controller: CanConfigurator<'static>,
-    shared: &'static canopen::Shared,
+    shared: &'static canopen_node::Shared,
     image: JointImage<'static>,
     demand: Publisher<Demand>,
 ) {
@@ -209,7 +210,7 @@ pub async fn next() -> Frame {
 }
 
 /// Sends a frame of the node `shared`; where the queue is full it is dropped and counted.
-pub fn send(frame: Frame, shared: &canopen::Shared) {
+pub fn send(frame: Frame, shared: &canopen_node::Shared) {
     let now = now();
     critical_section::with(|section| {
         let mut sending = SENDING.borrow_ref_mut(section);
@@ -316,7 +317,7 @@ fn transmit(sending: &mut TransmitQueue<TO_BUS>, now: u32) {
             // SAFETY: four words of an element of the message RAM, which is the writer's until it is requested.
             unsafe { place.wrapping_add(offset).write_volatile(word) };
         }
-        can.txbar().write(|w| w.set_ar(number.into(), true));
+        can.txbar().write_value(Txbar(1 << number));
     }
 }
 

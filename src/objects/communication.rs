@@ -1,7 +1,7 @@
 //! Communication parameters of the joint: which PDOs there are at first, and each parameter as a number at its index;
 //! the task.
 
-use crate::canopen::{COUNTER_AND_DATE, CommunicationParameters, MappedObject, PDOS, PdoParameters};
+use canopen_node::{COUNTER_AND_DATE, CommunicationParameters, MappedObject, PDOS, PdoParameters};
 
 const CONTROLWORD: MappedObject = MappedObject::new(0x6040, 0, 16);
 const STATUSWORD: MappedObject = MappedObject::new(0x6041, 0, 16);

@@ -1,4 +1,4 @@
-//! The joint's objects as [`canopen`](crate::canopen) asks for them; the task.
+//! The joint's objects as [`canopen`](canopen_node) asks for them; the task.
 
 mod configured;
 mod guarded;
@@ -23,9 +23,6 @@ use super::start::Start;
 use super::store_budget::StoreBudget;
 use super::stored::{Part, Update, communication_parameters, is_range};
 use super::{hardware, history, last_reset, open_loop, table};
-use crate::canopen::{
-    Abort, Access, COUNTER_AND_DATE, CommunicationParameters, Entry, Event, Group, Length, NmtState, ObjectDictionary,
-};
 use crate::hardware::chip_options::COMMAND;
 use crate::joint::PROFILES;
 use crate::joint::configuration::Configuration;
@@ -36,6 +33,9 @@ use crate::parameters::authentication::{CHALLENGE, STAGING, TAG};
 use crate::parameters::life_cycle::{Action, LifeCycle, Refusal};
 use crate::parameters::slots::SlotError;
 use crate::reset_record::LastReset;
+use canopen_node::{
+    Abort, Access, COUNTER_AND_DATE, CommunicationParameters, Entry, Event, Group, Length, NmtState, ObjectDictionary,
+};
 use core::cell::Cell;
 use heapless::Deque;
 
@@ -116,7 +116,7 @@ impl<'a, P: Program> Objects<'a, P> {
     }
 
     /// Begins anew, as at power-on: for a program that goes on running when the node is reset
-    /// ([`Event::Reset`](crate::canopen::Event::Reset)). What is staged, tried, or waits to be reported is forgotten;
+    /// ([`Event::Reset`](canopen_node::Event::Reset)). What is staged, tried, or waits to be reported is forgotten;
     /// how often a record may be written is not.
     pub fn restart(&mut self, life: LifeCycle, stored_images: StoredImages, start: &Start) {
         let Start { configuration, ranges, lost, single_bank, .. } = *start;
@@ -187,7 +187,7 @@ impl<'a, P: Program> Objects<'a, P> {
         }
     }
 
-    /// What is to be sent as EMCY by [`Server::emergency`](crate::canopen::Server::emergency), one at a time.
+    /// What is to be sent as EMCY by [`Server::emergency`](canopen_node::Server::emergency), one at a time.
     pub fn take_emergency(&mut self) -> Option<Emergency> {
         self.emergencies.pop_front()
     }

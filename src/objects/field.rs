@@ -8,7 +8,7 @@ use crate::joint::PROFILES;
 /// What an object reads or writes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Field {
-    /// Served by [`canopen`](crate::canopen).
+    /// Served by [`canopen`](canopen_node).
     Server,
     /// Sub-index 0 of a record: its highest sub-index.
     Highest(u8),

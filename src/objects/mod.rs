@@ -1,6 +1,6 @@
 //! This joint's object dictionary: the only place where an index meets a field.
 //!
-//! # Two contexts, as in [`canopen`](crate::canopen)
+//! # Two contexts, as in [`canopen`](canopen_node)
 //!
 //!  - [`JointImage`], in the receive interrupt: RPDOs to one [`Demand`](crate::joint::Demand), actual values to TPDOs.
 //!  - [`Objects`], in the task below: every object by SDO, storing, the image life cycle, EMCYs.
@@ -25,7 +25,7 @@
 //! ```
 //!
 //! A demand that nobody refreshes becomes stale by its deadline. The task has the interrupt run on every
-//! [`Event::State`](crate::canopen::Event::State), so that a transition of its own reaches the joint without a frame.
+//! [`Event::State`](canopen_node::Event::State), so that a transition of its own reaches the joint without a frame.
 
 mod communication;
 mod dictionary;

@@ -7,11 +7,11 @@
 
 use super::field::OwnerField;
 use super::settings::Setting;
-use crate::canopen::Abort;
 use crate::joint::configuration::Configuration;
 use crate::parameters::authentication::{CHALLENGE, Challenge, KEY, Key, Purpose, TAG};
 use crate::parameters::guard::Guard;
 use crate::parameters::image::Target;
+use canopen_node::Abort;
 
 /// Presence of sessions and of the rotation of keys in this program. With the feature `little-room` a chip's program
 /// has none: its board has a button, and who presses it is taken for the owner. On the host nothing changes.

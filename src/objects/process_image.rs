@@ -19,11 +19,11 @@ use super::observed::Observed;
 use super::set_points::SetPoints;
 use super::shared::Shared;
 use super::table;
-use crate::canopen::{MappedObject, NmtState, ProcessImage};
 use crate::joint::configuration::CollisionReaction;
 use crate::joint::load_feedforward::LOADS;
 use crate::joint::state_machine::Controlword;
 use crate::joint::{Command, Coupled, Demand, Mode, PROFILES};
+use canopen_node::{MappedObject, NmtState, ProcessImage};
 
 /// The interrupt's part of the objects.
 #[derive(Debug)]
@@ -90,14 +90,14 @@ impl<'a> JointImage<'a> {
         }
     }
 
-    /// What TPDOs carry from now on. Before [`Receiver::receive`](crate::canopen::Receiver::receive), at least where
+    /// What TPDOs carry from now on. Before [`Receiver::receive`](canopen_node::Receiver::receive), at least where
     /// the frame is SYNC.
     pub fn observe(&mut self, observed: &Observed) {
         self.observed = *observed;
     }
 
     /// Takes what came by SDO, and follows a transition that the task made: `state` is
-    /// [`canopen::Shared::state`](crate::canopen::Shared::state). At the end of every receive interrupt, before
+    /// [`canopen_node::Shared::state`](canopen_node::Shared::state). At the end of every receive interrupt, before
     /// [`JointImage::demand`].
     pub fn follow(&mut self, state: NmtState) {
         if state != self.state {
@@ -119,7 +119,7 @@ impl<'a> JointImage<'a> {
         }
     }
 
-    /// The time of what comes, µs, wrapping. Before [`Receiver::receive`](crate::canopen::Receiver::receive).
+    /// The time of what comes, µs, wrapping. Before [`Receiver::receive`](canopen_node::Receiver::receive).
     pub fn at(&mut self, now: u32) {
         self.now = now;
     }

@@ -9,11 +9,11 @@ use super::field::{ProfileParameter, SetPoint};
 use super::observed::Observed;
 use super::operation::Operation;
 use super::shared::{STARTED, Shared};
-use crate::canopen::Abort;
 use crate::joint::configuration::Configuration;
 use crate::joint::state_machine::{Controlword, State};
 use crate::joint::{PROFILES, STANDING};
 use crate::motor::number::{self, magnitude};
+use canopen_node::Abort;
 use core::f32::consts::TAU;
 
 /// How many there are of [`ProfileModes`]: none where a program does not have these modes.

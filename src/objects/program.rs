@@ -1,6 +1,5 @@
 //! What the objects need done at once by the program around them; the task.
 
-use crate::canopen::Event;
 use crate::hardware::Hardware;
 use crate::joint::configuration::{BridgeConfiguration, Configuration, ConfigurationError};
 use crate::joint::history::History;
@@ -10,6 +9,7 @@ use crate::parameters::fault_log::LoggedFault;
 use crate::parameters::guard::Guard;
 use crate::parameters::slots::SlotError;
 use crate::reset_record::LastReset;
+use canopen_node::Event;
 
 /// Why a configuration is not in use.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -324,7 +324,7 @@ impl<'a> Reader<'a> {
         };
         self.bytes = rest;
         self.offset += head.len();
-        out.copy_from_slice(head);
+        out.iter_mut().zip(head).for_each(|(byte, value)| *byte = *value);
     }
 
     fn bytes<const N: usize>(&mut self) -> [u8; N] {

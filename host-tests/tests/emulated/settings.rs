@@ -3,11 +3,11 @@
 //! refused, and the configuration in use stays as it was; what is taken lies within the facts that docs/boards.md has
 //! of the board.
 
+use canopen_node::Access;
 use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired as _};
 use host_tests::emulated::Bench;
 use host_tests::emulated::bench::program;
 use host_tests::emulated::observed::Observed;
-use joint_firmware::canopen::Access;
 use joint_firmware::objects::field::Field;
 use joint_firmware::objects::settings::Setting;
 use joint_firmware::objects::table::{DataType, Object, Text, described};

@@ -65,7 +65,7 @@ fn suffices() -> Result<(), Failed> {
     // Both executors run tasks by the same function; the medium one's feed the watchdog, or keep the winding cool.
     let polls = program.named(|name| name.contains("16embassy_executor3raw20TaskStorage") && name.contains("4poll"));
     let tasks: Vec<Depth> = polls.iter().map(|poll| stack.of(poll)).collect();
-    let serves = |depth: &&Depth| depth.path.iter().any(|(name, _)| name.contains("14joint_firmware7canopen"));
+    let serves = |depth: &&Depth| depth.path.iter().any(|(name, _)| name.contains("12canopen_node"));
     let executor = stack.of_containing("16embassy_executor3raw8Executor4poll");
     let entry = start.bytes_down_to("embassy_executor");
     let slowest = tasks.iter().max_by_key(|task| task.bytes).cloned().unwrap_or_default();

@@ -1,7 +1,6 @@
 //! The configuration as the dictionary writes it: taken by the control step, and stored; the task.
 
 use super::Objects;
-use crate::canopen::{Abort, COUNTER_AND_DATE};
 use crate::joint::configuration::Configuration;
 use crate::objects::emergency::over;
 use crate::objects::number::to_i32;
@@ -9,6 +8,7 @@ use crate::objects::program::{NotConfigured, Program};
 use crate::objects::refused::Refused;
 use crate::objects::settings::Setting;
 use crate::objects::stored::{Part, RECORD, Update};
+use canopen_node::{Abort, COUNTER_AND_DATE};
 
 impl<P: Program> Objects<'_, P> {
     /// Has the control step take a configuration. Functions of their own, here and below, because the stack has to bear

@@ -1,13 +1,13 @@
 //! Images and the owner, as the dictionary writes them; the task.
 
 use super::Objects;
-use crate::canopen::Abort;
 use crate::objects::field::{ImageField, OwnerField};
 use crate::objects::ownership::{Change, POWER_UP, Place, SESSIONS, Wrong};
 use crate::objects::program::Program;
 use crate::parameters::life_cycle::Command;
 use crate::parameters::slots::SlotError;
 use crate::reset_record::LastReset;
+use canopen_node::Abort;
 
 impl<P: Program> Objects<'_, P> {
     #[inline(never)]

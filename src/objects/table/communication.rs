@@ -1,4 +1,4 @@
-//! 1000h to 1FFFh: what [`canopen`](crate::canopen) serves, for the texts that a host makes. The server does not look
+//! 1000h to 1FFFh: what [`canopen`](canopen_node) serves, for the texts that a host makes. The server does not look
 //! here; a test holds the two together.
 
 use super::*;

@@ -15,7 +15,7 @@ mod profile;
 mod supervision;
 
 use super::field::Field;
-use crate::canopen::{Access, Mappable};
+use canopen_node::{Access, Mappable};
 
 /// Data types of CiA 301 section 7.4.7, by their index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

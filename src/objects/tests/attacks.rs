@@ -363,7 +363,7 @@ const BUS: [Attack; 9] = [
         "Refused (LSS error 255, 1); it moves on, and keeps its node id",
         &[
             (NODE, "lss_changes_neither_the_motion_nor_the_node_id_of_a_joint_that_moves"),
-            ("src/canopen/tests/lss.rs", "a_node_that_cannot_do_without_its_id_keeps_it"),
+            ("crates/canopen-node/src/tests/lss.rs", "a_node_that_cannot_do_without_its_id_keeps_it"),
         ],
     ),
     row(
@@ -379,7 +379,10 @@ const BUS: [Attack; 9] = [
         "Not taken, also not later",
         &[
             ("src/objects/tests/hostile.rs", "whatever_comes_no_torque_is_asked_for_outside_operational"),
-            ("src/canopen/tests/other_stacks.rs", "an_rpdo_received_before_operational_is_not_applied_later"),
+            (
+                "crates/canopen-node/src/tests/other_stacks.rs",
+                "an_rpdo_received_before_operational_is_not_applied_later",
+            ),
         ],
     ),
     row(
@@ -406,10 +409,10 @@ const BUS: [Attack; 9] = [
         "No panic, no transition and no set-point that the protocol does not allow; a transfer is whole or nothing",
         &[
             (
-                "src/canopen/tests/hostile.rs",
+                "crates/canopen-node/src/tests/hostile.rs",
                 "two_million_frames_of_a_hostile_bus_do_nothing_that_the_protocol_does_not_allow",
             ),
-            ("src/canopen/tests/hostile.rs", "a_mutated_transfer_is_whole_or_nothing"),
+            ("crates/canopen-node/src/tests/hostile.rs", "a_mutated_transfer_is_whole_or_nothing"),
         ],
     ),
     row(

@@ -1,7 +1,7 @@
 //! `docs/objects.md` is what the table says.
 
-use crate::canopen::Access;
 use crate::objects::table::{DataType, Object, Text, communication, described};
+use canopen_node::Access;
 use std::fmt::Write;
 
 const HEAD: &str = "# Objects

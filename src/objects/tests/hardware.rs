@@ -1,11 +1,11 @@
 //! What the board tells of its hardware, and what a master may do with it.
 
 use super::Node;
-use crate::canopen::Abort;
 use crate::hardware::chip_options::{COMMAND, ChipOptions};
 use crate::hardware::{GateDriver, Hardware, Setup};
 use crate::joint::fault::{Fault, Faults};
 use crate::joint::state_machine::State;
+use canopen_node::Abort;
 
 /// EMCYs of the node.
 fn emergencies(node: &mut Node) -> Vec<[u8; 8]> {

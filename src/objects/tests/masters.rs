@@ -2,8 +2,8 @@
 
 use super::documentation::{access, held_to, pdo};
 use super::evidence::{Evidence, links};
-use crate::canopen::Access;
 use crate::objects::table::{Object, communication, described};
+use canopen_node::Access;
 use std::fmt::Write;
 
 const HEAD: &str = "# What other masters touch

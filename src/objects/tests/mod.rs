@@ -18,7 +18,6 @@ mod stores;
 mod table;
 
 use super::*;
-use crate::canopen::{self, Event, Frame, Identity, NmtState, Receiver, Route, SdoSettings, Server};
 use crate::default_configuration::{B_G431B_ESC1, BoardConfiguration};
 use crate::hardware::Hardware;
 use crate::joint::configuration::{BridgeConfiguration, Configuration};
@@ -32,6 +31,7 @@ use crate::parameters::image::{Effort, Target};
 use crate::parameters::life_cycle::{LifeCycle, Requirements};
 use crate::parameters::slots::SlotError;
 use crate::reset_record::{Cause, LastReset, Record};
+use canopen_node::{Event, Frame, Identity, NmtState, Receiver, Route, SdoSettings, Server};
 use std::collections::VecDeque;
 
 pub const NODE: u8 = 5;
@@ -203,7 +203,7 @@ impl Program for Memory {
 /// A joint's node without the joint: what it observes is the test's to say.
 pub struct Node {
     pub shared: &'static Shared,
-    pub bus: &'static canopen::Shared,
+    pub bus: &'static canopen_node::Shared,
     pub receiver: Receiver<'static>,
     pub server: Server<'static>,
     pub image: JointImage<'static>,
@@ -238,7 +238,7 @@ impl Node {
 
     /// With a program that starts so.
     pub fn starting(program: Memory, start: &Start, guard: &Guard) -> Self {
-        let bus: &canopen::Shared = Box::leak(Box::new(canopen::Shared::new()));
+        let bus: &canopen_node::Shared = Box::leak(Box::new(canopen_node::Shared::new()));
         let shared: &Shared = Box::leak(Box::new(Shared::new()));
         let requirements = Requirements {
             target: Target { product: 2, serial: 4 },

@@ -98,7 +98,9 @@ fn every_setting_of_the_table_is_protected() {
     use crate::objects::field::Field;
     let mut tried = 0;
     for object in crate::objects::table::OBJECTS {
-        if matches!(object.field, Field::Setting(_) | Field::AtOnce(_)) && object.access != canopen::Access::ReadOnly {
+        if matches!(object.field, Field::Setting(_) | Field::AtOnce(_))
+            && object.access != canopen_node::Access::ReadOnly
+        {
             // Nothing that the owner set is above all bits of a number.
             let value = vec![0xff; object.data_type.bytes().unwrap().into()];
             let mut node = owned();

@@ -1,13 +1,13 @@
 //! The configuration: staged, taken as a whole, stored, restored.
 
 use super::*;
-use crate::canopen::CommunicationParameters;
 use crate::joint::configuration::LoadFeedforwardRequest;
 use crate::joint::state_machine::State;
 use crate::motor::setting::Name;
 use crate::objects::field::{Field, Range};
 use crate::objects::stored::communication_parameters;
 use crate::objects::table::{DataType, described};
+use canopen_node::CommunicationParameters;
 
 const TAKE: (u16, u8) = (0x2100, 1);
 

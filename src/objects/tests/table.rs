@@ -1,11 +1,11 @@
 //! The table against itself and against the server.
 
 use super::*;
-use crate::canopen::{Access, MappedObject, ObjectDictionary};
 use crate::objects::field::Field;
 use crate::objects::table::{
     COMMUNICATION, COMMUNICATION_TEXTS, DataType, OBJECTS, TEXTS, communication, described, find,
 };
+use canopen_node::{Access, MappedObject, ObjectDictionary};
 
 #[test]
 fn the_tables_are_sorted_and_each_entry_is_found() {
@@ -129,7 +129,7 @@ fn what_is_mapped_at_first_may_be_mapped() {
 
 #[test]
 fn every_mappable_object_is_the_same_in_a_pdo_and_by_sdo() {
-    use crate::canopen::ProcessImage;
+    use canopen_node::ProcessImage;
     let mut node = Node::operational();
     node.observed.telemetry.motion.position = -1.5;
     node.observed.telemetry.bus_voltage = 24.0;

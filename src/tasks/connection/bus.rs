@@ -8,8 +8,8 @@
 use super::program::BoardProgram;
 use crate::board::can::{self, Condition};
 use crate::board::{control, faults, options, shadow};
+use canopen_node::{Frame, Server};
 use embassy_time::{Duration, Instant, with_timeout};
-use joint_firmware::canopen::{self, Frame, Server};
 use joint_firmware::joint::state_machine::State;
 use joint_firmware::objects::{Objects, StoredImages};
 use joint_firmware::parameters::life_cycle::{Action, Mode};
@@ -22,7 +22,7 @@ const AWAY: Duration = Duration::from_millis(100);
 
 /// The task's part of the node.
 pub struct Node {
-    shared: &'static canopen::Shared,
+    shared: &'static canopen_node::Shared,
     server: Server<'static>,
     objects: &'static mut Objects<'static, BoardProgram>,
     stored: StoredImages,
@@ -62,7 +62,7 @@ const fn is_off(state: State) -> bool {
 impl Node {
     /// Before the receive interrupt is enabled.
     pub fn new(
-        shared: &'static canopen::Shared,
+        shared: &'static canopen_node::Shared,
         server: Server<'static>,
         objects: &'static mut Objects<'static, BoardProgram>,
         stored: StoredImages,

@@ -3,8 +3,8 @@
 use super::bus::Node;
 use super::program::BoardProgram;
 use crate::board::{self, Publisher, can};
+use canopen_node::{Identity, SdoSettings, Server};
 use embassy_stm32::can::CanConfigurator;
-use joint_firmware::canopen::{self, Identity, SdoSettings, Server};
 use joint_firmware::joint::Demand;
 use joint_firmware::objects::{Images, JointImage, Objects, Ownership, Shared, Start, StoredImages};
 use joint_firmware::parameters::authentication::STAGING;
@@ -18,7 +18,7 @@ const DEVICE_TYPE: u32 = 0x0002_0192;
 /// Number of the chip, for a serial number: CRC-32 of its 96 bits.
 const CRC: crc::Crc<u32, crc::NoTable> = crc::Crc::<u32, crc::NoTable>::new(&crc::CRC_32_ISO_HDLC);
 
-static BUS: canopen::Shared = canopen::Shared::new();
+static BUS: canopen_node::Shared = canopen_node::Shared::new();
 static OBJECTS: Shared = Shared::new();
 
 /// Starts the receive interrupt; the rest is the task's. A function of its own, as all steps of the start: what each

@@ -4,8 +4,8 @@
 use super::super::{adaptation, load};
 use super::store::Store;
 use crate::board::{self, BoardConfiguration, Offering, Prepared, Subscriber, oscillator, shadow};
+use canopen_node::{Event, Reset};
 use core::cell::RefCell;
-use joint_firmware::canopen::{Event, Reset};
 use joint_firmware::friction::regime::MAX_SETS;
 use joint_firmware::hardware::Hardware;
 use joint_firmware::joint::Active;

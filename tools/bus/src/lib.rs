@@ -7,7 +7,7 @@
 //! pacing::PacedBus                            what these frames cost on a wire: bits, arbitration, load, latency
 //! ```
 //!
-//! Frames, NMT states and abort codes are the server's own, from `joint_firmware::canopen`: one meaning on both sides.
+//! Frames, NMT states and abort codes are the server's own, from `canopen_node`: one meaning on both sides.
 //!
 //! - [`transport`]: the buses
 //! - [`pacing`]: the wire as a model, in simulated time; `virtual:NAME?bitrate=1000000` runs it in real time
@@ -19,5 +19,5 @@ pub mod client;
 pub mod pacing;
 pub mod transport;
 
-pub use joint_firmware::canopen::Frame;
+pub use canopen_node::Frame;
 pub use transport::{BusError, Transport, free_port, open};

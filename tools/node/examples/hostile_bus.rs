@@ -30,7 +30,7 @@ fn main() -> ExitCode {
         let mut node = HostileNode::new(&mut statics, present.then_some(&key)).expect("erased flash can be written");
         let mut lived = 0;
         // Without a node id only LSS is left.
-        while lived < LIFE && done < frames && node.id() != joint_firmware::canopen::NO_NODE_ID {
+        while lived < LIFE && done < frames && node.id() != canopen_node::NO_NODE_ID {
             if let Err(violation) = noise.attack(&mut node) {
                 eprintln!(
                     "seed {seed}, frame {lived}, {}: {violation}",

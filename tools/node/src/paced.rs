@@ -8,7 +8,7 @@
 use crate::virtual_node::VirtualNode;
 use bus::Frame;
 use bus::pacing::{Delivery, Order, PacedBus, Station};
-use joint_firmware::canopen::Buffers;
+use canopen_node::Buffers;
 use std::collections::VecDeque;
 use std::time::Duration;
 

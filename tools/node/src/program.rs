@@ -1,7 +1,7 @@
 //! What a board's program does for the objects, done for the simulated joint: swaps wait for the next control step.
 
 use crate::storage::Storage;
-use joint_firmware::canopen::{Event, Reset};
+use canopen_node::{Event, Reset};
 use joint_firmware::joint::Active;
 use joint_firmware::joint::configuration::{BridgeConfiguration, Configuration};
 use joint_firmware::joint::history::History;

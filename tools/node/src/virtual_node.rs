@@ -8,7 +8,7 @@ use crate::images::{SlotImages, model};
 use crate::program::VirtualProgram;
 use crate::storage::Storage;
 use bus::Frame;
-use joint_firmware::canopen::{
+use canopen_node::{
     self, Buffers, Identity, NO_NODE_ID, NmtState, PDOS, Receiver, Route, SdoSettings, Server, TransmitQueue,
 };
 use joint_firmware::joint::configuration::Configuration;
@@ -78,7 +78,7 @@ pub struct VirtualNode {
     rate: u32,
     /// Rounds of the motion loop a second, Hz.
     motion_rate: u32,
-    bus: &'static canopen::Shared,
+    bus: &'static canopen_node::Shared,
     receiver: Receiver<'static>,
     server: Server<'static>,
     image: JointImage<'static>,
@@ -140,7 +140,7 @@ impl VirtualNode {
         joint.set_friction(program.storage.images.model(motion_rate));
 
         // The firmware keeps these in statics.
-        let bus: &canopen::Shared = Box::leak(Box::new(canopen::Shared::new()));
+        let bus: &canopen_node::Shared = Box::leak(Box::new(canopen_node::Shared::new()));
         let shared: &Shared = Box::leak(Box::new(Shared::new()));
         let identity = Box::leak(Box::new(Identity {
             device_type: DEVICE_TYPE,

@@ -1,7 +1,7 @@
 //! A joint's objects by name, and its configuration as joint.toml; host.
 
 use crate::absent::is_absent;
-use joint_firmware::canopen::{Access, Group};
+use canopen_node::{Access, Group};
 use joint_firmware::default_configuration::MOTEUS_R4;
 use joint_firmware::joint::BoardLimits;
 use joint_firmware::joint::configuration::{BridgeConfiguration, Configuration};

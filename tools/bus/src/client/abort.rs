@@ -1,6 +1,6 @@
 //! CiA's words for every SDO abort code; host.
 
-use joint_firmware::canopen::Abort;
+use canopen_node::Abort;
 
 /// What an abort code means: CiA 301 section 7.2.4.3.17, table 22.
 pub fn description(abort: Abort) -> &'static str {

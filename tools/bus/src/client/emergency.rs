@@ -89,7 +89,7 @@ impl fmt::Display for Emergency {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use joint_firmware::canopen::emergency::code;
+    use canopen_node::emergency::code;
 
     fn decode(id: u16, data: &[u8]) -> Option<Emergency> {
         Emergency::decode(&Frame::new(id, data).unwrap())

@@ -2,7 +2,7 @@
 
 use super::abort::description;
 use crate::BusError;
-use joint_firmware::canopen::Abort;
+use canopen_node::Abort;
 use std::fmt;
 use std::time::Duration;
 

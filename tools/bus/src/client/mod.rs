@@ -39,7 +39,7 @@ pub use nmt::{Command, Target};
 pub use node::Node;
 pub use sync::SyncProducer;
 
-pub use joint_firmware::canopen::{Abort, NmtState};
+pub use canopen_node::{Abort, NmtState};
 
 /// Identifiers of the predefined connection set, CiA 301 section 7.3.3; the node id is added to the last four.
 pub mod cob_id {

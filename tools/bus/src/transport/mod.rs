@@ -27,8 +27,8 @@ mod socketcan;
 mod udp;
 mod virtual_bus;
 
+pub use canopen_node::Frame;
 pub use error::BusError;
-pub use joint_firmware::canopen::Frame;
 pub use port::free_port;
 
 use crate::pacing::Statistics;

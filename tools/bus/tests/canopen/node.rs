@@ -1,7 +1,7 @@
 //! A small CANopen node: the project's server with a dictionary of a few objects.
 
 use bus::{Frame, Transport};
-use joint_firmware::canopen::{
+use canopen_node::{
     Abort, Access, CommunicationParameters, Entry, Event, Group, Identity, Length, Mappable, MappedObject, NmtState,
     ObjectDictionary, PdoParameters, ProcessImage, Receiver, Route, SdoSettings, Server, Shared,
 };

@@ -3,8 +3,8 @@
 use super::CommandError;
 use super::remote::{Patience, Where};
 use crate::remote::{address, configuration};
+use canopen_node::Group;
 use clap::{Args, ValueEnum};
-use joint_firmware::canopen::Group;
 use std::time::Duration;
 
 /// Which parameters.

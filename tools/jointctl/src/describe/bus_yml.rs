@@ -9,7 +9,7 @@
 
 use super::eds::Identity;
 use crate::remote::Entry;
-use joint_firmware::canopen::PdoParameters;
+use canopen_node::PdoParameters;
 use joint_firmware::objects::default_communication;
 use std::fmt::Write;
 

@@ -7,7 +7,7 @@ use super::plain;
 use crate::remote::entry::{Entry, slug};
 use crate::remote::pdo::objects;
 use crate::remote::value::integer;
-use joint_firmware::canopen::PdoParameters;
+use canopen_node::PdoParameters;
 use joint_firmware::objects::field::{Field, SetPoint};
 use joint_firmware::objects::table::DataType;
 use joint_firmware::objects::{DEFAULT_RANGES, default_communication};

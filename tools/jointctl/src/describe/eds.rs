@@ -6,7 +6,7 @@
 
 use super::plain;
 use crate::remote::Entry;
-use joint_firmware::canopen::{Access, CommunicationParameters, PDOS, PdoParameters};
+use canopen_node::{Access, CommunicationParameters, PDOS, PdoParameters};
 use joint_firmware::objects::Operation;
 use joint_firmware::objects::default_communication;
 use joint_firmware::objects::field::{Constant, Field};

@@ -8,7 +8,7 @@ use super::error::RemoteError;
 use super::joint::RemoteJoint;
 use super::value::Value;
 use bus::client::{Abort, ClientError};
-use joint_firmware::canopen::{Access, Group};
+use canopen_node::{Access, Group};
 use joint_firmware::motor::setting::Name;
 use joint_firmware::objects::field::{ConfigurationField, Field, ImageField, OwnerField};
 

@@ -4,7 +4,7 @@
 //! the record goes before it: `image-life-cycle.command`. An index does as well: `2103:1`, `2103h:1`, `0x2103:1`.
 
 use super::error::RemoteError;
-use joint_firmware::canopen::Access;
+use canopen_node::Access;
 use joint_firmware::objects::field::Field;
 use joint_firmware::objects::table::{Object, Text, communication, described};
 

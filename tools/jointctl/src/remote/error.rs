@@ -2,7 +2,7 @@
 
 use bus::BusError;
 use bus::client::ClientError;
-use joint_firmware::canopen::NmtState;
+use canopen_node::NmtState;
 use joint_firmware::joint::fault::Fault;
 use joint_firmware::joint::state_machine::State;
 
@@ -253,7 +253,7 @@ pub enum RemoteError {
         problem: String,
     },
     /// More signals than TPDOs carry.
-    #[error("{signals} signals of {bits} bits do not fit into {} TPDOs of 64 bits", joint_firmware::canopen::PDOS)]
+    #[error("{signals} signals of {bits} bits do not fit into {} TPDOs of 64 bits", canopen_node::PDOS)]
     TooManySignals {
         /// How many.
         signals: usize,

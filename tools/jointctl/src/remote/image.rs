@@ -12,7 +12,7 @@ use super::value::Value;
 use crate::progress::Progress;
 use bus::client::ClientError;
 use bus::client::sdo::Method;
-use joint_firmware::canopen::Abort;
+use canopen_node::Abort;
 use joint_firmware::objects::field::{Actual, Field, ImageField, StoredField, Which};
 use joint_firmware::parameters::authentication::{STAGING, split};
 use joint_firmware::parameters::life_cycle::{Command, State};

@@ -2,7 +2,7 @@
 
 use super::error::RemoteError;
 use super::joint::RemoteJoint;
-use joint_firmware::canopen::{MAPPED, MappedObject, PDOS, PdoParameters};
+use canopen_node::{MAPPED, MappedObject, PDOS, PdoParameters};
 
 /// "Does not exist" in a PDO's COB-ID.
 const INVALID: u32 = 1 << 31;

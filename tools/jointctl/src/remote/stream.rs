@@ -12,7 +12,7 @@ use super::joint::RemoteJoint;
 use super::pdo::{Change, Direction, Pdo, pack};
 use bus::Frame;
 use bus::client::{ClientError, Command as Nmt, NmtState, Subscription, Target};
-use joint_firmware::canopen::{MappedObject, PdoParameters};
+use canopen_node::{MappedObject, PdoParameters};
 use joint_firmware::joint::state_machine::{Controlword, State};
 use joint_firmware::joint::{Command, Mode};
 use joint_firmware::objects::field::{Actual, Field, RANGES, Range, SetPoint};

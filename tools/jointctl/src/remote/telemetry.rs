@@ -10,7 +10,7 @@ use super::error::RemoteError;
 use super::joint::RemoteJoint;
 use super::pdo::{Change, Direction, Pdo, unpack};
 use bus::client::{Command, NmtState, Received, Subscription};
-use joint_firmware::canopen::{MAPPED, MappedObject, PDOS, PdoParameters};
+use canopen_node::{MAPPED, MappedObject, PDOS, PdoParameters};
 use joint_firmware::objects::field::{Actual, Field};
 use std::time::{Duration, Instant};
 

@@ -2,7 +2,7 @@
 
 use crate::served::{NODE, Served, image, program};
 use bus::client::Network;
-use joint_firmware::canopen::NO_NODE_ID;
+use canopen_node::NO_NODE_ID;
 use joint_firmware::joint::state_machine::State;
 use jointctl::remote::drive::state_of;
 use std::io::Read;

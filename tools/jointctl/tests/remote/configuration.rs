@@ -4,7 +4,7 @@ use crate::served::{NODE, Served};
 use bus::Frame;
 use bus::client::lss::request;
 use bus::client::{Command, Network, cob_id};
-use joint_firmware::canopen::{Group, NO_NODE_ID};
+use canopen_node::{Group, NO_NODE_ID};
 use joint_firmware::joint::Mode;
 use jointctl::remote::configuration::{restore, set, store};
 use jointctl::remote::{Entry, RemoteError, RemoteJoint, Stream, address, info};

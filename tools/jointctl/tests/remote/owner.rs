@@ -3,7 +3,7 @@
 
 use crate::served::{NODE, Served, image, program};
 use bus::client::{Abort, ClientError, Command as Nmt, Target};
-use joint_firmware::canopen::Group;
+use canopen_node::Group;
 use joint_firmware::objects::field::{Field, OwnerField, SetPoint};
 use joint_firmware::objects::settings::Setting;
 use joint_firmware::parameters::authentication::Key;

@@ -2,7 +2,7 @@
 
 use crate::served::{NODE, Served};
 use bus::client::SyncProducer;
-use joint_firmware::canopen::PdoParameters;
+use canopen_node::PdoParameters;
 use joint_firmware::joint::{Command, Mode};
 use joint_firmware::objects::default_communication;
 use joint_firmware::objects::field::Actual;

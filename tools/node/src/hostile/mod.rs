@@ -22,7 +22,7 @@ pub use script::{images, interpret};
 
 use crate::storage::Storage;
 use bus::Frame;
-use joint_firmware::canopen::{self, Identity, NO_NODE_ID, NmtState, Receiver, Route, SdoSettings, Server};
+use canopen_node::{Identity, NO_NODE_ID, NmtState, Receiver, Route, SdoSettings, Server};
 use joint_firmware::default_configuration::B_G431B_ESC1;
 use joint_firmware::joint::configuration::Configuration;
 use joint_firmware::joint::state_machine::{Controlword, State};
@@ -108,7 +108,7 @@ impl Counts {
 /// What the firmware keeps in statics.
 #[derive(Debug)]
 pub struct Statics {
-    bus: canopen::Shared,
+    bus: canopen_node::Shared,
     shared: Shared,
     staging: [u8; STAGING],
 }
@@ -118,14 +118,14 @@ impl Statics {
     #[allow(clippy::new_without_default, reason = "as its parts")]
     #[must_use]
     pub const fn new() -> Self {
-        Self { bus: canopen::Shared::new(), shared: Shared::new(), staging: [0; STAGING] }
+        Self { bus: canopen_node::Shared::new(), shared: Shared::new(), staging: [0; STAGING] }
     }
 }
 
 /// A node under attack.
 #[derive(Debug)]
 pub struct HostileNode<'a> {
-    bus: &'a canopen::Shared,
+    bus: &'a canopen_node::Shared,
     receiver: Receiver<'a>,
     server: Server<'a>,
     image: JointImage<'a>,

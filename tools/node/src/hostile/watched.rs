@@ -1,7 +1,7 @@
 //! The program around the objects under attack: it stores, and notes what it must never have been asked for.
 
 use crate::storage::Storage;
-use joint_firmware::canopen::Event;
+use canopen_node::Event;
 use joint_firmware::joint::configuration::{BridgeConfiguration, Configuration};
 use joint_firmware::joint::history::History;
 use joint_firmware::motor::open_loop::Window;

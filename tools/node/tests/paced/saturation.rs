@@ -1,9 +1,9 @@
-//! A bus without room: what is defined in `canopen::TransmitQueue` and docs/bus.md.
+//! A bus without room: what is defined in `canopen_node::TransmitQueue` and docs/bus.md.
 
 use crate::master::{FIRST, Line, MILLISECOND, US};
 use bus::Frame;
 use bus::pacing::Station;
-use joint_firmware::canopen::NmtState;
+use canopen_node::NmtState;
 use joint_firmware::joint::state_machine::State;
 use node::{PacedEvent, PacedNodes};
 use std::time::Duration;

@@ -3,7 +3,7 @@
 use super::super::error::Object;
 use super::crc::crc;
 use super::{Message, Method, SEGMENT, Step, TOGGLE, length, names, request};
-use joint_firmware::canopen::Abort;
+use canopen_node::Abort;
 
 /// Up to so many bytes the segmented protocol needs no more frames than the block protocol.
 const SEGMENTED: usize = 28;

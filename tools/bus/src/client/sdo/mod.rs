@@ -14,7 +14,7 @@ mod download;
 mod upload;
 
 use super::error::Object;
-use joint_firmware::canopen::Abort;
+use canopen_node::Abort;
 use std::time::Duration;
 
 /// An SDO message.

@@ -3,7 +3,7 @@
 use super::super::error::Object;
 use super::crc::crc;
 use super::{Message, Method, SEGMENT, Settings, Step, TOGGLE, names, request};
-use joint_firmware::canopen::Abort;
+use canopen_node::Abort;
 
 const LAST: u8 = 0x80;
 

@@ -21,7 +21,8 @@ impl Frame {
             return None;
         }
         let mut bytes = [0; 8];
-        bytes.get_mut(..data.len())?.copy_from_slice(data);
+        let place = bytes.get_mut(..data.len())?;
+        place.iter_mut().zip(data).for_each(|(byte, value)| *byte = *value);
         Some(Self { id, length: data.len() as u8, data: bytes })
     }
 

@@ -1,10 +1,10 @@
 //! TPDOs: assembling one, in either context, and when it is sent: with SYNC, on a change, by its timer.
 
 use super::MappedObject;
-use crate::canopen::COUNTER_AND_DATE;
-use crate::canopen::frame::Frame;
-use crate::canopen::shared::{PdoRegisters, Shared};
-use crate::canopen::time::{MILLISECOND, elapsed};
+use crate::COUNTER_AND_DATE;
+use crate::frame::Frame;
+use crate::shared::{PdoRegisters, Shared};
+use crate::time::{MILLISECOND, elapsed};
 
 /// The frame of a TPDO that exists and carries anything. `value` gives the actual value of each object; none leaves
 /// the frame out.

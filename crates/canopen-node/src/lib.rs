@@ -41,6 +41,8 @@
 //! multiplexed PDOs.
 //!
 //! A TPDO of type 0, 254 or 255 is sent once when the node becomes operational, then after [`Shared::trigger`].
+#![cfg_attr(not(test), no_std)]
+#![deny(unsafe_code)]
 
 mod abort;
 mod access;
@@ -76,9 +78,9 @@ pub use server::Server;
 pub use shared::{NO_NODE_ID, Shared};
 pub use transmit_queue::{Buffers, PATIENCE, TransmitQueue, URGENT};
 
-/// Presence of the SYNC counter (1019h, 1800h:6) and of date and time of the configuration (1020h) in this program.
-/// With the feature `little-room` a chip's program has none; on the host nothing changes.
-pub const COUNTER_AND_DATE: bool = !cfg!(all(feature = "little-room", target_os = "none"));
+/// Presence of the SYNC counter (1019h, 1800h:6) and of date and time of the configuration (1020h) in this program: the
+/// feature `counter-and-date`.
+pub const COUNTER_AND_DATE: bool = cfg!(feature = "counter-and-date");
 
 /// Identifiers of the predefined connection set, CiA 301 section 7.3.3; the node id is added to the last three.
 const NMT: u16 = 0x000;

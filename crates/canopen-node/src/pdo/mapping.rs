@@ -3,10 +3,10 @@
 //! PDO into service; the task.
 
 use super::MappedObject;
-use crate::canopen::abort::Abort;
-use crate::canopen::dictionary::{Access, Entry, Length, ObjectDictionary};
-use crate::canopen::parameters::{HIGHEST_COUNTER, INVALID, MAPPED, NO_REMOTE, is_free};
-use crate::canopen::shared::PdoRegisters;
+use crate::abort::Abort;
+use crate::dictionary::{Access, Entry, Length, ObjectDictionary};
+use crate::parameters::{HIGHEST_COUNTER, INVALID, MAPPED, NO_REMOTE, is_free};
+use crate::shared::PdoRegisters;
 
 /// Which way a PDO goes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -55,7 +55,7 @@ impl<'a, D: ObjectDictionary> Objects<'_, 'a, D> {
 fn copy(all: &[u8], offset: u32, out: &mut [u8]) -> Result<(), Abort> {
     let rest = all.get(offset as usize..).ok_or(Abort::GENERAL)?;
     let part = rest.get(..out.len()).ok_or(Abort::GENERAL)?;
-    out.copy_from_slice(part);
+    out.iter_mut().zip(part).for_each(|(byte, value)| *byte = *value);
     Ok(())
 }
 

@@ -1,9 +1,9 @@
 //! Expedited and segmented transfers: CiA 301 sections 7.2.4.3.3 to 7.2.4.3.8.
 
 use super::{Initiate, Message};
-use crate::canopen::abort::Abort;
-use crate::canopen::access::{Objects, Sink, Source};
-use crate::canopen::dictionary::ObjectDictionary;
+use crate::abort::Abort;
+use crate::access::{Objects, Sink, Source};
+use crate::dictionary::ObjectDictionary;
 
 /// Opens what an "initiate download" writes.
 pub(super) fn open<D: ObjectDictionary>(initiate: &Initiate, objects: &mut Objects<'_, '_, D>) -> Result<Sink, Abort> {

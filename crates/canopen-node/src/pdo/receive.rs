@@ -1,7 +1,7 @@
 //! RPDOs: from a frame to the process image; the receive interrupt.
 
 use super::{MappedObject, ProcessImage};
-use crate::canopen::shared::{PdoRegisters, Shared};
+use crate::shared::{PdoRegisters, Shared};
 
 /// Data of a synchronous RPDO that waits for SYNC; a newer one replaces it.
 #[derive(Clone, Copy, Debug)]

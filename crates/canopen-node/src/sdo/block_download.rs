@@ -2,9 +2,9 @@
 
 use super::Message;
 use super::crc::BlockCrc;
-use crate::canopen::abort::Abort;
-use crate::canopen::access::{Objects, Sink};
-use crate::canopen::dictionary::ObjectDictionary;
+use crate::abort::Abort;
+use crate::access::{Objects, Sink};
+use crate::dictionary::ObjectDictionary;
 
 /// Answer to "initiate block download", with CRC support.
 pub(super) const COMMAND: u8 = 0xA4;

@@ -2,9 +2,9 @@
 
 use super::Message;
 use super::crc::BlockCrc;
-use crate::canopen::abort::Abort;
-use crate::canopen::access::{Objects, Source};
-use crate::canopen::dictionary::ObjectDictionary;
+use crate::abort::Abort;
+use crate::access::{Objects, Source};
+use crate::dictionary::ObjectDictionary;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
