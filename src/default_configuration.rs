@@ -5,8 +5,6 @@
 //! compensation is off. What a board itself brings, [`BridgeConfiguration`] and the limits of its parts, is data of the
 //! board; its sources stand in `src/board/`.
 
-use crate::compensation::Request;
-use crate::friction::regime::MOST_SETS;
 use crate::joint::BoardLimits;
 use crate::joint::configuration::{
     AdaptationRequest, BridgeConfiguration, CompensationConfiguration, Configuration, FACTORY_TRIM,
@@ -16,6 +14,8 @@ use crate::joint::configuration::{
 use crate::joint::stopping::StopConfiguration;
 use crate::motor::angle::{Direction, ElectricalAngle, EncoderAlignment};
 use crate::sensors::analog::Analog;
+use friction_compensation::compensation::Request;
+use friction_compensation::friction::regime::MOST_SETS;
 
 /// What a board brings, and the joint that it is until a configuration says otherwise.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,8 +2,9 @@
 //!
 //! This library is everything of it that knows no register; `main.rs`, `board` and `tasks` are the program around it. A
 //! measurement takes this way: [`sensors`] (what a raw word means), [`joint`] (faults, state machine, motion),
-//! [`friction`] and [`compensation`] (what friction will take of the torque), [`motor`] (the current loop). Commands
-//! and settings come through [`canopen_node`] (the protocol) and [`objects`] (this joint's), images through [`parameters`].
+//! [`friction_compensation`] (what friction will take of the torque), [`motor`] (the current loop). Commands and
+//! settings come through [`canopen_node`] (the protocol) and [`objects`] (this joint's), images through
+//! [`friction_compensation::parameters`].
 //!
 //! # Where code runs
 //!
@@ -21,19 +22,11 @@
 #![cfg_attr(not(test), no_std)]
 #![deny(unsafe_code)]
 
-pub mod compensation;
 pub mod default_configuration;
-#[allow(unsafe_code)]
-pub mod dsp;
-
 pub mod exchange;
-pub mod friction;
 pub mod hardware;
 pub mod joint;
 pub mod motor;
 pub mod objects;
-pub mod parameters;
-pub mod quantity;
 pub mod reset_record;
 pub mod sensors;
-pub mod sine;

@@ -3,7 +3,7 @@
 
 #![no_main]
 
-use joint_firmware::parameters::authentication::Key;
+use friction_compensation::parameters::authentication::Key;
 use libfuzzer_sys::fuzz_target;
 use node::hostile::{HostileNode, Statics, images, interpret};
 use std::sync::OnceLock;

@@ -4,8 +4,8 @@
 use crate::driving::{COMMAND_STEPS, demand, moves};
 use crate::informed::informed;
 use crate::variant::DEFAULT;
-use joint_firmware::compensation::Request;
-use joint_firmware::friction::FrictionModel;
+use friction_compensation::compensation::Request;
+use friction_compensation::friction::FrictionModel;
 use joint_firmware::joint::configuration::{LoadConfiguration, LoadFeedforwardRequest};
 use joint_firmware::joint::state_machine::State;
 use joint_firmware::joint::{Command, Demand, Mode};

@@ -1,8 +1,8 @@
 //! Images of every kind drawn from a seed, with limits of their own, and whether the certificate passes them.
 
 use crate::parameters::{extreme, image, tame};
-use joint_firmware::parameters::certificate::{Limits, Refusal, certify, prove};
-use joint_firmware::parameters::image::Image;
+use friction_compensation::parameters::certificate::{Limits, Refusal, certify, prove};
+use friction_compensation::parameters::image::Image;
 use rand::{Rng, RngExt};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;

@@ -1,6 +1,6 @@
 //! A joint as a user commissions it: excite it without compensation, record, fit, and take what the board would load.
 
-use joint_firmware::friction::FrictionModel;
+use friction_compensation::friction::FrictionModel;
 use jointctl::dataset::prepare;
 use jointctl::fit::{Options, fit};
 use jointctl::progress::Silent;

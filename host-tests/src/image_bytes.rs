@@ -1,6 +1,6 @@
 //! The bytes of parameter images, with a checksum of our own.
 
-use joint_firmware::parameters::image::{Image, MAX_LENGTH};
+use friction_compensation::parameters::image::{Image, MAX_LENGTH};
 
 /// CRC-32 (ISO-HDLC), bit by bit.
 pub fn crc32(bytes: &[u8]) -> u32 {

@@ -4,8 +4,8 @@
 use crate::commission::{Commissioned, commission};
 use crate::driving::{self, COMMAND_STEPS, follow};
 use crate::variant::{DEFAULT, Variant};
-use joint_firmware::compensation::{Reason, Request};
-use joint_firmware::friction::FrictionModel;
+use friction_compensation::compensation::{Reason, Request};
+use friction_compensation::friction::FrictionModel;
 use joint_firmware::joint::state_machine::{Controlword, State};
 use joint_firmware::joint::{Demand, Telemetry};
 use jointctl::metrics::relative_floor;

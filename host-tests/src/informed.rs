@@ -2,11 +2,11 @@
 //! known amount.
 
 use crate::parameters::{coefficients, q16, range};
-use joint_firmware::friction::common::CommonTerms;
-use joint_firmware::friction::domain::Domain;
-use joint_firmware::friction::physical::{Coefficients, PhysicalParameters, Terms};
-use joint_firmware::friction::regime::Selector;
-use joint_firmware::friction::{FrictionParameters, ParameterSet};
+use friction_compensation::friction::common::CommonTerms;
+use friction_compensation::friction::domain::Domain;
+use friction_compensation::friction::physical::{Coefficients, PhysicalParameters, Terms};
+use friction_compensation::friction::regime::Selector;
+use friction_compensation::friction::{FrictionParameters, ParameterSet};
 use plant::actuator::ActuatorParameters;
 use plant::friction::{FrictionParameters as Plant, REFERENCE_TEMPERATURE};
 

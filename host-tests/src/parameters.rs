@@ -1,19 +1,19 @@
 //! Friction parameters drawn from a seed: [`tame`] ones look like those of identified joints and trained networks,
 //! [`extreme`] ones use every bit that an image may hold.
 
-use joint_firmware::friction::common::CommonTerms;
-use joint_firmware::friction::domain::{Domain, Range};
-use joint_firmware::friction::maxwell_slip::{ELEMENTS, MAX_LEVEL, MAX_STIFFNESS, MaxwellElement};
-use joint_firmware::friction::network::{
+use friction_compensation::friction::common::CommonTerms;
+use friction_compensation::friction::domain::{Domain, Range};
+use friction_compensation::friction::maxwell_slip::{ELEMENTS, MAX_LEVEL, MAX_STIFFNESS, MaxwellElement};
+use friction_compensation::friction::network::{
     INPUTS, MAX_FRACTION, MAX_SCALE, MIN_FRACTION, NEURONS, NetworkParameters, Neuron,
 };
-use joint_firmware::friction::physical::{Coefficients, Dimension, PhysicalParameters, Terms};
-use joint_firmware::friction::regime::{Criterion, MAX_CRITERIA, MOST_SETS, Measure, Selector};
-use joint_firmware::friction::ripple::Ripple;
-use joint_firmware::friction::state::{JointState, SIGNALS, Signal};
-use joint_firmware::friction::{Estimate, FrictionModel, FrictionParameters, ParameterSet};
-use joint_firmware::parameters::certificate::Limits;
-use joint_firmware::parameters::image::{GoldenSequence, GoldenVector, Image, MAX_GOLDEN};
+use friction_compensation::friction::physical::{Coefficients, Dimension, PhysicalParameters, Terms};
+use friction_compensation::friction::regime::{Criterion, MAX_CRITERIA, MOST_SETS, Measure, Selector};
+use friction_compensation::friction::ripple::Ripple;
+use friction_compensation::friction::state::{JointState, SIGNALS, Signal};
+use friction_compensation::friction::{Estimate, FrictionModel, FrictionParameters, ParameterSet};
+use friction_compensation::parameters::certificate::Limits;
+use friction_compensation::parameters::image::{GoldenSequence, GoldenVector, Image, MAX_GOLDEN};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 

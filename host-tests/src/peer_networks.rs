@@ -1,8 +1,8 @@
 //! A friction network for the other libraries of the probe's program `networks`: in floats, and quantized to 8 bits;
 //! with what each of them gives held against the exact one.
 
-use joint_firmware::friction::domain::Domain;
-use joint_firmware::friction::network::{INPUTS, NEURONS, NetworkParameters, Neuron};
+use friction_compensation::friction::domain::Domain;
+use friction_compensation::friction::network::{INPUTS, NEURONS, NetworkParameters, Neuron};
 
 /// Weights and bias of each neuron of a layer.
 type Layer = Vec<([f64; NEURONS], f64)>;

@@ -1,11 +1,11 @@
 //! Joint states drawn from a seed: inside a model's box, on its corners and edges, where a table's step begins, and
 //! anywhere.
 
-use joint_firmware::friction::FrictionParameters;
-use joint_firmware::friction::domain::Range;
-use joint_firmware::friction::network::{INPUTS, NetworkParameters};
-use joint_firmware::friction::regime::{Criterion, Measure};
-use joint_firmware::friction::state::{SIGNALS, Signal};
+use friction_compensation::friction::FrictionParameters;
+use friction_compensation::friction::domain::Range;
+use friction_compensation::friction::network::{INPUTS, NetworkParameters};
+use friction_compensation::friction::regime::{Criterion, Measure};
+use friction_compensation::friction::state::{SIGNALS, Signal};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 

@@ -2,8 +2,8 @@
 //! does.
 
 use crate::driving::enabled;
-use joint_firmware::compensation::Request;
-use joint_firmware::friction::FrictionModel;
+use friction_compensation::compensation::Request;
+use friction_compensation::friction::FrictionModel;
 use joint_firmware::joint::active::Active;
 use joint_firmware::joint::configuration::{AdaptationRequest, Configuration, VelocitySource};
 use plant::VirtualJoint;

@@ -2,8 +2,8 @@
 //! `jointctl robot fit`'s pipeline; then moved by computed torque with what came out.
 
 use crate::driving::COMMAND_STEPS;
-use joint_firmware::compensation::Request;
-use joint_firmware::friction::FrictionModel;
+use friction_compensation::compensation::Request;
+use friction_compensation::friction::FrictionModel;
 use joint_firmware::joint::state_machine::{Controlword, State};
 use joint_firmware::joint::{Command, Demand, Mode, Telemetry};
 use jointctl::fit::Options as JointOptions;

@@ -1,13 +1,13 @@
 //! The friction model once more, in 128-bit integers: the same roundings and tables as the control step, but no sum can
 //! wrap and no shift can lose a bit. Where the control step gives the same, nothing in it overflowed.
 
-use joint_firmware::friction::FrictionParameters;
-use joint_firmware::friction::common::CommonTorques;
-use joint_firmware::friction::domain::{Domain, Range};
-use joint_firmware::friction::network::{INPUTS, MIN_FRACTION, NetworkParameters, Neuron};
-use joint_firmware::friction::physical::{PhysicalParameters, Terms};
-use joint_firmware::friction::smooth::{atan, odd_sines, stribeck, tanh};
-use joint_firmware::friction::state::{SIGNALS, Signal};
+use friction_compensation::friction::FrictionParameters;
+use friction_compensation::friction::common::CommonTorques;
+use friction_compensation::friction::domain::{Domain, Range};
+use friction_compensation::friction::network::{INPUTS, MIN_FRACTION, NetworkParameters, Neuron};
+use friction_compensation::friction::physical::{PhysicalParameters, Terms};
+use friction_compensation::friction::smooth::{atan, odd_sines, stribeck, tanh};
+use friction_compensation::friction::state::{SIGNALS, Signal};
 
 /// Torques of the physical model and of the network of one set, Q16.16, with what the common terms give.
 pub fn evaluate(

@@ -1,8 +1,8 @@
 //! An arm of three virtual joints, identified from a recording of all of them, moves by computed torque with low gains:
 //! with the friction images it follows several times as closely.
 
+use friction_compensation::compensation::Request;
 use host_tests::virtual_arm::{Loop, identified};
-use joint_firmware::compensation::Request;
 
 /// Least factor by which the position error falls, RMS over the joints, where joints close the loop, and where the
 /// master does in torque mode: docs/robot.md's, less a tenth.

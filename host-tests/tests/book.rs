@@ -162,7 +162,7 @@ fn names_in_diagrams_are_those_of_the_code() {
 
 #[test]
 fn the_terms_of_the_theory_are_those_of_the_code() {
-    let (code, theory) = (read("src/friction/physical.rs"), read("docs/theory.md"));
+    let (code, theory) = (read("crates/friction-compensation/src/friction/physical.rs"), read("docs/theory.md"));
     let rows: Vec<&str> = code.lines().filter_map(|line| line.strip_prefix("//! | ")).skip(1).collect();
     assert!(rows.len() >= 10);
     for row in rows {

@@ -1,17 +1,17 @@
 //! The certificate is sound and says something: what it proves of an image holds for every state that random draws and
 //! a search against it come up with, and is not far above the worst of them.
 
+use friction_compensation::friction::common::CommonTorques;
+use friction_compensation::friction::domain::Range;
+use friction_compensation::friction::maxwell_slip::Bent;
+use friction_compensation::friction::network::{MAX_SCALE, NetworkParameters, Neuron};
+use friction_compensation::friction::physical::Terms;
+use friction_compensation::friction::state::{JointState, SIGNALS, Signal};
+use friction_compensation::friction::{Estimate, FrictionModel, FrictionParameters};
+use friction_compensation::parameters::certificate::{Certificate, Limits, Refusal, certify, prove};
 use host_tests::parameters::{extreme, frictionless, range, tame};
 use host_tests::states::signals;
 use host_tests::wide;
-use joint_firmware::friction::common::CommonTorques;
-use joint_firmware::friction::domain::Range;
-use joint_firmware::friction::maxwell_slip::Bent;
-use joint_firmware::friction::network::{MAX_SCALE, NetworkParameters, Neuron};
-use joint_firmware::friction::physical::Terms;
-use joint_firmware::friction::state::{JointState, SIGNALS, Signal};
-use joint_firmware::friction::{Estimate, FrictionModel, FrictionParameters};
-use joint_firmware::parameters::certificate::{Certificate, Limits, Refusal, certify, prove};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

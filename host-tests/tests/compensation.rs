@@ -1,14 +1,14 @@
 //! Compensation is bounded, falls back by itself, and switched off it is not there.
 
+use friction_compensation::compensation::{Acting, Compensation, Output, Reason, Request, Settings, SettingsError};
+use friction_compensation::friction::maxwell_slip::Bent;
+use friction_compensation::friction::physical::Terms;
+use friction_compensation::friction::regime::{Criterion, Measure, Selector};
+use friction_compensation::friction::state::{JointState, SIGNALS, Signal};
+use friction_compensation::friction::{FrictionModel, FrictionParameters, ParameterSet};
+use friction_compensation::quantity::{Torque, Velocity};
 use host_tests::parameters::{bits, extreme, frictionless, q16, range, tame, tame_network};
 use host_tests::states::{signals, within};
-use joint_firmware::compensation::{Acting, Compensation, Output, Reason, Request, Settings, SettingsError};
-use joint_firmware::friction::maxwell_slip::Bent;
-use joint_firmware::friction::physical::Terms;
-use joint_firmware::friction::regime::{Criterion, Measure, Selector};
-use joint_firmware::friction::state::{JointState, SIGNALS, Signal};
-use joint_firmware::friction::{FrictionModel, FrictionParameters, ParameterSet};
-use joint_firmware::quantity::{Torque, Velocity};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -1,11 +1,11 @@
 //! Every effect of the plant that the firmware compensates: the error is small with its compensation and several times
 //! as large with that compensation alone switched off.
 
+use friction_compensation::compensation::Request;
+use friction_compensation::friction::physical::Terms;
+use friction_compensation::friction::{FrictionModel, FrictionParameters};
 use host_tests::driving::{enabled, follow};
 use host_tests::informed::informed;
-use joint_firmware::compensation::Request;
-use joint_firmware::friction::physical::Terms;
-use joint_firmware::friction::{FrictionModel, FrictionParameters};
 use plant::actuator::{ActuatorParameters, Effect};
 use plant::excitation::{Segment, Trajectory, back_and_forth};
 use plant::virtual_joint::Setup;

@@ -1,11 +1,11 @@
 //! The physical model is the design's equation, term by term, within 0.05 % of each term's full scale; a term that is
 //! switched off contributes nothing.
 
+use friction_compensation::friction::domain::Domain;
+use friction_compensation::friction::physical::{Coefficients, Dimension, Physical, PhysicalParameters, Terms};
+use friction_compensation::friction::state::{SIGNALS, Signal};
 use host_tests::parameters::{bits, full_scale, tame_domain, tame_physical};
 use host_tests::states::within;
-use joint_firmware::friction::domain::Domain;
-use joint_firmware::friction::physical::{Coefficients, Dimension, Physical, PhysicalParameters, Terms};
-use joint_firmware::friction::state::{SIGNALS, Signal};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::{E, PI};

@@ -1,18 +1,20 @@
 //! A parameter image arrives whole or not at all: every damage is refused and named, everything else decodes and
 //! encodes to the same bytes.
 
+use friction_compensation::friction::domain::Range;
+use friction_compensation::friction::maxwell_slip::{MAX_LEVEL, MAX_STIFFNESS};
+use friction_compensation::friction::network::{MAX_SCALE, NetworkParameters, Neuron};
+use friction_compensation::friction::physical::Terms;
+use friction_compensation::friction::regime::{Criterion, Measure};
+use friction_compensation::friction::state::{SIGNALS, Signal};
+use friction_compensation::friction::{FrictionModel, FrictionParameters, ParameterSet};
+use friction_compensation::parameters::certificate::Limits;
+use friction_compensation::parameters::image::{
+    Effort, GoldenMismatch, Image, ImageError, MAX_GOLDEN, MAX_LENGTH, Target,
+};
+use friction_compensation::quantity::Torque;
 use host_tests::image_bytes::{encoded, sealed};
 use host_tests::parameters::{extreme, frictionless, image, tame, tame_common, to_format_1};
-use joint_firmware::friction::domain::Range;
-use joint_firmware::friction::maxwell_slip::{MAX_LEVEL, MAX_STIFFNESS};
-use joint_firmware::friction::network::{MAX_SCALE, NetworkParameters, Neuron};
-use joint_firmware::friction::physical::Terms;
-use joint_firmware::friction::regime::{Criterion, Measure};
-use joint_firmware::friction::state::{SIGNALS, Signal};
-use joint_firmware::friction::{FrictionModel, FrictionParameters, ParameterSet};
-use joint_firmware::parameters::certificate::Limits;
-use joint_firmware::parameters::image::{Effort, GoldenMismatch, Image, ImageError, MAX_GOLDEN, MAX_LENGTH, Target};
-use joint_firmware::quantity::Torque;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

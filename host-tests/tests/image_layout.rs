@@ -1,19 +1,19 @@
 //! The bytes of a parameter image are those of the documented layout: an image that a device stores today is read the
 //! same tomorrow.
 
+use friction_compensation::friction::FrictionParameters;
+use friction_compensation::friction::common::CommonTerms;
+use friction_compensation::friction::domain::Range;
+use friction_compensation::friction::maxwell_slip::MaxwellElement;
+use friction_compensation::friction::network::Neuron;
+use friction_compensation::friction::physical::{Coefficients, Terms};
+use friction_compensation::friction::regime::{Criterion, Measure, Selector};
+use friction_compensation::friction::ripple::Ripple;
+use friction_compensation::parameters::certificate::Limits;
+use friction_compensation::parameters::image::{Effort, GoldenVector, Image, Target};
+use friction_compensation::quantity::Torque;
 use host_tests::image_bytes::{crc32, encoded, sealed};
 use host_tests::parameters::frictionless;
-use joint_firmware::friction::FrictionParameters;
-use joint_firmware::friction::common::CommonTerms;
-use joint_firmware::friction::domain::Range;
-use joint_firmware::friction::maxwell_slip::MaxwellElement;
-use joint_firmware::friction::network::Neuron;
-use joint_firmware::friction::physical::{Coefficients, Terms};
-use joint_firmware::friction::regime::{Criterion, Measure, Selector};
-use joint_firmware::friction::ripple::Ripple;
-use joint_firmware::parameters::certificate::Limits;
-use joint_firmware::parameters::image::{Effort, GoldenVector, Image, Target};
-use joint_firmware::quantity::Torque;
 
 /// The coefficients in the order of the bytes: it is part of the format.
 const COEFFICIENTS: [&str; 32] = [

@@ -1,10 +1,10 @@
 //! Friction in motion, step by step: it changes once a round of the motion loop, and where the model is replaced
 //! meanwhile the torque stays within its slew limit.
 
+use friction_compensation::compensation::Request;
+use friction_compensation::friction::FrictionModel;
 use host_tests::driving::{demand, enabled};
 use host_tests::informed::informed;
-use joint_firmware::compensation::Request;
-use joint_firmware::friction::FrictionModel;
 use joint_firmware::joint::configuration::MOTION_STEPS;
 use joint_firmware::joint::state_machine::State;
 use plant::actuator::ActuatorParameters;

@@ -1,6 +1,6 @@
 //! A data set is the same in CSV, MCAP and Parquet: it fits to the same image, and its defects are told alike.
 
-use joint_firmware::parameters::image::MAX_LENGTH;
+use friction_compensation::parameters::image::MAX_LENGTH;
 use jointctl::dataset::{Prepared, prepare_with};
 use jointctl::fit::{Options, fit};
 use jointctl::presets::Preset;

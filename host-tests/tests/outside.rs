@@ -38,29 +38,45 @@ fn cargo(project: &Path, arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
+/// Crate, its example, and what that prints.
+const EXAMPLES: [(&str, &str, &str); 2] = [
+    // Boot-up message, then 21.5 °C by SDO.
+    (
+        "canopen-node",
+        "thermometer",
+        "event: State(PreOperational)\n705 [00]\nevent: State(Operational)\n585 [4B, 00, 20, 00, D7, 00, 00, 00]\n\
+         Operational\n",
+    ),
+    (
+        "friction-compensation",
+        "compensate",
+        "friction is at most 6.30 Nm\n+1.0 rad/s: +2.30 Nm (NoNetwork)\n-1.0 rad/s: -2.00 Nm (NoNetwork)\n\
+         +3.0 rad/s: +3.90 Nm (NoNetwork)\n+8.0 rad/s: +0.00 Nm (FarOutsideTrainedBox(Velocity))\n",
+    ),
+];
+
 fn main() {
     let arguments = Arguments::from_args();
     let missing = std::env::var_os("CI").is_none() && !target_installed();
-    let trials = vec![
-        Trial::test("a_node_of_another_project_answers_as_its_example_says", answers),
-        Trial::test("a_node_of_another_project_is_built_for_the_board_s_core", built).with_ignored_flag(missing),
-    ];
-    libtest_mimic::run(&arguments, trials).exit();
+    let trials = EXAMPLES.into_iter().flat_map(|(name, example, printed)| {
+        let runs = Trial::test(format!("{name}_prints_in_another_project_what_its_example_does"), move || {
+            runs(name, example, printed)
+        });
+        let built = Trial::test(format!("{name}_of_another_project_is_built_for_the_board_s_core"), move || {
+            built(name, example)
+        });
+        [runs, built.with_ignored_flag(missing)]
+    });
+    libtest_mimic::run(&arguments, trials.collect()).exit();
 }
 
-fn answers() -> Result<(), Failed> {
-    let printed = cargo(&project("canopen-node", "thermometer", "run"), &["run", "--quiet", "--offline"]);
-    // Boot-up message, then 21.5 °C by SDO.
-    let expected = "event: State(PreOperational)\n705 [00]\nevent: State(Operational)\n\
-                    585 [4B, 00, 20, 00, D7, 00, 00, 00]\nOperational\n";
-    if printed != expected {
-        return Err(printed.into());
-    }
-    Ok(())
+fn runs(name: &str, example: &str, expected: &str) -> Result<(), Failed> {
+    let printed = cargo(&project(name, example, "run"), &["run", "--quiet", "--offline"]);
+    if printed != expected { Err(printed.into()) } else { Ok(()) }
 }
 
-fn built() -> Result<(), Failed> {
-    let project = project("canopen-node", "thermometer", "build");
-    cargo(&project, &["check", "--quiet", "--offline", "-p", "canopen-node", "--target", TARGET]);
+fn built(name: &str, example: &str) -> Result<(), Failed> {
+    let project = project(name, example, "build");
+    cargo(&project, &["check", "--quiet", "--offline", "-p", name, "--target", TARGET]);
     Ok(())
 }

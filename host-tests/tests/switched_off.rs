@@ -1,9 +1,9 @@
 //! Compensation that is switched off is compensation that was never there: the same duties, bit for bit.
 
+use friction_compensation::compensation::Request;
+use friction_compensation::friction::FrictionModel;
 use host_tests::driving::{demand, enabled};
 use host_tests::informed::informed;
-use joint_firmware::compensation::Request;
-use joint_firmware::friction::FrictionModel;
 use joint_firmware::joint::Bridge;
 use plant::actuator::ActuatorParameters;
 use plant::excitation::Excitation;

@@ -11,8 +11,8 @@ use core::ptr::{addr_of, addr_of_mut};
 use core::sync::atomic::{AtomicU8, AtomicU32, Ordering};
 use cortex_m::peripheral::SCB;
 use embassy_stm32::pac;
+use friction_compensation::parameters::ecc::{self, Decision, Storage};
 use joint_firmware::objects::STORES;
-use joint_firmware::parameters::ecc::{self, Decision, Storage};
 use joint_firmware::reset_record::LastReset;
 use joint_firmware::reset_record::{Cause, Record, WORDS};
 

@@ -9,7 +9,7 @@ use core::ptr::addr_of;
 use embassy_stm32::Peri;
 use embassy_stm32::flash::{Blocking, Flash};
 use embassy_stm32::peripherals::FLASH;
-use joint_firmware::parameters::slots::{DOUBLE_WORD, PAGE, PAGE_WORDS, ReadError, SlotFlash, WriteError};
+use friction_compensation::parameters::slots::{DOUBLE_WORD, PAGE, PAGE_WORDS, ReadError, SlotFlash, WriteError};
 
 unsafe extern "C" {
     static __parameters_start: u8;

@@ -2,7 +2,7 @@
 //! mode.
 
 use embassy_stm32::pac;
-use joint_firmware::parameters::authentication::CHALLENGE;
+use friction_compensation::parameters::authentication::CHALLENGE;
 
 /// Reads until a bit is set, at most: the oscillator takes 4 us, a word some 10 us.
 const TRIES: u32 = 10_000;

@@ -8,11 +8,11 @@ use super::shared::Offering;
 use core::mem::MaybeUninit;
 use core::ptr::{addr_of_mut, null_mut};
 use core::sync::atomic::{AtomicPtr, Ordering};
-use joint_firmware::friction::FrictionModel;
-use joint_firmware::friction::regime::Memory;
+use friction_compensation::friction::FrictionModel;
+use friction_compensation::friction::regime::Memory;
+use friction_compensation::parameters::image::Image;
+use friction_compensation::quantity::Torque;
 use joint_firmware::joint::{Active, Telemetry, shadow};
-use joint_firmware::parameters::image::Image;
-use joint_firmware::quantity::Torque;
 
 /// Evaluations a second, Hz.
 const RATE: u32 = 1_000;

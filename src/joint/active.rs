@@ -9,8 +9,6 @@ use super::limit_law::LimitGains;
 use super::load_feedforward::{LOADS, LoadGains};
 use super::monitor::OVER_SPEED;
 use super::stopping::StopGains;
-use crate::compensation::Settings;
-use crate::friction::FrictionModel;
 use crate::motor::angle::{Direction, EncoderAlignment, STEPS, TAU};
 use crate::motor::current::{CurrentSettings, MotorConstants};
 use crate::motor::field_oriented::FieldOrientedGains;
@@ -22,8 +20,10 @@ use crate::motor::open_loop::OpenLoopGains;
 use crate::motor::setting::{SettingError, in_range};
 use crate::motor::thermal::{ThermalSettings, WindingTemperature};
 use crate::motor::transform::Dq;
-use crate::quantity::Torque;
 use core::mem::MaybeUninit;
+use friction_compensation::compensation::Settings;
+use friction_compensation::friction::FrictionModel;
+use friction_compensation::quantity::Torque;
 
 /// Steps of the slow task a second, Hz.
 pub const SLOW_RATE: f32 = 100.0;

@@ -29,9 +29,9 @@ use super::Telemetry;
 use super::active::Active;
 use super::configuration::AdaptationRequest;
 use super::state_machine::State;
-use crate::compensation::{Acting, Reason};
 use crate::motor::number::{exceeds, greater, lesser, limited, magnitude, or_zero, square_root, within};
-use crate::sine::cos_sin_of;
+use friction_compensation::compensation::{Acting, Reason};
+use friction_compensation::sine::cos_sin_of;
 
 /// Whether this program adapts. With the feature `little-room` a chip's program does not; on the host nothing changes.
 pub const ADAPTS: bool = !cfg!(all(feature = "little-room", target_os = "none"));

@@ -7,10 +7,10 @@
 use super::board_limits::BoardLimits;
 use super::load_feedforward::LOADS;
 use super::stopping::StopConfiguration;
-use crate::compensation::SettingsError;
 use crate::motor::angle::EncoderAlignment;
 use crate::motor::number::lesser;
 use crate::motor::setting::{Name, SettingError, in_range, within_range};
+use friction_compensation::compensation::SettingsError;
 
 /// Control steps of a round of the motion loop, each of which does a [stage](super::motion_loop::Stage) of it.
 pub const MOTION_STEPS: u32 = 5;
@@ -156,7 +156,7 @@ pub enum AdaptationRequest {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CompensationConfiguration {
     /// What is asked for.
-    pub request: crate::compensation::Request,
+    pub request: friction_compensation::compensation::Request,
     /// Share of the estimate that is added; 0 to 1.
     pub gain: f32,
     /// Largest compensation torque, Nm; 0 to the torque limit.

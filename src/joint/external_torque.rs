@@ -37,8 +37,8 @@ use super::adaptation::{Factors, image_torque};
 use super::configuration::{CollisionReaction, VelocitySource};
 use super::load_feedforward::{LOOK_RATE, Load};
 use super::state_machine::State;
-use crate::compensation::{Acting, Reason};
 use crate::motor::number::{greater, lesser, limited, magnitude, or_zero, within};
+use friction_compensation::compensation::{Acting, Reason};
 
 /// Time constant with which the estimate follows, s.
 pub const LAG: f32 = 0.01;

@@ -21,11 +21,11 @@ use super::active::{Active, AdaptationGains, CompensationGains, JointMotion};
 use super::adaptation::{ADAPTS, Factors};
 use super::configuration::VelocitySource;
 use super::motion_law::Wanted;
-use crate::compensation::{Acting, Compensation, Output, Reason};
-use crate::friction::FrictionModel;
-use crate::friction::state::JointState;
 use crate::motor::number::{greater, lesser, limited, magnitude, or_zero, within};
-use crate::quantity::{Acceleration, Position, Temperature, Torque, Velocity};
+use friction_compensation::compensation::{Acting, Compensation, Output, Reason};
+use friction_compensation::friction::FrictionModel;
+use friction_compensation::friction::state::JointState;
+use friction_compensation::quantity::{Acceleration, Position, Temperature, Torque, Velocity};
 
 /// Time over which the reference's acceleration is taken, s: several commands of a bus at 1 kHz.
 const DERIVATIVE: f32 = 0.004;
@@ -244,15 +244,15 @@ impl FrictionFeedforward {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::compensation::Request;
-    use crate::friction::common::CommonTerms;
-    use crate::friction::domain::{Domain, Range};
-    use crate::friction::maxwell_slip::MaxwellElement;
-    use crate::friction::physical::{Coefficients, PhysicalParameters, Terms};
-    use crate::friction::regime::Selector;
-    use crate::friction::state::SIGNALS;
-    use crate::friction::{FrictionModel, FrictionParameters, ParameterSet};
     use crate::joint::configuration::AdaptationRequest;
+    use friction_compensation::compensation::Request;
+    use friction_compensation::friction::common::CommonTerms;
+    use friction_compensation::friction::domain::{Domain, Range};
+    use friction_compensation::friction::maxwell_slip::MaxwellElement;
+    use friction_compensation::friction::physical::{Coefficients, PhysicalParameters, Terms};
+    use friction_compensation::friction::regime::Selector;
+    use friction_compensation::friction::state::SIGNALS;
+    use friction_compensation::friction::{FrictionModel, FrictionParameters, ParameterSet};
 
     /// Below it compensation fades, rad/s.
     const STANDSTILL: f32 = 0.1;

@@ -6,8 +6,8 @@
 
 use super::fault::{Fault, Faults};
 use super::state_machine::State;
-use crate::dsp::pkhtb;
 use crate::motor::transform::Dq;
+use friction_compensation::dsp::pkhtb;
 
 /// Steps that are kept.
 pub const LENGTH: usize = 64;

@@ -24,7 +24,7 @@ use super::Telemetry;
 use super::configuration::{CollisionReaction, Configuration, LoadConfiguration, LoadFeedforwardRequest};
 use super::state_machine::State;
 use crate::motor::number::{greater, limited, or_zero};
-use crate::sine::cos_sin_of;
+use friction_compensation::sine::cos_sin_of;
 
 /// Presence of the load's model in this program. With the feature `little-room` a chip's program does not have it; on
 /// the host nothing changes.

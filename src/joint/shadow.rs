@@ -1,10 +1,10 @@
 //! A friction model that is computed beside the one that acts, without effect; a task, a thousand times a second.
 
 use super::Telemetry;
-use crate::friction::FrictionModel;
-use crate::friction::regime::Memory;
-use crate::friction::state::JointState;
-use crate::quantity::{Acceleration, Position, Temperature, Torque, Velocity};
+use friction_compensation::friction::FrictionModel;
+use friction_compensation::friction::regime::Memory;
+use friction_compensation::friction::state::JointState;
+use friction_compensation::quantity::{Acceleration, Position, Temperature, Torque, Velocity};
 
 /// The model with its regime's memory.
 #[derive(Clone, Debug)]

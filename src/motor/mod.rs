@@ -2,7 +2,7 @@
 //!
 //! Single-precision floating point in SI units. The Cortex-M4F and the host both compute it by IEEE 754 without
 //! contraction, so the bits are the same as long as nothing calls a mathematics library: angles are 32-bit fractions of
-//! a turn, their sine and cosine come from integers ([`crate::sine`]), square roots from [`number`].
+//! a turn, their sine and cosine come from integers ([`friction_compensation::sine`]), square roots from [`number`].
 //!
 //! In the order of a control step:
 //!  - [`phases`]: one value for each of the three phases;

@@ -29,14 +29,14 @@ use crate::joint::configuration::Configuration;
 use crate::joint::state_machine::State;
 use crate::motor::number::exceeds;
 use crate::motor::open_loop::Window;
-use crate::parameters::authentication::{CHALLENGE, STAGING, TAG};
-use crate::parameters::life_cycle::{Action, LifeCycle, Refusal};
-use crate::parameters::slots::SlotError;
 use crate::reset_record::LastReset;
 use canopen_node::{
     Abort, Access, COUNTER_AND_DATE, CommunicationParameters, Entry, Event, Group, Length, NmtState, ObjectDictionary,
 };
 use core::cell::Cell;
+use friction_compensation::parameters::authentication::{CHALLENGE, STAGING, TAG};
+use friction_compensation::parameters::life_cycle::{Action, LifeCycle, Refusal};
+use friction_compensation::parameters::slots::SlotError;
 use heapless::Deque;
 
 /// EMCYs that wait for the task; when they are more, the newest are dropped.

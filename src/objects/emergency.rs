@@ -5,7 +5,7 @@ use super::observed::{Observed, fault_bits, reason_number};
 use crate::hardware::GateDriver;
 use crate::joint::configuration::CollisionReaction;
 use crate::joint::fault::{Fault, Faults};
-use crate::parameters::life_cycle::Refusal;
+use friction_compensation::parameters::life_cycle::Refusal;
 
 /// The joint left the range that its friction was learned in. Information: [`reason`](super::table), number of
 /// departures (u16).

@@ -7,7 +7,7 @@
 
 use super::program::Program;
 use crate::joint::fault::Faults;
-use crate::parameters::fault_log::{LOGGED, LoggedFault};
+use friction_compensation::parameters::fault_log::{LOGGED, LoggedFault};
 use heapless::Deque;
 
 /// Whether this program has the log.

@@ -1,9 +1,9 @@
 //! How well compensation does over time: departures from the range that friction was learned in, and how far the full
 //! model is from what acts; a task that looks at telemetry at an even rate.
 
-use crate::compensation::{Output, Reason};
 use crate::joint::Telemetry;
 use crate::motor::number::{or_zero, square_root};
+use friction_compensation::compensation::{Output, Reason};
 
 /// Looks over which the mean square is taken: about a second at 1 kHz.
 const MEMORY: f32 = 1_000.0;
@@ -44,8 +44,8 @@ impl FrictionStatistics {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::friction::state::Signal;
-    use crate::quantity::Torque;
+    use friction_compensation::friction::state::Signal;
+    use friction_compensation::quantity::Torque;
 
     fn telemetry(reason: Reason, shadow: f32) -> Telemetry {
         let mut telemetry = Telemetry::default();

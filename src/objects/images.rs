@@ -7,11 +7,11 @@ use super::emergency::{Emergency, of_refusal};
 use super::field::{ImageField, StoredField, Which};
 use super::ownership::Ownership;
 use crate::joint::fault::Faults;
-use crate::parameters::Summary;
-use crate::parameters::authentication::STAGING;
-use crate::parameters::life_cycle::{Action, Conditions, Ending, LifeCycle, Refusal, State};
-use crate::parameters::slots::{Slot, SlotError};
 use canopen_node::Abort;
+use friction_compensation::parameters::Summary;
+use friction_compensation::parameters::authentication::STAGING;
+use friction_compensation::parameters::life_cycle::{Action, Conditions, Ending, LifeCycle, Refusal, State};
+use friction_compensation::parameters::slots::{Slot, SlotError};
 
 /// What the slots hold.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

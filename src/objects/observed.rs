@@ -6,13 +6,13 @@ use super::friction_statistics::FrictionStatistics;
 use super::number::{temperature, to_i16, to_i32, to_u16, to_u32};
 use super::operation::Operation;
 use super::shared::Shared;
-use crate::compensation::Reason;
 use crate::joint::adaptation;
 use crate::joint::external_torque;
 use crate::joint::fault::Faults;
 use crate::joint::load_feedforward::LOADS;
 use crate::joint::state_machine::State;
 use crate::joint::{PROFILES, Telemetry};
+use friction_compensation::compensation::Reason;
 
 /// A copy of what the control step and the slow task know.
 #[derive(Clone, Copy, Debug, PartialEq)]

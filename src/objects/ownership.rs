@@ -1,17 +1,17 @@
 //! Object 2215h: who owns the joint, and what its owner may do; the task.
 //!
 //! A joint without a key belongs to nobody and takes everything. With one, whatever changes what it can do to its
-//! surroundings wants a session, which the key opens ([`authentication`](crate::parameters::authentication)). The first
+//! surroundings wants a session, which the key opens ([`authentication`](friction_compensation::parameters::authentication)). The first
 //! key, and the end of a key that is lost, want somebody at the joint: its button is pressed, or, where it has none,
 //! its supply has just come and no master has started it since.
 
 use super::field::OwnerField;
 use super::settings::Setting;
 use crate::joint::configuration::Configuration;
-use crate::parameters::authentication::{CHALLENGE, Challenge, KEY, Key, Purpose, TAG};
-use crate::parameters::guard::Guard;
-use crate::parameters::image::Target;
 use canopen_node::Abort;
+use friction_compensation::parameters::authentication::{CHALLENGE, Challenge, KEY, Key, Purpose, TAG};
+use friction_compensation::parameters::guard::Guard;
+use friction_compensation::parameters::image::Target;
 
 /// Presence of sessions and of the rotation of keys in this program. With the feature `little-room` a chip's program
 /// has none: its board has a button, and who presses it is taken for the owner. On the host nothing changes.

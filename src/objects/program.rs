@@ -4,12 +4,12 @@ use crate::hardware::Hardware;
 use crate::joint::configuration::{BridgeConfiguration, Configuration, ConfigurationError};
 use crate::joint::history::History;
 use crate::motor::open_loop::Window;
-use crate::parameters::authentication::CHALLENGE;
-use crate::parameters::fault_log::LoggedFault;
-use crate::parameters::guard::Guard;
-use crate::parameters::slots::SlotError;
 use crate::reset_record::LastReset;
 use canopen_node::Event;
+use friction_compensation::parameters::authentication::CHALLENGE;
+use friction_compensation::parameters::fault_log::LoggedFault;
+use friction_compensation::parameters::guard::Guard;
+use friction_compensation::parameters::slots::SlotError;
 
 /// Why a configuration is not in use.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,9 +1,9 @@
 //! What came of the last configuration, readable object by object; the task.
 
 use super::field::ConfigurationField;
-use crate::compensation::SettingsError;
 use crate::joint::configuration::ConfigurationError;
 use crate::motor::setting::{Name, SettingError};
+use friction_compensation::compensation::SettingsError;
 
 /// Objects 2100h:2 to 6.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -25,7 +25,7 @@ impl Refused {
         match *error {
             ConfigurationError::Setting(SettingError { name, value, low, high, .. }) => of(name, value, low, high),
             ConfigurationError::Compensation(error) => {
-                let torque = |torque: crate::quantity::Torque| torque.to_bits() as f32 / 65_536.0;
+                let torque = |torque: friction_compensation::quantity::Torque| torque.to_bits() as f32 / 65_536.0;
                 match error {
                     SettingsError::Gain(gain) => {
                         of(const { Name::of("compensation gain", "") }, gain as f32 / 65_536.0, 0.0, 1.0)

@@ -1,7 +1,6 @@
 //! Settings of the [`Configuration`], each as the number that an object carries; the task. Which setting is which
 //! member stands here and nowhere else.
 
-use crate::compensation::Request;
 use crate::joint::adaptation::ADAPTS;
 use crate::joint::configuration::{
     AdaptationRequest, CollisionReaction, Configuration, LoadConfiguration, LoadFeedforwardRequest, VelocitySource,
@@ -9,6 +8,7 @@ use crate::joint::configuration::{
 use crate::joint::load_feedforward::LOADS;
 use crate::joint::stopping::StopConfiguration;
 use crate::motor::angle::Direction;
+use friction_compensation::compensation::Request;
 
 /// Declares the settings: their names, and the members that are real numbers.
 macro_rules! settings {

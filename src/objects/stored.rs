@@ -10,7 +10,7 @@
 //!
 //! Objects that a program does not know are skipped, objects that are missing keep their defaults: a record survives a
 //! change of program both ways. A limit damping that is missing, in records of programs that had none, is the least
-//! that its limits permit. Length and damage are the business of the [slots](crate::parameters::slots) that it lies in.
+//! that its limits permit. Length and damage are the business of the [slots](friction_compensation::parameters::slots) that it lies in.
 
 use super::communication::{self, VERIFICATION};
 use super::field::{Field, RANGES, Range};
@@ -23,7 +23,9 @@ use canopen_node::{COUNTER_AND_DATE, CommunicationParameters, NO_NODE_ID};
 /// Longest record: what all objects take, 1,221 bytes and those of the SYNC counter, of 1020h and of a load, and three
 /// more. A page of flash would hold 2,016; the stack has to, too.
 pub const RECORD: usize = 1_224 + if COUNTER_AND_DATE { 7 * ITEM } else { 0 } + 9 * ITEM * LOADS as usize;
-const _: () = assert!(RECORD <= crate::parameters::slots::PAGE - crate::parameters::slots::OVERHEAD);
+const _: () = assert!(
+    RECORD <= friction_compensation::parameters::slots::PAGE - friction_compensation::parameters::slots::OVERHEAD
+);
 const FORMAT: u8 = 1;
 /// Flag of the format.
 const LOST: u8 = 1 << 7;

@@ -10,12 +10,12 @@ use connection::Watching;
 use embassy_executor::{SendSpawner, Spawner};
 use embassy_stm32::gpio::Input;
 use embassy_time::{Duration, Instant, Ticker};
+use friction_compensation::parameters::slots::WriteError;
 use joint_firmware::joint::PROFILES;
 use joint_firmware::joint::active::SLOW_RATE;
 use joint_firmware::joint::configuration::ConfigurationError;
 use joint_firmware::joint::state_machine::State;
 use joint_firmware::motor::thermal::{PLAUSIBLE_SENSOR, ThermalSettings, WindingTemperature};
-use joint_firmware::parameters::slots::WriteError;
 
 /// A program that has run for so long forgets why it stopped before.
 const HEALTHY: Duration = Duration::from_secs(10);

@@ -1,10 +1,10 @@
 // A joint's state evaluated in full, the same on the board's core and on the host: included by the program `states` and
 // by the test that sends it images and states.
 
-use joint_firmware::compensation::{Acting, Compensation, Reason, Request, Settings, SettingsError};
-use joint_firmware::friction::state::{JointState, SIGNALS};
-use joint_firmware::friction::{FrictionModel, FrictionParameters};
-use joint_firmware::quantity::{Torque, Velocity};
+use friction_compensation::compensation::{Acting, Compensation, Reason, Request, Settings, SettingsError};
+use friction_compensation::friction::state::{JointState, SIGNALS};
+use friction_compensation::friction::{FrictionModel, FrictionParameters};
+use friction_compensation::quantity::{Torque, Velocity};
 
 /// Control rate, Hz.
 pub const RATE: u32 = 20_000;

@@ -12,9 +12,9 @@ mod core_support;
 mod sequence;
 
 use core_support::{COUNTER, exit, print};
-use joint_firmware::friction::FrictionModel;
-use joint_firmware::parameters::certificate::certify;
-use joint_firmware::parameters::image::Image;
+use friction_compensation::friction::FrictionModel;
+use friction_compensation::parameters::certificate::certify;
+use friction_compensation::parameters::image::Image;
 
 /// Images, each behind its length (two bytes, little-endian).
 static IMAGES: &[u8] = include_bytes!(env!("PROBE_IMAGES"));

@@ -4,9 +4,10 @@
 // The run is recorded in closed loop on the host. Because the control step gives the same bits everywhere, the
 // recording is a closed loop for the core too; where it gave other bits, the hash would tell.
 
-use joint_firmware::compensation::Request;
+use friction_compensation::compensation::Request;
+use friction_compensation::friction::FrictionModel;
+use friction_compensation::parameters::image::Image;
 use joint_firmware::default_configuration::B_G431B_ESC1;
-use joint_firmware::friction::FrictionModel;
 use joint_firmware::joint::adaptation::Factors;
 use joint_firmware::joint::configuration::{BridgeConfiguration, Configuration, VelocitySource};
 use joint_firmware::joint::state_machine::Controlword;
@@ -14,7 +15,6 @@ use joint_firmware::joint::{
     Active, BoardLimits, Bridge, Command, Demand, Joint, Measurements, Mode, OFFSET_STEPS, Slow,
 };
 use joint_firmware::motor::phases::Phases;
-use joint_firmware::parameters::image::Image;
 
 /// What a run does.
 #[derive(Clone, Copy)]

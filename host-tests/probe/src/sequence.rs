@@ -24,12 +24,12 @@ pub fn hash(hash: u32, word: u32) -> u32 {
 /// Decodes, certifies and verifies an image, then compensates along the sequence; the hash of every torque. None where
 /// the image is refused.
 pub fn run(bytes: &[u8]) -> Option<u32> {
-    use joint_firmware::compensation::{Compensation, Request, Settings};
-    use joint_firmware::friction::FrictionModel;
-    use joint_firmware::friction::state::{JointState, SIGNALS};
-    use joint_firmware::parameters::certificate::certify;
-    use joint_firmware::parameters::image::Image;
-    use joint_firmware::quantity::Torque;
+    use friction_compensation::compensation::{Compensation, Request, Settings};
+    use friction_compensation::friction::FrictionModel;
+    use friction_compensation::friction::state::{JointState, SIGNALS};
+    use friction_compensation::parameters::certificate::certify;
+    use friction_compensation::parameters::image::Image;
+    use friction_compensation::quantity::Torque;
 
     let image = Image::decode(bytes).ok()?;
     let certificate = certify(&image.friction, &image.limits).ok()?;

@@ -9,7 +9,7 @@ use emulator::board::{Drivetrain, MoteusR4, Wired};
 use emulator::chip::time::Instant;
 use emulator::emulation::Emulation;
 use emulator::program::Program;
-use joint_firmware::compensation::Request;
+use friction_compensation::compensation::Request;
 use joint_firmware::joint::configuration::Configuration;
 use libtest_mimic::Failed;
 use plant::ActuatorParameters;

@@ -11,7 +11,7 @@
 use super::observed::{Memory, Observed, Reading};
 use emulator::emulation::Emulation;
 use emulator::variables::{Variable, VariableError, Variables};
-use joint_firmware::compensation::Output;
+use friction_compensation::compensation::Output;
 use joint_firmware::default_configuration::BoardConfiguration;
 use joint_firmware::joint::adaptation::Factors;
 use joint_firmware::joint::state_machine::Controlword;

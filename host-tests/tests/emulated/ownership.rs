@@ -2,10 +2,10 @@
 //! button, sessions by the chip's random numbers; on the B-G431B-ESC1 the button.
 
 use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired};
+use friction_compensation::parameters::authentication::{Challenge, Key, Purpose};
 use host_tests::emulated::Bench;
 use host_tests::emulated::bench::program;
 use joint_firmware::objects::ownership::FORGET;
-use joint_firmware::parameters::authentication::{Challenge, Key, Purpose};
 use libtest_mimic::{Failed, Trial};
 use std::collections::BTreeSet;
 

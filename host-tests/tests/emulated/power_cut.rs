@@ -7,14 +7,14 @@
 
 use emulator::board::MoteusR4;
 use emulator::chip::flash::Torn;
+use friction_compensation::compensation::Request;
+use friction_compensation::friction::regime::Selector;
+use friction_compensation::parameters::authentication::Key;
 use host_tests::emulated::Bench;
 use host_tests::emulated::bench::{actuator, program};
 use host_tests::emulated::kept::{Kept, configuration};
 use host_tests::emulated::master::Heard;
 use host_tests::emulated::power::Writing;
-use joint_firmware::compensation::Request;
-use joint_firmware::friction::regime::Selector;
-use joint_firmware::parameters::authentication::Key;
 use libtest_mimic::{Failed, Trial};
 use node::SampleImage;
 use rand::{RngExt, SeedableRng};

@@ -5,12 +5,12 @@
 //! demand.
 
 use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4};
+use friction_compensation::compensation::Request;
 use host_tests::emulated::Bench;
 use host_tests::emulated::bench::{actuator, program};
 use host_tests::emulated::kept::{Kept, configuration};
 use host_tests::emulated::master::send;
 use host_tests::emulated::observed::Observed;
-use joint_firmware::compensation::Request;
 use libtest_mimic::{Failed, Trial};
 
 const NODE: u8 = 5;

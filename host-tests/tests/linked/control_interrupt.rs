@@ -77,8 +77,8 @@ fn is_open_loop(name: &str) -> bool {
 /// [`Joint::control_step`]: joint_firmware::joint::Joint::control_step
 fn seldom_or_operating(name: &str) -> bool {
     [
-        "14joint_firmware8friction",
-        "14joint_firmware12compensation",
+        "21friction_compensation8friction",
+        "21friction_compensation12compensation",
         "19FrictionFeedforward5guard",
         "10motion_law9MotionLaw6follow",
         "10motion_law9MotionLaw5brake",

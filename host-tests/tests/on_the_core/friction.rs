@@ -1,5 +1,5 @@
-//! Friction and its compensation on the board's core give the host's integers, all of them, for 128,000 states of random
-//! certified images, or for a million where all samples are asked for.
+//! Friction and its compensation on the board's core give the host's integers, all of them, for 128,000 states of
+//! random certified images; for a million where all samples are asked for.
 //!
 //! The program `states` of the probe is compiled as each board's is and runs on the core of `tools/emulator`. Images,
 //! states and evaluations are exchanged in the emulated memory. A state that differs is told with its image's seed; the
@@ -10,6 +10,11 @@ mod evaluation;
 
 use crate::Missing;
 use evaluation::{BATCH, Evaluator, INPUTS, NAMES, OUTPUTS, RATE, SETTINGS, settings};
+use friction_compensation::compensation::{Acting, Reason};
+use friction_compensation::friction::physical::Terms;
+use friction_compensation::friction::state::Signal;
+use friction_compensation::friction::{FrictionModel, FrictionParameters};
+use friction_compensation::parameters::image::Image;
 use host_tests::bare_core::Core;
 use host_tests::bare_metal::{BOARDS, Board};
 use host_tests::certified::{drawn, random};
@@ -17,11 +22,6 @@ use host_tests::image_bytes::encoded;
 use host_tests::parameters::q16;
 use host_tests::samples::count;
 use host_tests::states::coupled;
-use joint_firmware::compensation::{Acting, Reason};
-use joint_firmware::friction::physical::Terms;
-use joint_firmware::friction::state::Signal;
-use joint_firmware::friction::{FrictionModel, FrictionParameters};
-use joint_firmware::parameters::image::Image;
 use libtest_mimic::{Failed, Trial};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;

@@ -2,8 +2,8 @@
 
 use super::super::motion_law::Wanted;
 use super::*;
-use crate::compensation::Output;
-use crate::quantity::Torque;
+use friction_compensation::compensation::Output;
+use friction_compensation::quantity::Torque;
 
 const SETTINGS: Settings = Settings {
     request: AdaptationRequest::On,
@@ -134,7 +134,10 @@ fn nothing_is_learned_from_a_joint_that_its_command_does_not_move() {
         (|t| t.compensated.output.acting = Acting::Nothing, Learning::NothingActs),
         (|t| t.state = State::QuickStopActive, Learning::NotEnabled),
         (
-            |t| t.compensated.output.reason = Reason::OutsideTrainedBox(crate::friction::state::Signal::Velocity),
+            |t| {
+                t.compensated.output.reason =
+                    Reason::OutsideTrainedBox(friction_compensation::friction::state::Signal::Velocity)
+            },
             Learning::OutsideTrainedBox,
         ),
     ];

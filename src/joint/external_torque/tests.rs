@@ -2,10 +2,10 @@
 
 use super::super::motion_law::Wanted;
 use super::*;
-use crate::compensation::Output;
-use crate::friction::state::Signal;
 use crate::joint::JointMotion;
-use crate::quantity::Torque;
+use friction_compensation::compensation::Output;
+use friction_compensation::friction::state::Signal;
+use friction_compensation::quantity::Torque;
 
 const SETTINGS: Settings = Settings {
     load: Load { inertia: 0.5, gravity: 4.0, hanging: 0.0 },

@@ -4,10 +4,10 @@ use super::Objects;
 use crate::objects::field::{ImageField, OwnerField};
 use crate::objects::ownership::{Change, POWER_UP, Place, SESSIONS, Wrong};
 use crate::objects::program::Program;
-use crate::parameters::life_cycle::Command;
-use crate::parameters::slots::SlotError;
 use crate::reset_record::LastReset;
 use canopen_node::Abort;
+use friction_compensation::parameters::life_cycle::Command;
+use friction_compensation::parameters::slots::SlotError;
 
 impl<P: Program> Objects<'_, P> {
     #[inline(never)]

@@ -31,8 +31,8 @@ const fn row(attack: &'static str, joint: &'static str, tests: &'static [Evidenc
 
 const OWNERSHIP: &str = "src/objects/tests/ownership.rs";
 const IMAGES: &str = "src/objects/tests/images.rs";
-const LIFE: &str = "src/parameters/life_cycle/tests.rs";
-const TAGS: &str = "src/parameters/authentication.rs";
+const LIFE: &str = "crates/friction-compensation/src/parameters/life_cycle/tests.rs";
+const TAGS: &str = "crates/friction-compensation/src/parameters/authentication.rs";
 const NODE: &str = "tools/node/tests/attacks.rs";
 const SCRIPT: &str = "tools/node/src/hostile/script.rs";
 const BOARDS: &str = "host-tests/tests/emulated/ownership.rs";
@@ -280,13 +280,13 @@ const RECORDS: [Attack; 8] = [
     row(
         "Other bytes in place of that record",
         "Locked",
-        &[("src/parameters/guard.rs", "bytes_that_are_no_record_lock")],
+        &[("crates/friction-compensation/src/parameters/guard.rs", "bytes_that_are_no_record_lock")],
     ),
     row(
         "A bit flipped in a slot: each one",
         "Reported; the other slot is used from then on",
         &[(
-            "src/parameters/slots/tests/mod.rs",
+            "crates/friction-compensation/src/parameters/slots/tests/mod.rs",
             "every_rotten_bit_of_the_newest_is_reported_and_the_other_slot_is_used_from_then_on",
         )],
     ),
@@ -334,7 +334,7 @@ const RECORDS: [Attack; 8] = [
             (POWER, "an_image_is_the_old_one_or_the_new_one"),
             (POWER, "the_first_key_is_there_or_not"),
             (
-                "src/parameters/slots/tests/power_cuts.rs",
+                "crates/friction-compensation/src/parameters/slots/tests/power_cuts.rs",
                 "two_losses_of_power_anywhere_leave_the_old_content_or_the_new_one_for_good",
             ),
         ],

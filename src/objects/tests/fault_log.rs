@@ -3,7 +3,7 @@
 use super::*;
 use crate::joint::fault::{Fault, Faults};
 use crate::objects::fault_log::decode;
-use crate::parameters::fault_log::LOGGED;
+use friction_compensation::parameters::fault_log::LOGGED;
 
 const MINUTE: u64 = 60_000;
 

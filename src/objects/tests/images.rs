@@ -1,18 +1,18 @@
 //! The image life cycle over SDO: every step, every refusal with its code, its abort and its EMCY.
 
 use super::*;
-use crate::friction::common::CommonTerms;
-use crate::friction::domain::{Domain, Range};
-use crate::friction::physical::{Coefficients, PhysicalParameters, Terms};
-use crate::friction::regime::Selector;
-use crate::friction::state::{JointState, SIGNALS};
-use crate::friction::{FrictionModel, FrictionParameters, ParameterSet};
 use crate::joint::state_machine::State;
-use crate::parameters::Summary;
-use crate::parameters::authentication::Key;
-use crate::parameters::image::{GoldenVector, Image, MAX_LENGTH};
-use crate::parameters::life_cycle::{Action, Mode};
-use crate::parameters::slots::Slot;
+use friction_compensation::friction::common::CommonTerms;
+use friction_compensation::friction::domain::{Domain, Range};
+use friction_compensation::friction::physical::{Coefficients, PhysicalParameters, Terms};
+use friction_compensation::friction::regime::Selector;
+use friction_compensation::friction::state::{JointState, SIGNALS};
+use friction_compensation::friction::{FrictionModel, FrictionParameters, ParameterSet};
+use friction_compensation::parameters::Summary;
+use friction_compensation::parameters::authentication::Key;
+use friction_compensation::parameters::image::{GoldenVector, Image, MAX_LENGTH};
+use friction_compensation::parameters::life_cycle::{Action, Mode};
+use friction_compensation::parameters::slots::Slot;
 
 const VERIFY: u8 = 1;
 const TRIAL: u8 = 2;

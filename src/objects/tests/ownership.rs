@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::objects::ownership::{FORGET, POWER_UP, SESSION};
-use crate::parameters::authentication::{Challenge, Key, Purpose};
+use friction_compensation::parameters::authentication::{Challenge, Key, Purpose};
 
 const ROLL_BACK: u8 = 4;
 const REFUSED: u32 = 0x0800_0021;
@@ -388,7 +388,7 @@ fn what_is_damaged_locks_until_the_owner_repairs_it() {
 
 #[test]
 fn a_change_of_the_owner_that_cannot_be_kept_is_none() {
-    for fails in [None, Some(SlotError::Verify { slot: crate::parameters::slots::Slot::First })] {
+    for fails in [None, Some(SlotError::Verify { slot: friction_compensation::parameters::slots::Slot::First })] {
         let mut node = owned();
         node.objects.program().fails = fails;
         assert_eq!(node.respond(&key(1), Purpose::TakeBack).is_err(), fails.is_some());

@@ -3,7 +3,7 @@
 use super::*;
 use crate::joint::state_machine::{Controlword, State};
 use crate::objects::store_budget::REFILL;
-use crate::parameters::slots::{
+use friction_compensation::parameters::slots::{
     BLANK, DOUBLE_WORD, Layout, OVERHEAD, PAGE_WORDS, ReadError, SlotFlash, Slots, WriteError,
 };
 

@@ -10,10 +10,10 @@ use crate::board::can::{self, Condition};
 use crate::board::{control, faults, options, shadow};
 use canopen_node::{Frame, Server};
 use embassy_time::{Duration, Instant, with_timeout};
+use friction_compensation::parameters::life_cycle::{Action, Mode};
+use friction_compensation::parameters::slots::SlotError;
 use joint_firmware::joint::state_machine::State;
 use joint_firmware::objects::{Objects, StoredImages};
-use joint_firmware::parameters::life_cycle::{Action, Mode};
-use joint_firmware::parameters::slots::SlotError;
 
 /// How often timers are looked at where nothing arrives.
 const TICK: Duration = Duration::from_millis(1);

@@ -16,7 +16,7 @@ use embassy_executor::Spawner;
 use embassy_stm32::Peri;
 use embassy_stm32::can::CanConfigurator;
 use embassy_stm32::peripherals::FLASH;
-use joint_firmware::friction::regime::Memory;
+use friction_compensation::friction::regime::Memory;
 use joint_firmware::objects::{FrictionStatistics, Observed};
 use program::BoardProgram;
 use store::Store;

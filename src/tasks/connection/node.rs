@@ -5,12 +5,12 @@ use super::program::BoardProgram;
 use crate::board::{self, Publisher, can};
 use canopen_node::{Identity, SdoSettings, Server};
 use embassy_stm32::can::CanConfigurator;
+use friction_compensation::parameters::authentication::STAGING;
+use friction_compensation::parameters::certificate::Limits;
+use friction_compensation::parameters::image::{Effort, Target};
+use friction_compensation::parameters::life_cycle::{LifeCycle, Requirements};
 use joint_firmware::joint::Demand;
 use joint_firmware::objects::{Images, JointImage, Objects, Ownership, Shared, Start, StoredImages};
-use joint_firmware::parameters::authentication::STAGING;
-use joint_firmware::parameters::certificate::Limits;
-use joint_firmware::parameters::image::{Effort, Target};
-use joint_firmware::parameters::life_cycle::{LifeCycle, Requirements};
 use static_cell::{ConstStaticCell, StaticCell};
 
 /// Device profile 402, a servo drive.

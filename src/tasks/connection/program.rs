@@ -6,7 +6,12 @@ use super::store::Store;
 use crate::board::{self, BoardConfiguration, Offering, Prepared, Subscriber, oscillator, shadow};
 use canopen_node::{Event, Reset};
 use core::cell::RefCell;
-use joint_firmware::friction::regime::MAX_SETS;
+use friction_compensation::friction::regime::MAX_SETS;
+use friction_compensation::parameters::authentication::CHALLENGE;
+use friction_compensation::parameters::fault_log::LoggedFault;
+use friction_compensation::parameters::guard::Guard;
+use friction_compensation::parameters::image::Image;
+use friction_compensation::parameters::slots::SlotError;
 use joint_firmware::hardware::Hardware;
 use joint_firmware::joint::Active;
 use joint_firmware::joint::configuration::{BridgeConfiguration, Configuration, ConfigurationError};
@@ -14,11 +19,6 @@ use joint_firmware::joint::history::History;
 use joint_firmware::motor::open_loop::Window;
 use joint_firmware::motor::thermal::ThermalSettings;
 use joint_firmware::objects::{NotConfigured, Program, Start};
-use joint_firmware::parameters::authentication::CHALLENGE;
-use joint_firmware::parameters::fault_log::LoggedFault;
-use joint_firmware::parameters::guard::Guard;
-use joint_firmware::parameters::image::Image;
-use joint_firmware::parameters::slots::SlotError;
 use joint_firmware::reset_record::LastReset;
 
 const _: () = assert!(

@@ -10,14 +10,14 @@
 
 use crate::board::faults;
 use crate::board::flash::Parameters;
+use friction_compensation::parameters::Summary;
+use friction_compensation::parameters::authentication::STAGING;
+use friction_compensation::parameters::fault_log::{FaultLog, LoggedFault};
+use friction_compensation::parameters::guard::{GUARD, Guard};
+use friction_compensation::parameters::image::Image;
+use friction_compensation::parameters::slots::{Layout, Slot, SlotError, Slots, WriteError};
 use joint_firmware::objects::StoredImages;
 use joint_firmware::objects::fault_log::LOGS;
-use joint_firmware::parameters::Summary;
-use joint_firmware::parameters::authentication::STAGING;
-use joint_firmware::parameters::fault_log::{FaultLog, LoggedFault};
-use joint_firmware::parameters::guard::{GUARD, Guard};
-use joint_firmware::parameters::image::Image;
-use joint_firmware::parameters::slots::{Layout, Slot, SlotError, Slots, WriteError};
 use joint_firmware::reset_record::LastReset;
 
 /// The pairs of slots.

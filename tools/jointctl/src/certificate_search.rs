@@ -2,9 +2,9 @@
 //!
 //! It proves nothing. A bound that is far above what the search finds is loose, one below it would be a defect.
 
-use joint_firmware::friction::domain::Range;
-use joint_firmware::friction::state::{JointState, SIGNALS, Signal};
-use joint_firmware::friction::{FrictionModel, FrictionParameters};
+use friction_compensation::friction::domain::Range;
+use friction_compensation::friction::state::{JointState, SIGNALS, Signal};
+use friction_compensation::friction::{FrictionModel, FrictionParameters};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
@@ -43,7 +43,7 @@ pub fn search(parameters: &FrictionParameters, states: usize, seed: u64) -> Foun
             let at = |signals| model.evaluate(set, &JointState::from_signals(signals));
             let here = at(signals);
             found.output = found.output.max(here.total().to_f64().abs());
-            let difference = |signal: Signal, value: fn(joint_firmware::friction::Estimate) -> f64| {
+            let difference = |signal: Signal, value: fn(friction_compensation::friction::Estimate) -> f64| {
                 let Range { low, high } = ranges[signal as usize];
                 if low == high || ranges[signal as usize] == Range::ANY {
                     return 0.0;

@@ -19,7 +19,7 @@
 //! two directions are blended by d; its sign(a) is a ramp of slope k_a, so that noise around a = 0 does not chatter.
 
 use crate::friction_parameter::{FrictionParameter, HARMONICS};
-use joint_firmware::friction::maxwell_slip::ELEMENTS;
+use friction_compensation::friction::maxwell_slip::ELEMENTS;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
@@ -27,7 +27,7 @@ use std::f64::consts::PI;
 pub const STRIBECK_PEAK: f64 = 2.331_643_981_597_124;
 
 /// Number of ripple series.
-pub const RIPPLES: usize = joint_firmware::friction::ripple::RIPPLES;
+pub const RIPPLES: usize = friction_compensation::friction::ripple::RIPPLES;
 /// How far each pre-sliding element is bent: z, -1 to 1.
 pub type Bent = [f64; ELEMENTS];
 

@@ -3,8 +3,8 @@
 //! The model itself (`friction_model`) has fields; identification, reports and bounds need to speak of "the third
 //! harmonic of the positive direction" as a value. The names and symbols are those of the design's friction formula.
 
-use joint_firmware::friction::maxwell_slip::ELEMENTS;
-use joint_firmware::friction::ripple::RIPPLES;
+use friction_compensation::friction::maxwell_slip::ELEMENTS;
+use friction_compensation::friction::ripple::RIPPLES;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 

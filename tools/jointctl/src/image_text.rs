@@ -5,18 +5,18 @@
 
 use crate::quantize::QuantizeError;
 use crate::quantize::full_scale::{from_q16, from_si, to_integer, to_q16, to_si, to_unsigned_q8, to_unsigned_q16};
-use joint_firmware::friction::common::CommonTerms;
-use joint_firmware::friction::domain::{Domain, Range};
-use joint_firmware::friction::maxwell_slip::MaxwellElement;
-use joint_firmware::friction::network::{INPUTS, NEURONS, NetworkParameters, Neuron};
-use joint_firmware::friction::physical::{Coefficients, PhysicalParameters, Terms};
-use joint_firmware::friction::regime::{Criterion, MAX_CRITERIA, MAX_SETS, Measure, Selector};
-use joint_firmware::friction::ripple::Ripple;
-use joint_firmware::friction::state::{SIGNALS, Signal};
-use joint_firmware::friction::{Estimate, FrictionParameters, ParameterSet};
-use joint_firmware::parameters::certificate::Limits;
-use joint_firmware::parameters::image::{Effort, FORMAT, GoldenVector, Image, MAX_GOLDEN, Target};
-use joint_firmware::quantity::Torque;
+use friction_compensation::friction::common::CommonTerms;
+use friction_compensation::friction::domain::{Domain, Range};
+use friction_compensation::friction::maxwell_slip::MaxwellElement;
+use friction_compensation::friction::network::{INPUTS, NEURONS, NetworkParameters, Neuron};
+use friction_compensation::friction::physical::{Coefficients, PhysicalParameters, Terms};
+use friction_compensation::friction::regime::{Criterion, MAX_CRITERIA, MAX_SETS, Measure, Selector};
+use friction_compensation::friction::ripple::Ripple;
+use friction_compensation::friction::state::{SIGNALS, Signal};
+use friction_compensation::friction::{Estimate, FrictionParameters, ParameterSet};
+use friction_compensation::parameters::certificate::Limits;
+use friction_compensation::parameters::image::{Effort, FORMAT, GoldenVector, Image, MAX_GOLDEN, Target};
+use friction_compensation::quantity::Torque;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

@@ -9,13 +9,13 @@ use crate::network::Network;
 use crate::quantize::QuantizeError;
 use crate::rigid::{LAGS, RigidParameters, RigidState};
 use crate::samples::Samples;
-use joint_firmware::compensation::{Compensation, Request, Settings};
-use joint_firmware::friction::common::CommonTorques;
-use joint_firmware::friction::maxwell_slip::{Bent as FirmwareBent, LOWEST_RATE};
-use joint_firmware::friction::regime::Selector;
-use joint_firmware::friction::state::JointState;
-use joint_firmware::friction::{FrictionModel as FirmwareModel, FrictionParameters};
-use joint_firmware::quantity::{Acceleration, OutOfRange, Position, Temperature, Torque, Velocity};
+use friction_compensation::compensation::{Compensation, Request, Settings};
+use friction_compensation::friction::common::CommonTorques;
+use friction_compensation::friction::maxwell_slip::{Bent as FirmwareBent, LOWEST_RATE};
+use friction_compensation::friction::regime::Selector;
+use friction_compensation::friction::state::JointState;
+use friction_compensation::friction::{FrictionModel as FirmwareModel, FrictionParameters};
+use friction_compensation::quantity::{Acceleration, OutOfRange, Position, Temperature, Torque, Velocity};
 use rayon::prelude::*;
 
 /// A recorded sample that the firmware's quantities cannot hold.

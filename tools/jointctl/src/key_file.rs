@@ -1,6 +1,6 @@
 //! A joint's key as a file: 64 hexadecimal digits, readable by nobody but its owner; host.
 
-use joint_firmware::parameters::authentication::{KEY, Key, KeyRefusal};
+use friction_compensation::parameters::authentication::{KEY, Key, KeyRefusal};
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};

@@ -5,7 +5,7 @@
 //! joint with a key. [`node::hostile`] says what is judged. A violation or panic ends with the seed and the number of
 //! the frame.
 
-use joint_firmware::parameters::authentication::Key;
+use friction_compensation::parameters::authentication::Key;
 use node::hostile::{Counts, HostileNode, Noise, Statics};
 use std::hint::black_box;
 use std::process::ExitCode;

@@ -1,7 +1,9 @@
 //! A flash with the rules of the STM32G4's: pages are erased, double words written once, zeros over anything. In
 //! memory, and where a file is given there, too.
 
-use joint_firmware::parameters::slots::{BLANK, DOUBLE_WORD, PAGE, PAGE_WORDS, ReadError, SlotFlash, WriteError, ZERO};
+use friction_compensation::parameters::slots::{
+    BLANK, DOUBLE_WORD, PAGE, PAGE_WORDS, ReadError, SlotFlash, WriteError, ZERO,
+};
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::Path;

@@ -1,12 +1,12 @@
 //! The two slots of friction images: what they hold, and the friction model that comes of it.
 
 use crate::flash::Flash;
-use joint_firmware::friction::FrictionModel;
+use friction_compensation::friction::FrictionModel;
+use friction_compensation::parameters::Summary;
+use friction_compensation::parameters::authentication::STAGING;
+use friction_compensation::parameters::image::{Image, MAX_LENGTH};
+use friction_compensation::parameters::slots::{Layout, Slot, SlotError, Slots};
 use joint_firmware::objects::StoredImages;
-use joint_firmware::parameters::Summary;
-use joint_firmware::parameters::authentication::STAGING;
-use joint_firmware::parameters::image::{Image, MAX_LENGTH};
-use joint_firmware::parameters::slots::{Layout, Slot, SlotError, Slots};
 
 /// Content of the slots, for their checksum: friction images.
 const KIND: u32 = 1;

@@ -2,15 +2,15 @@
 
 use crate::storage::Storage;
 use canopen_node::{Event, Reset};
+use friction_compensation::parameters::authentication::CHALLENGE;
+use friction_compensation::parameters::fault_log::{FaultLog, LoggedFault};
+use friction_compensation::parameters::guard::Guard;
+use friction_compensation::parameters::slots::SlotError;
 use joint_firmware::joint::Active;
 use joint_firmware::joint::configuration::{BridgeConfiguration, Configuration};
 use joint_firmware::joint::history::History;
 use joint_firmware::motor::open_loop::Window;
 use joint_firmware::objects::{NotConfigured, Program, STORES, Start};
-use joint_firmware::parameters::authentication::CHALLENGE;
-use joint_firmware::parameters::fault_log::{FaultLog, LoggedFault};
-use joint_firmware::parameters::guard::Guard;
-use joint_firmware::parameters::slots::SlotError;
 use joint_firmware::reset_record::LastReset;
 
 /// The program around the objects.

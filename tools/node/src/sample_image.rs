@@ -1,14 +1,14 @@
 //! Images with constant friction, for tests, benchmarks and hostile buses: what acts can be told from the torque alone.
 
-use joint_firmware::friction::common::CommonTerms;
-use joint_firmware::friction::domain::{Domain, Range};
-use joint_firmware::friction::network::{MIN_FRACTION, NetworkParameters, Neuron};
-use joint_firmware::friction::physical::{Coefficients, PhysicalParameters, Terms};
-use joint_firmware::friction::regime::{MAX_SETS, Selector};
-use joint_firmware::friction::state::{JointState, SIGNALS};
-use joint_firmware::friction::{FrictionModel, FrictionParameters, ParameterSet};
-use joint_firmware::parameters::certificate::Limits;
-use joint_firmware::parameters::image::{Effort, GoldenVector, Image, MAX_GOLDEN, MAX_LENGTH, Target};
+use friction_compensation::friction::common::CommonTerms;
+use friction_compensation::friction::domain::{Domain, Range};
+use friction_compensation::friction::network::{MIN_FRACTION, NetworkParameters, Neuron};
+use friction_compensation::friction::physical::{Coefficients, PhysicalParameters, Terms};
+use friction_compensation::friction::regime::{MAX_SETS, Selector};
+use friction_compensation::friction::state::{JointState, SIGNALS};
+use friction_compensation::friction::{FrictionModel, FrictionParameters, ParameterSet};
+use friction_compensation::parameters::certificate::Limits;
+use friction_compensation::parameters::image::{Effort, GoldenVector, Image, MAX_GOLDEN, MAX_LENGTH, Target};
 
 /// What varies.
 #[derive(Clone, Copy, Debug)]

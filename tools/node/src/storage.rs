@@ -3,9 +3,9 @@
 
 use crate::flash::Flash;
 use crate::images::SlotImages;
-use joint_firmware::parameters::fault_log::FaultLog;
-use joint_firmware::parameters::guard::Guard;
-use joint_firmware::parameters::slots::{Layout, PAGE, SlotError, Slots};
+use friction_compensation::parameters::fault_log::FaultLog;
+use friction_compensation::parameters::guard::Guard;
+use friction_compensation::parameters::slots::{Layout, PAGE, SlotError, Slots};
 use std::path::Path;
 
 /// Contents of slots, for their checksum; 1 are friction images.
@@ -169,7 +169,7 @@ impl Storage {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use joint_firmware::parameters::authentication::Key;
+    use friction_compensation::parameters::authentication::Key;
 
     fn guard(floor: u32) -> Guard {
         let key = Key::new(std::array::from_fn(|i| i as u8)).unwrap();

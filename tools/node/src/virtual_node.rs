@@ -11,6 +11,11 @@ use bus::Frame;
 use canopen_node::{
     self, Buffers, Identity, NO_NODE_ID, NmtState, PDOS, Receiver, Route, SdoSettings, Server, TransmitQueue,
 };
+use friction_compensation::parameters::authentication::STAGING;
+use friction_compensation::parameters::certificate::Limits;
+use friction_compensation::parameters::image::{Effort, Target};
+use friction_compensation::parameters::life_cycle::{Action, LifeCycle, Mode, Requirements};
+use friction_compensation::parameters::slots::SlotError;
 use joint_firmware::joint::configuration::Configuration;
 use joint_firmware::joint::shadow::Shadow;
 use joint_firmware::joint::state_machine::State;
@@ -18,11 +23,6 @@ use joint_firmware::joint::{Joint, Telemetry};
 use joint_firmware::objects::{
     FrictionStatistics, Images, JointImage, Objects, Observed, Ownership, Shared, StoredImages,
 };
-use joint_firmware::parameters::authentication::STAGING;
-use joint_firmware::parameters::certificate::Limits;
-use joint_firmware::parameters::image::{Effort, Target};
-use joint_firmware::parameters::life_cycle::{Action, LifeCycle, Mode, Requirements};
-use joint_firmware::parameters::slots::SlotError;
 use joint_firmware::reset_record::LastReset;
 use plant::virtual_joint::{Setup, VirtualJointError};
 use plant::{ActuatorParameters, VirtualJoint};

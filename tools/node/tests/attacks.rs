@@ -4,8 +4,8 @@
 mod master;
 
 use bus::client::{Command, NmtState};
+use friction_compensation::parameters::authentication::{Challenge, Key, Purpose};
 use joint_firmware::joint::state_machine::State;
-use joint_firmware::parameters::authentication::{Challenge, Key, Purpose};
 use master::{ID, Master};
 use node::SampleImage;
 

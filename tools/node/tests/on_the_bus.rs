@@ -5,8 +5,8 @@ mod master;
 
 use bus::client::sdo::{Failure, Method, Settings, Transfer};
 use bus::client::{Abort, Command, NmtState, Object};
+use friction_compensation::parameters::authentication::Key;
 use joint_firmware::joint::state_machine::State;
-use joint_firmware::parameters::authentication::Key;
 use master::{ID, Master};
 use node::{SampleImage, SlotImages, Storage};
 

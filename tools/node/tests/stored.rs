@@ -5,10 +5,10 @@ mod master;
 
 use bus::client::sdo::Failure;
 use bus::client::{Abort, Command};
+use friction_compensation::parameters::fault_log::LoggedFault;
 use joint_firmware::joint::state_machine::State;
 use joint_firmware::objects::STORES;
 use joint_firmware::objects::fault_log::decode;
-use joint_firmware::parameters::fault_log::LoggedFault;
 use master::Master;
 use node::{SampleImage, Storage};
 use std::path::Path;

@@ -2,7 +2,7 @@
 
 use bus::client::Network;
 use clap::Parser;
-use joint_firmware::parameters::authentication::Key;
+use friction_compensation::parameters::authentication::Key;
 use jointctl::key_file;
 use jointctl::remote::RemoteError;
 use jointctl::remote::present::{PATIENCE, present};

@@ -14,7 +14,7 @@ use axum::http::{HeaderMap, HeaderName, Method, StatusCode, Uri};
 use axum::response::Response;
 use axum::routing::get;
 use bus::client::Network;
-use joint_firmware::parameters::authentication::Key;
+use friction_compensation::parameters::authentication::Key;
 use serde_json::json;
 use std::collections::HashMap;
 use std::net::TcpListener;

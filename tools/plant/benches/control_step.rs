@@ -2,14 +2,14 @@
 //! loop runs.
 
 use divan::{Bencher, black_box};
-use joint_firmware::compensation::{Acting, Request};
-use joint_firmware::friction::common::CommonTerms;
-use joint_firmware::friction::domain::{Domain, Range};
-use joint_firmware::friction::network::{NetworkParameters, Neuron};
-use joint_firmware::friction::physical::{Coefficients, PhysicalParameters, Terms};
-use joint_firmware::friction::regime::Selector;
-use joint_firmware::friction::state::{JointState, SIGNALS};
-use joint_firmware::friction::{FrictionModel, FrictionParameters, ParameterSet};
+use friction_compensation::compensation::{Acting, Request};
+use friction_compensation::friction::common::CommonTerms;
+use friction_compensation::friction::domain::{Domain, Range};
+use friction_compensation::friction::network::{NetworkParameters, Neuron};
+use friction_compensation::friction::physical::{Coefficients, PhysicalParameters, Terms};
+use friction_compensation::friction::regime::Selector;
+use friction_compensation::friction::state::{JointState, SIGNALS};
+use friction_compensation::friction::{FrictionModel, FrictionParameters, ParameterSet};
 use joint_firmware::joint::state_machine::{Controlword, State};
 use joint_firmware::joint::{Command, Demand, Joint, Mode};
 use joint_firmware::motor::angle::ElectricalAngle;

@@ -18,9 +18,9 @@ mod peers;
 
 use core::hint::black_box;
 use exchanged::{Exchanged, hand_over};
-use joint_firmware::friction::network::Network;
-use joint_firmware::friction::state::SIGNALS;
-use joint_firmware::parameters::image::{Image, MAX_LENGTH};
+use friction_compensation::friction::network::Network;
+use friction_compensation::friction::state::SIGNALS;
+use friction_compensation::parameters::image::{Image, MAX_LENGTH};
 use peers::{ByteLayer, Bytes, FloatLayer, Floats, WIDTH};
 
 /// Inputs that each network evaluates.

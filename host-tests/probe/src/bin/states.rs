@@ -19,8 +19,8 @@ mod exchanged;
 
 use evaluation::{BATCH, Evaluator, INPUTS, OUTPUTS, RATE, SETTINGS, settings};
 use exchanged::{Exchanged, hand_over};
-use joint_firmware::friction::FrictionModel;
-use joint_firmware::parameters::image::{Image, MAX_LENGTH};
+use friction_compensation::friction::FrictionModel;
+use friction_compensation::parameters::image::{Image, MAX_LENGTH};
 
 #[unsafe(no_mangle)]
 static IMAGE: Exchanged<[u8; MAX_LENGTH]> = Exchanged::new([0; MAX_LENGTH]);

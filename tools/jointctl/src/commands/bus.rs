@@ -6,7 +6,7 @@ use crate::remote::present::{PATIENCE, present};
 use bus::client::{ClientError, Node};
 use canopen_node::NO_NODE_ID;
 use clap::Args;
-use joint_firmware::parameters::image::Image;
+use friction_compensation::parameters::image::Image;
 use node::{Options, Storage, VirtualNode, serve};
 use plant::ActuatorParameters;
 use plant::virtual_joint::Setup;
@@ -149,7 +149,7 @@ impl OnBus {
             None => Storage::empty().map_err(|error| failed(&error))?,
         };
         if let Some(image) = image {
-            let mut buffer = [0; joint_firmware::parameters::image::MAX_LENGTH];
+            let mut buffer = [0; friction_compensation::parameters::image::MAX_LENGTH];
             // It has been verified, which encodes it.
             let length = image.encode(&mut buffer).unwrap_or(0);
             storage.store_image(&buffer[..length]).map_err(|error| failed(&error))?;

@@ -12,8 +12,8 @@ use crate::progress::{Progress, Terminal};
 use crate::report::{NetworkOutcome, console, numbers, render, verdict};
 use crate::sample_table::write_sample_table;
 use clap::{Args, ValueEnum};
-use joint_firmware::friction::regime::Measure;
-use joint_firmware::parameters::image::{Image, MAX_LENGTH};
+use friction_compensation::friction::regime::Measure;
+use friction_compensation::parameters::image::{Image, MAX_LENGTH};
 use std::path::{Path, PathBuf};
 
 /// Arguments of `fit`.

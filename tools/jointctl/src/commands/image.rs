@@ -8,10 +8,10 @@ use crate::key_file;
 use crate::output::write_file;
 use crate::quantize::golden_vectors;
 use clap::{Args, Subcommand};
-use joint_firmware::friction::FrictionModel;
-use joint_firmware::parameters::authentication::{Key, split};
-use joint_firmware::parameters::certificate::{Certificate, certify};
-use joint_firmware::parameters::image::Image;
+use friction_compensation::friction::FrictionModel;
+use friction_compensation::parameters::authentication::{Key, split};
+use friction_compensation::parameters::certificate::{Certificate, certify};
+use friction_compensation::parameters::image::Image;
 use std::path::{Path, PathBuf};
 
 /// What to do with an image.

@@ -5,7 +5,7 @@ use crate::key_file;
 use crate::remote::{RemoteError, RemoteJoint};
 use bus::client::Network;
 use clap::Args;
-use joint_firmware::parameters::authentication::Key;
+use friction_compensation::parameters::authentication::Key;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;

@@ -5,11 +5,11 @@ use crate::dataset::description::EffortUnit;
 use crate::identify::Identified;
 use crate::quantize::{self, full_scale::to_unsigned_q16, golden_vectors};
 use crate::samples::Samples;
-use joint_firmware::friction::regime::MAX_SETS;
-use joint_firmware::friction::state::SIGNALS;
-use joint_firmware::friction::{FrictionParameters, ParameterSet};
-use joint_firmware::parameters::certificate::{Certificate, Limits, certify, prove};
-use joint_firmware::parameters::image::{Effort, Image, MAX_LENGTH, Target};
+use friction_compensation::friction::regime::MAX_SETS;
+use friction_compensation::friction::state::SIGNALS;
+use friction_compensation::friction::{FrictionParameters, ParameterSet};
+use friction_compensation::parameters::certificate::{Certificate, Limits, certify, prove};
+use friction_compensation::parameters::image::{Effort, Image, MAX_LENGTH, Target};
 
 /// Golden vectors of an image; fewer where they do not fit.
 const GOLDEN: usize = 6;

@@ -15,7 +15,7 @@ use crate::network::{InputBox, Network};
 use crate::report::{NetworkOutcome, TrainingCurve};
 use crate::samples::{Part, Samples};
 use crate::train::TrainError;
-use joint_firmware::friction::regime::{Criterion, MAX_CRITERIA, Measure, Selector};
+use friction_compensation::friction::regime::{Criterion, MAX_CRITERIA, Measure, Selector};
 
 /// A temperature that varies less than this in training is no input, K: over a few kelvins it stands for time.
 const TEMPERATURE_RANGE: f64 = 10.0;

@@ -35,10 +35,10 @@ use crate::progress::Progress;
 use crate::report::{self, NetworkOutcome, Report, Role};
 use crate::rigid::{Gravity, RigidModel, RigidParameters};
 use crate::samples::Samples;
-use joint_firmware::friction::FrictionParameters;
-use joint_firmware::friction::regime::Measure;
-use joint_firmware::parameters::certificate::Certificate;
-use joint_firmware::parameters::image::Image;
+use friction_compensation::friction::FrictionParameters;
+use friction_compensation::friction::regime::Measure;
+use friction_compensation::parameters::certificate::Certificate;
+use friction_compensation::parameters::image::Image;
 use serde::Serialize;
 
 /// Choices of a fit.
@@ -143,10 +143,10 @@ pub enum FitError {
          determine a term makes it large: record more positions, speeds and loads, or ask for a model with fewer terms (--preset, \
          --all tries every one)"
     )]
-    Refused(joint_firmware::parameters::certificate::Refusal),
+    Refused(friction_compensation::parameters::certificate::Refusal),
     /// The image cannot be written.
     #[error(transparent)]
-    Image(#[from] joint_firmware::parameters::image::ImageError),
+    Image(#[from] friction_compensation::parameters::image::ImageError),
     /// Judging.
     #[error(transparent)]
     Metrics(#[from] crate::metrics::MetricsError),

@@ -10,7 +10,7 @@ use crate::network::InputBox;
 use crate::progress::Progress;
 use crate::samples::Samples;
 use crate::train::TrainingSet;
-use joint_firmware::friction::state::JointState;
+use friction_compensation::friction::state::JointState;
 
 /// Least number of training samples, and of validation samples, with which a network is trained.
 pub(super) const MINIMUM_SAMPLES: usize = 300;

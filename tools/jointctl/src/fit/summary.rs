@@ -10,8 +10,8 @@ use crate::identify::{self, Identified};
 use crate::joint_model::{network_inputs, rigid_efforts};
 use crate::report::{self, Candidate, CertificateItem, NetworkOutcome, Role};
 use crate::samples::{Part, Samples};
-use joint_firmware::parameters::certificate::Certificate;
-use joint_firmware::parameters::image::Image;
+use friction_compensation::parameters::certificate::Certificate;
+use friction_compensation::parameters::image::Image;
 
 pub(super) fn predictions(
     samples: &Samples,

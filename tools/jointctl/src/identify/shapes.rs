@@ -14,7 +14,7 @@ use crate::levenberg_marquardt::NormalEquations;
 use crate::pre_sliding;
 use crate::rigid::RigidRegressor;
 use crate::samples::Samples;
-use joint_firmware::friction::maxwell_slip::{ELEMENTS, MAX_STIFFNESS};
+use friction_compensation::friction::maxwell_slip::{ELEMENTS, MAX_STIFFNESS};
 use nalgebra::{Matrix4, Vector4};
 use rayon::prelude::*;
 use std::f64::consts::TAU;

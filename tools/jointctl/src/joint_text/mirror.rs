@@ -3,7 +3,7 @@
 //! The firmware knows nothing of files, so serde is told here what its records look like; a field that is added to one
 //! of them and not here does not compile.
 
-use joint_firmware::compensation::Request;
+use friction_compensation::compensation::Request;
 use joint_firmware::joint::configuration::{
     AdaptationRequest, CollisionReaction, CompensationConfiguration, Configuration, FACTORY_TRIM, FRICTION_UNCERTAINTY,
     Gains, GearConfiguration, LOAD_UNCERTAINTY, Limits, LoadConfiguration, LoadFeedforwardRequest, MotorConfiguration,

@@ -1,5 +1,5 @@
 use super::*;
-use joint_firmware::compensation::Request;
+use friction_compensation::compensation::Request;
 use joint_firmware::joint::configuration::{
     AdaptationRequest, CollisionReaction, LoadConfiguration, LoadFeedforwardRequest, VelocitySource,
 };

@@ -3,9 +3,9 @@
 use super::QuantizeError;
 use super::full_scale::{from_q16, to_q16};
 use crate::friction_model::{FrictionModel, Ripple, Term};
-use joint_firmware::friction::common::CommonTerms;
-use joint_firmware::friction::maxwell_slip::{MAX_STIFFNESS, MaxwellElement};
-use joint_firmware::friction::ripple::Ripple as StoredRipple;
+use friction_compensation::friction::common::CommonTerms;
+use friction_compensation::friction::maxwell_slip::{MAX_STIFFNESS, MaxwellElement};
+use friction_compensation::friction::ripple::Ripple as StoredRipple;
 use std::f64::consts::TAU;
 
 /// Quantises the pre-sliding elements and ripples of `model`; those of terms that are off are absent.

@@ -5,8 +5,8 @@
 //! bits.
 
 use super::QuantizeError;
-use joint_firmware::friction::physical::Dimension;
-use joint_firmware::friction::state::SIGNALS;
+use friction_compensation::friction::physical::Dimension;
+use friction_compensation::friction::state::SIGNALS;
 
 const Q16: f64 = 65536.0;
 
@@ -46,7 +46,7 @@ pub fn from_q16(bits: i32) -> f64 {
 }
 
 /// What one unit at full scale is in SI, for a coefficient of this dimension; `shifts` as of
-/// [`Domain::shifts`](joint_firmware::friction::domain::Domain::shifts).
+/// [`Domain::shifts`](friction_compensation::friction::domain::Domain::shifts).
 fn unit(dimension: Dimension, shifts: &[u32; SIGNALS]) -> f64 {
     match dimension.per {
         None => 1.0,
@@ -74,7 +74,7 @@ pub fn from_si(what: &str, value: f64, dimension: Dimension, shifts: &[u32; SIGN
 #[cfg(test)]
 mod tests {
     use super::*;
-    use joint_firmware::friction::physical::Coefficients;
+    use friction_compensation::friction::physical::Coefficients;
     use proptest::prelude::*;
 
     proptest! {

@@ -8,11 +8,11 @@ pub mod full_scale;
 pub mod network;
 pub mod physical;
 
+use friction_compensation::friction::domain::{Domain, Range};
+use friction_compensation::friction::state::{JointState, SIGNALS, Signal};
+use friction_compensation::friction::{FrictionModel, FrictionParameters};
+use friction_compensation::parameters::image::{GoldenSequence, GoldenVector};
 use full_scale::to_q16;
-use joint_firmware::friction::domain::{Domain, Range};
-use joint_firmware::friction::state::{JointState, SIGNALS, Signal};
-use joint_firmware::friction::{FrictionModel, FrictionParameters};
-use joint_firmware::parameters::image::{GoldenSequence, GoldenVector};
 
 /// A model that an image cannot hold.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -4,8 +4,8 @@ use super::QuantizeError;
 use super::full_scale::from_q16;
 use super::full_scale::to_integer;
 use crate::network::{FIRMWARE_HIDDEN, InputBox, Network};
-use joint_firmware::friction::domain::Domain;
-use joint_firmware::friction::network::{
+use friction_compensation::friction::domain::Domain;
+use friction_compensation::friction::network::{
     INPUTS, MAX_FRACTION, MAX_SCALE, MIN_FRACTION, NEURONS, NetworkParameters, Neuron,
 };
 
@@ -50,7 +50,7 @@ pub fn quantize(network: &Network) -> Result<NetworkParameters, QuantizeError> {
 
 /// The network that stored parameters stand for. Inputs whose range is empty or without limits have no influence.
 pub fn dequantize(parameters: &NetworkParameters, domain: &Domain) -> Result<Network, QuantizeError> {
-    let ends = |pick: fn(&joint_firmware::friction::domain::Range) -> i32| {
+    let ends = |pick: fn(&friction_compensation::friction::domain::Range) -> i32| {
         std::array::from_fn(|i| from_q16(pick(&domain.ranges[i])))
     };
     let impossible = |error: crate::network::NetworkError| QuantizeError::Network(error.to_string());
@@ -101,9 +101,9 @@ fn neuron(layer: usize, index: usize, weights: &[f64], bias: f64) -> Result<Neur
 mod tests {
     use super::*;
     use crate::train::{TrainingSet, levenberg_marquardt};
-    use joint_firmware::friction::domain::Range;
-    use joint_firmware::friction::network::Network as FirmwareNetwork;
-    use joint_firmware::friction::state::SIGNALS;
+    use friction_compensation::friction::domain::Range;
+    use friction_compensation::friction::network::Network as FirmwareNetwork;
+    use friction_compensation::friction::state::SIGNALS;
     use rand::RngExt;
     use rand_chacha::ChaCha8Rng;
     use rand_chacha::rand_core::SeedableRng;

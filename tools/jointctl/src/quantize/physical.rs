@@ -3,9 +3,9 @@
 use super::QuantizeError;
 use super::full_scale::{from_q16, from_si, to_si};
 use crate::friction_model::{Directional, FrictionModel, Term, Terms as FloatTerms};
-use joint_firmware::friction::domain::Domain;
-use joint_firmware::friction::physical::{Coefficients, PhysicalParameters, Terms};
-use joint_firmware::friction::state::SIGNALS;
+use friction_compensation::friction::domain::Domain;
+use friction_compensation::friction::physical::{Coefficients, PhysicalParameters, Terms};
+use friction_compensation::friction::state::SIGNALS;
 
 /// Quantises `model` for evaluation in `domain`. Coefficients of terms that are off become zero.
 ///
@@ -107,7 +107,7 @@ pub fn dequantize(parameters: &PhysicalParameters, domain: &Domain) -> FrictionM
     }
 }
 
-/// Which signals the model depends on, in the order of [`Signal`](joint_firmware::friction::state::Signal).
+/// Which signals the model depends on, in the order of [`Signal`](friction_compensation::friction::state::Signal).
 pub fn depends_on(model: &FrictionModel) -> [bool; SIGNALS] {
     let any = |terms: &[Term]| terms.iter().any(|&term| model.terms.contains(term));
     use Term::*;
@@ -145,7 +145,7 @@ mod tests {
 
     #[test]
     fn a_stored_model_stands_for_what_was_stored() {
-        let range = joint_firmware::friction::domain::Range { low: -(3 << 16), high: 3 << 16 };
+        let range = friction_compensation::friction::domain::Range { low: -(3 << 16), high: 3 << 16 };
         let domain = Domain { ranges: [range; SIGNALS], margin: 1 << 15, reference_temperature: 25 << 16 };
         let bits = std::array::from_fn(|i| (i as i32 + 1) * 1000);
         let terms = Terms::ALL;

@@ -13,9 +13,9 @@ use crate::progress::Progress;
 use bus::client::ClientError;
 use bus::client::sdo::Method;
 use canopen_node::Abort;
+use friction_compensation::parameters::authentication::{STAGING, split};
+use friction_compensation::parameters::life_cycle::{Command, State};
 use joint_firmware::objects::field::{Actual, Field, ImageField, StoredField, Which};
-use joint_firmware::parameters::authentication::{STAGING, split};
-use joint_firmware::parameters::life_cycle::{Command, State};
 use std::time::{Duration, Instant};
 
 /// How long storing may take: two pages erased and written take less than a tenth of it.

@@ -8,6 +8,7 @@ use super::joint::RemoteJoint;
 use super::motion;
 use super::value::Value;
 use bus::client::{Abort, ClientError};
+use friction_compensation::parameters::life_cycle::State;
 use joint_firmware::joint::adaptation::{Factors, Learning, Report};
 use joint_firmware::joint::fault::Fault;
 use joint_firmware::objects::field::{
@@ -15,7 +16,6 @@ use joint_firmware::objects::field::{
 };
 use joint_firmware::objects::settings::Setting;
 use joint_firmware::objects::{emergency, fault_log};
-use joint_firmware::parameters::life_cycle::State;
 use std::fmt::Write;
 
 /// Signals by the number that a reason has for them, object 2200h:8.

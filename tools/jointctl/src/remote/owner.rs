@@ -10,9 +10,9 @@ use super::joint::RemoteJoint;
 use super::session::Owner;
 use super::value::Value;
 use bus::client::{Abort, ClientError};
+use friction_compensation::parameters::authentication::{CHALLENGE, Challenge, Key, Purpose};
 use joint_firmware::objects::field::{Field, OwnerField};
 use joint_firmware::objects::ownership::FORGET;
-use joint_firmware::parameters::authentication::{CHALLENGE, Challenge, Key, Purpose};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 

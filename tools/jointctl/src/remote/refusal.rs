@@ -5,13 +5,13 @@
 
 use super::error::RemoteError;
 use super::joint::RemoteJoint;
-use joint_firmware::friction::FrictionModel;
+use friction_compensation::friction::FrictionModel;
+use friction_compensation::parameters::authentication::split;
+use friction_compensation::parameters::certificate::certify;
+use friction_compensation::parameters::image::{Image, ImageError};
+use friction_compensation::parameters::life_cycle::{Command, Refusal, State};
+use friction_compensation::parameters::slots::SlotError;
 use joint_firmware::objects::field::{Field, ImageField};
-use joint_firmware::parameters::authentication::split;
-use joint_firmware::parameters::certificate::certify;
-use joint_firmware::parameters::image::{Image, ImageError};
-use joint_firmware::parameters::life_cycle::{Command, Refusal, State};
-use joint_firmware::parameters::slots::SlotError;
 
 /// General words for every number of [`Refusal::code`].
 const WORDS: [(u16, &str); 33] = [
@@ -160,7 +160,7 @@ mod tests {
 
     #[test]
     fn every_number_of_the_firmware_has_words_and_no_other() {
-        let source = include_str!("../../../../src/parameters/life_cycle/refusal.rs");
+        let source = include_str!("../../../../crates/friction-compensation/src/parameters/life_cycle/refusal.rs");
         let codes = source.lines().filter_map(|line| {
             let (_, number) = line.split_once("=> 0x")?;
             u16::from_str_radix(number.trim_end_matches(','), 16).ok()

@@ -30,11 +30,11 @@ use crate::fit::{FitError, Fitted, Options, fit};
 use crate::output::{OutputError, OutputFile, write_directory};
 use crate::progress::Progress;
 use crate::rigid::{RigidParameters, RigidRegressor};
+use friction_compensation::parameters::authentication::Key;
+use friction_compensation::parameters::image::MAX_LENGTH;
+use friction_compensation::parameters::life_cycle::State;
 use joint_firmware::objects::field::{Actual, ConfigurationField, Field, ImageField, OwnerField, Range};
 use joint_firmware::objects::settings::Setting;
-use joint_firmware::parameters::authentication::Key;
-use joint_firmware::parameters::image::MAX_LENGTH;
-use joint_firmware::parameters::life_cycle::State;
 use std::path::PathBuf;
 
 /// Part of the joint's limits of position and velocity that the motion uses: the rest is left to the controller, which

@@ -2,8 +2,8 @@
 
 use super::entry::Entry;
 use bus::client::Node;
+use friction_compensation::parameters::authentication::Key;
 use joint_firmware::objects::field::{Field, OwnerField};
-use joint_firmware::parameters::authentication::Key;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The owner of a joint at work: ends the session that was opened for it.

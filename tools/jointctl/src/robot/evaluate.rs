@@ -13,7 +13,7 @@ use crate::fit::FitError;
 use crate::joint_model::{firmware_states, fixed_point, regimes, rigid_efforts};
 use crate::rigid::RigidParameters;
 use crate::samples::Part;
-use joint_firmware::parameters::image::Image;
+use friction_compensation::parameters::image::Image;
 use nalgebra::DVector;
 use rayon::prelude::*;
 use rigid_body::inertia::PARAMETERS;

@@ -1,9 +1,9 @@
 //! An image's way into a joint and back.
 
 use crate::served::{NODE, Served, image};
+use friction_compensation::parameters::life_cycle::State;
 use joint_firmware::joint::state_machine::State as Drive;
 use joint_firmware::joint::{Command, Mode};
-use joint_firmware::parameters::life_cycle::State;
 use jointctl::progress::{Progress, Silent};
 use jointctl::remote::Stream;
 use jointctl::remote::image::Use;

@@ -4,9 +4,9 @@
 use crate::served::{NODE, Served, image, program};
 use bus::client::{Abort, ClientError, Command as Nmt, Target};
 use canopen_node::Group;
+use friction_compensation::parameters::authentication::Key;
 use joint_firmware::objects::field::{Field, OwnerField, SetPoint};
 use joint_firmware::objects::settings::Setting;
-use joint_firmware::parameters::authentication::Key;
 use jointctl::progress::Silent;
 use jointctl::remote::entry::Entry;
 use jointctl::remote::image::Use;

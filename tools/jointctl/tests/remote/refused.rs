@@ -3,10 +3,10 @@
 use crate::served::{NODE, Served, image};
 use bus::client::{ClientError, Network};
 use bus::{BusError, Frame, Transport};
+use friction_compensation::parameters::authentication::Key;
+use friction_compensation::parameters::life_cycle::State;
 use joint_firmware::joint::Mode;
 use joint_firmware::joint::state_machine::State as Drive;
-use joint_firmware::parameters::authentication::Key;
-use joint_firmware::parameters::life_cycle::State;
 use jointctl::progress::Silent;
 use jointctl::remote::image::Use;
 use jointctl::remote::{RemoteError, RemoteJoint, Stream};

@@ -1,11 +1,11 @@
 //! A recording as a data set, and the whole round on a joint: excite, record, fit, compare, commit.
 
 use crate::served::{NODE, Served, image};
+use friction_compensation::parameters::life_cycle::State as Life;
 use joint_firmware::joint::state_machine::State;
 use joint_firmware::joint::{Command, Mode};
 use joint_firmware::objects::field::{Actual, Field};
 use joint_firmware::objects::settings::Setting;
-use joint_firmware::parameters::life_cycle::State as Life;
 use jointctl::fit::Options;
 use jointctl::presets::Preset;
 use jointctl::progress::Silent;

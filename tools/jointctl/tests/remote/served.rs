@@ -1,13 +1,13 @@
 //! Virtual joints on a bus within this process.
 
-use joint_firmware::friction::common::CommonTerms;
-use joint_firmware::friction::domain::{Domain, Range};
-use joint_firmware::friction::physical::{Coefficients, PhysicalParameters, Terms};
-use joint_firmware::friction::regime::Selector;
-use joint_firmware::friction::state::{JointState, SIGNALS};
-use joint_firmware::friction::{FrictionModel, FrictionParameters, ParameterSet};
-use joint_firmware::parameters::certificate::Limits;
-use joint_firmware::parameters::image::{Effort, GoldenVector, Image, MAX_LENGTH, Target};
+use friction_compensation::friction::common::CommonTerms;
+use friction_compensation::friction::domain::{Domain, Range};
+use friction_compensation::friction::physical::{Coefficients, PhysicalParameters, Terms};
+use friction_compensation::friction::regime::Selector;
+use friction_compensation::friction::state::{JointState, SIGNALS};
+use friction_compensation::friction::{FrictionModel, FrictionParameters, ParameterSet};
+use friction_compensation::parameters::certificate::Limits;
+use friction_compensation::parameters::image::{Effort, GoldenVector, Image, MAX_LENGTH, Target};
 use jointctl::remote::RemoteJoint;
 use node::{Options, SlotImages, Storage, VirtualNode, serve};
 use plant::ActuatorParameters;

@@ -4,8 +4,8 @@
 use super::script::{self, Transfer};
 use super::{HostileNode, Violation};
 use bus::Frame;
+use friction_compensation::parameters::authentication::Key;
 use joint_firmware::objects::table::{COMMUNICATION, OBJECTS};
-use joint_firmware::parameters::authentication::Key;
 use std::collections::VecDeque;
 
 /// xorshift64*, so that a run can be repeated.

@@ -4,8 +4,8 @@
 use super::{HostileNode, NODE, Violation};
 use crate::SampleImage;
 use bus::Frame;
-use joint_firmware::friction::regime::Selector;
-use joint_firmware::parameters::authentication::Key;
+use friction_compensation::friction::regime::Selector;
+use friction_compensation::parameters::authentication::Key;
 
 /// Ways of a transfer longer than four bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,13 +2,13 @@
 
 use crate::storage::Storage;
 use canopen_node::Event;
+use friction_compensation::parameters::authentication::{CHALLENGE, Key};
+use friction_compensation::parameters::guard::Guard;
+use friction_compensation::parameters::slots::SlotError;
 use joint_firmware::joint::configuration::{BridgeConfiguration, Configuration};
 use joint_firmware::joint::history::History;
 use joint_firmware::motor::open_loop::Window;
 use joint_firmware::objects::{NotConfigured, Program};
-use joint_firmware::parameters::authentication::{CHALLENGE, Key};
-use joint_firmware::parameters::guard::Guard;
-use joint_firmware::parameters::slots::SlotError;
 use joint_firmware::reset_record::LastReset;
 
 /// The program.

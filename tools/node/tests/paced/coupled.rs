@@ -2,7 +2,7 @@
 //! it (paper 003, section II.C).
 
 use crate::master::{FIRST, Line, MILLISECOND};
-use joint_firmware::friction::regime::{Criterion, Measure, Selector};
+use friction_compensation::friction::regime::{Criterion, Measure, Selector};
 use joint_firmware::joint::state_machine::State;
 use node::SampleImage;
 

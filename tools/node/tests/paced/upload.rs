@@ -4,7 +4,7 @@
 use crate::master::{FIRST, Line, MILLISECOND};
 use bus::client::Object;
 use bus::client::sdo::{Method, Settings, Transfer};
-use joint_firmware::friction::regime::{Criterion, Measure, Selector};
+use friction_compensation::friction::regime::{Criterion, Measure, Selector};
 use joint_firmware::joint::state_machine::State;
 use node::{PacedEvent, SampleImage};
 use std::time::Duration;

@@ -11,7 +11,7 @@ mod worker;
 use crate::hold::Hold;
 use crate::message::{Ask, Message};
 use bus::client::{Network, SyncProducer};
-use joint_firmware::parameters::authentication::Key;
+use friction_compensation::parameters::authentication::Key;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError, Weak};

@@ -11,7 +11,7 @@ use crate::actuator::lockstep::Driven;
 use crate::actuator::{Actuator, ActuatorParameters};
 use crate::error::ParameterError;
 use crate::joint::Answer;
-use joint_firmware::friction::FrictionModel;
+use friction_compensation::friction::FrictionModel;
 use joint_firmware::joint::active::SLOW_RATE;
 use joint_firmware::joint::adaptation::{self, Adaptation, LOOK_RATE};
 use joint_firmware::joint::configuration::ConfigurationError;

@@ -2,7 +2,7 @@
 //! gains from its inertia. Nothing here knows the friction.
 
 use crate::actuator::ActuatorParameters;
-use joint_firmware::compensation::Request;
+use friction_compensation::compensation::Request;
 use joint_firmware::joint::BoardLimits;
 use joint_firmware::joint::configuration::{
     AdaptationRequest, BridgeConfiguration, CompensationConfiguration, Configuration, FACTORY_TRIM,

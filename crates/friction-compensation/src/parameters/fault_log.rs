@@ -6,7 +6,7 @@
 //! |---|---|
 //! | 0, 1 | error code (CiA 301, 7.2.7); 0000h: a power-up; 0001h: head of a page |
 //! | 2 to 5 | time since the program started, s; number of the power-up; number of the page |
-//! | 6 | number of the fault, [`Fault`](crate::joint::fault::Fault), 0 for none; 0 |
+//! | 6 | number of the fault as the application counts them, 0 for none; 0 |
 //! | 7 | CRC-8/AUTOSAR of the others |
 //!
 //! A page begins with its head and the number of power-ups. Where it is full the other one is erased, so that the last
