@@ -5,6 +5,7 @@ use emulator::program::Program;
 use host_tests::emulated::Bench;
 use host_tests::emulated::bench::{SUPPLY, program};
 use host_tests::emulated::commissioned::OnBoard;
+use host_tests::samples::count;
 use joint_firmware::joint::state_machine::State;
 use joint_firmware::objects::settings::Setting;
 use jointctl::commission::bench::Motion;
@@ -19,8 +20,8 @@ use rand_chacha::ChaCha8Rng;
 use std::f64::consts::{PI, TAU};
 use std::sync::OnceLock;
 
-/// Random motors on each board.
-const MOTORS: u64 = 20;
+/// Random motors on each board: in the test command, and in all.
+const MOTORS: (u64, u64) = (6, 20);
 /// Random motors that lose their power.
 const RESTARTED: u64 = 3;
 /// Velocity of a motor that turns again, turns of the rotor per second, for how long, s, and how far off its mean may
@@ -50,7 +51,7 @@ pub fn trials() -> Vec<Trial> {
         let name = format!("b_g431b_esc1_turns_again_by_its_index_after_a_loss_of_power_{motor}");
         trials.push(Trial::test(name, move || turns_again(1_100 + motor)));
     }
-    for motor in 0..MOTORS {
+    for motor in 0..count(MOTORS.0, MOTORS.1) {
         let name = format!("moteus_r4_is_commissioned_with_random_motor_{motor:02}");
         trials.push(Trial::test(name, move || is_commissioned(MOTEUS, MoteusR4::new, motor)));
         let name = format!("b_g431b_esc1_is_commissioned_with_random_motor_{motor:02}");
