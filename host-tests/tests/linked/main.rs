@@ -4,6 +4,7 @@
 
 mod control_interrupt;
 mod division;
+mod sizes;
 mod stack;
 mod thumb;
 
@@ -13,7 +14,7 @@ use libtest_mimic::Arguments;
 fn main() {
     let arguments = Arguments::from_args();
     let ignored = std::env::var_os("CI").is_none() && !target_installed();
-    let trials = control_interrupt::trials().into_iter().chain(stack::trials()).chain(division::trials());
-    let trials = trials.map(|trial| trial.with_ignored_flag(ignored)).collect();
+    let rooms = [control_interrupt::trials(), stack::trials(), division::trials(), sizes::trials()];
+    let trials = rooms.into_iter().flatten().map(|trial| trial.with_ignored_flag(ignored)).collect();
     libtest_mimic::run(&arguments, trials).exit();
 }
