@@ -68,6 +68,16 @@ fn an_image_survives_the_way_to_toml_and_back_and_a_damaged_one_is_refused() {
     assert!(run(&["sign", "again.img", "--key", "joint.key", "--version", "7", "--serial", "12"]).status.success());
     assert_eq!(read("again.signed").len(), read("again.img").len() + 32);
     assert!(run(&["image", "verify", "again.signed", "--key", "joint.key"]).status.success());
+    // Through pipes: TOML to a binary image with a tag, to its verification.
+    let piped = "$0 image convert again.img - | $0 sign - --key joint.key --version 7 --serial 12 > piped.signed && \
+                 $0 image verify - --key joint.key < piped.signed && cat again.img | $0 image convert - piped.toml";
+    let mut shell = Command::new("bash");
+    shell.args(["-o", "pipefail", "-c", piped, env!("CARGO_BIN_EXE_jointctl")]).current_dir(folder.path());
+    let output = shell.output().expect("bash starts");
+    assert!(output.status.success(), "{}", stderr(&output));
+    assert_eq!(read("piped.signed"), read("again.signed"));
+    assert_eq!(read("piped.toml"), read("again.toml"));
+    assert!(!folder.path().join("-").exists() && !folder.path().join("-.signed").exists());
     let refused = run(&["image", "verify", "again.signed", "--key", "other.key"]);
     assert!(!refused.status.success() && stderr(&refused).contains("its tag is not of key"), "{}", stderr(&refused));
     let refused = run(&["image", "verify", "again.img", "--key", "joint.key"]);
@@ -482,6 +492,41 @@ fn completions_of_every_shell_name_the_commands_and_bash_completes_one() {
     let completed = "source ./bash; COMP_WORDS=(jointctl comm); COMP_CWORD=1; _jointctl jointctl comm jointctl; echo ${COMPREPLY[*]}";
     let output = Command::new("bash").current_dir(folder.path()).args(["-c", completed]).output().expect("bash starts");
     assert_eq!(String::from_utf8_lossy(&output.stdout), "commission\n", "{}", stderr(&output));
+}
+
+#[test]
+fn every_command_has_a_manual_page_and_none_is_replaced_without_force() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = jointctl(folder.path(), &["man", "man1"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let page = |name: &str| std::fs::read_to_string(folder.path().join("man1").join(name)).unwrap();
+    assert!(page("jointctl.1").contains("bus\\-yml") && page("jointctl-image-verify.1").contains("standard input"));
+    let help = String::from_utf8(jointctl(folder.path(), &["--help"]).stdout).unwrap();
+    let list = help.split("Commands:\n").nth(1).unwrap().split("\n\n").next().unwrap();
+    let commands: Vec<&str> = list.lines().filter_map(|line| line.split_whitespace().next()).collect();
+    assert!(commands.len() > 20, "{help}");
+    commands.into_iter().filter(|name| *name != "help").for_each(|name| drop(page(&format!("jointctl-{name}.1"))));
+    let again = jointctl(folder.path(), &["man", "man1"]);
+    assert!(!again.status.success() && stderr(&again).contains("exists; --force replaces it"), "{}", stderr(&again));
+    assert!(jointctl(folder.path(), &["man", "man1", "--force"]).status.success());
+}
+
+#[test]
+fn a_dash_is_standard_output_for_what_is_one_file_and_refused_for_what_is_two() {
+    let folder = tempfile::tempdir().unwrap();
+    assert!(jointctl(folder.path(), &["eds", "joint.eds"]).status.success());
+    let written = std::fs::read_to_string(folder.path().join("joint.eds")).unwrap();
+    let printed = String::from_utf8(jointctl(folder.path(), &["eds", "-"]).stdout).unwrap();
+    // They differ by the moment of their making.
+    let kept = |text: &str| -> Vec<String> {
+        text.lines().filter(|line| !line.contains("Time=") && !line.contains("Date=")).map(str::to_owned).collect()
+    };
+    assert_eq!(kept(&printed), kept(&written));
+    let printed = jointctl(folder.path(), &["dbc", "-"]);
+    assert!(printed.stdout.starts_with(b"VERSION"), "{}", stderr(&printed));
+    let refused = jointctl(folder.path(), &["excite", "--out", "-"]);
+    assert_eq!(refused.status.code(), Some(2), "{}", stderr(&refused));
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 
 #[test]

@@ -3,19 +3,22 @@
 use super::CommandError;
 use super::force::Force;
 use super::remote::Patience;
+use super::stream;
 use crate::describe::{dbc, eds};
-use crate::output::write_file;
 use crate::remote::RemoteJoint;
 use bus::client::ClientError;
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
+
+/// Name of a file that has none.
+const EDS: &str = "joint.eds";
 
 /// Arguments of `eds`.
 #[derive(Debug, Args)]
 pub struct Eds {
-    /// File to write
-    #[arg(default_value = "joint.eds")]
+    /// File to write; "-" is standard output
+    #[arg(default_value = EDS)]
     file: PathBuf,
     /// Permission to replace.
     #[command(flatten)]
@@ -35,17 +38,17 @@ pub struct Eds {
 impl Eds {
     /// Runs the command.
     pub fn run(&self) -> Result<(), CommandError> {
-        self.force.permits([&self.file])?;
-        let name = self.file.file_name().unwrap_or_default().to_string_lossy();
+        stream::permits(self.force, &self.file)?;
+        let file = if stream::is_stream(&self.file) { Path::new(EDS) } else { &self.file };
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
         // A clock before 1970 dates the file 1970.
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let identity = match (&self.bus, self.node) {
             (Some(bus), Some(node)) => identity(&RemoteJoint::open_within(bus, node, self.patience.duration())?)?,
             _ => eds::Identity::default(),
         };
-        write_file(&self.file, eds::text(&name, now, identity).as_bytes())?;
-        println!("written: {}", self.file.display());
-        Ok(())
+        let text = eds::text(&name, now, identity);
+        stream::write(&self.file, text.as_bytes(), &format!("written: {}", self.file.display()))
     }
 }
 
@@ -61,7 +64,7 @@ pub(super) fn identity(joint: &RemoteJoint) -> Result<eds::Identity, CommandErro
 /// Arguments of `dbc`.
 #[derive(Debug, Args)]
 pub struct Dbc {
-    /// File to write
+    /// File to write; "-" is standard output
     #[arg(default_value = "joint.dbc")]
     file: PathBuf,
     /// Permission to replace.
@@ -78,7 +81,7 @@ pub struct Dbc {
 impl Dbc {
     /// Runs the command.
     pub fn run(&self) -> Result<(), CommandError> {
-        self.force.permits([&self.file])?;
+        stream::permits(self.force, &self.file)?;
         let mut nodes = self.node.clone();
         nodes.sort_unstable();
         nodes.dedup();
@@ -88,8 +91,7 @@ impl Dbc {
         if let Some(torque) = self.rated_torque.filter(|torque| !(*torque > 0.0 && *torque < 1e6)) {
             return Err(CommandError::Arguments(format!("--rated-torque is {torque} Nm, must lie in 0 to 1000000 Nm")));
         }
-        write_file(&self.file, dbc::text(&nodes, self.rated_torque).as_bytes())?;
-        println!("written: {}", self.file.display());
-        Ok(())
+        let text = dbc::text(&nodes, self.rated_torque);
+        stream::write(&self.file, text.as_bytes(), &format!("written: {}", self.file.display()))
     }
 }

@@ -4,7 +4,7 @@ use clap::Command;
 
 /// What a command is called below `jointctl`, and lines as one types them. `JOINTCTL_BUS` and `JOINTCTL_NODE` stand for
 /// `--bus` and `--node`.
-const EXAMPLES: [(&str, &[&str]); 41] = [
+const EXAMPLES: [(&str, &[&str]); 42] = [
     ("demo", &["jointctl demo", "jointctl demo --seed 7 --out demo-7"]),
     ("fit", &["jointctl fit elbow.toml", "jointctl fit elbow.toml --all"]),
     ("evaluate", &["jointctl evaluate elbow/friction.img other.toml"]),
@@ -91,6 +91,7 @@ const EXAMPLES: [(&str, &[&str]); 41] = [
     ("dbc", &["jointctl dbc arm.dbc --node 5 --node 6"]),
     ("bus-yml", &["jointctl bus-yml --node 5 --node 6 --out arm"]),
     ("excite", &["jointctl excite --config joint.toml", "jointctl excite --config joint.toml --check my-motion.csv"]),
+    ("man", &["jointctl man ~/.local/share/man/man1"]),
     ("completions", &["jointctl completions bash > ~/.local/share/bash-completion/completions/jointctl"]),
 ];
 

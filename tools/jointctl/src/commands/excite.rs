@@ -3,6 +3,7 @@
 use super::CommandError;
 use super::force::Force;
 use super::joint::JointChoice;
+use super::stream;
 use crate::excite::check::{Findings, check};
 use crate::excite::file::{SAMPLE_PERIOD, coefficients, read, table};
 use crate::excite::{Bounds, Effort, optimise};
@@ -63,6 +64,9 @@ impl Excite {
                 true => Ok(()),
                 false => Err(CommandError::Excitation { path: path.clone(), defects: findings.defects.join("; ") }),
             };
+        }
+        if stream::is_stream(&self.out) {
+            return Err(CommandError::Arguments("--out names a table, and coefficients are written beside it".into()));
         }
         let twin = self.out.with_extension("toml");
         if twin == self.out {

@@ -3,9 +3,9 @@
 use super::CommandError;
 use super::fit::bytes;
 use super::force::Force;
+use super::stream;
 use crate::image_text;
 use crate::key_file;
-use crate::output::write_file;
 use crate::quantize::golden_vectors;
 use clap::{Args, Subcommand};
 use friction_compensation::friction::FrictionModel;
@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 pub enum ImageCommand {
     /// Print an image as TOML
     Inspect {
-        /// Image, binary or TOML
+        /// Image, binary or TOML; "-" is standard input
         image: PathBuf,
         /// Print JSON instead, with the same keys
         #[arg(long)]
@@ -28,22 +28,22 @@ pub enum ImageCommand {
     /// Check an image as a joint does before it uses one: checksum, fields, certificate, golden vectors; with a key,
     /// the tag
     Verify {
-        /// Image, binary, signed or TOML
+        /// Image, binary, signed or TOML; "-" is standard input
         image: PathBuf,
         /// The key that its tag must be of
         #[arg(long, value_name = "FILE")]
         key: Option<PathBuf>,
     },
-    /// Convert between the binary form and TOML (by the names' endings: .toml is TOML)
+    /// Convert between the binary form and TOML (by the names' endings: .toml is TOML, and so is standard output)
     Convert(Convert),
 }
 
 /// Arguments of `image convert`.
 #[derive(Debug, Args)]
 pub struct Convert {
-    /// Image, binary or TOML
+    /// Image, binary or TOML; "-" is standard input
     from: PathBuf,
-    /// File to write
+    /// File to write; "-" is standard output, as TOML
     to: PathBuf,
     /// Permission to replace.
     #[command(flatten)]
@@ -66,11 +66,12 @@ impl ImageCommand {
             }
             Self::Verify { image: path, key } => {
                 let key = key.as_deref().map(key_file::read).transpose()?;
+                let upload = stream::read(path)?;
                 if let Some(key) = &key {
-                    verify_tag(path, key)?;
+                    verify_tag(&upload, path, key)?;
                 }
                 let number = key.map(|key| key.id());
-                let image = read(path)?;
+                let image = decode(&upload, path)?;
                 let certificate = verify(&image, path)?;
                 print!("{}", summary(&image, &certificate));
                 if let Some(number) = number {
@@ -95,13 +96,12 @@ impl Convert {
             reason: format!("{error}; after an edit, --recompute-golden computes them anew"),
         };
         image.verify_golden(&FrictionModel::new(&image.friction, 1)).map_err(|error| refused(&error))?;
-        let contents = match is_text(&self.to) {
+        let contents = match is_text(&self.to) || stream::is_stream(&self.to) {
             true => image_text::to_text(&image).into_bytes(),
             false => bytes(&image, &self.from)?,
         };
-        self.force.permits([&self.to])?;
-        write_file(&self.to, &contents)?;
-        Ok(())
+        stream::permits(self.force, &self.to)?;
+        stream::write(&self.to, &contents, "")
     }
 }
 
@@ -110,10 +110,9 @@ fn is_text(path: &Path) -> bool {
 }
 
 /// Whether the tag behind an image is of this key.
-fn verify_tag(path: &Path, key: &Key) -> Result<(), CommandError> {
+fn verify_tag(upload: &[u8], path: &Path, key: &Key) -> Result<(), CommandError> {
     let refused = |reason: String| Err(CommandError::Image { path: path.to_owned(), reason });
-    let upload = std::fs::read(path).map_err(|source| CommandError::Read { path: path.to_owned(), source })?;
-    match split(&upload) {
+    match split(upload) {
         (_, None) => refused("there is no tag behind it; `jointctl sign` puts one there".to_owned()),
         (image, Some(tag)) if !key.verify(image, tag) => {
             refused(format!("its tag is not of key {:08x}, or the image has been changed", key.id()))
@@ -122,16 +121,22 @@ fn verify_tag(path: &Path, key: &Key) -> Result<(), CommandError> {
     }
 }
 
-/// Reads an image, with or without a tag behind it: TOML where the name ends in `.toml`, else binary.
+/// Reads an image, with or without a tag behind it: TOML where the name ends in `.toml`, else binary; from standard
+/// input either.
 pub fn read(path: &Path) -> Result<Image, CommandError> {
-    let unreadable = |source| CommandError::Read { path: path.to_owned(), source };
+    decode(&stream::read(path)?, path)
+}
+
+/// The image that a file's bytes are; see [`read`].
+pub fn decode(bytes: &[u8], path: &Path) -> Result<Image, CommandError> {
     let refused = |reason: String| CommandError::Image { path: path.to_owned(), reason };
-    if is_text(path) {
-        let text = std::fs::read_to_string(path).map_err(unreadable)?;
-        return image_text::from_text(&text).map_err(|error| refused(error.to_string()));
+    // A binary image has zeros, a text none.
+    let text = is_text(path) || stream::is_stream(path) && !bytes.contains(&0);
+    if text {
+        let text = str::from_utf8(bytes).map_err(|error| refused(error.to_string()))?;
+        return image_text::from_text(text).map_err(|error| refused(error.to_string()));
     }
-    let bytes = std::fs::read(path).map_err(unreadable)?;
-    Image::decode(split(&bytes).0).map_err(|error| refused(error.to_string()))
+    Image::decode(split(bytes).0).map_err(|error| refused(error.to_string()))
 }
 
 /// What a joint checks before it uses an image, after decoding.

@@ -5,8 +5,8 @@ use super::fit::bytes;
 use super::force::Force;
 use super::image::{read, verify};
 use super::remote::Where;
+use super::stream;
 use crate::key_file;
-use crate::output::write_file;
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
 
@@ -99,7 +99,8 @@ pub struct Sign {
     /// Serial number of the only joint to sign it for, 0 for any [default: the image's]
     #[arg(long, value_name = "N")]
     serial: Option<u32>,
-    /// File to write: the image with its tag behind it [default: the image's name with the ending .signed]
+    /// File to write: the image with its tag behind it [default: the image's name with the ending .signed; "-", standard output, where
+    /// the image comes from standard input]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Permission to replace.
@@ -119,15 +120,19 @@ impl Sign {
         let mut upload = bytes(&image, &self.image)?;
         let tag = key.sign(&upload);
         upload.extend_from_slice(&tag);
-        let out = self.out.clone().unwrap_or_else(|| self.image.with_extension("signed"));
-        self.force.permits([&out])?;
-        write_file(&out, &upload)?;
+        let out = match &self.out {
+            Some(out) => out.clone(),
+            None if stream::is_stream(&self.image) => self.image.clone(),
+            None => self.image.with_extension("signed"),
+        };
+        stream::permits(self.force, &out)?;
         let target = match (image.target.product, image.target.serial) {
             (0, 0) => "any joint".to_owned(),
             (product, 0) => format!("every joint of product {product:#010x}"),
             (product, serial) => format!("joint {serial} of product {product:#010x}"),
         };
-        println!("version {} for {target}, signed with key {:08x}: {}", image.version, key.id(), out.display());
-        Ok(())
+        let said =
+            format!("version {} for {target}, signed with key {:08x}: {}", image.version, key.id(), out.display());
+        stream::write(&out, &upload, &said)
     }
 }

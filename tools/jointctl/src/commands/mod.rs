@@ -20,6 +20,7 @@ pub mod image;
 pub mod joint;
 pub mod keep;
 pub mod key;
+pub mod man;
 pub mod monitor;
 pub mod objects;
 mod on_board;
@@ -28,6 +29,7 @@ pub mod remote;
 pub mod retrain;
 pub mod robot;
 pub mod sim;
+mod stream;
 pub mod upload;
 
 use clap::{CommandFactory, Parser, Subcommand};
@@ -111,6 +113,8 @@ pub enum Command {
     Excite(excite::Excite),
     /// Write the completions of a shell to standard output
     Completions(completions::Completions),
+    /// Write the manual pages, one a command, into a folder
+    Man(man::Man),
 }
 
 /// The program's arguments, with examples at the end of every command's help.
@@ -275,6 +279,7 @@ pub fn run(arguments: Arguments) -> Result<(), CommandError> {
         Command::BusYml(bus_yml) => bus_yml.run(),
         Command::Excite(excite) => excite.run(),
         Command::Completions(completions) => completions.run(),
+        Command::Man(man) => man.run(),
     }
 }
 

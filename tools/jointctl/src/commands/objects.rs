@@ -3,7 +3,7 @@
 use super::CommandError;
 use super::force::Force;
 use super::remote::{Patience, Where};
-use crate::output::write_file;
+use super::stream;
 use crate::remote::entry::Entry;
 use crate::remote::{Value, configuration, info};
 use clap::Args;
@@ -45,7 +45,7 @@ pub struct Get {
     /// Node id of the joint, 1 to 127
     #[arg(long, value_name = "N", required_unless_present = "list", env = "JOINTCTL_NODE")]
     node: Option<u8>,
-    /// Write the bytes of the one object to a file: an image, a fault history
+    /// Write the bytes of the one object to a file: an image, a fault history; "-" is standard output
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Permission to replace.
@@ -76,7 +76,9 @@ impl Get {
             return Ok(());
         };
         let named = self.objects.iter().map(|name| Entry::find(name)).collect::<Result<Vec<_>, _>>()?;
-        self.force.permits(&self.out)?;
+        if let Some(path) = &self.out {
+            stream::permits(self.force, path)?;
+        }
         let joint = Where { bus: bus.clone(), node, key: None, patience: self.patience }.joint()?;
         if let Some(path) = &self.out {
             let [entry] = named.concat()[..] else {
@@ -84,9 +86,8 @@ impl Get {
             };
             let bytes = joint.node().upload(entry.object.index, entry.object.sub_index);
             let bytes = bytes.map_err(crate::remote::RemoteError::from)?;
-            write_file(path, &bytes)?;
-            println!("{}: {} bytes written: {}", entry.described(), bytes.len(), path.display());
-            return Ok(());
+            let said = format!("{}: {} bytes written: {}", entry.described(), bytes.len(), path.display());
+            return stream::write(path, &bytes, &said);
         }
         if self.json {
             let entries = named.concat();

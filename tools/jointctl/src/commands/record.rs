@@ -53,7 +53,7 @@ impl Record {
             seconds => seconds.map(Duration::from_secs_f64),
         };
         let name = self.out.file_name().and_then(|name| name.to_str());
-        let Some(name) = name.filter(|name| *name != DESCRIPTION) else {
+        let Some(name) = name.filter(|name| ![DESCRIPTION, "-"].contains(name)) else {
             let text = format!("--out is {}: it has to name a file other than {DESCRIPTION}", self.out.display());
             return Err(CommandError::Arguments(text));
         };

@@ -4,6 +4,7 @@ use super::CommandError;
 use super::fit::bytes;
 use super::image::read;
 use super::remote::Where;
+use super::stream;
 use crate::progress::Terminal;
 use crate::remote::image::{ImageStatus, Use};
 use crate::remote::info::life;
@@ -16,7 +17,7 @@ const SHADOW: f64 = 600.0;
 /// Arguments of `upload`.
 #[derive(Debug, Args)]
 pub struct Upload {
-    /// Image: binary, signed, or TOML
+    /// Image: binary, signed, or TOML; "-" is standard input, binary or signed
     image: PathBuf,
     /// Which joint.
     #[command(flatten)]
@@ -38,9 +39,7 @@ impl Upload {
         let upload = match self.image.extension() {
             Some(ending) if ending.eq_ignore_ascii_case("toml") => bytes(&read(&self.image)?, &self.image)?,
             // As it is: what is wrong with it is the joint's to say.
-            _ => {
-                std::fs::read(&self.image).map_err(|source| CommandError::Read { path: self.image.clone(), source })?
-            }
+            _ => stream::read(&self.image)?,
         };
         let usage = match (self.shadow, self.trial, self.commit) {
             (Some(seconds), ..) => Use::Shadow(seconds),

@@ -70,6 +70,9 @@ pub struct Source {
     /// Separator of the fields.
     #[serde(default = "comma")]
     pub delimiter: char,
+    /// Between the whole and the fraction of a number: `.` or `,`.
+    #[serde(default = "point")]
+    pub decimal: char,
 }
 
 /// Which column is which signal.
@@ -353,6 +356,10 @@ pub enum FractionBy {
 
 fn one() -> f64 {
     1.0
+}
+
+fn point() -> char {
+    '.'
 }
 
 fn comma() -> char {

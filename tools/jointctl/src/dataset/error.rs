@@ -81,7 +81,7 @@ pub enum DatasetError {
         message: String,
     },
     /// A column that the description names does not exist.
-    #[error("{}: no column {column:?}; available: {}", file.display(), available.join(", "))]
+    #[error("{}: no column {column:?}; available: {}{hint}", file.display(), available.join(", "))]
     MissingColumn {
         /// The file.
         file: PathBuf,
@@ -89,6 +89,8 @@ pub enum DatasetError {
         column: String,
         /// The columns that exist.
         available: Vec<String>,
+        /// What may be meant, or nothing.
+        hint: String,
     },
     /// A column that the description names exists twice.
     #[error("{}: column {column:?} appears more than once in the header", file.display())]
@@ -99,7 +101,7 @@ pub enum DatasetError {
         column: String,
     },
     /// A field that should be a number is not.
-    #[error("{} line {line}, column {column:?}: {text:?}: expected a number", file.display())]
+    #[error("{} line {line}, column {column:?}: {text:?}: expected a number{hint}", file.display())]
     NotANumber {
         /// The file.
         file: PathBuf,
@@ -109,6 +111,8 @@ pub enum DatasetError {
         column: String,
         /// The text in the field.
         text: String,
+        /// What may be meant, or nothing.
+        hint: &'static str,
     },
     /// A field that should be a finite number is NaN or infinite.
     #[error("{} line {line}, column {column:?}: {text}: expected a finite number (name it in clean.missing_text if it marks a missing sample)", file.display())]

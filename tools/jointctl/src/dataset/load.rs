@@ -198,12 +198,12 @@ pub fn append(
             match target {
                 Target::Number { field, name, values } => {
                     let bytes = record.get(*field).unwrap_or_default().trim_ascii();
-                    let value = number(bytes).filter(|value| value.is_finite());
+                    let value = number(bytes, source.decimal).filter(|value| value.is_finite());
                     missing |= value.is_none();
                     values.push(match value {
                         Some(value) => value,
                         None if missing_text.iter().any(|text| text.as_bytes() == bytes) => f64::NAN,
-                        None => return Err(bad_number(bytes, path, line, name)),
+                        None => return Err(bad_number(bytes, source.decimal, path, line, name)),
                     });
                 }
                 Target::Text { field, column, .. } => {
@@ -255,7 +255,9 @@ fn targets<'a>(
             _ => Err(DatasetError::MissingColumn {
                 file: path.to_owned(),
                 column: name.clone(),
-                available: header.iter().chain(elsewhere).cloned().collect(),
+                // Bytes of a file that is no table are no orders to a terminal.
+                available: header.iter().chain(elsewhere).map(|name| name.escape_debug().to_string()).collect(),
+                hint: delimiter_hint(header).unwrap_or_default(),
             }),
         }
     };
@@ -269,15 +271,33 @@ fn targets<'a>(
     Ok(targets)
 }
 
-fn number(bytes: &[u8]) -> Option<f64> {
-    std::str::from_utf8(bytes).ok()?.parse().ok()
+/// Which delimiter a header of one field may have meant.
+fn delimiter_hint(header: &[String]) -> Option<String> {
+    let [only] = header else { return None };
+    let delimiter = [";", "\t", ",", "|"].into_iter().find(|delimiter| only.contains(delimiter))?;
+    Some(format!("; one column alone: `delimiter = {delimiter:?}` in [source]?"))
 }
 
-fn bad_number(bytes: &[u8], path: &Path, line: u64, column: &str) -> DatasetError {
+fn number(bytes: &[u8], decimal: char) -> Option<f64> {
+    let text = std::str::from_utf8(bytes).ok()?;
+    match decimal {
+        '.' => text.parse().ok(),
+        // A point would be between thousands.
+        _ if text.contains('.') => None,
+        _ => text.replacen(decimal, ".", 1).parse().ok(),
+    }
+}
+
+fn bad_number(bytes: &[u8], decimal: char, path: &Path, line: u64, column: &str) -> DatasetError {
     let (file, column, text) = (path.to_owned(), column.to_owned(), String::from_utf8_lossy(bytes).into_owned());
-    match number(bytes) {
+    let hint = match decimal {
+        '.' if number(bytes, ',').is_some() => "; `decimal = \",\"` in [source]?",
+        ',' if number(bytes, '.').is_some() => "; `decimal = \".\"` in [source]?",
+        _ => "",
+    };
+    match number(bytes, decimal) {
         Some(_) => DatasetError::NotFinite { file, line, column, text },
-        None => DatasetError::NotANumber { file, line, column, text },
+        None => DatasetError::NotANumber { file, line, column, text, hint },
     }
 }
 

@@ -66,6 +66,9 @@ impl Check<'_> {
         )?;
         self.require(!d.source.files.is_empty(), "source.files", "[]", "at least one file")?;
         self.require(d.source.delimiter.is_ascii(), "source.delimiter", d.source.delimiter, "an ASCII character")?;
+        let decimal = d.source.decimal;
+        let apart = matches!(decimal, '.' | ',') && decimal != d.source.delimiter;
+        self.require(apart, "source.decimal", decimal, "\".\" or \",\", and not the delimiter")?;
         self.columns(d)?;
         self.select(d)?;
         self.clean(d)?;

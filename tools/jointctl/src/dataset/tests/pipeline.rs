@@ -262,3 +262,23 @@ fn a_byte_order_mark_spaces_and_windows_line_ends_do_no_harm() {
     let semicolons = DESCRIPTION.replace("files =", "delimiter = \";\"\nfiles =");
     assert_eq!(prepare(&semicolons, &joint().replace(',', ";")).unwrap().samples.len(), 2000);
 }
+
+#[test]
+fn decimal_commas_are_read_and_what_is_missing_in_the_description_is_named() {
+    let points = prepare(DESCRIPTION, &joint()).unwrap();
+    let commas = joint().replace(',', ";").replace('.', ",");
+    let semicolons = DESCRIPTION.replace("files =", "delimiter = \";\"\nfiles =");
+    let decimal = semicolons.replace("files =", "decimal = \",\"\nfiles =");
+    assert_eq!(prepare(&decimal, &commas).unwrap().samples.velocity, points.samples.velocity);
+    let refusal = |description: &str, csv: &str| prepare(description, csv).unwrap_err().to_string();
+    let told = refusal(&semicolons, &commas);
+    assert!(told.ends_with("expected a number; `decimal = \",\"` in [source]?"), "{told}");
+    let told = refusal(&decimal, &joint().replace(',', ";"));
+    assert!(told.ends_with("expected a number; `decimal = \".\"` in [source]?"), "{told}");
+    let told = refusal(DESCRIPTION, &joint().replace(',', ";"));
+    assert!(told.ends_with("; one column alone: `delimiter = \";\"` in [source]?"), "{told}");
+    let same = semicolons.replace("files =", "decimal = \";\"\nfiles =");
+    assert!(refusal(&same, &commas).contains("source.decimal"), "{}", refusal(&same, &commas));
+    let told = refusal(DESCRIPTION, &joint().replacen("time", "\u{1b}[2Jtime", 1));
+    assert!(told.contains("\\u{1b}[2Jtime") && !told.contains('\u{1b}'), "{told:?}");
+}
