@@ -92,7 +92,8 @@ pub fn differences(configured: &Load, identified: &[Parameter]) -> Vec<LoadDiffe
 impl LoadDifference {
     fn counts(&self) -> bool {
         let permitted = TOLERANCE * self.configured + DEVIATIONS * self.standard_error;
-        self.configured > 0.0 && self.measured > 0.0 && (self.measured - self.configured).abs() > permitted
+        // What was not identified is zero. A negative inertia is the sign of torque or position.
+        self.configured > 0.0 && self.measured != 0.0 && (self.measured - self.configured).abs() > permitted
     }
 }
 
@@ -125,6 +126,7 @@ mod tests {
         for factor in [0.9, 1.0, 1.1] {
             assert_eq!(scaled(factor), [], "{factor}");
         }
+        assert_eq!(scaled(-1.0).len(), 1, "the inertia of a torque with the wrong sign");
         for factor in [0.8, 1.2, 4.0, 0.25] {
             let found = scaled(factor);
             assert_eq!(
