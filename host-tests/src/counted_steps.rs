@@ -10,7 +10,9 @@ use crate::control_steps::replay::{SCENARIOS, START, STEPS};
 use std::collections::HashMap;
 use std::path::Path;
 
-/// Parts of a control step, and how their functions' names begin behind `joint_firmware::`.
+/// Crates whose functions are told apart.
+const CRATES: [&str; 2] = ["joint_firmware::", "friction_compensation::"];
+/// Parts of a control step, and how their functions' names begin behind the crate's.
 pub const PARTS: [(&str, &[&str]); 17] = [
     ("network's inputs", &["friction::network::InputScale::"]),
     ("network", &["friction::network::"]),
@@ -62,7 +64,7 @@ pub fn part(loader: &addr2line::Loader, address: u32) -> Option<usize> {
     let mut frames = loader.find_frames(address.into()).ok()?;
     while let Ok(Some(frame)) = frames.next() {
         let Some(name) = frame.function.as_ref().and_then(|function| function.demangle().ok()) else { continue };
-        let Some((_, path)) = name.split_once("joint_firmware::") else { continue };
+        let Some((_, path)) = CRATES.iter().find_map(|of| name.split_once(of)) else { continue };
         let found = PARTS.iter().position(|(_, names)| names.iter().any(|begin| path.starts_with(begin)));
         if found.is_some() {
             return found;
