@@ -3,10 +3,10 @@
 //! Angles are 32-bit fractions of a turn and wrap with the integers, so a multiple of the encoder's angle is exact
 //! however often it wraps.
 //!
-//! Sine and cosine come from [`friction_compensation::sine`], in integers: the same bits everywhere, within 9e-6, for about 40
-//! instructions. The CORDIC unit of the STM32G4 takes no less: 103 cycles for the pair, with the accesses to it, have
-//! been reported from a G431. It would bring registers into this arithmetic, and the host would have to imitate it bit
-//! for bit; an encoder of 14 bits is 40 times coarser than the error of either.
+//! Sine and cosine come from [`friction_compensation::sine`], in integers: the same bits everywhere, within 9e-6, for
+//! about 40 instructions. The CORDIC unit of the STM32G4 takes no less: 103 cycles for the pair, with the accesses to
+//! it, have been reported from a G431. It would bring registers into this arithmetic, and the host would have to
+//! imitate it bit for bit; an encoder of 14 bits is 40 times coarser than the error of either.
 
 use friction_compensation::sine::cos_sin;
 

@@ -1,9 +1,10 @@
 //! Object 2215h: who owns the joint, and what its owner may do; the task.
 //!
 //! A joint without a key belongs to nobody and takes everything. With one, whatever changes what it can do to its
-//! surroundings wants a session, which the key opens ([`authentication`](friction_compensation::parameters::authentication)). The first
-//! key, and the end of a key that is lost, want somebody at the joint: its button is pressed, or, where it has none,
-//! its supply has just come and no master has started it since.
+//! surroundings wants a session, which the key opens
+//! ([`authentication`](friction_compensation::parameters::authentication)). The first key, and the end of a key that is
+//! lost, want somebody at the joint: its button is pressed, or, where it has none, its supply has just come and no
+//! master has started it since.
 
 use super::field::OwnerField;
 use super::settings::Setting;

@@ -10,7 +10,8 @@
 //!
 //! Objects that a program does not know are skipped, objects that are missing keep their defaults: a record survives a
 //! change of program both ways. A limit damping that is missing, in records of programs that had none, is the least
-//! that its limits permit. Length and damage are the business of the [slots](friction_compensation::parameters::slots) that it lies in.
+//! that its limits permit. Length and damage are the business of the [slots](friction_compensation::parameters::slots)
+//! that it lies in.
 
 use super::communication::{self, VERIFICATION};
 use super::field::{Field, RANGES, Range};

@@ -99,8 +99,8 @@ pub struct Sign {
     /// Serial number of the only joint to sign it for, 0 for any [default: the image's]
     #[arg(long, value_name = "N")]
     serial: Option<u32>,
-    /// File to write: the image with its tag behind it [default: the image's name with the ending .signed; "-", standard output, where
-    /// the image comes from standard input]
+    /// File to write: the image with its tag behind it [default: the image's name with the ending .signed; "-",
+    /// standard output, where the image comes from standard input]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Permission to replace.
