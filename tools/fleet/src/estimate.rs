@@ -137,6 +137,16 @@ mod tests {
         let mut still = recorded(500, 0.1);
         still.windows.iter_mut().for_each(|window| window.row = [0.0, 0.5, 0.8, 1.0, 1.0, 0.4]);
         assert!(estimate(&Sums::of(&[still], |_| None)).is_none());
+        // A swing so small that gravity's cosine looks like the offset.
+        let swing = |amplitude: f64| {
+            let mut swing = recorded(500, 0.0);
+            swing.windows.iter_mut().enumerate().for_each(|(at, window)| {
+                let q = amplitude * (0.068 * at as f64).sin();
+                (window.row[1], window.row[2]) = (q.sin(), q.cos());
+            });
+            estimate(&Sums::of(&[swing], |_| None))
+        };
+        assert!(swing(0.05).is_none() && swing(0.5).is_some());
         let mut broken = sums(500, 0.1);
         broken.products[3] = f64::NAN;
         assert!(estimate(&broken).is_none());

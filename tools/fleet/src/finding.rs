@@ -259,3 +259,105 @@ fn judge(change: &Change, reference: &Side) -> (Kind, String) {
     }
     (Kind::Healthy, format!("friction within {:.0} %", 100.0 * DRIFT))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::windows::{Recorded, Window};
+
+    /// Inertia, gravity (sine, cosine), offset, dry and viscous friction of a joint.
+    const JOINT: [f64; 6] = [0.5, 2.0, 0.1, 0.2, 1.5, 0.3];
+
+    /// Day number so and so of a joint with these parameters, and a torque that no parameter explains.
+    fn entry(number: usize, values: [f64; 6], unexplained: f64) -> Entry {
+        let window = |at: usize| {
+            let t = at as f64 * 0.04;
+            let (q, v) = ((1.7 * t).sin() + 0.3 * t.cos(), 1.7 * (1.7 * t).cos() - 0.3 * t.sin());
+            let row = [-2.9 * (1.7 * t).sin(), q.sin(), q.cos(), 1.0, v.signum(), v];
+            let error = unexplained * ((at * 7_919 % 1_009) as f64 / 504.0 - 1.0);
+            let torque = row.iter().zip(values).map(|(factor, value)| factor * value).sum::<f64>() + error;
+            Window { row, torque, duration: 0.04 }
+        };
+        let windows = (0..400).map(window).collect();
+        let recorded = Recorded { windows, seconds: 16.0, temperature: 30.0 };
+        Entry {
+            joint: "j".into(),
+            day: format!("2026-01-{:02}", number + 1),
+            source: String::new(),
+            defect: String::new(),
+            sums: Sums::of(&[recorded], |_| None),
+        }
+    }
+
+    /// The finding where six days are followed by three with other parameters.
+    fn after(values: [f64; 6], unexplained: f64) -> Finding {
+        let before = (0..6).map(|number| entry(number, JOINT, 0.1));
+        let days: Vec<Entry> = before.chain((6..9).map(|number| entry(number, values, unexplained))).collect();
+        finding(&days)
+    }
+
+    /// The joint with its rigid torque and its friction times a factor each.
+    fn times(rigid: f64, friction: f64) -> [f64; 6] {
+        let factors = [rigid, rigid, rigid, rigid, friction, friction];
+        std::array::from_fn(|at| JOINT[at] * factors[at])
+    }
+
+    #[test]
+    fn each_limit_has_a_joint_just_below_and_one_just_above_it() {
+        for (friction, kind) in [
+            (1.0, Kind::Healthy),
+            (0.99 + DRIFT, Kind::Healthy),
+            (1.01 + DRIFT, Kind::Drifted),
+            (1.01 - DRIFT, Kind::Healthy),
+            (0.99 - DRIFT, Kind::FrictionFell),
+        ] {
+            let found = after(times(1.0, friction), 0.1);
+            assert_eq!(found.kind, kind, "{friction}: {}", found.reason);
+        }
+        for (scale, kind) in [(1.01 - SCALE, Kind::Healthy), (0.99 - SCALE, Kind::WrongConfiguration)] {
+            let found = after(times(scale, scale), 0.1);
+            assert_eq!(found.kind, kind, "{scale}: {}", found.reason);
+        }
+        for (factor, kind) in [(0.97 * BROKEN, Kind::Healthy), (1.03 * BROKEN, Kind::Broken)] {
+            let found = after(JOINT, factor * 0.1);
+            assert_eq!(found.kind, kind, "{factor}: {}", found.reason);
+        }
+        let friction = rms(&entry(0, JOINT, 0.0).sums, &FRICTION, &estimate(&entry(0, JOINT, 0.0).sums).unwrap());
+        for (part, kind) in [(0.97, Kind::Healthy), (1.03, Kind::Drifted)] {
+            let mut moved = JOINT;
+            moved[3] += part * OFFSET_DRIFT * friction;
+            let found = after(moved, 0.1);
+            assert_eq!(found.kind, kind, "{part}: {}", found.reason);
+        }
+    }
+
+    #[test]
+    fn a_payload_scales_no_friction_and_is_no_wrong_configuration() {
+        for rigid in [0.7, 1.5] {
+            assert_eq!(after(times(rigid, 1.0), 0.1).kind, Kind::Healthy, "{rigid}");
+        }
+        assert_eq!(after(times(-1.0, -1.0), 0.1).kind, Kind::WrongConfiguration);
+    }
+
+    #[test]
+    fn more_friction_may_leave_as_much_more_unexplained() {
+        assert_eq!(after(times(1.0, 2.0), 0.1 * 3.9).kind, Kind::Drifted);
+        assert_eq!(after(times(1.0, 2.0), 0.1 * 4.1).kind, Kind::Broken);
+    }
+
+    #[test]
+    fn a_change_holds_since_its_first_day_and_a_healthy_joint_has_none() {
+        assert_eq!(after(times(1.0, 1.4), 0.1).since.as_deref(), Some("2026-01-07"));
+        assert_eq!(after(JOINT, 0.1).since, None);
+    }
+
+    #[test]
+    fn the_present_has_no_day_of_the_reference() {
+        let three: Vec<Entry> = (0..REFERENCE_DAYS).map(|number| entry(number, JOINT, 0.1)).collect();
+        assert_eq!(finding(&three).kind, Kind::NotEnoughMotion);
+        let four: Vec<Entry> = three.into_iter().chain([entry(3, times(1.0, 1.4), 0.1)]).collect();
+        let found = finding(&four);
+        // One day of the present, and it alone.
+        assert!((found.change.unwrap().friction - 1.4).abs() < 0.01, "{found:?}");
+    }
+}
