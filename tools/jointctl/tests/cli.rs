@@ -503,7 +503,9 @@ fn every_command_has_a_manual_page_and_none_is_replaced_without_force() {
     assert!(page("jointctl.1").contains("bus\\-yml") && page("jointctl-image-verify.1").contains("standard input"));
     let help = String::from_utf8(jointctl(folder.path(), &["--help"]).stdout).unwrap();
     let list = help.split("Commands:\n").nth(1).unwrap().split("\n\n").next().unwrap();
-    let commands: Vec<&str> = list.lines().filter_map(|line| line.split_whitespace().next()).collect();
+    // A description that is wrapped is indented by more.
+    let lines = list.lines().filter_map(|line| line.strip_prefix("  ")).filter(|line| !line.starts_with(' '));
+    let commands: Vec<&str> = lines.filter_map(|line| line.split_whitespace().next()).collect();
     assert!(commands.len() > 20, "{help}");
     commands.into_iter().filter(|name| *name != "help").for_each(|name| drop(page(&format!("jointctl-{name}.1"))));
     let again = jointctl(folder.path(), &["man", "man1"]);
