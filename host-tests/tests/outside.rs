@@ -25,7 +25,7 @@ fn project(crate_name: &str, example: &str, purpose: &str) -> PathBuf {
     project
 }
 
-/// What Cargo prints on standard output in a project.
+/// Standard output of Cargo in a project.
 fn cargo(project: &Path, arguments: &[&str]) -> String {
     let output = Command::new(env!("CARGO"))
         .args(arguments)

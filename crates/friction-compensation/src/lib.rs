@@ -15,7 +15,7 @@
 #![deny(unsafe_code)]
 
 pub mod compensation;
-#[allow(unsafe_code)]
+#[allow(unsafe_code, reason = "DSP instructions have no safe form")]
 pub mod dsp;
 pub mod friction;
 pub mod parameters;

@@ -1,11 +1,11 @@
-//! What the boards' programs take of their memories is what docs/boards.md says, to a hundredth: the names of source
-//! files in the program depend on where it is built.
+//! Sizes of the boards' programs in docs/boards.md are those of the programs, to a hundredth: the names of source files
+//! in a program depend on where it is built.
 
 use host_tests::bare_metal::{BOARDS, build};
 use libtest_mimic::{Failed, Trial};
 use object::{Object, ObjectSegment};
 
-/// How far a size may be off what is published.
+/// Largest difference from a published size, as a part of it.
 const MARGIN: f64 = 0.01;
 
 /// The tests of this file, by name.
