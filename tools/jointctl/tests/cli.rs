@@ -1,6 +1,7 @@
 //! The program as a user meets it: exit codes, messages, files.
 
 mod figure;
+mod tables;
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -322,6 +323,27 @@ fn a_robot_is_excited_within_its_limits_the_same_way_by_the_same_seed_and_each_t
     for file in ["motion/one.csv", "motion/two.csv"] {
         let checked = run(&[&["excite", "--check", file], &limits[..]].concat());
         assert!(checked.status.success(), "{}", stderr(&checked));
+    }
+}
+
+#[test]
+fn every_table_is_json_where_that_is_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in [("arm.urdf", ARM), ("robot.toml", "urdf = 'arm.urdf'\n[joint.one]\n[joint.two]\n")] {
+        std::fs::write(folder.path().join(name), text).unwrap();
+    }
+    for line in tables::WITHOUT_BUS {
+        tables::assert_is_table(line, &jointctl(folder.path(), &line.split(' ').collect::<Vec<_>>()));
+    }
+    // None that has the option is missing.
+    let has = |command: &clap::Command| command.get_arguments().any(|argument| argument.get_long() == Some("json"));
+    let all = jointctl::commands::arguments();
+    let lines = tables::WITHOUT_BUS.iter().chain(&tables::OF_A_JOINT).chain([&tables::ADDRESS]);
+    // Those of a fleet are tried by its own test.
+    let rooms = all.get_subcommands().filter(|command| command.get_name() != "fleet");
+    for command in rooms.flat_map(|command| [command].into_iter().chain(command.get_subcommands())) {
+        let tried = lines.clone().any(|line| line.split(' ').any(|word| word == command.get_name()));
+        assert!(tried || !has(command), "{} is not tried", command.get_name());
     }
 }
 

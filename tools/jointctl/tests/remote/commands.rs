@@ -1,6 +1,7 @@
 //! The program itself, with a joint behind slcan over TCP: what it prints, and the exit codes.
 
 use crate::served::{NODE, Served, image, program};
+use crate::tables::{ADDRESS, OF_A_JOINT, assert_is_table};
 use bus::client::Network;
 use canopen_node::NO_NODE_ID;
 use joint_firmware::joint::state_machine::State;
@@ -169,56 +170,18 @@ fn finished(child: &mut Child) -> (Option<i32>, String) {
     (code, text)
 }
 
-/// A robot of two joints.
-const ARM: &str = "<robot name='arm'><link name='base'/>
-<joint name='one' type='revolute'><parent link='base'/><child link='a'/><axis xyz='0 1 0'/><limit lower='-1' upper='1' velocity='2'/></joint>
-<link name='a'><inertial><mass value='2'/><inertia ixx='.02' ixy='0' ixz='0' iyy='.02' iyz='0' izz='.01'/></inertial></link>
-<joint name='two' type='revolute'><parent link='a'/><child link='b'/><origin xyz='0 0 .3'/><axis xyz='1 0 0'/>
-<limit lower='-1' upper='1' velocity='2'/></joint>
-<link name='b'><inertial><origin xyz='0 .1 .1'/><mass value='1'/><inertia ixx='.01' ixy='0' ixz='0' iyy='.01' iyz='0' izz='.01'/></inertial>
-</link></robot>";
-
-pub fn every_table_is_json_where_that_is_asked_for() {
+pub fn every_table_of_a_joint_is_json_where_that_is_asked_for() {
     let desk = Desk::new();
-    for (name, text) in [("arm.urdf", ARM), ("robot.toml", "urdf = 'arm.urdf'\n[joint.one]\n[joint.two]\n")] {
-        std::fs::write(desk.folder.path().join(name), text).unwrap();
-    }
     // Joints without node ids, which `address` finds.
     let port = bus::free_port().unwrap();
     let _others = Served::on(&format!("slcan:listen://127.0.0.1:{port}"), &[NO_NODE_ID]);
-    let on_bus = |line: &str| format!("{line} --bus {} --node {NODE}", desk.client);
-    let lines = [
-        "demo --samples 2000 --restarts 1 --patience 5 --json".into(),
-        "fit demo/dataset.toml --trainer none --json".into(),
-        "evaluate demo/friction.img demo/dataset.toml --json".into(),
-        "image inspect demo/friction.img --json".into(),
-        "sim --scenario slow-reversal --json".into(),
-        "robot excite robot.toml --out motion --acceleration 5 --draws 4 --rounds 1 --duration 8 --json".into(),
-        "get --list --json".into(),
-        on_bus("get limits --json"),
-        on_bus("info --json"),
-        on_bus("monitor --once --json"),
-        on_bus("retrain --duration 5 --validation 4 --restarts 0 --json"),
-        format!("scan --json --bus {}", desk.client),
-        format!("address --json --first 9 --wait 100 --bus slcan:tcp://127.0.0.1:{port}"),
-    ];
-    for line in &lines {
+    let lines = OF_A_JOINT.map(|line| {
+        let node = if line.starts_with("scan") { String::new() } else { format!(" --node {NODE}") };
+        format!("{line} --bus {}{node}", desk.client)
+    });
+    for line in lines.into_iter().chain([format!("{ADDRESS} --bus slcan:tcp://127.0.0.1:{port}")]) {
         let output = program().current_dir(&desk.folder).args(line.split(' ')).output().unwrap();
-        assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
-        let value = serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap_or_else(|error| {
-            panic!("{line}: {error} in {}", String::from_utf8_lossy(&output.stdout));
-        });
-        assert!(value.as_object().is_none_or(|object| !object.is_empty()), "{line}: {value}");
-        assert!(value.as_array().is_none_or(|array| !array.is_empty()), "{line}: {value}");
-    }
-    // None that has the option is missing.
-    let has = |command: &clap::Command| command.get_arguments().any(|argument| argument.get_long() == Some("json"));
-    let all = jointctl::commands::arguments();
-    // Those of a fleet need no bus: tests/fleet.rs tries them.
-    let rooms = all.get_subcommands().filter(|command| command.get_name() != "fleet");
-    for command in rooms.flat_map(|command| [command].into_iter().chain(command.get_subcommands())) {
-        let tried = lines.iter().any(|line| line.split(' ').any(|word| word == command.get_name()));
-        assert!(tried || !has(command), "{} is not tried", command.get_name());
+        assert_is_table(&line, &output);
     }
 }
 

@@ -15,6 +15,8 @@ mod retrain;
 mod served;
 #[path = "../shown/mod.rs"]
 mod shown;
+#[path = "../tables/mod.rs"]
+mod tables;
 mod telemetry;
 
 use libtest_mimic::{Arguments, Trial};
@@ -40,7 +42,7 @@ fn main() {
         commands {
             a_joint_is_looked_at_set_moved_and_fed_from_the_command_line,
             what_goes_wrong_ends_in_one_line_and_an_exit_code_that_tells_why,
-            every_table_is_json_where_that_is_asked_for,
+            every_table_of_a_joint_is_json_where_that_is_asked_for,
             tables_are_json_where_asked_for_and_bus_and_node_come_from_the_environment,
             #[cfg(unix)] a_motion_that_is_interrupted_is_not_done,
             #[cfg(unix)] ctrl_c_and_termination_leave_the_joint_disabled,

@@ -1,0 +1,39 @@
+//! Every command that prints a table as JSON where that is asked for.
+
+use std::process::Output;
+
+/// Those without a bus, each with what the ones before it wrote.
+#[allow(dead_code, reason = "of two tests each runs one half")]
+pub const WITHOUT_BUS: [&str; 7] = [
+    "demo --samples 2000 --restarts 1 --patience 5 --json",
+    "fit demo/dataset.toml --trainer none --json",
+    "evaluate demo/friction.img demo/dataset.toml --json",
+    "image inspect demo/friction.img --json",
+    "sim --scenario slow-reversal --json",
+    "robot excite robot.toml --out motion --acceleration 5 --draws 4 --rounds 1 --duration 8 --json",
+    "get --list --json",
+];
+
+/// Those that find joints which have no node id.
+#[allow(dead_code, reason = "of two tests each runs one half")]
+pub const ADDRESS: &str = "address --json --first 9 --wait 100";
+
+/// Those of a joint on a bus.
+#[allow(dead_code, reason = "of two tests each runs one half")]
+pub const OF_A_JOINT: [&str; 5] = [
+    "get limits --json",
+    "info --json",
+    "monitor --once --json",
+    "retrain --duration 5 --validation 4 --restarts 0 --json",
+    "scan --json",
+];
+
+/// Panics where `line` failed, or printed anything but one JSON value that holds something.
+pub fn assert_is_table(line: &str, output: &Output) {
+    assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
+    let value = serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap_or_else(|error| {
+        panic!("{line}: {error} in {}", String::from_utf8_lossy(&output.stdout));
+    });
+    assert!(value.as_object().is_none_or(|object| !object.is_empty()), "{line}: {value}");
+    assert!(value.as_array().is_none_or(|array| !array.is_empty()), "{line}: {value}");
+}
