@@ -36,8 +36,10 @@ const LAST_TURNS: u32 = 3;
 /// Back-EMF of a sweep as a part of the holding voltage, and the field's speeds, electrical turns/s.
 const EMF: f64 = 0.25;
 const SPEEDS: [f64; 2] = [0.5, 10.0];
-/// Least samples of an electrical turn.
+/// Least samples of an electrical turn, and the most of one between two: when the field is turned round, more than half
+/// cannot be told from less.
 const SAMPLES: f64 = 10.0;
+const WIDEST: f64 = 0.4;
 /// Times that a sweep is begun anew because the encoder has met its index.
 const ATTEMPTS: usize = 3;
 
@@ -105,7 +107,7 @@ pub(super) fn first<B: Bench>(drive: &mut Drive<'_, B>, known: &Known<'_>) -> Re
     let ratio = ratio(&sweep)?;
     let flux = flux(&sweep, FIRST_SPEED, known, 0.0).value;
     // A slow bus gives few samples of a fast field.
-    let by_samples = FIRST_SPEED / (SAMPLES * sweep.spacing());
+    let by_samples = FIRST_SPEED / (SAMPLES * sweep.spacing()).max(sweep.widest() / WIDEST);
     let speed = speed(known.resistance, known.current, flux, ratio, known.rotor_speed);
     Ok(First { ratio, speed: speed.min(by_samples).max(SPEEDS[0]) })
 }

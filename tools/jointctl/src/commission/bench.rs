@@ -78,7 +78,8 @@ pub struct Condition {
 pub enum Stopped {
     /// The user has asked to stop.
     Interrupted,
-    /// The joint missed this program for longer than [`DEAD_MAN`].
+    /// The joint missed this program for longer than [`DEAD_MAN`], or this program missed so much of the joint that it
+    /// does not know where the field is.
     Late,
     /// The joint has left its open-loop state.
     Joint(String),
@@ -94,8 +95,8 @@ impl std::fmt::Display for Stopped {
             Self::Interrupted => write!(f, "interrupted; the bridge is off"),
             Self::Late => write!(
                 f,
-                "the joint had no frame for {} ms and switched off (8100h): this machine or its CAN adapter is too slow; \
-                 close what else keeps it busy, then repeat",
+                "frames and answers took up to {} ms or longer: this machine or its CAN adapter is too slow; close what else \
+                 keeps it busy, then repeat (after 8100h, a frame that the joint missed, with --reset)",
                 1e3 * DEAD_MAN
             ),
             Self::Joint(words) => write!(f, "the joint ended it: {words}"),

@@ -2,10 +2,10 @@
 //! the other.
 
 use super::alignment::MOST_POLE_PAIRS;
-use super::bench::{Bench, Frame};
+use super::bench::{Bench, Frame, Stopped};
 use super::drive::Drive;
 use super::failure::Failure;
-use super::sweep::Track;
+use super::sweep::{Taken, Track};
 
 /// Mechanical turns to each side within which the index must be met: a turn, and what the rotor may lag.
 const LONGEST: f64 = 1.1;
@@ -44,14 +44,19 @@ pub(super) fn find<B: Bench>(
     let most = (limit + 1.0) * ratio.clamp(1.0, f64::from(MOST_POLE_PAIRS)) + STALLED;
     for (side, speed) in [speed, -speed].into_iter().enumerate() {
         drive.set(Frame { speed, ..still })?;
+        track.turns_at(speed);
         let (begun, mut checked) = (track.field, (track.field, track.encoder));
         let mut number = drive.look(false)?.number;
         loop {
             let window = drive.after(number, false)?;
             number = window.number;
-            if !track.take(window, speed) {
-                drive.set(still)?;
-                return Ok(Index { turns: track.encoder.abs(), back: side == 1 });
+            match track.take(window) {
+                Taken::Followed => {}
+                Taken::Index => {
+                    drive.set(still)?;
+                    return Ok(Index { turns: track.encoder.abs(), back: side == 1 });
+                }
+                Taken::Lost => return Err(Stopped::Late.into()),
             }
             // Back again it first comes by where it began.
             if side == 0 || track.field < 0.0 {

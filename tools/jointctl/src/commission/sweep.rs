@@ -4,7 +4,7 @@
 //! rotor to catch up with the field. Means are taken over the field's angle, so that it does not matter how evenly a
 //! bus delivers samples.
 
-use super::bench::{Bench, Frame, Window};
+use super::bench::{Bench, Frame, Stopped, Window};
 use super::drive::Drive;
 use super::estimate::{turns_between, wrapped};
 use super::failure::Failure;
@@ -50,6 +50,23 @@ pub(super) enum Swept {
     Index,
 }
 
+/// Part of an electrical turn that the field may have made more or less than what is reckoned with: with more than half
+/// a turn it could not be told which turn it is.
+const UNSURE: f64 = 0.45;
+/// Windows after a change of speed until all of a window is after it: the last one when it was asked for, and the next.
+const CHANGING: u8 = 2;
+
+/// What a window tells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Taken {
+    /// Field and encoder have been followed.
+    Followed,
+    /// The encoder has met its index meanwhile: its angle has jumped.
+    Index,
+    /// It came so late after the field's speed was changed that the field may have made a turn more or less.
+    Lost,
+}
+
 /// Follows field and encoder over all turns.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Track {
@@ -60,18 +77,35 @@ pub(super) struct Track {
     pub encoder: f64,
     /// s.
     window: f64,
+    /// Speed of the field before and since the last change, turns/s.
+    speeds: [f64; 2],
+    /// Windows to come in which both may have been.
+    changing: u8,
 }
 
 impl Track {
-    /// Begins with a window.
+    /// Begins with a window in which the field stands.
     pub const fn new(first: Window, window: f64) -> Self {
-        Self { last: first, field: 0.0, encoder: 0.0, window }
+        Self { last: first, field: 0.0, encoder: 0.0, window, speeds: [0.0; 2], changing: 0 }
     }
 
-    /// Takes a window, while the field turned at `speed`, turns/s; false where the encoder has met its index meanwhile.
-    pub fn take(&mut self, next: Window, speed: f64) -> bool {
+    /// The field has been told another speed, turns/s.
+    pub const fn turns_at(&mut self, speed: f64) {
+        self.speeds = [self.speeds[1], speed];
+        self.changing = CHANGING;
+    }
+
+    /// Takes a window.
+    pub fn take(&mut self, next: Window) -> Taken {
         // Between two looks the field may have made more than half a turn: the windows' numbers tell the time.
-        let expected = speed * f64::from(next.number.wrapping_sub(self.last.number)) * self.window;
+        let time = f64::from(next.number.wrapping_sub(self.last.number)) * self.window;
+        let [before, since] = self.speeds;
+        let before = if self.changing > 0 { before } else { since };
+        self.changing = self.changing.saturating_sub(1);
+        if 0.5 * (since - before).abs() * time > UNSURE {
+            return Taken::Lost;
+        }
+        let expected = 0.5 * (before + since) * time;
         let seen = turns_between(self.last.field, next.field);
         self.field += expected + wrapped(seen - expected);
         let index = next.referenced && !self.last.referenced;
@@ -79,7 +113,7 @@ impl Track {
             self.encoder += turns_between(self.last.encoder, next.encoder);
         }
         self.last = next;
-        !index
+        if index { Taken::Index } else { Taken::Followed }
     }
 
     fn sample(&self) -> Sample {
@@ -102,12 +136,21 @@ pub(super) fn sweep<B: Bench>(
     let mut ways = [Way::default(), Way::default()];
     for (way, speed) in ways.iter_mut().zip([speed, -speed]) {
         drive.set(Frame { speed, ..still })?;
+        track.turns_at(speed);
         loop {
             let before = track.last.number;
             let window = drive.after(before, false)?;
-            if !track.take(window, speed) {
-                drive.set(still)?;
-                return Ok(Swept::Index);
+            match track.take(window) {
+                Taken::Followed => {}
+                Taken::Index => {
+                    drive.set(still)?;
+                    return Ok(Swept::Index);
+                }
+                Taken::Lost => {
+                    // About to where it began, so that what is repeated goes no farther.
+                    drive.wait(if speed < 0.0 { whole / -speed } else { 0.0 })?;
+                    return Err(Stopped::Late.into());
+                }
             }
             way.0.push(track.sample());
             let there = if speed > 0.0 { track.field >= whole } else { track.field <= 0.0 };
@@ -150,6 +193,16 @@ impl Sweep {
     pub fn spacing(&self) -> f64 {
         let samples = self.forward.0.len() + self.backward.0.len();
         2.0 * (f64::from(self.turns) + 2.0 * CATCH_UP) / samples.max(1) as f64
+    }
+
+    /// Most electrical turns between two samples that lie beside each other.
+    pub fn widest(&self) -> f64 {
+        let pairs = [&self.forward, &self.backward].into_iter().flat_map(|way| way.0.windows(2));
+        let wide = |pair: &[Sample]| match pair {
+            [a, b] => (b.field - a.field).abs(),
+            _ => 0.0,
+        };
+        pairs.map(wide).fold(0.0, f64::max)
     }
 
     /// Samples of what is evaluated, there or back.
@@ -209,10 +262,41 @@ mod tests {
         let window =
             |number, field, encoder, referenced| Window { number, field, encoder, referenced, ..Window::default() };
         let mut track = Track::new(window(10, 0, 0, false), 0.01);
-        // 10 turns/s for 8 windows: 0.8 turns.
-        assert!(track.take(window(18, 0xCCCC_CCCD, 0x1000_0000, false), 10.0));
-        assert!((track.field - 0.8).abs() < 1e-6 && (track.encoder - 0.0625).abs() < 1e-9);
-        assert!(!track.take(window(19, 0xE666_6666, 0x9000_0000, true), 10.0));
-        assert!((track.field - 0.9).abs() < 1e-6 && (track.encoder - 0.0625).abs() < 1e-9);
+        // 10 turns/s from the start, then 8 windows in which it is known to have turned for all of the time.
+        track.turns_at(10.0);
+        assert_eq!(track.take(window(11, 0x1000_0000, 0, false)), Taken::Followed);
+        assert_eq!(track.take(window(12, 0x2999_999A, 0, false)), Taken::Followed);
+        let from = track.field;
+        assert_eq!(track.take(window(20, 0xF666_6667, 0x1000_0000, false)), Taken::Followed);
+        assert!((track.field - from - 0.8).abs() < 1e-6 && (track.encoder - 0.0625).abs() < 1e-9);
+        assert_eq!(track.take(window(21, 0x1000_0001, 0x9000_0000, true)), Taken::Index);
+        assert!((track.field - from - 0.9).abs() < 1e-6 && (track.encoder - 0.0625).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_window_that_is_late_after_a_change_of_speed_is_not_counted_as_a_turn() {
+        let window = |number, field| Window { number, field, ..Window::default() };
+        // From rest to 10 turns/s: 0.09 s is the most after which the turn is known.
+        for (late, taken) in [(9, Taken::Followed), (10, Taken::Lost)] {
+            for known in 1..=CHANGING {
+                let mut track = Track::new(window(0, 0), 0.01);
+                track.turns_at(10.0);
+                for number in 1..known {
+                    assert_eq!(track.take(window(number.into(), 0)), Taken::Followed);
+                }
+                // The field began to turn half of the time ago.
+                let field = (f64::from(late) * 0.05 * 2f64.powi(32)) as u32;
+                assert_eq!(track.take(window(u32::from(known) - 1 + late, field)), taken);
+                assert!(taken == Taken::Lost || (track.field - f64::from(late) * 0.05).abs() < 1e-6);
+            }
+        }
+        // The other way round the speed changes by twice as much.
+        for (late, taken) in [(4, Taken::Followed), (5, Taken::Lost)] {
+            let mut track = Track::new(window(0, 0), 0.01);
+            track.turns_at(10.0);
+            track.changing = 0;
+            track.turns_at(-10.0);
+            assert_eq!(track.take(window(late, 0)), taken);
+        }
     }
 }

@@ -38,6 +38,8 @@ pub struct Simulated {
     pub stored: bool,
     /// The host does not come back in time at this control step.
     pub late_at: Option<u32>,
+    /// Time until the host comes back after it changed the field's speed, s.
+    pub hesitates: f64,
     pub highest_current: f64,
     wanted: Frame,
     applied: Frame,
@@ -101,6 +103,7 @@ impl Simulated {
             fault: None,
             stored: false,
             late_at: None,
+            hesitates: 0.0,
             highest_current: 0.0,
             wanted: Frame::default(),
             applied: Frame::default(),
@@ -214,8 +217,9 @@ impl Bench for Simulated {
 
     fn apply(&mut self, frame: &Frame) -> Result<(), Stopped> {
         self.pass(0.002)?;
+        let changed = self.wanted.speed != frame.speed;
         (self.wanted, self.renewed) = (*frame, self.step);
-        Ok(())
+        if changed { self.pass(self.hesitates) } else { Ok(()) }
     }
 
     fn window(&mut self, ripple: bool) -> Result<Window, Stopped> {

@@ -198,6 +198,23 @@ fn every_stage_comes_in_its_order_and_no_question_is_asked_under_current() {
 }
 
 #[test]
+fn a_host_that_hesitates_when_the_field_turns_round_counts_right_or_says_that_it_is_late() {
+    let mut late = 0;
+    for milliseconds in (0..95).step_by(7) {
+        let mut bench = Simulated::new(parameters());
+        bench.hesitates = 1e-3 * f64::from(milliseconds);
+        match commission(&mut bench, &plan(), &mut Yes::default()) {
+            Ok(found) => winding_and_encoder_are_right(&found, &parameters()),
+            Err(failure) => {
+                assert_eq!(failure, Failure::Stopped(Stopped::Late), "{milliseconds} ms");
+                late += 1;
+            }
+        }
+    }
+    assert!((1..8).contains(&late), "{late} of 14 were late");
+}
+
+#[test]
 fn a_host_that_is_late_once_repeats_the_part_and_one_that_is_late_again_and_again_is_told() {
     let mut bench = Simulated::new(parameters());
     bench.late_at = Some(20_000);
