@@ -1,15 +1,41 @@
 //! A joint is commissioned over a bus.
 
 use crate::served::{NODE, Served};
+use bus::client::Command;
 use joint_firmware::objects::field::Field;
 use joint_firmware::objects::settings::Setting;
-use jointctl::commission::joint::Joint;
+use jointctl::commission::joint::{Joint, Objects};
 use jointctl::commission::{Bench as _, Failure, Guide, Plan, Stage, Stopped, commission, page};
 use jointctl::remote::commission::RemoteObjects;
 use jointctl::remote::configuration::set;
 use jointctl::remote::{Entry, RemoteJoint};
 use plant::ActuatorParameters;
 use std::cell::Cell;
+
+/// How many times slower than the clock the joint lives. It bears 0.1 s without a frame, which a dozen questions and
+/// answers must fit into; on a busy machine they take longer.
+const SLOWER: u32 = 4;
+
+/// Its objects, for which time passes as it does for the joint.
+struct Slowed<'r>(RemoteObjects<'r>);
+
+impl Objects for Slowed<'_> {
+    fn upload(&mut self, index: u16, sub_index: u8) -> Result<Vec<u8>, Stopped> {
+        self.0.upload(index, sub_index)
+    }
+
+    fn download(&mut self, index: u16, sub_index: u8, data: &[u8]) -> Result<(), Stopped> {
+        self.0.download(index, sub_index, data)
+    }
+
+    fn network(&mut self, command: Command) -> Result<(), Stopped> {
+        self.0.network(command)
+    }
+
+    fn pass(&mut self, seconds: f64) -> Result<(), Stopped> {
+        self.0.pass(seconds * f64::from(SLOWER))
+    }
+}
 
 /// What a commissioning finds, made wrong.
 fn forget(joint: &RemoteJoint) {
@@ -46,14 +72,14 @@ fn plan() -> Plan {
 }
 
 pub fn a_joint_is_commissioned_with_the_motor_that_it_has_and_stopped_at_once_when_asked() {
-    let served = Served::joints(&[NODE]);
+    let served = Served::slowed(SLOWER);
     let joint = served.joint();
     forget(&joint);
     let stage = Cell::new(None);
 
     // The user has enough of it in the middle of the first sweep.
     let running = || stage.get() != Some(Stage::Inductance);
-    let mut bench = Joint::new(RemoteObjects::new(joint.clone(), &running));
+    let mut bench = Joint::new(Slowed(RemoteObjects::new(joint.clone(), &running)));
     let stopped = commission(&mut bench, &plan(), &mut Yes { told: Vec::new(), stage: &stage });
     assert_eq!(stopped.unwrap_err(), Failure::Stopped(Stopped::Interrupted));
     drop(bench);
@@ -61,7 +87,7 @@ pub fn a_joint_is_commissioned_with_the_motor_that_it_has_and_stopped_at_once_wh
     assert_eq!(joint.raw(Field::Setting(Setting::PolePairs)).unwrap(), 3, "nothing was changed");
 
     stage.set(None);
-    let mut bench = Joint::new(RemoteObjects::new(joint.clone(), &|| true));
+    let mut bench = Joint::new(Slowed(RemoteObjects::new(joint.clone(), &|| true)));
     let refused = bench.set(&[(Setting::OverCurrent, 0.5)]).unwrap_err().to_string();
     assert!(refused.contains("refuses its over-current limit of 0.5: "), "{refused}");
     let mut yes = Yes { told: Vec::new(), stage: &stage };

@@ -12,7 +12,7 @@ use jointctl::remote::RemoteJoint;
 use node::{Options, SlotImages, Storage, VirtualNode, serve};
 use plant::ActuatorParameters;
 use plant::virtual_joint::Setup;
-use std::process::Command;
+use std::process::{Command, Output};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::JoinHandle;
@@ -26,6 +26,20 @@ pub fn program() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_jointctl"));
     command.env("JOINTCTL_TIMEOUT", PATIENCE.as_millis().to_string());
     command
+}
+
+/// A round of `retrain`, and a few more where nothing better came of it: a machine that is late with set-points disturbs
+/// the motion by which a new image is judged, and the joint keeps the one that it has. `run` is given what a repeated
+/// command ends with.
+pub fn repeated(run: impl Fn(&str) -> Output) -> Output {
+    let mut output = run("");
+    for _ in 0..3 {
+        if output.status.code() != Some(3) {
+            break;
+        }
+        output = run(" --force");
+    }
+    output
 }
 
 /// Node id of the first joint.
@@ -69,6 +83,23 @@ impl Served {
         Self { bus: bus.into(), stop, threads }
     }
 
+    /// A joint that lives this many times slower than the clock: what it must hear within a time of its own has so much
+    /// longer on a machine that is busy. Who waits for it waits longer, too.
+    pub fn slowed(factor: u32) -> Self {
+        // One test alone has such a joint.
+        let bus = "virtual:remote-slowed".to_owned();
+        let transport = bus::open(&bus).unwrap();
+        let stop = Arc::new(AtomicBool::new(false));
+        let parameters = ActuatorParameters::reference().aligned().without_payload();
+        let options = Options { node_id: NODE, serial: 12, seed: 1 };
+        let images = SlotImages::empty().unwrap();
+        let mut node = VirtualNode::new(parameters, &Setup::of(&parameters), &options, images).unwrap();
+        node.advance(4_000);
+        let stopped = Arc::clone(&stop);
+        let thread = std::thread::spawn(move || drop(serve(&mut Slowed { node, factor }, &*transport, &stopped)));
+        Self { bus, stop, threads: vec![thread] }
+    }
+
     /// A joint that has this stored.
     pub fn stored(folder: &std::path::Path) -> Self {
         // One test alone has such a joint.
@@ -106,6 +137,30 @@ impl Drop for Served {
         for thread in self.threads.drain(..) {
             let _ = thread.join();
         }
+    }
+}
+
+/// See [`Served::slowed`].
+struct Slowed {
+    node: VirtualNode,
+    factor: u32,
+}
+
+impl node::Served for Slowed {
+    fn now(&self) -> Duration {
+        self.node.now() * self.factor
+    }
+
+    fn live_until(&mut self, instant: Duration) -> Result<(), String> {
+        self.node.live_until(instant / self.factor)
+    }
+
+    fn receive(&mut self, frame: &bus::Frame) {
+        node::Served::receive(&mut self.node, frame);
+    }
+
+    fn take_frame(&mut self) -> Option<bus::Frame> {
+        node::Served::take_frame(&mut self.node)
     }
 }
 
