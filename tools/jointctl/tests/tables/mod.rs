@@ -24,7 +24,7 @@ pub const OF_A_JOINT: [&str; 5] = [
     "get limits --json",
     "info --json",
     "monitor --once --json",
-    "retrain --duration 5 --validation 4 --preset coulomb-viscous --trainer none --json",
+    "retrain --duration 5 --validation 4 --restarts 0 --json",
     "scan --json",
 ];
 
