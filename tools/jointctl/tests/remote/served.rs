@@ -28,9 +28,9 @@ pub fn program() -> Command {
     command
 }
 
-/// A round of `retrain`, and a few more where nothing better came of it: a machine that is late with set-points disturbs
-/// the motion by which a new image is judged, and the joint keeps the one that it has. `run` is given what a repeated
-/// command ends with.
+/// A round of `retrain`, and a few more where nothing better came of it: a machine that is late with set-points
+/// disturbs the motion by which a new image is judged, and the joint keeps the one that it has. `run` is given what a
+/// repeated command ends with.
 pub fn repeated(run: impl Fn(&str) -> Output) -> Output {
     let mut output = run("");
     for _ in 0..3 {
