@@ -20,7 +20,7 @@ compile_error!("two boards are chosen: for the moteus r4 build with `--no-defaul
 compile_error!("no board is chosen: build with `--features b-g431b-esc1` or `--features moteus-r4`");
 
 #[cfg(all(target_os = "none", any(feature = "b-g431b-esc1", feature = "moteus-r4")))]
-#[allow(unsafe_code)]
+#[allow(unsafe_code, reason = "registers, interrupts and statics of the board have no safe form")]
 mod board;
 #[cfg(all(target_os = "none", any(feature = "b-g431b-esc1", feature = "moteus-r4")))]
 mod tasks;

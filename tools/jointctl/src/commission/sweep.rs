@@ -56,7 +56,7 @@ const UNSURE: f64 = 0.45;
 /// Windows after a change of speed until all of a window is after it: the last one when it was asked for, and the next.
 const CHANGING: u8 = 2;
 
-/// What a window tells.
+/// Outcome of a window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Taken {
     /// Field and encoder have been followed.

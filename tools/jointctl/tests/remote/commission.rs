@@ -12,7 +12,7 @@ use jointctl::remote::{Entry, RemoteJoint};
 use plant::ActuatorParameters;
 use std::cell::Cell;
 
-/// How many times slower than the clock the joint lives. It bears 0.1 s without a frame, which a dozen questions and
+/// Factor by which the joint lives slower than the clock. It bears 0.1 s without a frame, which a dozen questions and
 /// answers must fit into; on a busy machine they take longer.
 const SLOWER: u32 = 4;
 
