@@ -11,7 +11,7 @@ use syn::visit::{self, Visit};
 use syn::{Attribute, Item, UseTree};
 
 /// Sources of each crate.
-const CRATES: [&str; 14] = [
+const CRATES: [&str; 15] = [
     "src",
     "crates/canopen-node/src",
     "crates/friction-compensation/src",
@@ -25,6 +25,7 @@ const CRATES: [&str; 14] = [
     "tools/panel/src",
     "tools/plant/src",
     "tools/python/src",
+    "tools/report/src",
     "tools/rigid-body/src",
 ];
 

@@ -2,7 +2,7 @@
 
 use crate::joint_model::{FloatFriction, rigid_state};
 use crate::metrics::{MetricsError, RELATIVE_FLOOR, metrics_by_state, relative_floor};
-use crate::report::{ErrorRow, ErrorTable, FixedPointDifference, Role};
+use crate::page::{ErrorRow, ErrorTable, FixedPointDifference, Role};
 use crate::rigid::{RigidModel, RigidParameters};
 use crate::samples::{Part, Samples};
 use crate::split::TestSet;

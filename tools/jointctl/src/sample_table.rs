@@ -7,11 +7,11 @@ use crate::dataset::Prepared;
 use crate::evaluate::Prediction;
 use crate::fit::{rigid_model, units};
 use crate::joint_model::rigid_state;
-use crate::output::{OutputError, write_file};
 use crate::rigid::{RigidParameters, RigidRegressor};
 use crate::samples::Part;
 use flate2::Compression;
 use flate2::write::GzEncoder;
+use report::output::{OutputError, write_file};
 use std::io::{self, Write};
 use std::path::Path;
 

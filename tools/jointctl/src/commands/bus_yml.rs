@@ -6,10 +6,10 @@ use super::force::Force;
 use super::remote::Patience;
 use crate::describe::bus_yml::{Joint, Master, PERIODS, text};
 use crate::describe::eds::{self, Identity};
-use crate::output::{OutputFile, write_directory};
 use crate::remote::present::{PATIENCE, present};
 use crate::remote::{Entry, RemoteError, RemoteJoint};
 use clap::Args;
+use report::output::{OutputFile, write_directory};
 use std::path::PathBuf;
 use std::time::{SystemTime, UNIX_EPOCH};
 

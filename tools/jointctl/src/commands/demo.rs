@@ -6,9 +6,8 @@ use super::fit::{Choices, FILES, print_summary, write};
 use super::force::Force;
 use crate::dataset::prepare;
 use crate::fit::fit;
-use crate::output::{OutputFile, write_directory};
+use crate::page::{ReportError, numbers};
 use crate::progress::{Progress, Terminal};
-use crate::report::{ReportError, numbers};
 use crate::simulation::page::{Shown, page};
 use crate::simulation::recording::{DESCRIPTION, record};
 use crate::simulation::table::{Line, json, table};
@@ -19,6 +18,7 @@ use friction_compensation::friction::FrictionModel;
 use plant::ActuatorParameters;
 use plant::virtual_joint::Setup;
 use rayon::prelude::*;
+use report::output::{OutputFile, write_directory};
 use std::path::PathBuf;
 
 /// What the joint is put through before and after.

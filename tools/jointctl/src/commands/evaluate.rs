@@ -9,11 +9,11 @@ use crate::evaluate::{Prediction, error_tables, fixed_point_difference, rigid_be
 use crate::fit::{FitError, image_on_other_motion, rigid_model, units};
 use crate::identify::{self, identify};
 use crate::joint_model::{FloatFriction, firmware_states, fixed_point, regimes, replay, rigid_efforts};
+use crate::page::{Role, console};
 use crate::pre_sliding;
 use crate::presets::Preset;
 use crate::progress::{Progress, Terminal};
 use crate::quantize::full_scale::from_q16;
-use crate::report::{Role, console};
 use crate::sample_table::write_sample_table;
 use clap::Args;
 use std::path::PathBuf;

@@ -7,8 +7,8 @@ use super::stream;
 use crate::excite::check::{Findings, check};
 use crate::excite::file::{SAMPLE_PERIOD, coefficients, read, table};
 use crate::excite::{Bounds, Effort, optimise};
-use crate::output::write_file;
 use clap::Args;
+use report::output::write_file;
 use std::path::PathBuf;
 
 /// Part of the joint's limits that a motion uses where nothing else is asked for: the rest is left to the controller.

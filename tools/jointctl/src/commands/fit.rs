@@ -6,14 +6,14 @@ use crate::choice::{Decision, TermRule};
 use crate::dataset::{Prepared, Warning, prepare};
 use crate::fit::{Fitted, Options, Trainer, fit};
 use crate::image_text;
-use crate::output::{OutputFile, write_directory};
+use crate::page::{NetworkOutcome, console, numbers, render, verdict};
 use crate::presets::Preset;
 use crate::progress::{Progress, Terminal};
-use crate::report::{NetworkOutcome, console, numbers, render, verdict};
 use crate::sample_table::write_sample_table;
 use clap::{Args, ValueEnum};
 use friction_compensation::friction::regime::Measure;
 use friction_compensation::parameters::image::{Image, MAX_LENGTH};
+use report::output::{OutputFile, write_directory};
 use std::path::{Path, PathBuf};
 
 /// Arguments of `fit`.

@@ -1,8 +1,8 @@
 //! `--force`: permission to replace files, and the check of output paths before any work.
 
 use super::CommandError;
-use crate::output::check_writable;
 use clap::Args;
+use report::output::check_writable;
 use std::path::{Path, PathBuf};
 
 /// Permission to replace files.

@@ -2,8 +2,8 @@
 
 use super::force::Force;
 use super::{CommandError, arguments};
-use crate::output::{OutputFile, write_directory};
 use clap::{Args, Command};
+use report::output::{OutputFile, write_directory};
 use std::path::PathBuf;
 
 /// Arguments of `man`.

@@ -148,10 +148,10 @@ pub enum CommandError {
     },
     /// Writing of results.
     #[error(transparent)]
-    Output(#[from] crate::output::OutputError),
+    Output(#[from] report::output::OutputError),
     /// The report.
     #[error(transparent)]
-    Report(#[from] crate::report::ReportError),
+    Report(#[from] crate::page::ReportError),
     /// The virtual joint.
     #[error("virtual joint: {0}")]
     Plant(#[from] plant::ParameterError),
@@ -171,7 +171,7 @@ pub enum CommandError {
     Simulation(#[from] crate::simulation::SimulationError),
     /// A figure.
     #[error(transparent)]
-    Figure(#[from] crate::report::FigureError),
+    Figure(#[from] report::figures::FigureError),
     /// A number that TOML cannot hold.
     #[error("cannot write parameters as TOML: {0}")]
     Toml(#[from] toml::ser::Error),

@@ -5,10 +5,10 @@ use super::force::Force;
 use super::remote::{Where, catch_interrupts, running};
 use crate::dataset::DatasetError;
 use crate::dataset::load::is_log;
-use crate::output::{OutputFile, write_directory};
 use crate::progress::{Progress, Terminal};
 use crate::remote::record::{Pace, Recorder, Recording, SIGNALS, description};
 use clap::Args;
+use report::output::{OutputFile, write_directory};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 

@@ -8,7 +8,6 @@ use super::joint::JointChoice;
 use super::on_board::OnBoard;
 use crate::excite::file as excitation;
 use crate::joint_text;
-use crate::output::{OutputFile, write_directory};
 use crate::progress::{Progress, Terminal};
 use crate::simulation::page::{Shown, page};
 use crate::simulation::run::USUAL_SAMPLE_PERIOD;
@@ -19,6 +18,7 @@ use friction_compensation::compensation::Request;
 use friction_compensation::friction::FrictionModel;
 use plant::virtual_joint::Setup;
 use rayon::prelude::*;
+use report::output::{OutputFile, write_directory};
 use std::path::PathBuf;
 use std::time::Instant;
 

@@ -2,7 +2,7 @@
 
 use super::CommandError;
 use super::force::Force;
-use crate::output::write_file;
+use report::output::write_file;
 use std::io::{self, Read, Write};
 use std::path::Path;
 

@@ -2,12 +2,13 @@
 
 use super::estimate::Estimate;
 use super::{Found, Stage};
-use crate::output::OutputFile;
 use crate::remote::Entry;
-use crate::report::{Curve, FigureError, Ink, Plot, document, gallery, over_time};
 use joint_firmware::objects::field::Field;
 use joint_firmware::objects::settings::Setting;
 use maud::{Markup, html};
+use report::figures::{Curve, FigureError, Ink, Plot, over_time};
+use report::html::{document, gallery};
+use report::output::OutputFile;
 use std::fmt::Write as _;
 
 /// The page's and the text's names.
@@ -43,7 +44,7 @@ pub fn text(found: &Found, node: u8) -> String {
             let _ = write!(text, "\n[{}]\n", crate::remote::entry::slug(record));
         }
         let measured = estimate(found, setting).map_or_else(String::new, |estimate| {
-            format!(", standard error {}", crate::report::number::significant(estimate.error, 2))
+            format!(", standard error {}", report::number::significant(estimate.error, 2))
         });
         let unit = entry.text.unit;
         let name = crate::remote::entry::slug(entry.text.name);

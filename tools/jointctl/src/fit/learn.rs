@@ -12,7 +12,7 @@ use crate::equalise::{Equalise, draw};
 use crate::identify::{Identified, overall};
 use crate::joint_model::{FloatFriction, regimes};
 use crate::network::{InputBox, Network};
-use crate::report::{NetworkOutcome, TrainingCurve};
+use crate::page::{NetworkOutcome, TrainingCurve};
 use crate::samples::{Part, Samples};
 use crate::train::TrainError;
 use friction_compensation::friction::regime::{Criterion, MAX_CRITERIA, Measure, Selector};

@@ -30,9 +30,9 @@ use crate::evaluate::{Prediction, error_tables, fixed_point_difference};
 use crate::friction_parameter::Units;
 use crate::identify::{self, Identified, identify};
 use crate::joint_model::{firmware_states, fixed_point, regimes, rigid_efforts};
+use crate::page::{self, NetworkOutcome, Report, Role};
 use crate::presets::Preset;
 use crate::progress::Progress;
-use crate::report::{self, NetworkOutcome, Report, Role};
 use crate::rigid::{Gravity, RigidModel, RigidParameters};
 use crate::samples::Samples;
 use friction_compensation::friction::FrictionParameters;
@@ -228,12 +228,12 @@ pub fn fit(prepared: &mut Prepared, options: &Options, progress: &dyn Progress) 
     let report = Report {
         title: format!("Friction of {}", prepared.description.name),
         data_set: prepared.description.name.clone(),
-        units: report::Units {
+        units: page::Units {
             position: units.position.clone(),
             velocity: format!("{}/s", units.position),
             effort: units.effort.clone(),
         },
-        provenance: report::Provenance {
+        provenance: page::Provenance {
             tool_version: env!("CARGO_PKG_VERSION").to_owned(),
             data_sha256: prepared.sha256.iter().map(|byte| format!("{byte:02x}")).collect(),
             description: prepared.description.name.clone(),

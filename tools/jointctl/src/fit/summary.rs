@@ -8,7 +8,7 @@ use crate::evaluate::Prediction;
 use crate::friction_parameter::Units;
 use crate::identify::{self, Identified};
 use crate::joint_model::{network_inputs, rigid_efforts};
-use crate::report::{self, Candidate, CertificateItem, NetworkOutcome, Role};
+use crate::page::{self, Candidate, CertificateItem, NetworkOutcome, Role};
 use crate::samples::{Part, Samples};
 use friction_compensation::parameters::certificate::Certificate;
 use friction_compensation::parameters::image::Image;
@@ -45,8 +45,8 @@ pub(super) fn predictions(
     all
 }
 
-pub(super) fn parameter(estimated: &identify::Estimated) -> report::Parameter {
-    report::Parameter {
+pub(super) fn parameter(estimated: &identify::Estimated) -> page::Parameter {
+    page::Parameter {
         name: estimated.name.clone(),
         symbol: estimated.symbol.clone(),
         value: estimated.value,
@@ -106,7 +106,7 @@ pub(super) fn choice(
     refused: &[(usize, String)],
     learned: &Learned,
     options: &Options,
-) -> report::Choice {
+) -> page::Choice {
     let mut overruled: Vec<String> = options.terms.iter().map(|rule| format!("term {rule}")).collect();
     for (part, decision) in [("network", options.network), ("lagged accelerations", options.lags)] {
         match decision {
@@ -123,11 +123,11 @@ pub(super) fn choice(
     let mut notes: Vec<String> = identified[chosen].notes.clone();
     notes.extend(learned.notes.iter().cloned());
     notes.extend(refused.iter().map(|(i, reason)| format!("{} is refused: {reason}", identified[*i].preset)));
-    report::Choice {
+    page::Choice {
         grouping: folds.grouping.clone(),
         motions: folds.motions,
         folds: (0..folds.len())
-            .map(|fold| report::FoldRow {
+            .map(|fold| page::FoldRow {
                 left_out: folds.names[fold].clone(),
                 errors: identified.iter().map(|one| one.folds.get(fold).map_or(f64::NAN, |fit| fit.rmse)).collect(),
             })
@@ -180,22 +180,20 @@ pub(super) fn certificate_items(
     ]
 }
 
-pub(super) fn stages(prepared: &Prepared) -> Vec<report::StageNote> {
-    let mut stages: Vec<report::StageNote> = Vec::new();
+pub(super) fn stages(prepared: &Prepared) -> Vec<page::StageNote> {
+    let mut stages: Vec<page::StageNote> = Vec::new();
     for note in &prepared.notes {
         let count = (note.what.to_owned(), note.count as u64);
         match stages.iter_mut().find(|stage| stage.stage == note.stage) {
             Some(stage) => stage.counts.push(count),
-            None => stages.push(report::StageNote {
-                stage: note.stage.to_owned(),
-                note: String::new(),
-                counts: vec![count],
-            }),
+            None => {
+                stages.push(page::StageNote { stage: note.stage.to_owned(), note: String::new(), counts: vec![count] })
+            }
         }
     }
     if let Some(lag) = &prepared.lag {
         let done = if lag.applies() { "moved by it" } else { "not significant, or beyond the limit: not moved" };
-        stages.push(report::StageNote {
+        stages.push(page::StageNote {
             stage: "lag".to_owned(),
             note: format!(
                 "effort behind position by {:.2} +- {:.2} ms; left-out groups' residual falls by {:.2} %: {done}",
@@ -221,11 +219,11 @@ pub(super) fn test_samples(
     physical: &Identified,
     learned: &Learned,
     fixed: &[(f64, f64)],
-) -> report::TestSamples {
+) -> page::TestSamples {
     let samples = &prepared.samples;
     let test = samples.indices(Part::Test);
     let pick = |value: &dyn Fn(usize) -> f64| test.iter().map(|&i| value(i)).collect::<Vec<_>>();
-    report::TestSamples {
+    page::TestSamples {
         time: pick(&|i| samples.time[i]),
         run: test.iter().map(|&i| samples.run[i]).collect(),
         position: pick(&|i| samples.position[i]),

@@ -2,8 +2,8 @@
 
 use super::{FitError, Options};
 use crate::network::InputBox;
+use crate::page::TrainingCurve;
 use crate::progress::Progress;
-use crate::report::TrainingCurve;
 use crate::train::{self, Trained, TrainingSet, levenberg_marquardt, reference, stochastic};
 use serde::{Deserialize, Serialize};
 

@@ -9,7 +9,7 @@
 use crate::choice::Folds;
 use crate::identify::Identified;
 use crate::joint_model::{float_state, rigid_state};
-use crate::report::Uncertainty;
+use crate::page::Uncertainty;
 use crate::samples::{Part, Samples};
 use std::collections::BTreeMap;
 

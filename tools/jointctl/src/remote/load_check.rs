@@ -3,7 +3,7 @@
 
 use super::error::RemoteError;
 use super::joint::RemoteJoint;
-use crate::report::Parameter;
+use crate::page::Parameter;
 use crate::rigid::RigidRegressor;
 use bus::client::{Abort, ClientError};
 use joint_firmware::joint::configuration::LoadConfiguration;

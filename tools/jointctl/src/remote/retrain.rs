@@ -27,7 +27,6 @@ use super::value::Value;
 use crate::dataset::{DatasetError, prepare};
 use crate::excite::{Bounds, Effort, Excitation, ExciteError, optimise};
 use crate::fit::{FitError, Fitted, Options, fit};
-use crate::output::{OutputError, OutputFile, write_directory};
 use crate::progress::Progress;
 use crate::rigid::{RigidParameters, RigidRegressor};
 use friction_compensation::parameters::authentication::Key;
@@ -35,6 +34,7 @@ use friction_compensation::parameters::image::MAX_LENGTH;
 use friction_compensation::parameters::life_cycle::State;
 use joint_firmware::objects::field::{Actual, ConfigurationField, Field, ImageField, OwnerField, Range};
 use joint_firmware::objects::settings::Setting;
+use report::output::{OutputError, OutputFile, write_directory};
 use std::path::PathBuf;
 
 /// Part of the joint's limits of position and velocity that the motion uses: the rest is left to the controller, which

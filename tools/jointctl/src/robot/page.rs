@@ -3,10 +3,12 @@
 
 use super::fit::{BaseParameter, FittedRobot};
 use super::recording::Recording;
-use crate::report::number::significant;
-use crate::report::{Curve, Figure, FigureError, Ink, Plot, Role, document, gallery, over_time};
+use crate::page::Role;
 use crate::samples::Part;
 use maud::{Markup, html};
+use report::figures::{Curve, Figure, FigureError, Ink, Plot, over_time};
+use report::html::{document, gallery};
+use report::number::significant;
 use rigid_body::{LinkInertia, Robot};
 
 /// Samples of a curve at the most.

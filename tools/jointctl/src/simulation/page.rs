@@ -2,8 +2,9 @@
 
 use super::Log;
 use super::table::{HEADING, Line};
-use crate::report::{Curve, Figure, FigureError, Ink, Plot, document, gallery, over_time};
 use maud::{Markup, html};
+use report::figures::{Curve, Figure, FigureError, Ink, Plot, over_time};
+use report::html::{document, gallery};
 
 /// Points of one line.
 const LINE_POINTS: usize = 2000;

@@ -2,7 +2,7 @@
 //! compensation; host.
 
 use super::{Ending, Judgement};
-use crate::report::number::{optional, percent};
+use report::number::{optional, percent};
 
 /// Share of the samples in motion, %, from which a row says that the image was faded out.
 const TOLD_FADED: f64 = 5.0;

@@ -1,7 +1,7 @@
 //! The figure of README: the demo's joint in slow reversals, without compensation and with the image that it learned.
 //! `UPDATE_DOCS=1 cargo test -p jointctl --test cli` draws it anew.
 
-use jointctl::report::{Curve, Ink, Plot, over_time};
+use report::figures::{Curve, Ink, Plot, over_time};
 use std::path::Path;
 
 const FIGURE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/figures/slow-reversal.svg");

@@ -1,9 +1,9 @@
 //! The fleet on one page: a map of what the reference leaves unexplained, by joint and day, and the reasons.
 
-use crate::report::document;
 use ::fleet::finding::{Day, Finding, Kind};
 use ::fleet::night::Night;
 use maud::{Markup, html};
+use report::html::document;
 use std::collections::BTreeSet;
 
 /// Part of the torque that is unexplained at which the map's colour is full.

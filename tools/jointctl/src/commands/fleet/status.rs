@@ -3,10 +3,10 @@
 use super::{Folder, Status, page};
 use crate::commands::CommandError;
 use crate::commands::remote::{catch_interrupts, running};
-use crate::output::write_file;
 use crate::progress::{Progress, Terminal};
 use ::fleet::finding::{Finding, findings};
 use ::fleet::night::{Night, night};
+use report::output::write_file;
 use serde_json::json;
 use std::fmt::Write;
 

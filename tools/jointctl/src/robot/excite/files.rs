@@ -5,7 +5,7 @@ use super::Task;
 use super::regressor::Score;
 use super::search::Found;
 use crate::excite::file::table_in;
-use crate::output::OutputFile;
+use report::output::OutputFile;
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;

@@ -1,11 +1,10 @@
 //! What was measured against what the models say: friction over velocity, and predicted over measured effort; host.
 
-use super::axis::Axis;
-use super::binning::{CLOUD_POINTS, bins, extent, robust_extent, thin, widen};
-use super::chart::{Entry, Panel, Swatch, legend, paper};
-use super::ink::Ink;
-use super::{Figure, FigureError};
-use crate::report::Report;
+use crate::page::Report;
+use report::figures::axis::Axis;
+use report::figures::binning::{CLOUD_POINTS, bins, extent, robust_extent, thin, widen};
+use report::figures::chart::{Entry, Panel, Swatch, legend, paper};
+use report::figures::{Figure, FigureError, Ink};
 
 const CURVE_BINS: usize = 160;
 

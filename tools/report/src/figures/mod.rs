@@ -1,20 +1,15 @@
-//! The figures of the report, each one function from the report to one drawing; host.
+//! Figures as SVG, and what they are drawn with; host.
 //!
-//! plotters lays out axes and marks, `svg` writes them, `ink` gives them meaning and colour.
+//! plotters lays out axes and marks, `svg` writes them, [`ink`] gives them meaning and colour. [`over_time`] is the
+//! figure that every page has: curves over time.
 
-mod axis;
-mod bars;
-mod binning;
-mod chart;
-mod friction;
-mod ink;
-mod lines;
-mod residuals;
+pub mod axis;
+pub mod binning;
+pub mod chart;
+pub mod ink;
+pub mod lines;
 mod svg;
-mod time;
-mod training;
 
-use super::Report;
 pub use ink::{Ink, style_sheet};
 pub use lines::{Curve, Plot, over_time};
 use plotters::drawing::DrawingAreaErrorKind;
@@ -51,24 +46,4 @@ impl Figure {
         let figure = self.svg.replacen(">\n", &inside, 1);
         format!("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n{figure}")
     }
-}
-
-/// All figures for which the report has data, in the order in which they are read.
-///
-/// # Errors
-/// [`FigureError`].
-pub fn figures(report: &Report) -> Result<Vec<Figure>, FigureError> {
-    let drawn = [
-        friction::against_velocity(report)?,
-        time::measured_and_predicted(report)?,
-        residuals::histogram(report)?,
-        friction::predicted_against_measured(report)?,
-        residuals::against_velocity(report)?,
-        residuals::against_position(report)?,
-        residuals::against_temperature(report)?,
-        bars::motion_states(report)?,
-        bars::candidates(report)?,
-        training::curves(report)?,
-    ];
-    Ok(drawn.into_iter().flatten().collect())
 }

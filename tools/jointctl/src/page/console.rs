@@ -1,7 +1,7 @@
 //! The errors of one test set as a table for a terminal: plain text, aligned, one row for each model; host.
 
 use super::ErrorTable;
-use super::number::{NONE, optional, percent};
+use report::number::{NONE, optional, percent};
 
 /// How the model was chosen, in lines for a terminal.
 pub fn choice(choice: &super::Choice) -> String {

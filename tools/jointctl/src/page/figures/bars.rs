@@ -1,12 +1,10 @@
 //! Comparisons as bars: RMSE in each motion state, and the candidates' validation error; host.
 
-use super::axis::Axis;
-use super::chart::{Panel, Swatch, legend, paper};
-use super::ink::Ink;
-use super::{Figure, FigureError};
-use crate::report::number::significant;
-use crate::report::{ErrorRow, Report, Role};
-use plotters::style::text_anchor::{HPos, VPos};
+use crate::page::{ErrorRow, Report, Role};
+use report::figures::axis::Axis;
+use report::figures::chart::{Panel, Swatch, legend, paper};
+use report::figures::{Figure, FigureError, Ink};
+use report::number::significant;
 
 /// Share of the distance between two groups that bars take.
 const GROUP_WIDTH: f64 = 0.78;
@@ -71,7 +69,7 @@ pub fn candidates(report: &Report) -> Result<Option<Figure>, FigureError> {
             let (place, value) = (place as f64, candidate.unseen_rmse);
             let ink = if candidate.kept { Ink::Network } else { Ink::Measured };
             panel.bar([(0.0, place - 0.34), (value, place + 0.34)], ink, 1.0)?;
-            panel.text(&significant(value, 4), (value, place), (6, 0), HPos::Left, VPos::Center)?;
+            panel.text_beside(&significant(value, 4), (value, place), 6)?;
         }
         Ok(())
     })?;

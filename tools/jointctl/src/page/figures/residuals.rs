@@ -1,12 +1,11 @@
 //! What the models leave unexplained: its distribution, and whether it still depends on something; host.
 
-use super::axis::Axis;
-use super::binning::{CLOUD_POINTS, bins, extent, quantile, robust_extent, thin, widen};
-use super::chart::{Entry, Panel, Swatch, legend, paper};
 use super::friction::{compensated_ink, outside};
-use super::ink::Ink;
-use super::{Figure, FigureError};
-use crate::report::Report;
+use crate::page::Report;
+use report::figures::axis::Axis;
+use report::figures::binning::{CLOUD_POINTS, bins, extent, quantile, robust_extent, thin, widen};
+use report::figures::chart::{Entry, Panel, Swatch, legend, paper};
+use report::figures::{Figure, FigureError, Ink};
 
 const HISTOGRAM_BINS: usize = 81;
 const MEAN_BINS: usize = 40;

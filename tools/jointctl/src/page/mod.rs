@@ -8,17 +8,16 @@ mod choice;
 pub mod console;
 mod figures;
 mod html;
-pub(crate) mod number;
 mod summary;
 mod tables;
 
-pub use figures::{Curve, Figure, FigureError, Ink, Plot, figures, over_time, style_sheet};
-pub(crate) use html::{document, gallery};
+pub use figures::figures;
 pub use summary::{Verdict, verdict};
 
 use crate::dataset::Warning;
 use crate::metrics::{ByState, Metrics};
-use crate::output::{OutputError, OutputFile, write_directory};
+use report::figures::FigureError;
+use report::output::{OutputError, OutputFile, write_directory};
 use serde::Serialize;
 use std::path::Path;
 

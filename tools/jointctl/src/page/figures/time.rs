@@ -1,12 +1,11 @@
 //! Measured and predicted effort over time, with the error below: a typical stretch of the test data and its worst;
 //! host.
 
-use super::axis::Axis;
-use super::binning::{extent, quantile, widen};
-use super::chart::{Area, Entry, Panel, Swatch, heading, legend, paper};
-use super::ink::Ink;
-use super::{Figure, FigureError};
-use crate::report::{Report, TestSamples};
+use crate::page::{Report, TestSamples};
+use report::figures::axis::Axis;
+use report::figures::binning::{extent, quantile, widen};
+use report::figures::chart::{Area, Entry, Panel, Swatch, heading, legend, paper};
+use report::figures::{Figure, FigureError, Ink};
 use std::ops::Range;
 
 /// Longest stretch, s. Runs are cut into equal parts no longer than this.

@@ -1,8 +1,8 @@
 //! The report in one sentence, from all test sets: what compensation removes of the error that the rigid body leaves,
 //! whether a simpler model of the same table does better, or why nothing can be said; host.
 
-use super::number::{percent, significant};
 use super::{NetworkOutcome, Report, Role};
+use report::number::{percent, significant};
 use serde::Serialize;
 
 /// How much worse than the best physical model of the same table what the joint would run may be on a test set.

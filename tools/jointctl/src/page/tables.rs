@@ -1,9 +1,9 @@
 //! The tables of the page; host.
 
-use super::number::{NONE, count, optional, percent, significant, with_error};
 use super::{ErrorRow, ErrorTable, NetworkOutcome, Report, Role};
 use crate::metrics::Metrics;
 use maud::{Markup, html};
+use report::number::{NONE, count, optional, percent, significant, with_error};
 
 /// A table that scrolls by itself on narrow screens; the first `text_columns` columns are text, the others numbers.
 fn table(heading: &[&str], text_columns: usize, rows: &[(Option<&'static str>, Vec<Markup>)], caption: &str) -> Markup {

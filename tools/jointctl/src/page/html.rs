@@ -1,38 +1,18 @@
-//! The report as one page that needs nothing but itself: style sheet and figures are inside, there is no script; host.
-//!
-//! All text goes through maud, which escapes it.
+//! The report as one page that needs nothing but itself; host.
 
 use super::choice;
-use super::number::{count, percent, significant};
 use super::summary::{headline, verdict};
-use super::{Figure, NetworkOutcome, Report, style_sheet, tables};
-use maud::{DOCTYPE, Markup, PreEscaped, html};
-
-const PAGE_STYLE: &str = include_str!("page.css");
+use super::{NetworkOutcome, Report, tables};
+use maud::{Markup, html};
+use report::figures::Figure;
+use report::html::{document, gallery};
+use report::number::{count, percent, significant};
 
 /// One part of the page: anchor, heading, contents.
 struct Section {
     anchor: &'static str,
     heading: &'static str,
     contents: Markup,
-}
-
-/// A page that needs nothing but itself.
-pub fn document(title: &str, body: &Markup) -> String {
-    html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta name="color-scheme" content="light dark";
-                title { (title) }
-                style { (PreEscaped(PAGE_STYLE)) (PreEscaped(style_sheet())) }
-            }
-            body { (body) }
-        }
-    }
-    .into_string()
 }
 
 /// The whole page.
@@ -91,21 +71,6 @@ fn sections(report: &Report, figures: &[Figure]) -> Vec<Option<Section>> {
         section(!report.stages.is_empty(), "data", "What was done to the data", tables::stages(report)),
         section(true, "provenance", "Provenance", tables::provenance(report)),
     ]
-}
-
-/// Figures side by side where there is room.
-pub fn gallery(figures: &[&Figure]) -> Markup {
-    html! {
-        div.gallery {
-            @for figure in figures {
-                figure id={ "figure-" (figure.name) } class=[figure.wide.then_some("wide")] {
-                    h3 { (figure.title) }
-                    div.scroll aria-label=(figure.title) { (PreEscaped(&figure.svg)) }
-                    figcaption { (figure.caption) }
-                }
-            }
-        }
-    }
 }
 
 /// The numbers that one looks for first.

@@ -1,11 +1,10 @@
 //! Training and validation error over the epochs, for every seed; host.
 
-use super::axis::Axis;
-use super::binning::extent;
-use super::chart::{Panel, Swatch, legend, paper};
-use super::ink::Ink;
-use super::{Figure, FigureError};
-use crate::report::{Report, TrainingCurve};
+use crate::page::{Report, TrainingCurve};
+use report::figures::axis::Axis;
+use report::figures::binning::extent;
+use report::figures::chart::{Panel, Swatch, legend, paper};
+use report::figures::{Figure, FigureError, Ink};
 
 /// Points of one line; early epochs, where the error falls fast, are all kept.
 const LINE_POINTS: usize = 600;

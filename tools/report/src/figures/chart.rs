@@ -179,12 +179,13 @@ impl<'a> Panel<'a> {
         Ok(self.chart.plotting_area().draw(&Circle::new(at, 5 * UNIT, line_style(ink, 2.0)))?)
     }
 
-    /// A text at a point, moved by some pixels.
-    pub fn text(&self, text: &str, at: (f64, f64), (dx, dy): (i32, i32), h: HPos, v: VPos) -> Result<()> {
+    /// A text to the right of a point, some pixels away.
+    pub fn text_beside(&self, text: &str, at: (f64, f64), pixels: i32) -> Result<()> {
         let (x, y) = self.chart.backend_coord(&at);
-        let (base_x, base_y) = self.chart.plotting_area().strip_coord_spec().get_base_pixel();
-        let place = (x - base_x + dx * UNIT, y - base_y + dy * UNIT);
-        Ok(self.chart.plotting_area().strip_coord_spec().draw(&Text::new(text, place, text_style(h, v)))?)
+        let plot = self.chart.plotting_area().strip_coord_spec();
+        let (base_x, base_y) = plot.get_base_pixel();
+        let place = (x - base_x + pixels * UNIT, y - base_y);
+        Ok(plot.draw(&Text::new(text, place, text_style(HPos::Left, VPos::Center)))?)
     }
 
     /// Says in the corner how many samples lie beyond the axes, if any do.

@@ -1,9 +1,9 @@
 //! How the model was chosen, as a section of the page: the folds with the errors there, the steps, and what was
 //! overruled; host.
 
-use super::number::significant;
 use super::{Choice, Report};
 use maud::{Markup, html};
+use report::number::significant;
 
 /// The grouping, the errors of the physical models on each fold, and every step.
 pub fn choice(report: &Report) -> Markup {
