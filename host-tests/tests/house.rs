@@ -11,13 +11,14 @@ use syn::visit::{self, Visit};
 use syn::{Attribute, Item, UseTree};
 
 /// Sources of each crate.
-const CRATES: [&str; 15] = [
+const CRATES: [&str; 16] = [
     "src",
     "crates/canopen-node/src",
     "crates/friction-compensation/src",
     "host-tests/src",
     "tools/bus/src",
     "tools/emulator/src",
+    "tools/excitation/src",
     "tools/fleet/src",
     "tools/jointctl/src",
     "tools/logs/src",

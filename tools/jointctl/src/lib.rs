@@ -4,10 +4,9 @@
 //! split; the rigid body and the physical friction are identified, a network is trained on what is left, the better
 //! model on validation data is quantised, certified and judged by the same `no_std` code that the board runs.
 //!
-//! Beside it, [`simulation`] closes the firmware's control step over a simulated actuator, [`joint_text`] is a joint's
-//! configuration as a file, and [`excite`] finds motions that identify a joint. [`remote`] is a joint over a bus,
-//! [`describe`] tells other people's tools of it. [`robot`] identifies all joints of an arm at once and hands each to
-//! this pipeline.
+//! Beside it, [`simulation`] closes the firmware's control step over a simulated actuator, and [`joint_text`] is a
+//! joint's configuration as a file. [`remote`] is a joint over a bus, [`describe`] tells other people's tools of it.
+//! [`robot`] identifies all joints of an arm at once and hands each to this pipeline.
 
 pub mod augment;
 pub mod certificate_search;
@@ -21,7 +20,6 @@ pub mod describe;
 pub mod differentiate;
 pub mod equalise;
 pub mod evaluate;
-pub mod excite;
 pub mod filter;
 pub mod fit;
 pub mod friction_model;

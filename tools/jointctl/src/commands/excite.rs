@@ -4,10 +4,10 @@ use super::CommandError;
 use super::force::Force;
 use super::joint::JointChoice;
 use super::stream;
-use crate::excite::check::{Findings, check};
-use crate::excite::file::{SAMPLE_PERIOD, coefficients, read, table};
-use crate::excite::{Bounds, Effort, optimise};
 use clap::Args;
+use excitation::check::{Findings, check};
+use excitation::file::{SAMPLE_PERIOD, coefficients, read, table};
+use excitation::{Bounds, Effort, optimise};
 use report::output::write_file;
 use std::path::PathBuf;
 

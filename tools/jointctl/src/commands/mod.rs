@@ -177,10 +177,10 @@ pub enum CommandError {
     Toml(#[from] toml::ser::Error),
     /// The search for an excitation.
     #[error("excitation: {0}")]
-    Excite(#[from] crate::excite::ExciteError),
+    Excite(#[from] excitation::ExciteError),
     /// A file with an excitation.
     #[error(transparent)]
-    ExcitationFile(#[from] crate::excite::file::ExcitationFileError),
+    ExcitationFile(#[from] excitation::file::ExcitationFileError),
     /// An excitation that must not be run.
     #[error("{}: {defects}", path.display())]
     Excitation {

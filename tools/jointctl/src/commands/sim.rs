@@ -6,7 +6,6 @@ use super::force::Force;
 use super::image::{read, verify};
 use super::joint::JointChoice;
 use super::on_board::OnBoard;
-use crate::excite::file as excitation;
 use crate::joint_text;
 use crate::progress::{Progress, Terminal};
 use crate::simulation::page::{Shown, page};
@@ -14,6 +13,7 @@ use crate::simulation::run::USUAL_SAMPLE_PERIOD;
 use crate::simulation::table::{Line, json, table};
 use crate::simulation::{Choices, Log, Part, Run, Scenario, SimulationError, judge, log, run};
 use clap::Args;
+use excitation::file;
 use friction_compensation::compensation::Request;
 use friction_compensation::friction::FrictionModel;
 use plant::virtual_joint::Setup;
@@ -95,7 +95,7 @@ impl Sim {
         }
         self.force.permits_in(&self.out, &["joint.toml", "plant.toml", "sim.html"])?;
         let friction = self.friction(&setup)?;
-        let samples = self.excitation.as_deref().map(excitation::read).transpose()?;
+        let samples = self.excitation.as_deref().map(file::read).transpose()?;
         let mut scenarios = if self.scenario.is_empty() { Scenario::ALL.to_vec() } else { self.scenario.clone() };
         // A scenario that is named twice is run once.
         let mut seen = Vec::new();

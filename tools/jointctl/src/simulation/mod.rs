@@ -34,7 +34,7 @@ pub enum SimulationError {
     Plant(#[from] plant::ParameterError),
     /// No excitation within the joint's limits.
     #[error(transparent)]
-    Excitation(#[from] crate::excite::ExciteError),
+    Excitation(#[from] excitation::ExciteError),
     /// A recording that a fault ended.
     #[error("run {run} of the recording {reason}")]
     Recording {

@@ -4,7 +4,7 @@
 //! that the rigid body needs for it, at a stiffness and damping. Targets are reached in position mode, where the joint
 //! makes its own ramp. Either way the controller knows inertia and gravity of the joint, and nothing of its friction.
 
-use crate::excite::file::Samples;
+use excitation::file::Samples;
 use joint_firmware::joint::{Command, Mode};
 use plant::JointParameters;
 use plant::excitation::{Reference, Trajectory};

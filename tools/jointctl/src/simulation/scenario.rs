@@ -5,8 +5,8 @@
 
 use super::SimulationError;
 use super::motion::{Led, Motion, Sweep, Targets};
-use crate::excite::file::Samples;
-use crate::excite::{Bounds, Effort, optimise};
+use excitation::file::Samples;
+use excitation::{Bounds, Effort, optimise};
 use plant::ActuatorParameters;
 use plant::contact::{Contact, Side};
 use plant::excitation::{GENTLE_ACCELERATION, Segment, Trajectory, back_and_forth, slow_reversals};

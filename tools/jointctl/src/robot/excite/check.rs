@@ -2,7 +2,7 @@
 //! every series fades.
 
 use super::Task;
-use crate::excite::Excitation;
+use excitation::Excitation;
 use serde::Serialize;
 
 /// Extremes of one joint.

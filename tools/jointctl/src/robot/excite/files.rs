@@ -4,7 +4,7 @@ use super::Effort;
 use super::Task;
 use super::regressor::Score;
 use super::search::Found;
-use crate::excite::file::table_in;
+use excitation::file::table_in;
 use report::output::OutputFile;
 use serde::Serialize;
 use serde_json::{Value, json};

@@ -16,7 +16,7 @@ pub mod files;
 pub mod regressor;
 pub mod search;
 
-use crate::excite::{Bounds, ExciteError, within};
+use excitation::{Bounds, ExciteError, within};
 use rigid_body::{JointKind, Robot};
 use std::path::{Path, PathBuf};
 

@@ -8,9 +8,9 @@
 use super::check::{Findings, check};
 use super::regressor::{Motion, Regressor, Score};
 use super::{Effort, RobotExciteError, Task};
-use crate::excite::basis::Basis;
-use crate::excite::file::SAMPLE_PERIOD;
-use crate::excite::{Bounds, Excitation};
+use excitation::basis::Basis;
+use excitation::file::SAMPLE_PERIOD;
+use excitation::{Bounds, Excitation};
 use plant::excitation::Reference;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;

@@ -1,13 +1,13 @@
 //! A motion of all joints: within every limit, and better than a random one.
 
 use super::synthetic::{EffortNoise, Measured, RATE, Truth, rows};
-use crate::excite::Excitation;
 use crate::robot::excite::check::check;
 use crate::robot::excite::files::{COEFFICIENTS, files};
 use crate::robot::excite::search::{Found, search};
 use crate::robot::excite::{Effort, Task};
 use crate::robot::friction_columns::Friction;
 use crate::robot::least_squares::{Weighting, base, solve};
+use excitation::Excitation;
 use plant::excitation::Reference;
 use rigid_body::Robot;
 use rigid_body::random_tree::{Shape, tree, urdf};

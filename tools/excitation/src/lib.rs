@@ -4,10 +4,9 @@
 //! The form of the series is that of the non-symmetric-Coulomb paper (002, section III-B), see [`plant::fourier`]; it
 //! fades in and out, so that it begins and ends at rest. It is about the middle of the position limits.
 //!
-//! - [`regressor`]: what the samples tell apart, as a condition number
-//! - [`basis`]: series as sums over their coefficients; `optimise`: the search for a series
-//! - [`mod@file`]: a series as coefficients and as a table of samples
-//! - [`check`]: whether a table keeps the limits, and its condition number
+//! Data flows one way: limits become a series by a search (`optimise`) over sums of single harmonics ([`basis`]), each
+//! judged by what its samples tell apart, a condition number ([`regressor`]). The series is written as coefficients and
+//! as a table of samples ([`mod@file`]); whether a table keeps the limits is checked apart from its origin ([`check`]).
 
 pub mod basis;
 pub mod check;
@@ -61,12 +60,11 @@ pub enum ExciteError {
     },
 }
 
-pub(crate) fn within(
-    name: &'static str,
-    unit: &'static str,
-    value: f64,
-    (low, high): (f64, f64),
-) -> Result<(), ExciteError> {
+/// Nothing where a choice lies within its range.
+///
+/// # Errors
+/// [`ExciteError::Choice`].
+pub fn within(name: &'static str, unit: &'static str, value: f64, (low, high): (f64, f64)) -> Result<(), ExciteError> {
     match (low..=high).contains(&value) {
         true => Ok(()),
         false => Err(ExciteError::Choice { name, value, low, high, unit }),
