@@ -1,9 +1,9 @@
 //! A joint as a user commissions it: excite it without compensation, record, fit, and take what the board would load.
 
 use friction_compensation::friction::FrictionModel;
-use jointctl::dataset::prepare;
-use jointctl::fit::{Options, fit};
-use jointctl::progress::Silent;
+use identification::dataset::prepare;
+use identification::fit::{Options, fit};
+use identification::progress::Silent;
 use jointctl::simulation::recording::{DESCRIPTION, record};
 use plant::actuator::ActuatorParameters;
 use plant::virtual_joint::Setup;

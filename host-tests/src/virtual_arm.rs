@@ -4,10 +4,10 @@
 use crate::driving::COMMAND_STEPS;
 use friction_compensation::compensation::Request;
 use friction_compensation::friction::FrictionModel;
+use identification::fit::Options as JointOptions;
+use identification::progress::Silent;
 use joint_firmware::joint::state_machine::{Controlword, State};
 use joint_firmware::joint::{Command, Demand, Mode, Telemetry};
-use jointctl::fit::Options as JointOptions;
-use jointctl::progress::Silent;
 use jointctl::robot::{Options, fit, record};
 use nalgebra::{Matrix3, Unit, Vector3};
 use plant::actuator::ActuatorParameters;

@@ -146,8 +146,8 @@ fn readme_is_short_and_its_results_are_those_of_the_pages() {
 
 #[test]
 fn names_in_diagrams_are_those_of_the_code() {
-    let code: String =
-        ["src", "crates", "tools/jointctl/src"].into_iter().flat_map(|at| files(at, "rs")).map(read).collect();
+    let folders = ["src", "crates", "tools/identification/src", "tools/jointctl/src"];
+    let code: String = folders.into_iter().flat_map(|at| files(at, "rs")).map(read).collect();
     let mut count = 0;
     for figure in files("docs/figures", "svg") {
         let text = read(&figure);

@@ -11,7 +11,7 @@ use syn::visit::{self, Visit};
 use syn::{Attribute, Item, UseTree};
 
 /// Sources of each crate.
-const CRATES: [&str; 16] = [
+const CRATES: [&str; 17] = [
     "src",
     "crates/canopen-node/src",
     "crates/friction-compensation/src",
@@ -20,6 +20,7 @@ const CRATES: [&str; 16] = [
     "tools/emulator/src",
     "tools/excitation/src",
     "tools/fleet/src",
+    "tools/identification/src",
     "tools/jointctl/src",
     "tools/logs/src",
     "tools/node/src",

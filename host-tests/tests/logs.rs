@@ -1,10 +1,10 @@
 //! A data set is the same in CSV, MCAP and Parquet: it fits to the same image, and its defects are told alike.
 
 use friction_compensation::parameters::image::MAX_LENGTH;
-use jointctl::dataset::{Prepared, prepare_with};
-use jointctl::fit::{Options, fit};
-use jointctl::presets::Preset;
-use jointctl::progress::Silent;
+use identification::dataset::{Prepared, prepare_with};
+use identification::fit::{Options, fit};
+use identification::presets::Preset;
+use identification::progress::Silent;
 use logs::{Format, Table, Texts, encode};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};

@@ -3,12 +3,12 @@
 //! Without the recordings ([`host_tests::recordings`]) every test here is reported as ignored, by name.
 
 use host_tests::recordings;
-use jointctl::dataset::{Prepared, prepare_with};
-use jointctl::filter::LowPassFilter;
-use jointctl::fit::{Options, fit};
-use jointctl::page::Role;
-use jointctl::progress::Silent;
-use jointctl::samples::Part;
+use identification::dataset::{Prepared, prepare_with};
+use identification::filter::LowPassFilter;
+use identification::fit::{Options, fit};
+use identification::page::Role;
+use identification::progress::Silent;
+use identification::samples::Part;
 use libtest_mimic::{Arguments, Failed, Trial};
 use nalgebra::{DMatrix, DVector};
 use std::path::{Path, PathBuf};
@@ -165,7 +165,7 @@ fn protocol_rows(file: &Path, asymmetric: bool) -> Result<(DMatrix<f64>, DVector
         q.push(record[position].parse::<f64>()?);
         f.push(record[force].parse::<f64>()?);
     }
-    let differences = |x: &[f64]| jointctl::differentiate::central_difference(x, 1e-3);
+    let differences = |x: &[f64]| identification::differentiate::central_difference(x, 1e-3);
     let q = LowPassFilter::butterworth(4, 0.2)?.zero_phase(&q)?;
     let v = differences(&q);
     let a = differences(&v);

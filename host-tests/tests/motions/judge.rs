@@ -2,14 +2,14 @@
 
 use crate::list::Motion;
 use crate::page::{Image, Row};
-use jointctl::dataset::description::Rule;
-use jointctl::dataset::{Description, Prepared, prepare_as};
-use jointctl::evaluate::Prediction;
-use jointctl::fit::{FitError, Fitted, Options, fit};
-use jointctl::page::{ErrorTable, Role};
-use jointctl::presets::Preset;
-use jointctl::progress::Silent;
-use jointctl::sample_table::write_sample_table;
+use identification::dataset::description::Rule;
+use identification::dataset::{Description, Prepared, prepare_as};
+use identification::evaluate::Prediction;
+use identification::fit::{FitError, Fitted, Options, fit};
+use identification::page::{ErrorTable, Role};
+use identification::presets::Preset;
+use identification::progress::Silent;
+use identification::sample_table::write_sample_table;
 use libtest_mimic::Failed;
 use serde_json::Value;
 use std::path::Path;

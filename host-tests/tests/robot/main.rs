@@ -7,8 +7,8 @@
 mod page;
 
 use host_tests::recordings;
-use jointctl::fit::Options as JointOptions;
-use jointctl::progress::Silent;
+use identification::fit::Options as JointOptions;
+use identification::progress::Silent;
 use jointctl::robot::{FittedRobot, Options, fit, record};
 use libtest_mimic::{Arguments, Failed, Trial};
 use std::path::Path;

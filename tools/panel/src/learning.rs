@@ -1,9 +1,9 @@
 //! Images of the friction model and compensation, as a page shows them; host.
 
 use crate::message::Usage;
+use identification::progress::Silent;
 use joint_firmware::objects::field::{Actual, Field};
 use joint_firmware::objects::settings::Setting;
-use jointctl::progress::Silent;
 use jointctl::remote::image::{ImageStatus, StoredImage, Use};
 use jointctl::remote::info::{life, show};
 use jointctl::remote::{RemoteError, RemoteJoint};

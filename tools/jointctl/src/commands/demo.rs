@@ -4,10 +4,7 @@
 use super::CommandError;
 use super::fit::{Choices, FILES, print_summary, write};
 use super::force::Force;
-use crate::dataset::prepare;
-use crate::fit::fit;
-use crate::page::{ReportError, numbers};
-use crate::progress::{Progress, Terminal};
+use super::terminal::Terminal;
 use crate::simulation::page::{Shown, page};
 use crate::simulation::recording::{DESCRIPTION, record};
 use crate::simulation::table::{Line, json, table};
@@ -15,6 +12,10 @@ use crate::simulation::{self, Choices as RunChoices, Run, Scenario, SimulationEr
 use clap::Args;
 use friction_compensation::compensation::Request;
 use friction_compensation::friction::FrictionModel;
+use identification::dataset::prepare;
+use identification::fit::fit;
+use identification::page::{ReportError, numbers};
+use identification::progress::Progress;
 use plant::ActuatorParameters;
 use plant::virtual_joint::Setup;
 use rayon::prelude::*;

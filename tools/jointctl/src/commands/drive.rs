@@ -2,10 +2,11 @@
 
 use super::CommandError;
 use super::remote::{Where, catch_interrupts, running};
-use crate::progress::{Progress, Terminal};
+use super::terminal::Terminal;
 use crate::remote::RemoteJoint;
 use crate::remote::motion::{Motion, left};
 use clap::{Args, ValueEnum};
+use identification::progress::Progress;
 use joint_firmware::joint::{Command, Mode};
 
 /// Arguments that `enable` and `move` share.

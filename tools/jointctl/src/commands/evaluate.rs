@@ -3,19 +3,21 @@
 use super::CommandError;
 use super::fit::print_warnings;
 use super::force::Force;
-use super::image::{read, verify};
-use crate::dataset::prepare;
-use crate::evaluate::{Prediction, error_tables, fixed_point_difference, rigid_beside};
-use crate::fit::{FitError, image_on_other_motion, rigid_model, units};
-use crate::identify::{self, identify};
-use crate::joint_model::{FloatFriction, firmware_states, fixed_point, regimes, replay, rigid_efforts};
-use crate::page::{Role, console};
-use crate::pre_sliding;
-use crate::presets::Preset;
-use crate::progress::{Progress, Terminal};
-use crate::quantize::full_scale::from_q16;
-use crate::sample_table::write_sample_table;
+use super::image::read;
+use super::terminal::Terminal;
 use clap::Args;
+use identification::dataset::prepare;
+use identification::evaluate::{Prediction, error_tables, fixed_point_difference, rigid_beside};
+use identification::fit::{FitError, image_on_other_motion, rigid_model, units};
+use identification::identify::{self, identify};
+use identification::image_file::verify;
+use identification::joint_model::{FloatFriction, firmware_states, fixed_point, regimes, replay, rigid_efforts};
+use identification::page::{Role, console};
+use identification::pre_sliding;
+use identification::presets::Preset;
+use identification::progress::Progress;
+use identification::quantize::full_scale::from_q16;
+use identification::sample_table::write_sample_table;
 use std::path::PathBuf;
 
 /// A note below the tables.

@@ -2,17 +2,18 @@
 
 use super::CommandError;
 use super::force::Force;
-use crate::choice::{Decision, TermRule};
-use crate::dataset::{Prepared, Warning, prepare};
-use crate::fit::{Fitted, Options, Trainer, fit};
-use crate::image_text;
-use crate::page::{NetworkOutcome, console, numbers, render, verdict};
-use crate::presets::Preset;
-use crate::progress::{Progress, Terminal};
-use crate::sample_table::write_sample_table;
+use super::terminal::Terminal;
 use clap::{Args, ValueEnum};
 use friction_compensation::friction::regime::Measure;
-use friction_compensation::parameters::image::{Image, MAX_LENGTH};
+use identification::choice::{Decision, TermRule};
+use identification::dataset::{Prepared, Warning, prepare};
+use identification::fit::{Fitted, Options, Trainer, fit};
+use identification::image_file::bytes;
+use identification::image_text;
+use identification::page::{NetworkOutcome, console, numbers, render, verdict};
+use identification::presets::Preset;
+use identification::progress::Progress;
+use identification::sample_table::write_sample_table;
 use report::output::{OutputFile, write_directory};
 use std::path::{Path, PathBuf};
 
@@ -49,6 +50,28 @@ pub enum TrainerChoice {
     Sgd,
     /// No network
     None,
+}
+
+/// Who decides about a part of the model.
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+pub enum DecisionChoice {
+    /// The error on motions that were left out decides
+    #[default]
+    Choose,
+    /// It is kept, unless the certificate refuses it
+    Keep,
+    /// It is left out
+    Never,
+}
+
+impl From<DecisionChoice> for Decision {
+    fn from(choice: DecisionChoice) -> Self {
+        match choice {
+            DecisionChoice::Choose => Self::Choose,
+            DecisionChoice::Keep => Self::Keep,
+            DecisionChoice::Never => Self::Never,
+        }
+    }
 }
 
 /// What tells motion regimes apart, each of which gets a network of its own.
@@ -118,11 +141,11 @@ pub struct Choices {
     regimes: Vec<RegimeChoice>,
     /// Who decides about the network: the error on motions that were left out, or you
     #[arg(long, value_enum, default_value_t)]
-    network: Decision,
+    network: DecisionChoice,
     /// Who decides about lagged accelerations beside the rigid body, for an elastic joint: the error on motions that
     /// were left out, or you
     #[arg(long = "lagged-accelerations", value_enum, default_value_t)]
-    lags: Decision,
+    lags: DecisionChoice,
     /// Terms of the full model that are forced (+) or forbidden (-), as in +Stribeck,-Hysteresis
     #[arg(long = "term", value_name = "±NAME", value_delimiter = ',', allow_hyphen_values = true)]
     terms: Vec<TermRule>,
@@ -162,8 +185,8 @@ impl Choices {
             seed: self.seed,
             samples: self.samples,
             equalise: fraction("equalise", self.equalise, 1.0)?,
-            network: self.network,
-            lags: self.lags,
+            network: self.network.into(),
+            lags: self.lags.into(),
             terms: self.terms.clone(),
             least_gain: fraction("least-gain", self.least_gain, 100.0)? / 100.0,
             margin: fraction("margin", self.margin, 100.0)?,
@@ -237,15 +260,6 @@ pub fn write(fitted: &Fitted, out: &Path) -> Result<(), CommandError> {
     files.push(OutputFile::new("friction.toml", image_text::to_text(&fitted.image)));
     write_directory(out, &files)?;
     Ok(())
-}
-
-/// The image in its binary form.
-pub fn bytes(image: &Image, path: &Path) -> Result<Vec<u8>, CommandError> {
-    let mut buffer = [0; MAX_LENGTH];
-    let length = image
-        .encode(&mut buffer)
-        .map_err(|error| CommandError::Image { path: path.to_owned(), reason: error.to_string() })?;
-    Ok(buffer[..length].to_vec())
 }
 
 /// Suspected defects of the data on standard error.

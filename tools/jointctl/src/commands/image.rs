@@ -1,17 +1,17 @@
 //! `jointctl image`: look into a parameter image, verify it as a joint would, convert it to TOML and back.
 
 use super::CommandError;
-use super::fit::bytes;
 use super::force::Force;
 use super::stream;
-use crate::image_text;
 use crate::key_file;
-use crate::quantize::golden_vectors;
 use clap::{Args, Subcommand};
 use friction_compensation::friction::FrictionModel;
 use friction_compensation::parameters::authentication::{Key, split};
-use friction_compensation::parameters::certificate::{Certificate, certify};
+use friction_compensation::parameters::certificate::Certificate;
 use friction_compensation::parameters::image::Image;
+use identification::image_file::{self, bytes, is_text, verify};
+use identification::image_text;
+use identification::quantize::golden_vectors;
 use std::path::{Path, PathBuf};
 
 /// What to do with an image.
@@ -105,10 +105,6 @@ impl Convert {
     }
 }
 
-fn is_text(path: &Path) -> bool {
-    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
-}
-
 /// Whether the tag behind an image is of this key.
 fn verify_tag(upload: &[u8], path: &Path, key: &Key) -> Result<(), CommandError> {
     let refused = |reason: String| Err(CommandError::Image { path: path.to_owned(), reason });
@@ -129,23 +125,9 @@ pub fn read(path: &Path) -> Result<Image, CommandError> {
 
 /// The image that a file's bytes are; see [`read`].
 pub fn decode(bytes: &[u8], path: &Path) -> Result<Image, CommandError> {
-    let refused = |reason: String| CommandError::Image { path: path.to_owned(), reason };
     // A binary image has zeros, a text none.
     let text = is_text(path) || stream::is_stream(path) && !bytes.contains(&0);
-    if text {
-        let text = str::from_utf8(bytes).map_err(|error| refused(error.to_string()))?;
-        return image_text::from_text(text).map_err(|error| refused(error.to_string()));
-    }
-    Image::decode(split(bytes).0).map_err(|error| refused(error.to_string()))
-}
-
-/// What a joint checks before it uses an image, after decoding.
-pub fn verify(image: &Image, path: &Path) -> Result<Certificate, CommandError> {
-    let refused = |reason: String| CommandError::Image { path: path.to_owned(), reason };
-    let certificate = certify(&image.friction, &image.limits).map_err(|error| refused(error.to_string()))?;
-    let model = FrictionModel::new(&image.friction, 1);
-    image.verify_golden(&model).map_err(|error| refused(error.to_string()))?;
-    Ok(certificate)
+    Ok(image_file::decode(bytes, path, text)?)
 }
 
 fn summary(image: &Image, certificate: &Certificate) -> String {

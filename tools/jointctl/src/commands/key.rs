@@ -1,13 +1,13 @@
 //! `jointctl key` and `jointctl sign`: who may change what a joint adds to its torque.
 
 use super::CommandError;
-use super::fit::bytes;
 use super::force::Force;
-use super::image::{read, verify};
+use super::image::read;
 use super::remote::Where;
 use super::stream;
 use crate::key_file;
 use clap::{Args, Subcommand};
+use identification::image_file::{bytes, verify};
 use std::path::PathBuf;
 
 /// What to do with a key.

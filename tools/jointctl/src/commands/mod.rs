@@ -30,6 +30,7 @@ pub mod retrain;
 pub mod robot;
 pub mod sim;
 mod stream;
+mod terminal;
 pub mod upload;
 
 use clap::{CommandFactory, Parser, Subcommand};
@@ -128,10 +129,10 @@ pub fn arguments() -> clap::Command {
 pub enum CommandError {
     /// The data set.
     #[error(transparent)]
-    Dataset(#[from] crate::dataset::DatasetError),
+    Dataset(#[from] identification::dataset::DatasetError),
     /// The fit.
     #[error(transparent)]
-    Fit(#[from] crate::fit::FitError),
+    Fit(#[from] identification::fit::FitError),
     /// A robot.
     #[error(transparent)]
     Robot(#[from] crate::robot::RobotFitError),
@@ -151,7 +152,7 @@ pub enum CommandError {
     Output(#[from] report::output::OutputError),
     /// The report.
     #[error(transparent)]
-    Report(#[from] crate::page::ReportError),
+    Report(#[from] identification::page::ReportError),
     /// The virtual joint.
     #[error("virtual joint: {0}")]
     Plant(#[from] plant::ParameterError),
@@ -205,6 +206,9 @@ pub enum CommandError {
         /// Why.
         reason: String,
     },
+    /// A file that is no image that can be used.
+    #[error(transparent)]
+    ImageFile(#[from] identification::image_file::ImageFileError),
     /// A key.
     #[error(transparent)]
     Key(#[from] crate::key_file::KeyFileError),

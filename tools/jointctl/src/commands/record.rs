@@ -3,11 +3,12 @@
 use super::CommandError;
 use super::force::Force;
 use super::remote::{Where, catch_interrupts, running};
-use crate::dataset::DatasetError;
-use crate::dataset::load::is_log;
-use crate::progress::{Progress, Terminal};
+use super::terminal::Terminal;
 use crate::remote::record::{Pace, Recorder, Recording, SIGNALS, description};
 use clap::Args;
+use identification::dataset::DatasetError;
+use identification::dataset::load::is_log;
+use identification::progress::Progress;
 use report::output::{OutputFile, write_directory};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};

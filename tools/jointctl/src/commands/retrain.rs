@@ -4,11 +4,11 @@ use super::CommandError;
 use super::fit::{FILES, write};
 use super::force::Force;
 use super::remote::{Where, catch_interrupts, running};
-use crate::fit::Options;
-use crate::page::verdict;
-use crate::progress::Terminal;
+use super::terminal::Terminal;
 use crate::remote::retrain::{RetrainError, Round, Shown};
 use clap::Args;
+use identification::fit::Options;
+use identification::page::verdict;
 use std::path::PathBuf;
 use std::time::{SystemTime, UNIX_EPOCH};
 

@@ -1,14 +1,14 @@
 //! `jointctl upload`, `rollback`, `discard`: a parameter image's way into a joint, and back.
 
 use super::CommandError;
-use super::fit::bytes;
 use super::image::read;
 use super::remote::Where;
 use super::stream;
-use crate::progress::Terminal;
+use super::terminal::Terminal;
 use crate::remote::image::{ImageStatus, Use};
 use crate::remote::info::life;
 use clap::Args;
+use identification::image_file::bytes;
 use std::path::PathBuf;
 
 /// How long a shadow runs where nobody says, s.

@@ -9,12 +9,12 @@ use super::error::RemoteError;
 use super::joint::RemoteJoint;
 use super::refusal::{Attempt, image_state};
 use super::value::Value;
-use crate::progress::Progress;
 use bus::client::ClientError;
 use bus::client::sdo::Method;
 use canopen_node::Abort;
 use friction_compensation::parameters::authentication::{STAGING, split};
 use friction_compensation::parameters::life_cycle::{Command, State};
+use identification::progress::Progress;
 use joint_firmware::objects::field::{Actual, Field, ImageField, StoredField, Which};
 use std::time::{Duration, Instant};
 

@@ -3,9 +3,9 @@
 
 use super::error::RemoteError;
 use super::joint::RemoteJoint;
-use crate::page::Parameter;
-use crate::rigid::RigidRegressor;
 use bus::client::{Abort, ClientError};
+use identification::page::Parameter;
+use identification::rigid::RigidRegressor;
 use joint_firmware::joint::configuration::LoadConfiguration;
 use joint_firmware::joint::load_feedforward::Load;
 use joint_firmware::objects::field::Field;

@@ -6,7 +6,7 @@ use super::equations::{GROUPS, Normal, Rows};
 use super::friction_columns::Friction;
 use super::least_squares::{self, Solution, Weighting, base};
 use super::recording::{Recording, RobotFitError};
-use crate::choice::{compare, rank};
+use identification::choice::{compare, rank};
 use nalgebra::DVector;
 use rayon::prelude::*;
 

@@ -7,7 +7,7 @@
 
 use super::friction_columns::Friction;
 use super::recording::Recording;
-use crate::samples::Part;
+use identification::samples::Part;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use rigid_body::Robot;

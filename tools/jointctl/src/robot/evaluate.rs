@@ -7,13 +7,13 @@ use super::equations::rigid_columns;
 use super::fit::FittedRobot;
 use super::recording::Recording;
 use crate::commands::CommandError;
-use crate::commands::image::{read, verify};
-use crate::evaluate::rmse;
-use crate::fit::FitError;
-use crate::joint_model::{firmware_states, fixed_point, regimes, rigid_efforts};
-use crate::rigid::RigidParameters;
-use crate::samples::Part;
 use friction_compensation::parameters::image::Image;
+use identification::evaluate::rmse;
+use identification::fit::FitError;
+use identification::image_file::{read, verify};
+use identification::joint_model::{firmware_states, fixed_point, regimes, rigid_efforts};
+use identification::rigid::RigidParameters;
+use identification::samples::Part;
 use nalgebra::DVector;
 use rayon::prelude::*;
 use rigid_body::inertia::PARAMETERS;
@@ -40,7 +40,7 @@ pub type Bodies = BTreeMap<String, JointBodies>;
 
 /// Rigid parts of a fitted robot.
 pub fn bodies(recording: &Recording, fitted: &FittedRobot) -> Bodies {
-    let joint = |(j, one): (usize, &crate::fit::Fitted)| {
+    let joint = |(j, one): (usize, &identification::fit::Fitted)| {
         let own = JointBodies {
             link: fitted.links[j].parameters(),
             rotor_inertia: fitted.rotors[j],

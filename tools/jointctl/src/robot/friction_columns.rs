@@ -3,8 +3,8 @@
 //! Only the rigid bodies of this fit are kept: each joint's friction is identified anew by the pipeline of one joint.
 //! What friction lacks here would be learned by inertias.
 
-use crate::pre_sliding;
-use crate::samples::Samples;
+use identification::pre_sliding;
+use identification::samples::Samples;
 
 /// Slope of the Coulomb friction at standstill, s/rad.
 pub(super) const SLOPE: f64 = 100.0;

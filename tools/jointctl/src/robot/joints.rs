@@ -4,8 +4,8 @@
 //! free: it takes up what the gain of a drive is wrong by. So is an inertia of the joint's own.
 
 use super::recording::{Recording, RobotFitError};
-use crate::fit::{Fitted, Options, fit};
-use crate::progress::Progress;
+use identification::fit::{Fitted, Options, fit};
+use identification::progress::Progress;
 
 /// The joints' images. `rigid` is the effort of the rigid bodies for every joint and sample.
 ///
@@ -26,7 +26,7 @@ pub fn images(
         prepared.samples.part = parts;
         prepared.samples.extra.insert("rigid".to_owned(), rigid);
         prepared.description.rigid.given = true;
-        prepared.description.rigid.gravity = crate::dataset::Gravity::None;
+        prepared.description.rigid.gravity = identification::dataset::Gravity::None;
         let path = recording.path.clone();
         let fitted = fit(prepared, options, progress).map_err(|source| RobotFitError::Fit { path, joint, source })?;
         images.push(fitted);

@@ -100,7 +100,7 @@ pub fn autocorrelation(stretches: &[Vec<f64>]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::filter::LowPassFilter;
+    use identification::filter::LowPassFilter;
     use rand_chacha::ChaCha8Rng;
     use rand_chacha::rand_core::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};

@@ -3,8 +3,8 @@
 
 use super::fit::{BaseParameter, FittedRobot};
 use super::recording::Recording;
-use crate::page::Role;
-use crate::samples::Part;
+use identification::page::Role;
+use identification::samples::Part;
 use maud::{Markup, html};
 use report::figures::{Curve, Figure, FigureError, Ink, Plot, over_time};
 use report::html::{document, gallery};

@@ -19,11 +19,11 @@
 //! All other keys are those of `docs/dataset.md` and hold for all joints; `[rigid]` is what the robot's links are. A
 //! delay of the effort is not identified, but can be given (`filter.effort_lag`).
 
-use crate::choice::Folds;
-use crate::dataset::description::{PositionColumn, PositionUnit};
-use crate::dataset::load::Environment;
-use crate::dataset::{DatasetError, Prepared, prepare_text};
-use crate::samples::Part;
+use identification::choice::Folds;
+use identification::dataset::description::{PositionColumn, PositionUnit};
+use identification::dataset::load::Environment;
+use identification::dataset::{DatasetError, Prepared, prepare_text};
+use identification::samples::Part;
 use rigid_body::{JointKind, Robot, RobotError};
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
@@ -131,7 +131,7 @@ pub enum RobotFitError {
         /// The joint.
         joint: String,
         /// What is wrong.
-        source: crate::fit::FitError,
+        source: identification::fit::FitError,
     },
 }
 
@@ -176,7 +176,7 @@ impl Recording {
 
     /// Positions, velocities and accelerations of all joints at a sample.
     pub fn state(&self, sample: usize) -> [Vec<f64>; 3] {
-        let of = |column: fn(&crate::samples::Samples) -> &Vec<f64>| -> Vec<f64> {
+        let of = |column: fn(&identification::samples::Samples) -> &Vec<f64>| -> Vec<f64> {
             self.joints.iter().map(|joint| column(&joint.samples)[sample]).collect()
         };
         [of(|s| &s.position), of(|s| &s.velocity), of(|s| &s.acceleration)]
@@ -194,7 +194,7 @@ impl Recording {
                 }
                 left = left.saturating_sub(1);
             }
-            let found = crate::choice::grouping::find(samples, &joint.recordings, &[], &[]);
+            let found = identification::choice::grouping::find(samples, &joint.recordings, &[], &[]);
             joint.folds = found.unwrap_or_else(|_| Folds::default());
         }
     }

@@ -2,13 +2,13 @@
 //! torque that was asked for; host.
 //!
 //! What did not arrive is the command before compensation less what the motor gives and friction leaves. It is judged
-//! as everywhere ([`mod@crate::torque_error`]): below 20 Hz, as a share of the friction. Beside it stands equation 11
+//! as everywhere ([`mod@identification::torque_error`]): below 20 Hz, as a share of the friction. Beside it stands equation 11
 //! of the mobile-robot paper (001),
 //! |what did not arrive| / |motor torque|, without samples below a tenth of the motor torque's RMS.
 
 use super::log::Log;
-use crate::metrics::{Metrics, MetricsError, RELATIVE_FLOOR, metrics, relative_floor};
-use crate::torque_error::{Lost, torque_error};
+use identification::metrics::{Metrics, MetricsError, RELATIVE_FLOOR, metrics, relative_floor};
+use identification::torque_error::{Lost, torque_error};
 
 /// Errors over some runs.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -45,7 +45,7 @@ pub enum SimulationError {
     },
     /// A torque that is not a number.
     #[error(transparent)]
-    Metrics(#[from] crate::metrics::MetricsError),
+    Metrics(#[from] identification::metrics::MetricsError),
 }
 
 #[cfg(test)]

@@ -3,8 +3,6 @@
 use super::motion::Sweep;
 use super::table::{Line, table};
 use super::*;
-use crate::friction_model::{Directional, FrictionModel as FloatModel, Term, Terms};
-use crate::quantize::physical::quantize;
 use friction_compensation::compensation::Request;
 use friction_compensation::friction::common::CommonTerms;
 use friction_compensation::friction::domain::{Domain, Range};
@@ -12,6 +10,8 @@ use friction_compensation::friction::physical::PhysicalParameters;
 use friction_compensation::friction::regime::Selector;
 use friction_compensation::friction::state::SIGNALS;
 use friction_compensation::friction::{FrictionModel, FrictionParameters, ParameterSet};
+use identification::friction_model::{Directional, FrictionModel as FloatModel, Term, Terms};
+use identification::quantize::physical::quantize;
 use joint_firmware::joint::fault::Fault;
 use joint_firmware::motor::angle::ElectricalAngle;
 use plant::ActuatorParameters;

@@ -2,9 +2,9 @@
 
 use crate::served::{NODE, Served, image};
 use friction_compensation::parameters::life_cycle::State;
+use identification::progress::{Progress, Silent};
 use joint_firmware::joint::state_machine::State as Drive;
 use joint_firmware::joint::{Command, Mode};
-use jointctl::progress::{Progress, Silent};
 use jointctl::remote::Stream;
 use jointctl::remote::image::Use;
 use std::sync::Mutex;

@@ -2,13 +2,13 @@
 
 use crate::served::{NODE, Served, image};
 use friction_compensation::parameters::life_cycle::State as Life;
+use identification::fit::Options;
+use identification::presets::Preset;
+use identification::progress::Silent;
 use joint_firmware::joint::state_machine::State;
 use joint_firmware::joint::{Command, Mode};
 use joint_firmware::objects::field::{Actual, Field};
 use joint_firmware::objects::settings::Setting;
-use jointctl::fit::Options;
-use jointctl::presets::Preset;
-use jointctl::progress::Silent;
 use jointctl::remote::configuration::set;
 use jointctl::remote::image::Use;
 use jointctl::remote::record::{Pace, Recorder, SIGNALS, description};
@@ -102,7 +102,7 @@ pub fn a_recording_of_a_motion_is_a_data_set() {
     std::fs::write(folder.path().join("log.csv"), recording.table()).unwrap();
     let described = folder.path().join("dataset.toml");
     std::fs::write(&described, description(NODE, "log.csv")).unwrap();
-    let prepared = jointctl::dataset::prepare(&described).unwrap();
+    let prepared = identification::dataset::prepare(&described).unwrap();
     assert!(prepared.samples.len() > 300, "{}", prepared.samples.len());
 }
 

@@ -9,8 +9,8 @@ mod status;
 
 use super::CommandError;
 use super::force::Force;
-use crate::presets::Preset;
 use clap::{Args, Subcommand};
+use identification::presets::Preset;
 use std::path::PathBuf;
 
 /// Commands for a fleet of joints.
@@ -98,6 +98,6 @@ impl FleetCommand {
     #[cfg(not(feature = "logs"))]
     pub fn run(&self) -> Result<(), CommandError> {
         let (Self::Sums(fleet) | Self::Status(Status { fleet, .. }) | Self::Retrain(Retrain { fleet, .. })) = self;
-        Err(crate::dataset::DatasetError::WithoutLogs { file: fleet.folder.clone() }.into())
+        Err(identification::dataset::DatasetError::WithoutLogs { file: fleet.folder.clone() }.into())
     }
 }

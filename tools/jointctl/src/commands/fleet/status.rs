@@ -3,9 +3,10 @@
 use super::{Folder, Status, page};
 use crate::commands::CommandError;
 use crate::commands::remote::{catch_interrupts, running};
-use crate::progress::{Progress, Terminal};
+use crate::commands::terminal::Terminal;
 use ::fleet::finding::{Finding, findings};
 use ::fleet::night::{Night, night};
+use identification::progress::Progress;
 use report::output::write_file;
 use serde_json::json;
 use std::fmt::Write;

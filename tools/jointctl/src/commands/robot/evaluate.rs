@@ -2,10 +2,11 @@
 
 use crate::commands::CommandError;
 use crate::commands::fit::print_warnings;
-use crate::progress::{Progress, Terminal};
+use crate::commands::terminal::Terminal;
 use crate::robot::evaluate::{Judged, evaluate, mean_percent, table};
 use crate::robot::record;
 use clap::Args;
+use identification::progress::Progress;
 use std::path::PathBuf;
 
 /// Arguments of `robot evaluate`.

@@ -2,11 +2,11 @@
 
 use super::synthetic::{RATE, Truth, fourier, robot};
 use crate::commands::CommandError;
-use crate::fit::Options as JointOptions;
-use crate::presets::Preset;
-use crate::progress::Silent;
 use crate::robot::evaluate::{Judged, evaluate, table};
 use crate::robot::{Options, files, fit, record};
+use identification::fit::Options as JointOptions;
+use identification::presets::Preset;
+use identification::progress::Silent;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};

@@ -1,10 +1,10 @@
 //! Random robots and their recordings: a Fourier motion of every joint, noise, filters.
 
-use crate::differentiate::central_difference;
-use crate::filter::LowPassFilter;
 use crate::robot::equations::{GROUPS, Layout, Rows, rigid_columns};
 use crate::robot::friction_columns::Friction;
-use crate::samples::Samples;
+use identification::differentiate::central_difference;
+use identification::filter::LowPassFilter;
+use identification::samples::Samples;
 use nalgebra::{DMatrix, DVector};
 use plant::excitation::Reference;
 use rand::RngExt;

@@ -84,5 +84,5 @@ fn joint_with_field(line: usize, column: usize, text: &str) -> String {
 }
 
 fn shipped_folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("datasets")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../jointctl/datasets")
 }

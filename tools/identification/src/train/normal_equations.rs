@@ -3,7 +3,7 @@
 //! The Jacobian exists for one block of samples at a time, in panels of four parameters, so that a 4 x 4 tile of J^T J
 //! is accumulated in registers while two panels stream past. The errors are one more column of the Jacobian: the last
 //! row of the product is then J^T r and its last entry the cost. Only tiles on and below the diagonal are formed. Its
-//! time: `cargo bench -p jointctl --bench train`.
+//! time: `cargo bench -p identification --bench train`.
 
 use super::batch::{BLOCK, Batch, Block, Column, PIECE, Pass};
 use super::wide_vectors::{Loop, on_wide_vectors};

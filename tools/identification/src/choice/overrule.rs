@@ -6,15 +6,15 @@ use std::fmt;
 use std::str::FromStr;
 
 /// Who decides about a part of the model.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Decision {
-    /// The error on motions that were left out decides
+    /// The error on motions that were left out decides.
     #[default]
     Choose,
-    /// It is kept, unless the certificate refuses it
+    /// It is kept, unless the certificate refuses it.
     Keep,
-    /// It is left out
+    /// It is left out.
     Never,
 }
 

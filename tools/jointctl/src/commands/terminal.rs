@@ -1,23 +1,8 @@
-//! What a long computation tells of itself, and how a terminal shows it; host.
+//! The progress of a command on a terminal.
 
+use identification::progress::Progress;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::time::{Duration, Instant};
-
-/// Listens to a computation's progress, from several threads.
-pub trait Progress: Sync {
-    /// A new stage begins.
-    fn stage(&self, name: &str);
-    /// Something worth knowing about the current stage.
-    fn detail(&self, text: &str);
-}
-
-/// Tells nobody.
-pub struct Silent;
-
-impl Progress for Silent {
-    fn stage(&self, _: &str) {}
-    fn detail(&self, _: &str) {}
-}
 
 /// A line on standard error that says what is being done and for how long; without a terminal, a line for each stage.
 pub struct Terminal {

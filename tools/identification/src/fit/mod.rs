@@ -265,7 +265,10 @@ pub fn fit(prepared: &mut Prepared, options: &Options, progress: &dyn Progress) 
 
 /// The image on another view of the same motion: the difference to its own row is what observer, sampling and noise
 /// cost.
-pub(crate) fn image_on_other_motion(
+///
+/// # Errors
+/// [`FitError::State`].
+pub fn image_on_other_motion(
     name: &str,
     samples: &Samples,
     rigid: &RigidParameters,

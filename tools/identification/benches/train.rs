@@ -1,15 +1,15 @@
 //! What an epoch of training costs: one evaluation of the normal equations of the 5-5-5-5-1 network on one core.
 //!
-//! Run with `cargo bench -p jointctl --bench train`. The time must grow in proportion to the number of samples.
+//! Run with `cargo bench -p identification --bench train`. The time must grow in proportion to the number of samples.
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use jointctl::levenberg_marquardt::LeastSquares;
-use jointctl::network::{FIRMWARE_HIDDEN, INPUTS, InputBox, Shape};
-use jointctl::train::TrainingSet;
-use jointctl::train::batch::Batch;
-use jointctl::train::normal_equations::NetworkFit;
-use jointctl::train::weights::nguyen_widrow;
+use identification::levenberg_marquardt::LeastSquares;
+use identification::network::{FIRMWARE_HIDDEN, INPUTS, InputBox, Shape};
+use identification::train::TrainingSet;
+use identification::train::batch::Batch;
+use identification::train::normal_equations::NetworkFit;
+use identification::train::weights::nguyen_widrow;
 use nalgebra::DVector;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
