@@ -8,7 +8,6 @@ use identification::fit::Options as JointOptions;
 use identification::progress::Silent;
 use joint_firmware::joint::state_machine::{Controlword, State};
 use joint_firmware::joint::{Command, Demand, Mode, Telemetry};
-use jointctl::robot::{Options, fit, record};
 use nalgebra::{Matrix3, Unit, Vector3};
 use plant::actuator::ActuatorParameters;
 use plant::fourier::FourierSeries;
@@ -22,6 +21,7 @@ use rigid_body::mass_matrix::mass_matrix;
 use rigid_body::newton_euler::inverse_dynamics;
 use rigid_body::random_tree::urdf;
 use rigid_body::{Joint, JointKind, LinkInertia, Placement, Tree};
+use robot::{Options, fit, record};
 use std::fmt::Write;
 
 /// Joints.

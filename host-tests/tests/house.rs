@@ -11,7 +11,7 @@ use syn::visit::{self, Visit};
 use syn::{Attribute, Item, UseTree};
 
 /// Sources of each crate.
-const CRATES: [&str; 17] = [
+const CRATES: [&str; 18] = [
     "src",
     "crates/canopen-node/src",
     "crates/friction-compensation/src",
@@ -29,6 +29,7 @@ const CRATES: [&str; 17] = [
     "tools/python/src",
     "tools/report/src",
     "tools/rigid-body/src",
+    "tools/robot/src",
 ];
 
 /// Folders of comments that are held to their width.

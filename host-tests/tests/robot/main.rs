@@ -9,8 +9,8 @@ mod page;
 use host_tests::recordings;
 use identification::fit::Options as JointOptions;
 use identification::progress::Silent;
-use jointctl::robot::{FittedRobot, Options, fit, record};
 use libtest_mimic::{Arguments, Failed, Trial};
+use robot::{FittedRobot, Options, fit, record};
 use std::path::Path;
 
 /// Seconds of training; None: all of both recordings.
@@ -52,7 +52,7 @@ fn as_published(data: &Path) -> Result<(), Failed> {
 /// The rows of one fit.
 fn of(fitted: &FittedRobot, seconds: Option<f64>) -> [page::Row; 3] {
     let training = seconds.map_or("all".to_owned(), |seconds| format!("{seconds} s"));
-    let column = |error: fn(&jointctl::robot::fit::JointErrors) -> f64| fitted.errors.iter().map(error).collect();
+    let column = |error: fn(&robot::fit::JointErrors) -> f64| fitted.errors.iter().map(error).collect();
     let [simplest, bodies, image] = fitted.mean_percent();
     let row =
         |model: &str, errors, mean| page::Row { training: training.clone(), model: model.to_owned(), errors, mean };

@@ -135,18 +135,16 @@ pub enum CommandError {
     Fit(#[from] identification::fit::FitError),
     /// A robot.
     #[error(transparent)]
-    Robot(#[from] crate::robot::RobotFitError),
+    Robot(#[from] ::robot::RobotFitError),
     /// The search for a robot's excitation.
     #[error(transparent)]
-    RobotExcite(#[from] crate::robot::excite::RobotExciteError),
+    RobotExcite(#[from] ::robot::excite::RobotExciteError),
     /// A fitted robot that cannot be used.
-    #[error("{}: {reason}", path.display())]
-    FittedRobot {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        reason: String,
-    },
+    #[error(transparent)]
+    RobotEvaluate(#[from] ::robot::evaluate::RobotEvaluateError),
+    /// Writing of a fitted robot.
+    #[error(transparent)]
+    RobotWrite(#[from] ::robot::files::RobotWriteError),
     /// Writing of results.
     #[error(transparent)]
     Output(#[from] report::output::OutputError),

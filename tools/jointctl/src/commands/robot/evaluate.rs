@@ -3,8 +3,8 @@
 use crate::commands::CommandError;
 use crate::commands::fit::print_warnings;
 use crate::commands::terminal::Terminal;
-use crate::robot::evaluate::{Judged, evaluate, mean_percent, table};
-use crate::robot::record;
+use ::robot::evaluate::{Judged, evaluate, mean_percent, table};
+use ::robot::record;
 use clap::Args;
 use identification::progress::Progress;
 use std::path::PathBuf;

@@ -3,10 +3,10 @@
 use crate::commands::CommandError;
 use crate::commands::force::Force;
 use crate::commands::terminal::Terminal;
-use crate::robot::excite::files::{COEFFICIENTS, files, summary, table};
-use crate::robot::excite::search::search;
-use crate::robot::excite::{Effort, Task};
-use crate::robot::read_robot;
+use ::robot::excite::files::{COEFFICIENTS, files, summary, table};
+use ::robot::excite::search::search;
+use ::robot::excite::{Effort, Task};
+use ::robot::read_robot;
 use clap::Args;
 use identification::progress::Progress;
 use report::output::write_directory;

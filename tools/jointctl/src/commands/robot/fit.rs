@@ -4,7 +4,7 @@ use crate::commands::CommandError;
 use crate::commands::fit::{Choices, print_warnings};
 use crate::commands::force::Force;
 use crate::commands::terminal::Terminal;
-use crate::robot::{FittedRobot, Options, files, fit, record};
+use ::robot::{FittedRobot, Options, files, fit, record};
 use clap::Args;
 use identification::progress::Progress;
 use std::path::PathBuf;

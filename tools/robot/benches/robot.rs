@@ -2,13 +2,13 @@
 //! the convex fit of physical links.
 
 use divan::Bencher;
-use jointctl::robot::convex::{self, Prior};
-use jointctl::robot::equations::{GROUPS, Layout, Normal, Rows, rigid_columns};
-use jointctl::robot::friction_columns::Friction;
-use jointctl::robot::least_squares::{Weighting, base, solve};
 use nalgebra::{DMatrix, DVector};
 use rigid_body::random_tree::{Shape, state, tree, urdf};
 use rigid_body::{Robot, Tree};
+use robot::convex::{self, Prior};
+use robot::equations::{GROUPS, Layout, Normal, Rows, rigid_columns};
+use robot::friction_columns::Friction;
+use robot::least_squares::{Weighting, base, solve};
 
 fn main() {
     divan::main();

@@ -1,10 +1,10 @@
 //! Parameters are recovered within their stated errors, and every link is one that a body can have.
 
 use super::synthetic::{EffortNoise, Measured, Truth, fourier, robot, rows};
-use crate::robot::convex::{self, Prior, links};
-use crate::robot::equations::{Normal, Rows};
-use crate::robot::friction_columns::Friction;
-use crate::robot::least_squares::{Solution, Weighting, base, solve};
+use crate::convex::{self, Prior, links};
+use crate::equations::{Normal, Rows};
+use crate::friction_columns::Friction;
+use crate::least_squares::{Solution, Weighting, base, solve};
 use rayon::prelude::*;
 use rigid_body::Robot;
 

@@ -5,9 +5,9 @@
 //! reference motions, which is the same for all motions: a timid motion is worse, not only a one-sided one. With that,
 //! standard errors of all unknowns grow with 1 / sigma_min.
 
-use crate::robot::equations::rigid_columns;
-use crate::robot::friction_columns::SLOPE;
-use crate::robot::least_squares::base;
+use crate::equations::rigid_columns;
+use crate::friction_columns::SLOPE;
+use crate::least_squares::base;
 use nalgebra::{DMatrix, DVector};
 use plant::excitation::Reference;
 use rigid_body::Robot;

@@ -1,6 +1,6 @@
 //! Recordings that do not fit their robot: errors name file, joint and remedy.
 
-use crate::robot::record;
+use crate::record;
 use std::f64::consts::{PI, SQRT_2, TAU};
 use std::path::PathBuf;
 

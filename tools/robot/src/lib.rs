@@ -1,4 +1,8 @@
-//! All joints of a robot from one recording of all of them: rigid bodies, then the friction image of each joint; host.
+//! Identification of all joints of a robot from one recording of all of them: rigid bodies, then the friction image of
+//! each joint; host. The dynamics are those of the crate `rigid-body`, what a single joint needs is the crate
+//! `identification`.
+//!
+//! Data flows one way:
 //!
 //! 1. [`recording`]: `recording.toml` names the robot and the columns of each joint; every joint is cleaned, filtered
 //!    and split as a data set of one joint is.
@@ -13,8 +17,6 @@
 //!    on another recording.
 //!
 //! [`excite`] finds the motion of all joints that such a recording should be of.
-//!
-//! The dynamics are those of the crate `rigid-body`.
 
 pub mod choose;
 pub mod convex;

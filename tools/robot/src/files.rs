@@ -4,11 +4,12 @@ use super::evaluate;
 use super::fit::FittedRobot;
 use super::page::page;
 use super::recording::Recording;
-use crate::commands::CommandError;
-use identification::image_file::bytes;
+use identification::image_file::{ImageFileError, bytes};
 use identification::image_text;
-use identification::page::render;
-use report::output::{OutputFile, write_directory};
+use identification::page::{ReportError, render};
+use report::figures::FigureError;
+use report::output::{OutputError, OutputFile, write_directory};
+use rigid_body::RobotError;
 use rigid_body::inertia::NAMES;
 use rigid_body::mjcf::{JointFriction, mjcf};
 use rigid_body::urdf::{LinkValues, with_values};
@@ -19,8 +20,31 @@ use std::path::Path;
 /// Files of a fit, but for those of its joints.
 pub const FILES: [&str; 5] = ["robot.html", "robot.urdf", "mujoco.xml", "parameters.toml", "robot.json"];
 
+/// Why the files of a robot were not written.
+#[derive(Debug, thiserror::Error)]
+pub enum RobotWriteError {
+    /// The report of a joint.
+    #[error(transparent)]
+    Report(#[from] ReportError),
+    /// The image of a joint.
+    #[error(transparent)]
+    Image(#[from] ImageFileError),
+    /// A figure of the robot's page.
+    #[error(transparent)]
+    Figure(#[from] FigureError),
+    /// The URDF does not take the values.
+    #[error(transparent)]
+    Urdf(Box<RobotError>),
+    /// Writing of results.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+}
+
 /// Writes everything into `out`, all or nothing.
-pub fn write(out: &Path, recording: &Recording, fitted: &FittedRobot) -> Result<(), CommandError> {
+///
+/// # Errors
+/// [`RobotWriteError`]; the folder is then as it was.
+pub fn write(out: &Path, recording: &Recording, fitted: &FittedRobot) -> Result<(), RobotWriteError> {
     let mut files = Vec::new();
     for (joint, one) in recording.robot.tree.joints.iter().zip(&fitted.joints) {
         for file in render(&one.report)? {
@@ -51,7 +75,10 @@ fn friction(recording: &Recording, fitted: &FittedRobot) -> Vec<JointFriction> {
 }
 
 /// The URDF with the identified inertias, and friction as `damping` and `friction`.
-pub fn urdf(recording: &Recording, fitted: &FittedRobot) -> Result<String, CommandError> {
+///
+/// # Errors
+/// [`RobotWriteError::Urdf`].
+pub fn urdf(recording: &Recording, fitted: &FittedRobot) -> Result<String, RobotWriteError> {
     let robot = &recording.robot;
     let values = friction(recording, fitted).into_iter().enumerate().map(|(j, friction)| LinkValues {
         joint: robot.tree.joints[j].name.clone(),
@@ -61,7 +88,7 @@ pub fn urdf(recording: &Recording, fitted: &FittedRobot) -> Result<String, Comma
         friction: friction.frictionloss,
     });
     with_values(&recording.urdf, "robot.urdf", &values.collect::<Vec<_>>())
-        .map_err(|error| CommandError::Robot(error.into()))
+        .map_err(|error| RobotWriteError::Urdf(Box::new(error)))
 }
 
 /// The robot for MuJoCo: identified inertias, rotors as `armature`, friction as `damping` and `frictionloss`; with what

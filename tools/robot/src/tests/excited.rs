@@ -1,12 +1,12 @@
 //! A motion of all joints: within every limit, and better than a random one.
 
 use super::synthetic::{EffortNoise, Measured, RATE, Truth, rows};
-use crate::robot::excite::check::check;
-use crate::robot::excite::files::{COEFFICIENTS, files};
-use crate::robot::excite::search::{Found, search};
-use crate::robot::excite::{Effort, Task};
-use crate::robot::friction_columns::Friction;
-use crate::robot::least_squares::{Weighting, base, solve};
+use crate::excite::check::check;
+use crate::excite::files::{COEFFICIENTS, files};
+use crate::excite::search::{Found, search};
+use crate::excite::{Effort, Task};
+use crate::friction_columns::Friction;
+use crate::least_squares::{Weighting, base, solve};
 use excitation::Excitation;
 use plant::excitation::Reference;
 use rigid_body::Robot;

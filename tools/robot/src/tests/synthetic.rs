@@ -1,7 +1,7 @@
 //! Random robots and their recordings: a Fourier motion of every joint, noise, filters.
 
-use crate::robot::equations::{GROUPS, Layout, Rows, rigid_columns};
-use crate::robot::friction_columns::Friction;
+use crate::equations::{GROUPS, Layout, Rows, rigid_columns};
+use crate::friction_columns::Friction;
 use identification::differentiate::central_difference;
 use identification::filter::LowPassFilter;
 use identification::samples::Samples;

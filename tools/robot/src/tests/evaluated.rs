@@ -1,9 +1,8 @@
 //! A robot from files: fitted, written, and judged on another recording.
 
 use super::synthetic::{RATE, Truth, fourier, robot};
-use crate::commands::CommandError;
-use crate::robot::evaluate::{Judged, evaluate, table};
-use crate::robot::{Options, files, fit, record};
+use crate::evaluate::{Judged, evaluate, table};
+use crate::{Options, files, fit, record};
 use identification::fit::Options as JointOptions;
 use identification::presets::Preset;
 use identification::progress::Silent;
@@ -120,7 +119,7 @@ fn a_fitted_robot_is_judged_as_it_was_written_on_its_own_recording_and_on_anothe
 
     let refused = |folder: &str| -> String {
         let mut second = record(&at("second.toml"), &|_| None).unwrap();
-        evaluate(&at(folder), &mut second, Judged::All).map_err(|error: CommandError| error.to_string()).unwrap_err()
+        evaluate(&at(folder), &mut second, Judged::All).unwrap_err().to_string()
     };
     assert!(refused("nowhere").contains("cannot read") && refused("nowhere").contains("robot.json"));
     let summary = std::fs::read_to_string(at("fitted/robot.json")).unwrap();

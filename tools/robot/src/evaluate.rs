@@ -6,12 +6,10 @@
 use super::equations::rigid_columns;
 use super::fit::FittedRobot;
 use super::recording::Recording;
-use crate::commands::CommandError;
 use friction_compensation::parameters::image::Image;
 use identification::evaluate::rmse;
-use identification::fit::FitError;
-use identification::image_file::{read, verify};
-use identification::joint_model::{firmware_states, fixed_point, regimes, rigid_efforts};
+use identification::image_file::{ImageFileError, read, verify};
+use identification::joint_model::{StateError, firmware_states, fixed_point, regimes, rigid_efforts};
 use identification::rigid::RigidParameters;
 use identification::samples::Part;
 use nalgebra::DVector;
@@ -20,7 +18,35 @@ use rigid_body::inertia::PARAMETERS;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt::Write;
-use std::path::Path;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Why a fitted robot was not judged.
+#[derive(Debug, thiserror::Error)]
+pub enum RobotEvaluateError {
+    /// A file that cannot be read.
+    #[error("cannot read {}: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// Rigid parts that cannot be used.
+    #[error("{}: {reason}", path.display())]
+    Bodies {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// The image of a joint.
+    #[error(transparent)]
+    Image(#[from] ImageFileError),
+    /// A sample that does not fit the firmware's quantities.
+    #[error(transparent)]
+    State(#[from] StateError),
+}
 
 /// Rigid part of a joint as it was fitted.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize)]
@@ -84,7 +110,11 @@ pub enum Judged {
 ///
 /// # Errors
 /// Files that are missing, damaged, of another robot or in another unit.
-pub fn evaluate(folder: &Path, recording: &mut Recording, judged: Judged) -> Result<Vec<JointErrors>, CommandError> {
+pub fn evaluate(
+    folder: &Path,
+    recording: &mut Recording,
+    judged: Judged,
+) -> Result<Vec<JointErrors>, RobotEvaluateError> {
     let (bodies, images) = fitted(folder, recording)?;
     let efforts = efforts(recording, &bodies);
     let parts: Vec<Part> = (0..recording.len()).map(|i| recording.part(i)).collect();
@@ -97,7 +127,7 @@ pub fn evaluate(folder: &Path, recording: &mut Recording, judged: Judged) -> Res
         let samples = &mut recording.joints[j].samples;
         samples.extra.insert("rigid".to_owned(), given);
         samples.load = rigid_efforts(&own.theoretical, samples);
-        let states = firmware_states(samples).map_err(FitError::from)?;
+        let states = firmware_states(samples)?;
         let sets = regimes(&image.friction.selector, &states, samples);
         let friction = fixed_point(&image.friction, &states, &sets, samples);
         let rigid = rigid_efforts(&own.rigid, samples);
@@ -118,14 +148,15 @@ pub fn evaluate(folder: &Path, recording: &mut Recording, judged: Judged) -> Res
 }
 
 /// Rigid parts and images of all joints, in the recording's order.
-fn fitted(folder: &Path, recording: &Recording) -> Result<(Vec<JointBodies>, Vec<Image>), CommandError> {
+fn fitted(folder: &Path, recording: &Recording) -> Result<(Vec<JointBodies>, Vec<Image>), RobotEvaluateError> {
     #[derive(Deserialize)]
     struct Summary {
         bodies: Bodies,
     }
     let path = folder.join("robot.json");
-    let refused = |reason: String| CommandError::FittedRobot { path: path.clone(), reason };
-    let text = std::fs::read_to_string(&path).map_err(|source| CommandError::Read { path: path.clone(), source })?;
+    let refused = |reason: String| RobotEvaluateError::Bodies { path: path.clone(), reason };
+    let text =
+        std::fs::read_to_string(&path).map_err(|source| RobotEvaluateError::Read { path: path.clone(), source })?;
     let Summary { bodies } = serde_json::from_str(&text)
         .map_err(|error| refused(format!("{error}; `jointctl robot fit` of this version writes it")))?;
     let (mut ordered, mut images) = (Vec::new(), Vec::new());
@@ -149,7 +180,7 @@ fn fitted(folder: &Path, recording: &Recording) -> Result<(Vec<JointBodies>, Vec
                 image.effort.symbol(),
                 recording.path.display()
             );
-            return Err(CommandError::Image { path: file, reason });
+            return Err(ImageFileError::Image { path: file, reason }.into());
         }
         ordered.push(*own);
         images.push(image);
