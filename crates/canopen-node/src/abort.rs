@@ -1,6 +1,6 @@
 //! SDO abort codes, CiA 301 section 7.2.4.3.17, table 22; any context.
 
-/// Why an SDO transfer ended. The application may use any other code, too.
+/// Abort code of an SDO transfer. The application may use any other code, too.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Abort(pub u32);
 

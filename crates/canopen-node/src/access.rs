@@ -6,7 +6,7 @@ use super::abort::Abort;
 use super::communication::{Communication, Object};
 use super::dictionary::{Access, Entry, Length, ObjectDictionary};
 
-/// Everything that an index and a sub-index can mean.
+/// Meaning of every index and sub-index.
 #[derive(Debug)]
 pub(super) struct Objects<'s, 'a, D> {
     pub(super) communication: Communication<'s, 'a>,
@@ -183,7 +183,7 @@ impl Sink {
         Ok(())
     }
 
-    /// Whether nothing announced is missing.
+    /// Returns `true` if nothing announced is missing.
     fn is_whole(&self) -> bool {
         self.announced.is_none_or(|announced| announced == self.received)
             && self.value.is_none_or(|bytes| u32::from(bytes) == self.received)

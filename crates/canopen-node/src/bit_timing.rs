@@ -43,7 +43,7 @@ impl BitTiming {
         self.propagation + self.phase1
     }
 
-    /// By how much each node's clock may be off, in millionths: the lower of the two conditions.
+    /// Tolerated clock deviation of each node, in millionths: the lower of the two conditions.
     pub const fn tolerance(&self) -> u32 {
         let bit = self.bit() as u32;
         let jump = self.jump_width as u32 * 1_000_000 / (20 * bit);

@@ -16,7 +16,7 @@ const LOAD: u32 = u32::from_le_bytes(*b"load");
 /// "Saves on command" of object 1010h, "restores defaults" of object 1011h.
 const ON_COMMAND: u32 = 1;
 
-/// What a communication object is about; `find` gives it for an index and a sub-index.
+/// Communication object; `find` gives it for an index and a sub-index.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Object<'a> {
     Constant(u32, u8),

@@ -1,10 +1,10 @@
-//! What the application gives to the server: its objects, its identity, what it keeps in flash; the task's context.
+//! Interface of the application to the server: its objects, its identity, what it keeps in flash; the task's context.
 
 use super::abort::Abort;
 use super::nmt::{NmtState, Reset};
 use super::parameters::CommunicationParameters;
 
-/// What an SDO client may do with an entry.
+/// Access of an SDO client to an entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
     /// Only read; constant or not.
@@ -15,7 +15,7 @@ pub enum Access {
     ReadWrite,
 }
 
-/// How long an entry is.
+/// Length of an entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Length {
     /// A number of 1 to 8 bytes. It is read and written whole, however many frames it takes.
@@ -29,7 +29,7 @@ pub enum Length {
     },
 }
 
-/// Whether an entry may be part of a PDO.
+/// Permission to map an entry into a PDO, by direction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Mappable {
     /// In an RPDO: the process image can take it in the receive interrupt.
@@ -41,15 +41,15 @@ pub struct Mappable {
 /// Attributes of one entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Entry {
-    /// How long it is.
+    /// Length of the entry.
     pub length: Length,
-    /// What an SDO client may do with it.
+    /// Access of an SDO client.
     pub access: Access,
-    /// Whether it may be part of a PDO; streams never are.
+    /// Permission to map it into a PDO; streams never are.
     pub mappable: Mappable,
 }
 
-/// Which parameters objects 1010h and 1011h mean: their sub-index.
+/// Group of parameters that objects 1010h and 1011h mean: their sub-index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Group {
     /// Sub-index 1.
@@ -60,7 +60,7 @@ pub enum Group {
     Application,
 }
 
-/// What the task tells the application.
+/// Event that the task tells the application.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
     /// The NMT state changed. Every set-point that came by PDO is invalid from here on.

@@ -41,7 +41,7 @@ impl Frame {
         self.id
     }
 
-    /// What the frame carries, 0 to 8 bytes.
+    /// Data of the frame, 0 to 8 bytes.
     pub fn data(&self) -> &[u8] {
         self.data.get(..self.length.into()).unwrap_or(&self.data)
     }

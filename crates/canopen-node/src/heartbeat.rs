@@ -7,12 +7,12 @@ use super::parameters::CONSUMERS;
 use super::shared::Shared;
 use super::time::{MILLISECOND, elapsed};
 
-/// When the next heartbeat is due.
+/// Heartbeat producer: time of the next heartbeat.
 #[derive(Debug, Default)]
 pub(super) struct Producer {
     /// 1017h, ms.
     period: u16,
-    /// When the last one was due; none before the first.
+    /// Time at which the last one was due; none before the first.
     last: Option<u32>,
 }
 
@@ -31,7 +31,8 @@ impl Producer {
         self.last = Some(now);
     }
 
-    /// Whether one is to be sent now. Late polls do not shift the following ones, unless a whole period was missed.
+    /// Returns `true` if a heartbeat is to be sent now. Late polls do not shift the following ones, unless a whole
+    /// period was missed.
     pub(super) fn is_due(&mut self, now: u32) -> bool {
         if self.period == 0 {
             self.last = None;

@@ -11,7 +11,7 @@
 //!  - [`Shared`], a static, which both borrow: the NMT state, the PDO parameters, instants. See there why no lock is
 //!    needed.
 //!
-//! What both send waits in a [`TransmitQueue`], which defines what happens on a bus that has no room.
+//! Frames that both send wait in a [`TransmitQueue`], which defines what happens on a bus that has no room.
 //!
 //! ```text
 //!  FDCAN interrupt   frame -> Receiver::receive(frame, now, &mut image, send) -> Done | Server -> bounded queue

@@ -28,7 +28,7 @@ enum Mode {
     Configuration,
 }
 
-/// What a request leads to.
+/// Result of a request.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Outcome {
     /// Data of the answer.

@@ -7,7 +7,7 @@ pub enum NmtState {
     /// From reset until the boot-up message; also a node without a node id. Its number is the boot-up message's data
     /// byte.
     Initialising = 0x00,
-    /// Nothing but NMT, heartbeat and LSS.
+    /// NMT, heartbeat and LSS alone.
     Stopped = 0x04,
     /// Everything.
     Operational = 0x05,
@@ -26,13 +26,13 @@ impl NmtState {
         }
     }
 
-    /// Whether SDO and EMCY exist in this state (CiA 301 table 39).
+    /// Returns `true` if SDO and EMCY exist in this state (CiA 301 table 39).
     pub const fn communicates(self) -> bool {
         matches!(self, Self::Operational | Self::PreOperational)
     }
 }
 
-/// What starts anew.
+/// Scope of a reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reset {
     /// The communication parameters get their power-on values.

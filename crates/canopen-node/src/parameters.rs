@@ -104,7 +104,7 @@ impl CommunicationParameters {
     }
 }
 
-/// Whether a client may choose this identifier: 11 bits, and none that CiA 301 table 40 restricts.
+/// Returns `true` if a client may choose this identifier: 11 bits, and none that CiA 301 table 40 restricts.
 pub(super) const fn is_free(cob_id: u32) -> bool {
     !matches!(
         cob_id,
@@ -112,7 +112,7 @@ pub(super) const fn is_free(cob_id: u32) -> bool {
     )
 }
 
-/// Whether this node id can be used on the bus.
+/// Returns `true` if this node id can be used on the bus.
 pub(super) const fn is_node_id(node_id: u8) -> bool {
     node_id >= 1 && node_id <= 127
 }

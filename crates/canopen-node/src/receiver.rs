@@ -17,11 +17,11 @@ use super::{LSS_MASTER, NMT, SDO_RECEIVE};
 /// Without this a bus full of nothing but SYNC, 20,000 a second, leaves tasks no time.
 pub const SHORTEST_SYNC: u32 = 180;
 
-/// What remains to be done with a frame.
+/// Remaining work on a frame.
 #[must_use = "a frame for the server has to be given to it"]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Route {
-    /// Nothing: it was dealt with, or it is not for this node.
+    /// No further step: the frame was dealt with, or it is not for this node.
     Done,
     /// Queue it for [`super::Server::receive`].
     Server,
@@ -35,7 +35,7 @@ pub struct Receiver<'a> {
     known: Epoch,
     waiting: [Option<Waiting>; PDOS],
     synchronous: [Synchronous; PDOS],
-    /// When the last SYNC that counted came.
+    /// Time of the last SYNC that counted.
     synchronised: Option<u32>,
 }
 
@@ -85,8 +85,8 @@ impl<'a> Receiver<'a> {
         Route::Done
     }
 
-    /// Whether a frame received at `now` is a SYNC that counts, so that [`Receiver::receive`] asks for what TPDOs
-    /// carry.
+    /// Returns `true` if a frame received at `now` is a SYNC that counts, so that [`Receiver::receive`] asks for what
+    /// TPDOs carry.
     pub fn is_sync(&self, frame: &Frame, now: u32) -> bool {
         // Time wraps: of the SYNCs that come after an hour, one in 20 million is taken for one that came too soon.
         let soon = |before| now.wrapping_sub(before) < SHORTEST_SYNC;

@@ -85,9 +85,9 @@ impl<'a> Server<'a> {
         Some(Frame::full(SDO_TRANSMIT | u16::from(node_id), answer))
     }
 
-    /// What is to be sent next, one frame at a time, most urgent first; call it until there is none, or until the
-    /// sender's queue is full. At least every millisecond for timers to be exact to a millisecond, and never less than
-    /// every half hour.
+    /// Next frame to be sent, one at a time, most urgent first; call it until there is none, or until the sender's
+    /// queue is full. At least every millisecond for timers to be exact to a millisecond, and never less than every
+    /// half hour.
     pub fn poll(&mut self, now: u32, dictionary: &mut impl ObjectDictionary) -> Option<Frame> {
         let epoch = self.shared.epoch();
         if epoch.state() == NmtState::Initialising && self.initialised != Some(epoch) {
@@ -137,7 +137,7 @@ impl<'a> Server<'a> {
         self.communication_error(dictionary);
     }
 
-    /// Whether the controller is error passive: EMCY 8120h when it begins, and its end.
+    /// Takes the error-passive state of the controller: EMCY 8120h when it begins, and its end.
     pub fn error_passive(&mut self, passive: bool) {
         if passive {
             self.emergencies.begin(Lasting::ErrorPassive, code::ERROR_PASSIVE, 0);

@@ -1,4 +1,5 @@
-//! What the receive interrupt and the task both need: NMT state, PDO parameters, what was heard; atomics, any context.
+//! State that the receive interrupt and the task share: NMT state, PDO parameters, what was heard; atomics, any
+//! context.
 //!
 //! Nobody waits for anybody here, and nothing needs a lock:
 //!
@@ -30,7 +31,7 @@ pub struct Shared {
     node_id: AtomicU8,
     /// NMT state in bits 0 to 7; above them a count of transitions, so that leaving a state and coming back is seen.
     state: AtomicU32,
-    /// What the newest reset was; that there was one, the count of transitions says.
+    /// Newest reset; that there was one, the count of transitions says.
     reset: AtomicU8,
     sync_cob_id: AtomicU16,
     sync_overflow: AtomicU8,
@@ -94,8 +95,8 @@ impl Shared {
         self.events.fetch_or(bit(pdo), Ordering::Relaxed);
     }
 
-    /// Whether a frame of this node makes the one before it with the same identifier worthless: TPDOs, and heartbeats
-    /// but for the boot-up message. Any context.
+    /// Returns `true` if a frame of this node makes the one before it with the same identifier worthless: TPDOs, and
+    /// heartbeats but for the boot-up message. Any context.
     pub fn is_renewable(&self, frame: &Frame) -> bool {
         let heartbeat = HEARTBEAT | u16::from(self.node_id());
         match frame.id() {
@@ -180,7 +181,7 @@ impl Shared {
         self.sync_overflow.store(overflow, Ordering::Relaxed);
     }
 
-    /// Whether TPDO `pdo` has an event to send; forgets it.
+    /// Returns `true` if TPDO `pdo` has an event to send; forgets it.
     pub(super) fn take_event(&self, pdo: u8) -> bool {
         self.events.fetch_and(!bit(pdo), Ordering::Relaxed) & bit(pdo) != 0
     }
@@ -329,7 +330,7 @@ impl PdoRegisters {
         }
     }
 
-    /// When the PDO came last.
+    /// Time at which the PDO came last.
     pub(super) fn received(&self) -> &Instant {
         &self.received
     }
@@ -406,7 +407,7 @@ impl ConsumerRegisters {
         Self { setting: AtomicU32::new(0), heard: Instant::new() }
     }
 
-    /// As in object 1016h.
+    /// Value in the format of object 1016h.
     pub(super) fn setting(&self) -> u32 {
         self.setting.load(Ordering::Relaxed)
     }

@@ -46,9 +46,9 @@ fn is_heartbeat(frame: &Frame) -> bool {
 /// Transmit buffers of a controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Buffers {
-    /// How many there are.
+    /// Number of buffers.
     pub all: usize,
-    /// How many of them hold a frame that is not out yet.
+    /// Number of buffers that hold a frame that is not out yet.
     pub occupied: usize,
 }
 
@@ -63,16 +63,16 @@ impl Buffers {
 pub struct TransmitQueue<const N: usize> {
     waiting: [Option<Waiting>; N],
     number: u32,
-    /// When the heartbeat that the controller has was queued.
+    /// Time at which the heartbeat that the controller has was queued.
     heartbeat: Option<u32>,
-    /// When a heartbeat that was late had gone out.
+    /// Time at which a heartbeat that was late had gone out.
     pausing: Option<u32>,
     overwritten: u32,
     dropped: u32,
 }
 
 impl<const N: usize> TransmitQueue<N> {
-    /// Nothing waits.
+    /// Empty queue.
     #[allow(clippy::new_without_default, reason = "it belongs into a static")]
     pub const fn new() -> Self {
         Self { waiting: [None; N], number: 0, heartbeat: None, pausing: None, overwritten: 0, dropped: 0 }
@@ -129,7 +129,7 @@ impl<const N: usize> TransmitQueue<N> {
         self.waiting.iter().flatten().count()
     }
 
-    /// Nothing waits.
+    /// Returns `true` if nothing waits.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

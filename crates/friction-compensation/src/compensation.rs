@@ -1,4 +1,4 @@
-//! How a friction estimate becomes a torque that is safe to add to the command; control step.
+//! Conversion of a friction estimate into a torque that is safe to add to the command; control step.
 //!
 //! In this order: the estimate's parts fade outside the box that they were identified in, gain, clamp, slew limit. What
 //! is asked for falls back by itself (network, then physical, then nothing) and every step says what it did and why.
@@ -11,7 +11,7 @@ use crate::friction::state::{JointState, SIGNALS, Signal};
 use crate::friction::{Estimate, FrictionModel};
 use crate::quantity::Torque;
 
-/// What the operator asks for.
+/// Request of the operator.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Request {
@@ -26,11 +26,11 @@ pub enum Request {
     NetworkInShadow = 3,
 }
 
-/// Which model acted in a step.
+/// Model that acted in a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Acting {
-    /// Nothing.
+    /// No model.
     #[default]
     Nothing = 0,
     /// The physical model.
@@ -39,7 +39,7 @@ pub enum Acting {
     PhysicalAndNetwork = 2,
 }
 
-/// Why less acted than a full compensation by network and physical model.
+/// Reason for less than a full compensation by network and physical model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Reason {
     /// Switched off.
@@ -47,7 +47,7 @@ pub enum Reason {
     Off,
     /// There is no verified image.
     NoModel,
-    /// As requested, in full.
+    /// Full compensation, as requested.
     AsRequested,
     /// The image's parameter set has no network: it did not help on validation data.
     NoNetwork,
@@ -110,8 +110,8 @@ impl core::fmt::Display for SettingsError {
 
 impl core::error::Error for SettingsError {}
 
-/// How much compensation is permitted. New settings take effect with the next evaluation; a torque beyond a new, lower
-/// clamp comes down to it at the slew rate.
+/// Permitted compensation. New settings take effect with the next evaluation; a torque beyond a new, lower clamp comes
+/// down to it at the slew rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
     request: Request,
@@ -153,19 +153,19 @@ impl Settings {
 pub struct Output {
     /// Torque to add to the command.
     pub torque: Torque,
-    /// What the full model would have added in this step, whatever was requested: gain and clamp applied, no slew
-    /// limit.
+    /// Torque that the full model would have added in this step, whatever was requested: gain and clamp applied, no
+    /// slew limit.
     pub shadow: Torque,
-    /// Which model acted.
+    /// Model that acted.
     pub acting: Acting,
-    /// Why.
+    /// Reason for it.
     pub reason: Reason,
     /// True where the clamp or the slew limit changed the torque.
     pub limited: bool,
 }
 
 impl Output {
-    /// Nothing, because it is off.
+    /// Output of a compensation that is off.
     pub const NOTHING: Self = Self {
         torque: Torque::ZERO,
         shadow: Torque::ZERO,

@@ -222,7 +222,7 @@ pub fn interpolate_odd(knots: &[i16; HALF_TABLE_LEN], x: i32) -> i32 {
     between_knots(knots, magnitude >> 20, (magnitude >> 8 & 0xfff) as i32, sign)
 }
 
-/// What [`interpolate_odd`] gives at a step (held at the last) and a fraction of it right of zero, with the function's
+/// Value of [`interpolate_odd`] at a step (held at the last) and a fraction of it right of zero, with the function's
 /// sign: 0, or -1 left of zero.
 #[inline(always)]
 fn between_knots(knots: &[i16; HALF_TABLE_LEN], step: u32, fraction: i32, sign: i32) -> i32 {

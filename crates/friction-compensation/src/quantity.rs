@@ -3,15 +3,15 @@
 //! One newtype a unit, so that a velocity cannot be passed for a torque. The range is [-32768, 32768) with a resolution
 //! of 1/65536 (0.000015) of the unit. The same types serve a linear axis, with m for rad and N for Nm.
 //!
-//! What the control step calls is always inlined: optimised for size, the compiler would rather call a function that
-//! does nothing, 25 times a step.
+//! Functions that the control step calls are always inlined: optimised for size, the compiler would rather call a
+//! function that does nothing, 25 times a step.
 
 use fixed::types::I16F16;
 
 /// A number that Q16.16 cannot hold.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OutOfRange {
-    /// What was to be converted.
+    /// Number that was to be converted.
     pub value: f64,
     /// Unit of the quantity.
     pub unit: &'static str,

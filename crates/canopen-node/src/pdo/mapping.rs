@@ -8,7 +8,7 @@ use crate::dictionary::{Access, Entry, Length, ObjectDictionary};
 use crate::parameters::{HIGHEST_COUNTER, INVALID, MAPPED, NO_REMOTE, is_free};
 use crate::shared::PdoRegisters;
 
-/// Which way a PDO goes.
+/// Direction of a PDO.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Direction {
     Receive,
@@ -112,7 +112,7 @@ pub(crate) fn set_mapped(
     Ok(())
 }
 
-/// Whether an object may be mapped; whole values only.
+/// Checks that an object may be mapped; whole values only.
 fn check(object: MappedObject, direction: Direction, dictionary: &impl ObjectDictionary) -> Result<(), Abort> {
     if object.index() < 0x1000 {
         let dummy = direction == Direction::Receive && object.dummy() == Some(object.bits());

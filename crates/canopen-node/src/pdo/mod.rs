@@ -53,8 +53,8 @@ impl MappedObject {
     }
 }
 
-/// What the receive interrupt does with process data: set-points in, actual values out. Everything here has to be
-/// quick and must not wait.
+/// Process data in the receive interrupt: set-points in, actual values out. Everything here has to be quick and must
+/// not wait.
 pub trait ProcessImage {
     /// An object of an RPDO has arrived: its value in the low bits, not sign-extended. The entry was found mappable
     /// when the PDO was set up; ignore it where it is not.

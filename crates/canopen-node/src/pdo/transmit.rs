@@ -22,7 +22,7 @@ pub(crate) fn assemble(registers: &PdoRegisters, mut value: impl FnMut(MappedObj
     Some(Frame::cut(id, data.to_le_bytes(), bits.div_ceil(8).min(8) as u8))
 }
 
-/// Which SYNCs a synchronous TPDO follows; the receive interrupt.
+/// SYNCs that a synchronous TPDO follows; the receive interrupt.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Synchronous {
     syncs: u8,
@@ -86,8 +86,8 @@ pub(crate) struct Timers {
 }
 
 impl Timers {
-    /// What TPDO `pdo` sends now: `frame`, which is assembled where the inhibit time is over, if it is another one than
-    /// the last, an event has happened or the timer has expired. Called in every poll in OPERATIONAL.
+    /// Frame that TPDO `pdo` sends now: `frame`, which is assembled where the inhibit time is over, if it is another
+    /// one than the last, an event has happened or the timer has expired. Called in every poll in OPERATIONAL.
     pub(crate) fn next(
         &mut self,
         shared: &Shared,

@@ -23,7 +23,7 @@ pub(super) struct BlockDownload {
     /// The message that closed the block before. CAN may repeat a frame whose end was disturbed (ISO 11898-1); this
     /// one would be taken for a block of which everything else was lost.
     closing: Option<Message>,
-    /// Whether the last segment came, so that the client is about to end.
+    /// `true` once the last segment came, so that the client is about to end.
     complete: bool,
     crc: Option<BlockCrc>,
 }

@@ -24,14 +24,14 @@ pub(super) struct BlockUpload {
     source: Source,
     phase: Phase,
     block_size: u8,
-    /// Where the block begins; a multiple of seven.
+    /// Offset at which the block begins; a multiple of seven.
     base: u32,
     /// Segments of the block that were sent.
     sent: u8,
-    /// Whether the last of them ends the data.
+    /// `true` if the last of them ends the data.
     complete: bool,
     crc: Option<BlockCrc>,
-    /// How far the CRC has come: what is sent again is not counted again.
+    /// Offset up to which the CRC has come: what is sent again is not counted again.
     counted: u32,
 }
 
@@ -51,7 +51,7 @@ impl BlockUpload {
         self.phase == Phase::Sending
     }
 
-    /// Whether the client confirms the end.
+    /// Returns `true` if the client confirms the end.
     pub(super) fn is_over(&self, request: &Message) -> bool {
         let [command, ..] = *request;
         self.phase == Phase::End && command & 0xE3 == 0xA1

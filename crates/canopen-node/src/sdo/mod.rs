@@ -27,7 +27,7 @@ type Message = [u8; 8];
 /// The command specifier of an abort, in either direction.
 const ABORT: u8 = 0x80;
 
-/// How patient the server is, and how much it takes at a time.
+/// Time-out of the server, and the size of its blocks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SdoSettings {
     /// A client that is silent for so long within a transfer loses it, us; at most half an hour.
@@ -58,11 +58,11 @@ enum State {
 pub(super) struct SdoServer {
     settings: SdoSettings,
     state: State,
-    /// What a download in progress writes.
+    /// Destination of a download in progress.
     sink: Option<Sink>,
     /// Index and sub-index of the transfer, as they were sent.
     address: [u8; 3],
-    /// When the client was heard last, or given something to answer.
+    /// Time at which the client was heard last, or given something to answer.
     heard: u32,
 }
 
@@ -118,8 +118,8 @@ impl SdoServer {
         }
     }
 
-    /// What has to be sent without a request: segments of a block upload, and the abort after a time-out. One message
-    /// at a time, so that the sender's queue paces the upload.
+    /// Messages that have to be sent without a request: segments of a block upload, and the abort after a time-out. One
+    /// message at a time, so that the sender's queue paces the upload.
     pub(super) fn poll<D: ObjectDictionary>(&mut self, now: u32, objects: &mut Objects<'_, '_, D>) -> Option<Message> {
         if let State::BlockUpload(upload) = &mut self.state
             && upload.is_sending()

@@ -79,14 +79,14 @@ fn finish_upload(node: &mut Node, index: u16, sub_index: u8, answer: [u8; 8]) ->
     }
 }
 
-/// What a client knows of the CRC.
+/// CRC as a client knows it.
 pub fn crc(data: &[u8]) -> u16 {
     data.iter().fold(0, |crc, byte| {
         (0..8).fold(crc ^ u16::from(*byte) << 8, |crc, _| crc << 1 ^ if crc & 0x8000 != 0 { 0x1021 } else { 0 })
     })
 }
 
-/// How a block download went that a disturbed bus carried.
+/// Outcome of a block download that a disturbed bus carried.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Outcome {
     Done,

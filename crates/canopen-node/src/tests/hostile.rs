@@ -23,7 +23,7 @@ impl Noise {
         self.next().to_le_bytes()
     }
 
-    /// What might mean something to a node: its own identifiers, command specifiers that exist, its objects.
+    /// Frame that might mean something to a node: its own identifiers, command specifiers that exist, its objects.
     fn frame(&mut self) -> Frame {
         let mut data = self.bytes();
         let id = match self.below(16) {
@@ -69,7 +69,7 @@ impl Noise {
     }
 }
 
-/// What must hold after each frame: `before` is the state that the frame met.
+/// Asserts what must hold after each frame: `before` is the state that the frame met.
 fn check(node: &Node, frame: &Frame, before: NmtState, set_points: &BTreeMap<u32, u64>) {
     let after = node.shared.state();
     // Nothing but NMT changes the state in the interrupt, as it does at once.
@@ -89,7 +89,7 @@ fn check(node: &Node, frame: &Frame, before: NmtState, set_points: &BTreeMap<u32
     }
 }
 
-/// What the node sends has an identifier that is its own, or one that PDOs and EMCY may be moved to.
+/// Asserts that what the node sends has an identifier that is its own, or one that PDOs and EMCY may be moved to.
 fn check_sent(node: &Node, sent: &[Frame]) {
     let node_id = u16::from(node.shared.node_id());
     for frame in sent {

@@ -35,7 +35,7 @@ pub struct Dictionary {
     pub values: BTreeMap<(u16, u8), Vec<u8>>,
     pub domain: Vec<u8>,
     pub staging: Option<Vec<u8>>,
-    /// What `finish` says.
+    /// Refusal that `finish` returns.
     pub refusal: Option<Abort>,
     pub writes: Vec<(u16, u8, Vec<u8>)>,
     pub opened: u32,
@@ -44,7 +44,7 @@ pub struct Dictionary {
     pub stored: Option<(Group, CommunicationParameters)>,
     pub restored: Option<Group>,
     pub stored_node_id: Option<u8>,
-    /// Why no node id is stored.
+    /// Abort with which a node id is not stored.
     pub refuses_node_id: Option<Abort>,
     pub keeps_node_id: bool,
     pub parameters: Option<CommunicationParameters>,
@@ -298,7 +298,7 @@ impl Node {
         sent
     }
 
-    /// What the task sends within so many milliseconds, polled each of them.
+    /// Frames that the task sends within so many milliseconds, polled each of them.
     pub fn run(&mut self, milliseconds: u32) -> Vec<Frame> {
         let mut sent = Vec::new();
         for _ in 0..milliseconds {

@@ -1,4 +1,4 @@
-//! What other servers get wrong: each of these brought one down, or made it act on what it should not have.
+//! Defects of other servers: each of these brought one down, or made it act on what it should not have.
 
 use super::client::{BlockDownload, BlockUpload, Outcome};
 use super::*;

@@ -1,5 +1,5 @@
-//! What all parameter sets of an image have in common: pre-sliding and ripple. They belong to the joint's bearings and
-//! gears, whatever the regime; control step.
+//! Terms that all parameter sets of an image have in common: pre-sliding and ripple. They belong to the joint's
+//! bearings and gears, whatever the regime; control step.
 
 use super::maxwell_slip::{Bent, ELEMENTS, MaxwellElement, MaxwellSlip};
 use super::ripple::{RIPPLES, Ripple, Rippled, ripple};
@@ -25,13 +25,13 @@ impl CommonTerms {
 /// The terms ready to be evaluated at a fixed rate.
 #[derive(Clone, Copy, Debug)]
 pub struct Common {
-    /// Whether there are any: without them the control step does nothing here.
+    /// `true` if there are any: without them the control step does nothing here.
     present: bool,
     slip: MaxwellSlip,
     ripples: [Ripple; RIPPLES],
 }
 
-/// What the common terms give to a parameter set's physical model, Nm in Q16.16.
+/// Contribution of the common terms to a parameter set's physical model, Nm in Q16.16.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CommonTorques {
     /// Pre-sliding friction, before the factor of the Coulomb friction (temperature, load).

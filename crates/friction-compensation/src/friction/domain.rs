@@ -50,8 +50,8 @@ impl Range {
 pub struct Domain {
     /// Trained ranges.
     pub ranges: [Range; SIGNALS],
-    /// How far beyond its half width a signal may go until the model has faded out, Q16.16: the network has no weight
-    /// left at one margin, the physical model none at two.
+    /// Distance beyond its half width at which a signal has faded the model out, Q16.16: the network has no weight left
+    /// at one margin, the physical model none at two.
     pub margin: u32,
     /// Temperature at which the physical parameters hold, Q16.16.
     pub reference_temperature: i32,
@@ -84,7 +84,7 @@ impl Domain {
 /// A signal that is always zero would allow any shift; this is the largest.
 const MAX_SHIFT: u32 = 30;
 
-/// How much each part of a model counts in a state, Q31; `i32::MAX` is all.
+/// Weight of each part of a model in a state, Q31; `i32::MAX` is all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Weights {
     /// Weight of the network: falls from the box's edge to nothing at one margin.
@@ -96,7 +96,7 @@ pub struct Weights {
 }
 
 impl Weights {
-    /// Nothing fades. No constant: the compiler would read that from flash.
+    /// Full weights: nothing fades. No constant: the compiler would read that from flash.
     #[inline(always)]
     fn full() -> Self {
         Self { network: i32::MAX, physical: i32::MAX, outside: None }
@@ -126,13 +126,13 @@ impl Edge {
         Self { range, margin: width, factor, per_step: ((1u64 << 63) / divisor).min(u32::MAX as u64) as u32 }
     }
 
-    /// Whether `value` lies within the range: one comparison, because what is below wraps.
+    /// Returns `true` if `value` lies within the range: one comparison, because what is below wraps.
     #[inline(always)]
     fn holds(&self, value: i32) -> bool {
         value.wrapping_sub(self.range.low) as u32 <= self.range.high.wrapping_sub(self.range.low) as u32
     }
 
-    /// How far `value` lies beyond the range, Q16.16.
+    /// Distance of `value` beyond the range, Q16.16.
     #[inline(always)]
     fn distance(&self, value: i32) -> u32 {
         match () {

@@ -1,4 +1,4 @@
-//! What friction is: pure functions of the joint's state, in fixed point, the same bits on every machine.
+//! Friction model: pure functions of the joint's state, in fixed point, the same bits on every machine.
 //!
 //! `state` says what the model looks at, `domain` where it was identified, `physical` and `network` are its two parts,
 //! `smooth` holds the functions that both share, `regime` chooses between parameter sets, `common` holds what these
@@ -34,14 +34,14 @@ pub struct ParameterSet {
     pub network: Option<NetworkParameters>,
 }
 
-/// Everything that the friction of one joint depends on.
+/// Parameters of the friction of one joint, complete.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FrictionParameters {
     /// The box that the parameters were identified in.
     pub domain: Domain,
-    /// Which set applies when.
+    /// Selector of the set that applies.
     pub selector: Selector,
-    /// What all sets have in common.
+    /// Terms that all sets have in common.
     pub common: CommonTerms,
     /// Parameter sets; those beyond [`Selector::sets`] are unused and all zero.
     pub sets: [ParameterSet; MAX_SETS],
@@ -144,7 +144,7 @@ impl FrictionModel {
         }
     }
 
-    /// How much the model counts beyond the box that it was identified in.
+    /// Fade of the model beyond the box that it was identified in.
     pub const fn fade(&self) -> &Fade {
         &self.fade
     }
@@ -183,13 +183,13 @@ impl FrictionModel {
         self.common.ripple(signals[Signal::Position as usize])
     }
 
-    /// What the regime's network gives; zero without one.
+    /// Torque of the regime's network; zero without one.
     #[inline]
     pub fn by_network(&self, signals: &[i32; SIGNALS], memory: &Memory) -> Torque {
         by_network(&self.inputs, &self.set(memory.set.unwrap_or(0)).1, signals)
     }
 
-    /// What the regime's physical model gives.
+    /// Torque of the regime's physical model.
     #[inline]
     pub fn by_physical_model(&self, signals: &[i32; SIGNALS], common: &CommonTorques, memory: &Memory) -> Torque {
         by_physical_model(&self.scaling, &self.set(memory.set.unwrap_or(0)).0, common, signals)
@@ -214,7 +214,7 @@ impl FrictionModel {
         self.common.pre_slides()
     }
 
-    /// What the common terms give in this state, which bends the pre-sliding elements.
+    /// Torques of the common terms in this state, which bends the pre-sliding elements.
     #[inline]
     pub fn common(&self, bent: &mut Bent, state: &JointState) -> CommonTorques {
         self.common.step(bent, state)
@@ -272,7 +272,7 @@ fn by_physical_model(
     terms.evaluate(&scaling.apply(signals), common)
 }
 
-/// As above; nothing without a network.
+/// A function of its own, as above; zero without a network.
 #[inline(never)]
 fn by_network(inputs: &Inputs, network: &Option<Layers>, signals: &[i32; SIGNALS]) -> Torque {
     match network {

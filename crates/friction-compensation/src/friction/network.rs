@@ -48,7 +48,7 @@ pub struct NetworkParameters {
     pub scale: i32,
 }
 
-/// How one input reaches Q31: centred, clamped to its range, scaled.
+/// Scaling of one input to Q31: centred, clamped to its range, scaled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InputScale {
     centre: i32,
@@ -56,9 +56,9 @@ pub struct InputScale {
     above: i32,
     /// A power of two.
     factor: i32,
-    /// What adding `below` has moved, times the factor.
+    /// Shift by the addition of `below`, times the factor.
     offset: i32,
-    /// As `above` for the lower end, negative.
+    /// Counterpart of `above` for the lower end, negative.
     below: i32,
     gain: i32,
 }
@@ -98,7 +98,7 @@ impl InputScale {
     }
 }
 
-/// How every input is scaled: the same for every network of an image.
+/// Scaling of every input: the same for every network of an image.
 #[derive(Clone, Copy, Debug)]
 pub struct Inputs([InputScale; INPUTS]);
 
@@ -184,7 +184,7 @@ impl Inputs {
         Self([q, v, theoretical, measured, temperature].map(InputScale::new))
     }
 
-    /// How each input is scaled.
+    /// Scaling of each input.
     pub(crate) const fn scales(&self) -> &[InputScale; INPUTS] {
         &self.0
     }

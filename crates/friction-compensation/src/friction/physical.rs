@@ -32,7 +32,7 @@ use crate::quantity::Torque;
 /// Number of position harmonics.
 pub const HARMONICS: usize = 5;
 
-/// Which terms take part.
+/// Terms that take part.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Terms(pub u32);
 
@@ -103,7 +103,7 @@ impl Terms {
     }
 }
 
-/// What a coefficient is multiplied with: decides its unit and its scale in SI.
+/// Quantity that a coefficient is multiplied with: decides its unit and its scale in SI.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Dimension {
     /// Signal whose full scale is contained in the stored number, and its power.
@@ -241,7 +241,7 @@ impl Directional {
     }
 }
 
-/// How signals reach Q31 of full scale, prepared from a domain: the same for every parameter set of an image.
+/// Scaling of signals to Q31 of full scale, prepared from a domain: the same for every parameter set of an image.
 #[derive(Clone, Copy, Debug)]
 pub struct Scaling {
     pub(crate) ranges: [Range; SIGNALS],

@@ -1,5 +1,5 @@
-//! Which parameter set applies now: up to two criteria, each with hysteresis, choose one of up to four sets; control
-//! step.
+//! Selection of the parameter set that applies now: up to two criteria, each with hysteresis, choose one of up to four
+//! sets; control step.
 //!
 //! Criteria: |acceleration| (accelerating against uniform motion) and |velocity| (high against low speed) are the
 //! mobile-robot paper's two ways to divide motion (001, section 3.1); own speed against that of a coupled joint is the
@@ -20,7 +20,7 @@ pub const MOST_SETS: usize = 1 << MAX_CRITERIA;
 /// on the host nothing changes.
 pub const MAX_SETS: usize = if cfg!(all(feature = "little-room", target_os = "none")) { 1 } else { MOST_SETS };
 
-/// What a criterion looks at.
+/// Quantity that a criterion looks at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Measure {
@@ -48,7 +48,7 @@ impl Measure {
 /// A threshold with hysteresis: upper from `enter` on, lower from `leave` down, unchanged between.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Criterion {
-    /// What is compared.
+    /// Quantity that is compared.
     pub measure: Measure,
     /// Upper threshold, Q16.16.
     pub enter: i32,
@@ -92,7 +92,7 @@ impl Selector {
     }
 }
 
-/// What the selection remembers from one evaluation to the next.
+/// Memory of the selection from one evaluation to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Memory {
     /// Index of the set in use; nothing before the first step.
@@ -233,7 +233,7 @@ mod tests {
         assert_eq!(last, 10_000);
     }
 
-    /// What [`blend`] does, in 64 bits.
+    /// Reference for [`blend`], in 64 bits.
     fn wide_blend(old: i64, new: i64, weight: i64) -> i64 {
         let half = (old >> 1) - (new >> 1);
         (new + ((half * weight) >> 32) * 4).max(old.min(new)).min(old.max(new))

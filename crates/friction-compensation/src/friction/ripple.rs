@@ -30,7 +30,7 @@ pub struct Ripple {
     pub torque_cosine: i32,
 }
 
-/// What the series give at a position, Nm in Q16.16.
+/// Values of the series at a position, Nm in Q16.16.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Rippled {
     /// Added to the Coulomb friction of both directions.

@@ -89,7 +89,7 @@ pub fn odd_sines(phase: u32) -> [i32; 5] {
     [first, third, fifth, seventh, next(seventh, fifth)]
 }
 
-/// What a table holds. (A function pointer would say the same, but cannot be called at compile time.)
+/// Function that a table holds. (A function pointer would say the same, but cannot be called at compile time.)
 #[derive(Clone, Copy)]
 enum Shape {
     Tanh,

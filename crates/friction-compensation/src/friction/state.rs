@@ -1,4 +1,4 @@
-//! What the friction model looks at: the joint's state, as quantities and as a row of signals; any context.
+//! Inputs of the friction model: the joint's state, as quantities and as a row of signals; any context.
 
 use crate::quantity::{Acceleration, Position, Temperature, Torque, Velocity};
 

@@ -1,4 +1,5 @@
-//! Who may change what a joint adds to its torque: a tag behind every image, once the joint has a key; task or host.
+//! Authority to change what a joint adds to its torque: a tag behind every image, once the joint has a key; task or
+//! host.
 //!
 //! # Bytes of an upload
 //!
@@ -45,14 +46,14 @@ const _: () = assert!(MAX_LENGTH + TAG == 2048);
 /// Bytes of a challenge: random, so that nobody meets the same one twice.
 pub const CHALLENGE: usize = 16;
 
-/// What is signed with a tag; another use of the key has another text.
+/// Context string that is signed with a tag; another use of the key has another text.
 const IMAGE: &[u8; 16] = b"joint image tag1";
-/// What the mask of a new key is made from.
+/// Text that the mask of a new key is made from.
 const MASK: &[u8; 16] = b"joint key mask 1";
-/// What the key's number is made from.
+/// Text that the key's number is made from.
 const KEY_ID: &[u8; 16] = b"joint key number";
 
-/// What a response to a challenge asks for.
+/// Purpose of a response to a challenge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Purpose {
     /// A session: protected objects can be written.
@@ -80,7 +81,7 @@ pub struct Challenge {
     pub product: u32,
     /// Its serial number (1018h:4).
     pub serial: u32,
-    /// What it drew.
+    /// Random bytes that it drew.
     pub random: [u8; CHALLENGE],
 }
 
@@ -94,7 +95,7 @@ impl core::fmt::Debug for Key {
     }
 }
 
-/// Why a key is not taken.
+/// Reason for the refusal of a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum KeyRefusal {
     /// All bytes are equal: erased flash, a cleared buffer.

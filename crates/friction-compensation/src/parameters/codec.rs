@@ -13,7 +13,7 @@ use crate::friction::state::{SIGNALS, Signal};
 use crate::friction::{Estimate, FrictionParameters, ParameterSet};
 use crate::quantity::Torque;
 
-/// What stands before the parameter sets.
+/// Fields before the parameter sets.
 pub(super) struct Header {
     /// 1 or 2.
     pub(super) format: u16,
@@ -171,7 +171,7 @@ pub(super) fn decode_golden(reader: &mut Reader, sets: u8) -> GoldenVector {
     GoldenVector { set, signals, expected }
 }
 
-/// Nothing may follow.
+/// Refuses bytes that follow.
 pub(super) fn decode_end(reader: &mut Reader) {
     if !reader.bytes.is_empty() {
         let length = reader.offset + reader.bytes.len() + CRC_LENGTH;

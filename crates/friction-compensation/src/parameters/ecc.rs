@@ -1,4 +1,4 @@
-//! What to do about a double error of the flash's ECC: go on where a parameter word is torn, stop everywhere else.
+//! Response to a double error of the flash's ECC: go on where a parameter word is torn, stop everywhere else.
 //!
 //! Called by the handler of the non-maskable interrupt; pure. A loss of power leaves torn double words in the
 //! parameters' pages, and reading one raises that interrupt (RM0440, FLASH_ECCR). That the address counts bytes from
@@ -19,7 +19,7 @@ const DOUBLE_ERROR_UPPER: u32 = 1 << 29;
 /// A double error.
 const DOUBLE_ERROR: u32 = 1 << 31;
 
-/// Where the flash and the parameters in it lie, as addresses.
+/// Addresses of the flash and of the parameters in it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Storage {
     /// Address of the flash.
@@ -30,7 +30,7 @@ pub struct Storage {
     pub parameters: Range<u32>,
 }
 
-/// What the handler does.
+/// Action of the handler.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Decision {
     /// A parameter word is torn: write `clear` to FLASH_ECCR, note it, go on.

@@ -163,7 +163,7 @@ impl FaultLog {
         self.newest.iter()
     }
 
-    /// Whether this power-up is not in flash yet.
+    /// Returns `true` while this power-up is not in flash yet.
     pub const fn is_new(&self) -> bool {
         self.new
     }
@@ -236,7 +236,7 @@ mod tests {
             Self { words, left: u32::MAX, torn: Err(ReadError), erases: [0; 3], writes: 0 }
         }
 
-        /// Whether power is still there for a write.
+        /// Returns `true` if power is still there for a write.
         fn counts(&mut self, word: usize) -> Result<bool, WriteError> {
             let last = self.left == 1;
             self.left = self.left.checked_sub(1).ok_or(WriteError { word })?;

@@ -23,7 +23,7 @@ pub struct Guard {
     pub failures: u16,
     /// The owner's key, once there is one.
     pub key: Option<Key>,
-    /// What was kept is damaged: nothing that needs authority works before the owner has repaired it.
+    /// `true` if what was kept is damaged: nothing that needs authority works before the owner has repaired it.
     pub locked: bool,
 }
 
@@ -40,7 +40,7 @@ impl Guard {
         bytes
     }
 
-    /// What was kept; none where nothing ever was. Bytes that are no such record lock: they may have held a key.
+    /// Guard that was kept; none where nothing ever was. Bytes that are no such record lock: they may have held a key.
     pub fn decode(bytes: Option<&[u8]>) -> Self {
         let Some(bytes) = bytes else { return Self::default() };
         let Some((&[a, b, c, d, low, high, state, _], rest)) = bytes.split_first_chunk() else { return Self::LOCKED };
@@ -55,7 +55,7 @@ impl Guard {
         Self { floor: u32::from_le_bytes([a, b, c, d]), failures: u16::from_le_bytes([low, high]), key, locked }
     }
 
-    /// Nothing is known.
+    /// Locked state: nothing is known.
     const LOCKED: Self = Self { floor: 0, failures: 0, key: None, locked: true };
 }
 

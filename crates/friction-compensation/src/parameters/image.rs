@@ -119,7 +119,7 @@ impl Effort {
     }
 }
 
-/// Which joints an image is for; 0 = any.
+/// Joints that an image is for; 0 = any.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Target {
     /// Product code.
@@ -154,13 +154,13 @@ pub struct Image {
     pub data_hash: [u8; 16],
     /// The friction model.
     pub friction: FrictionParameters,
-    /// What the certificate must stay within.
+    /// Limits that the certificate must stay within.
     pub limits: Limits,
     /// Inputs with exact outputs; at least one.
     pub golden: heapless::Vec<GoldenVector, MAX_GOLDEN>,
 }
 
-/// Why bytes are not a usable image, or an image cannot be written.
+/// Reason for which bytes are not a usable image, or an image cannot be written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ImageError {
     /// Fewer bytes than the smallest image, or than the image's own length says.
@@ -282,7 +282,7 @@ impl Image {
         decode_content(Reader::new(Self::content(bytes)?))
     }
 
-    /// What the checksum is of, once magic, format, length and checksum are right.
+    /// Content that the checksum is of, once magic, format, length and checksum are right.
     #[inline(never)]
     pub(super) fn content(bytes: &[u8]) -> Result<&[u8], ImageError> {
         let truncated = |needed| ImageError::Truncated { length: bytes.len(), needed };
@@ -354,7 +354,7 @@ impl Image {
     }
 }
 
-/// What the common terms of an image give along its golden vectors.
+/// Outputs of the common terms of an image along its golden vectors.
 pub struct GoldenSequence {
     common: Common,
     bent: Bent,

@@ -1,4 +1,4 @@
-//! How a trained model travels: the byte layout of an image, the proof that it is safe to use, and how it is kept.
+//! Transport of a trained model: the byte layout of an image, the proof that it is safe to use, and its storage.
 
 pub mod authentication;
 pub mod certificate;

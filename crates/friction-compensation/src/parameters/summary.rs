@@ -1,15 +1,15 @@
-//! What a directory of images shows of one, without decoding it; task or host.
+//! Summary of an image for a directory of images, without decoding it; task or host.
 
 use super::image::{Image, ImageError};
 
-/// What an image's header says.
+/// Fields of an image's header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Summary {
     /// Rises with every image of a joint.
     pub version: u32,
     /// Creation time, seconds since 1970-01-01 UTC, 0 = not stated.
     pub created: u64,
-    /// Whether any parameter set has a network.
+    /// `true` if any parameter set has a network.
     pub network: bool,
     /// The image's own CRC-32.
     pub checksum: u32,

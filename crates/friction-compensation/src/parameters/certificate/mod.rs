@@ -34,10 +34,10 @@ use crate::friction::{FrictionParameters, ParameterSet};
 use crate::quantity::Torque;
 use interval::Interval;
 
-/// How often the box is bisected: at most 2^MAX_DEPTH cells for each part of all sets together.
+/// Depth of bisection of the box: at most 2^MAX_DEPTH cells for each part of all sets together.
 pub const MAX_DEPTH: u32 = 8;
 
-/// How often the box of one of `sets` sets is bisected, so that more sets do not take more work.
+/// Depth of bisection of the box of one of `sets` sets, so that more sets do not take more work.
 const fn depth(sets: usize) -> u32 {
     match sets {
         0 | 1 => MAX_DEPTH,
@@ -46,7 +46,7 @@ const fn depth(sets: usize) -> u32 {
     }
 }
 
-/// What an image may not exceed.
+/// Limits that an image may not exceed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Limits {
     /// |friction|, Q16.16 of the effort's unit.
@@ -57,7 +57,7 @@ pub struct Limits {
     pub velocity_slope: u32,
 }
 
-/// What has been proved of an image: the largest over its parameter sets.
+/// Proved bounds of an image: the largest over its parameter sets.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Certificate {
     /// |friction| is at most this, Q16.16.
@@ -74,7 +74,7 @@ pub struct Certificate {
     pub resolution: u32,
 }
 
-/// Why an image must not be used. Numbers are in the units of [`Limits`].
+/// Reason for which an image must not be used. Numbers are in the units of [`Limits`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refusal {
     /// A neuron's sum can leave 32 bits.

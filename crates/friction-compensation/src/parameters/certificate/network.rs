@@ -9,7 +9,7 @@ use crate::friction::network::{
 };
 use crate::friction::state::Signal;
 
-/// What holds of the network in the whole box.
+/// Bounds of the network in the whole box.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Bounds {
     /// Q16.16.
@@ -18,7 +18,7 @@ pub(super) struct Bounds {
     pub(super) torque_gain: Interval,
     /// d(network) / d(velocity), 1/256 Nm s/rad.
     pub(super) velocity_slope: Interval,
-    /// How far the fixed-point network departs from the piecewise linear one whose slopes are bounded, Q16.16.
+    /// Deviation of the fixed-point network from the piecewise linear one whose slopes are bounded, Q16.16.
     pub(super) resolution: u32,
 }
 

@@ -11,7 +11,7 @@ use crate::friction::ripple::Ripple;
 use crate::friction::smooth::{TANH, atan, stribeck, stribeck_slope};
 use crate::friction::state::{SIGNALS, Signal};
 
-/// What holds of the physical model in the whole widened box.
+/// Bounds of the physical model in the whole widened box.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bounds {
     /// Q16.16.
@@ -20,18 +20,18 @@ pub(super) struct Bounds {
     pub(super) slope: Interval,
     /// Slope over velocity that bending the pre-sliding elements adds in one evaluation, 1/256 Nm s/rad.
     pub(super) bending: Interval,
-    /// How far the fixed-point model departs from the smooth one whose slope is bounded, Q16.16.
+    /// Deviation of the fixed-point model from the smooth one whose slope is bounded, Q16.16.
     pub(super) resolution: u32,
 }
 
-/// What holds in one cell: the sum of products with 47 fraction bits, and the slope.
+/// Bounds in one cell: the sum of products with 47 fraction bits, and the slope.
 #[derive(Clone, Copy)]
 struct CellBounds {
     sum: Interval,
     slope: Interval,
 }
 
-/// What the common terms can give, whatever the velocity.
+/// Range of the common terms, whatever the velocity.
 struct Common {
     /// Added to the Coulomb friction, Q16.16.
     level: Interval,
@@ -97,7 +97,7 @@ fn scaled_box(scaling: &Scaling) -> [Interval; SIGNALS] {
     scaled
 }
 
-/// Whether the harmonics' own sums stay in 64 bits.
+/// Returns `true` if the harmonics' own sums stay in 64 bits.
 fn harmonics_fit(physical: &PreparedTerms) -> bool {
     let total = |amplitudes: &[i32]| amplitudes.iter().map(|a| (*a as i64).abs()).sum::<i64>();
     total(&physical.harmonic_mean) < 1 << 31 && total(&physical.harmonic_difference) < 1 << 31

@@ -33,11 +33,11 @@ pub use verification::{Requirements, Verified};
 /// Longest trial, ms: an hour.
 pub const MAX_TRIAL_MS: u32 = 3_600_000;
 
-/// Of what was verified. Not the CRC that an image ends with: over an image and its own CRC that one is the same for
-/// all of them.
+/// Checksum of what was verified. Not the CRC that an image ends with: over an image and its own CRC that one is the
+/// same for all of them.
 const CRC: crc::Crc<u32, crc::NoTable> = crc::Crc::<u32, crc::NoTable>::new(&crc::CRC_32_ISCSI);
 
-/// What a client asks for, with the number that it writes to object 2212:1.
+/// Command of a client, with the number that it writes to object 2212:1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Command {
@@ -65,11 +65,11 @@ impl Command {
     }
 }
 
-/// Where an image stands, with the number of object 2212:2.
+/// State of an image, with the number of object 2212:2.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum State {
-    /// Nothing is staged.
+    /// No image is staged.
     #[default]
     Empty = 0,
     /// Bytes have arrived.
@@ -118,7 +118,7 @@ impl State {
     }
 }
 
-/// How an image runs from RAM.
+/// Mode of an image that runs from RAM.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
     /// Computed, without effect on the torque.
@@ -127,14 +127,14 @@ pub enum Mode {
     Trial,
 }
 
-/// What the caller does next. But for [`Action::Nothing`], it tells by [`LifeCycle::finished`] how that went.
+/// Next action of the caller. But for [`Action::Nothing`], it tells by [`LifeCycle::finished`] how that went.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Action {
-    /// Nothing.
+    /// No action.
     Nothing,
     /// Prepare the first `length` bytes of the staging buffer and swap them in between two control steps.
     Run {
-        /// How.
+        /// Mode in which it runs.
         mode: Mode,
         /// Bytes of the image.
         length: usize,
@@ -152,7 +152,7 @@ pub enum Action {
     Activate,
 }
 
-/// Why a trial ended by itself.
+/// Reason for which a trial ended by itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ending {
     /// Its time was over.
@@ -161,7 +161,7 @@ pub enum Ending {
     Heartbeat,
 }
 
-/// What is true of the joint at this instant.
+/// State of the joint at this instant.
 #[derive(Clone, Copy, Debug)]
 pub struct Conditions<'a> {
     /// Time, ms.
@@ -176,7 +176,7 @@ pub struct Conditions<'a> {
     pub locked: bool,
 }
 
-/// What verification leaves behind.
+/// Results of verification.
 #[derive(Clone, Copy, Debug)]
 struct Checked {
     verified: Verified,
@@ -191,7 +191,7 @@ struct Checked {
 pub struct LifeCycle {
     requirements: Requirements,
     state: State,
-    /// What the caller has been told to do and has not finished, with the state to go back to.
+    /// Action that the caller has been told to do and has not finished, with the state to go back to.
     pending: Option<(Action, State)>,
     /// Bytes in the staging buffer.
     length: usize,
@@ -230,7 +230,7 @@ impl LifeCycle {
         }
     }
 
-    /// Where the image stands.
+    /// State of the image.
     pub const fn state(&self) -> State {
         self.state
     }
@@ -240,7 +240,7 @@ impl LifeCycle {
         self.result
     }
 
-    /// What was found out of the staged image, from verification on.
+    /// Findings about the staged image, from verification on.
     pub fn verified(&self) -> Option<Verified> {
         self.verified.map(|checked| checked.verified)
     }
@@ -281,7 +281,7 @@ impl LifeCycle {
         (self.floor, self.failures) = (0, 0);
     }
 
-    /// What is left of a trial or shadow, ms; 0 outside.
+    /// Remaining time of a trial or shadow, ms; 0 outside.
     pub fn trial_left(&self, now: u64) -> u32 {
         match self.state {
             State::Shadow | State::Trial => u32::try_from(self.end.saturating_sub(now)).unwrap_or(u32::MAX),
@@ -289,7 +289,7 @@ impl LifeCycle {
         }
     }
 
-    /// How the last trial ended by itself; none while one runs, or where a command ended it.
+    /// Reason for which the last trial ended by itself; none while one runs, or where a command ended it.
     pub const fn ending(&self) -> Option<Ending> {
         self.ending
     }
@@ -391,7 +391,8 @@ impl LifeCycle {
         self.revert(State::Verified)
     }
 
-    /// How what [`LifeCycle::command`], [`LifeCycle::tick`] or this function asked for went; what is to be done then.
+    /// Takes the outcome of what [`LifeCycle::command`], [`LifeCycle::tick`] or this function asked for; returns what
+    /// is to be done then.
     pub fn finished(&mut self, outcome: Result<(), SlotError>) -> Action {
         let Some((action, before)) = self.pending.take() else { return Action::Nothing };
         let next = match (action, outcome) {

@@ -1,4 +1,4 @@
-//! Why an image is not taken a step further, with a number for each reason; task or host.
+//! Reasons for which an image is not taken a step further, with a number for each; task or host.
 //!
 //! The numbers are what a bus reads (result of the last command, object 2212:3). They never change their meaning; 0 is
 //! success.
@@ -8,7 +8,7 @@ use crate::parameters::certificate;
 use crate::parameters::image::{Effort, GoldenMismatch, ImageError};
 use crate::parameters::slots::SlotError;
 
-/// Why a command, or what followed from it, was refused.
+/// Reason for which a command, or what followed from it, was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refusal {
     /// More bytes than the staging buffer has.
@@ -70,7 +70,7 @@ pub enum Refusal {
     Golden(GoldenMismatch),
     /// No such command.
     UnknownCommand {
-        /// What was written.
+        /// Number that was written.
         value: u8,
     },
     /// Not in this state.

@@ -1,4 +1,4 @@
-//! Everything that must hold of an upload before a joint runs it; task or host, some tens of milliseconds on the board.
+//! Requirements that an upload must meet before a joint runs it; task or host, some tens of milliseconds on the board.
 //!
 //! In this order: length and checksum, tag, the fields, version, target, unit, certificate, golden vectors. With a key,
 //! nothing behind the length is interpreted before the tag is right; a damaged upload is told from a forged one by its
@@ -11,14 +11,14 @@ use crate::parameters::certificate::{self, Certificate, Limits};
 use crate::parameters::image::{Effort, Image, Target};
 use crate::parameters::pieces::Pieces;
 
-/// What this joint asks of an image.
+/// Requirements of this joint on an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Requirements {
-    /// What it is: an image states the same or 0, any.
+    /// Identity of this joint: an image states the same or 0, any.
     pub target: Target,
-    /// What it commands.
+    /// Effort that it commands.
     pub effort: Effort,
-    /// What its own certificate must stay within, whatever the image permits itself.
+    /// Limits that an image's own certificate must stay within, whatever the image permits itself.
     pub limits: Limits,
 }
 
@@ -29,7 +29,7 @@ pub struct Verified {
     pub length: usize,
     /// Version of the image.
     pub version: u32,
-    /// What was proved.
+    /// Bounds that were proved.
     pub certificate: Certificate,
 }
 

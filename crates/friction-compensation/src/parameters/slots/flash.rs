@@ -1,4 +1,4 @@
-//! What a store of slots needs of a flash, with the rules of the STM32G4's; task, or host with a model.
+//! Interface of a flash to a store of slots, with the rules of the STM32G4's; task, or host with a model.
 //!
 //! Double words of 8 bytes are written once after an erase, even 0xFF bytes; only all zeros may be written over
 //! anything. Pages of 2 KiB are erased to 0xFF (RM0440, embedded flash memory). A double word or page whose writing is

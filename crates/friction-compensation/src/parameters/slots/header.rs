@@ -19,12 +19,12 @@ pub(super) const HEADER: usize = 0;
 pub(super) const CONFIRMATIONS: [usize; 2] = [1, 2];
 /// Double word that is zero in a settled slot.
 pub(super) const SETTLED: usize = 3;
-/// What a confirmation holds: neither blank nor zero, nor anything that a half-done write of zeros looks like.
+/// Content of a confirmation: neither blank nor zero, nor anything that a half-done write of zeros looks like.
 pub(super) const CONFIRMED: [u8; DOUBLE_WORD] = *b"\x5a\xc3confir";
 
 const CRC: crc::Crc<u32, crc::NoTable> = crc::Crc::<u32, crc::NoTable>::new(&crc::CRC_32_ISO_HDLC);
 
-/// What the header says of the payload.
+/// Fields of the header about the payload.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Header {
     pub(super) length: u16,

@@ -61,7 +61,7 @@ use header::{CONFIRMATIONS, CONFIRMED, Checksum, HEADER, HEADER_WORDS, Header, M
 pub const OVERHEAD: usize = HEADER_WORDS * DOUBLE_WORD;
 const _: () = assert!(super::image::MAX_LENGTH + OVERHEAD <= PAGE, "an image fits a slot of one page");
 
-/// Where two slots lie, and for what.
+/// Location of two slots, and the kind of their content.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Layout {
     first_page: usize,
@@ -111,7 +111,7 @@ impl Slot {
     }
 }
 
-/// What is in a slot.
+/// Content of a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SlotState {
     /// Erased.
@@ -133,12 +133,12 @@ pub enum SlotState {
     Retired,
 }
 
-/// Why something is not done.
+/// Reason for which an operation is not done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SlotError {
     /// The flash refuses to write.
     Write(WriteError),
-    /// What was written does not read back. The content in use is untouched.
+    /// Written content that does not read back. The content in use is untouched.
     Verify {
         /// Slot that was being written.
         slot: Slot,
@@ -212,7 +212,7 @@ impl Slots {
         Ok(slots)
     }
 
-    /// What is in a slot.
+    /// Content of a slot.
     pub const fn state(&self, slot: Slot) -> SlotState {
         match slot {
             Slot::First => self.first,
@@ -220,8 +220,8 @@ impl Slots {
         }
     }
 
-    /// Whether a slot was whole once and is not any more, as it was found at start or since. What it held may have been
-    /// newer than what the other one holds.
+    /// Returns `true` if a slot was whole once and is not any more, as it was found at start or since. What it held may
+    /// have been newer than what the other one holds.
     pub const fn is_damaged(&self) -> bool {
         matches!(self.first, SlotState::Damaged) || matches!(self.second, SlotState::Damaged)
     }
@@ -289,13 +289,13 @@ impl Slots {
         Ok(Some(other))
     }
 
-    /// Whether the payload of `slot` still has its checksum.
+    /// Returns `true` if the payload of `slot` still has its checksum.
     pub fn is_whole(&self, flash: &mut impl SlotFlash, slot: Slot) -> bool {
         let SlotState::Whole { sequence, length, checksum } = self.state(slot) else { return false };
         fits(flash, &self.layout, slot, Header { length, sequence, checksum })
     }
 
-    /// Where the payload of `slot` lies, in bytes from the first page; none where the slot has none.
+    /// Range of the payload of `slot`, in bytes from the first page; none where the slot has none.
     pub fn range(&self, slot: Slot) -> Option<core::ops::Range<usize>> {
         let SlotState::Whole { length, .. } = self.state(slot) else { return None };
         let start = (self.layout.first_word(slot) + HEADER_WORDS) * DOUBLE_WORD;

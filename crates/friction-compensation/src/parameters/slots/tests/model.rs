@@ -8,7 +8,7 @@ use super::super::flash::{BLANK, DOUBLE_WORD, PAGE_WORDS, ReadError, SlotFlash, 
 
 type Bytes = [u8; DOUBLE_WORD];
 
-/// How torn double words read.
+/// Reading of torn double words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Torn {
     Error,

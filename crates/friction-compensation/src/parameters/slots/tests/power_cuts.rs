@@ -27,7 +27,7 @@ fn content(number: u64, length: usize) -> Vec<u8> {
 
 /// A way to keep one content through losses of power.
 trait Protocol: Clone {
-    /// What the joint starts with; an error where the power goes meanwhile.
+    /// Content that the joint starts with; an error where the power goes meanwhile.
     fn start(&self, flash: &mut Flash) -> Result<Option<Vec<u8>>, SlotError>;
     fn store(&self, flash: &mut Flash, payload: &[u8]) -> Result<(), SlotError>;
     fn roll_back(&self, flash: &mut Flash) -> Result<(), SlotError>;
@@ -51,7 +51,7 @@ impl Protocol for Layout {
     }
 }
 
-/// What a case begins with, and what it does.
+/// Initial state of a case, and its operation.
 #[derive(Clone)]
 struct Scenario<P> {
     protocol: P,
@@ -126,7 +126,7 @@ impl<P: Protocol> Scenario<P> {
             && (0..2).all(|_| self.protocol.start(&mut flash) == Ok(Some(next.clone())))
     }
 
-    /// As [`Scenario::recovers`], with a second loss of power in the `second` operation from now, in a start or in the
+    /// [`Scenario::recovers`] with a second loss of power in the `second` operation from now, in a start or in the
     /// store that follows. None where there are not so many operations.
     fn recovers_with_a_cut(&self, mut flash: Flash, second: usize) -> Option<bool> {
         let mut permitted = vec![self.old.clone(), Some(self.new.clone())];
