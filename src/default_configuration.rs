@@ -1,4 +1,4 @@
-//! What a board's joint is until somebody has commissioned it: values with which nothing can go far; task, host.
+//! Default joint of each board, until somebody has commissioned it: values with which nothing can go far; task, host.
 //!
 //! **No motor is known here.** Everything about motor, gear and heat is a placeholder that commissioning has to
 //! replace: resistance and inductance are low, which makes the current loop slow on any real motor; limits are low;
@@ -17,7 +17,7 @@ use crate::sensors::analog::Analog;
 use friction_compensation::compensation::Request;
 use friction_compensation::friction::regime::MOST_SETS;
 
-/// What a board brings, and the joint that it is until a configuration says otherwise.
+/// Facts of a board, and the joint that it is until a configuration says otherwise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoardConfiguration {
     /// The bridge and its timing.
@@ -50,8 +50,8 @@ const MOTEUS_R4_ANALOG: Analog = Analog {
     volts_per_code: 0.017_947,
 };
 
-/// What holds for both boards. No source states how hot their bridges may be: the chip beside it bears a junction of
-/// 105 °C (temperature class 6), and the moteus' own firmware stops at 75 °C unless told otherwise. A joint that nobody
+/// Limits of both boards. No source states how hot their bridges may be: the chip beside it bears a junction of 105 °C
+/// (temperature class 6), and the moteus' own firmware stops at 75 °C unless told otherwise. A joint that nobody
 /// commands for longer is not under control.
 const HOT_OR_SILENT: BoardLimits = BoardLimits {
     supply: 0.0,

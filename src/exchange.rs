@@ -1,5 +1,5 @@
-//! Who may touch which place, so that the control interrupt and a task hand values to each other and neither ever
-//! waits; any context.
+//! Ownership of the places by which the control interrupt and a task hand values to each other and neither ever waits;
+//! any context.
 //!
 //! Nothing here holds a value. A value that two contexts share lies in a few places of equal kind, and these types say,
 //! by one atomic exchange each, which context owns which place at every instant. Whoever stores the values
@@ -38,7 +38,7 @@ pub struct Taker<'a> {
 }
 
 impl Newest {
-    /// Nothing given yet: the taker has what lies in its place at the start, index 2.
+    /// Initial state, nothing given yet: the taker has what lies in its place at the start, index 2.
     #[allow(clippy::new_without_default, reason = "it belongs into a static")]
     pub const fn new() -> Self {
         Self { between: AtomicU8::new(1), split: AtomicBool::new(false) }
@@ -109,7 +109,7 @@ pub struct User<'a> {
 }
 
 impl Handover {
-    /// Nothing offered yet.
+    /// Initial state: nothing offered yet.
     #[allow(clippy::new_without_default, reason = "it belongs into a static")]
     pub const fn new() -> Self {
         Self { offered: AtomicBool::new(false), split: AtomicBool::new(false) }

@@ -1,4 +1,4 @@
-//! Why the program stopped, kept over the reset; written by the fault handlers, read once at start.
+//! Reason for the program's stop, kept over the reset; written by the fault handlers, read once at start.
 //!
 //! Pure code: a record becomes sixteen words and words become a record again. Where the words lie is the board's
 //! business. RAM that nobody initialises holds noise after power-on, so a record counts only with its magic word and
@@ -12,7 +12,7 @@ pub const PLACE: usize = 40;
 const MAGIC: u32 = u32::from_le_bytes(*b"JNT1");
 const CRC: crc::Crc<u32, crc::NoTable> = crc::Crc::<u32, crc::NoTable>::new(&crc::CRC_32_ISO_HDLC);
 
-/// What stopped the program.
+/// Cause of the program's stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
     /// The program panicked: detail is the line, place the file.
@@ -28,7 +28,7 @@ pub enum Cause {
 impl Cause {
     const ALL: [Self; 4] = [Self::Panic, Self::HardFault, Self::NonMaskable, Self::Unexpected];
 
-    /// As it is kept and as object 2301h:2 says it.
+    /// Number as it is kept and as object 2301h:2 says it.
     pub const fn code(self) -> u32 {
         match self {
             Self::Panic => 1,
@@ -39,7 +39,7 @@ impl Cause {
     }
 }
 
-/// Why the program started: what the chip says, and what stopped the program before.
+/// Reason for the program's start: what the chip says, and what stopped the program before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LastReset {
     /// Bits of what has reset the chip since they were cleared at the start before, as in bits 25 to 31 of its
@@ -65,7 +65,7 @@ impl LastReset {
 /// One stop of the program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Record {
-    /// What stopped it.
+    /// Cause of the stop.
     pub cause: Cause,
     /// Address of the instruction that it stopped at; 0 where that is not known.
     pub address: u32,

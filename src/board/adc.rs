@@ -21,7 +21,7 @@ pub struct Sequence<'a> {
     pub channels: &'a [(u8, SampleTime)],
     /// Number of the trigger (RM0440, tables 166 and 167).
     pub trigger: u8,
-    /// Whether the end of the sequence is the control interrupt.
+    /// `true` if the end of the sequence is the control interrupt.
     pub interrupt: bool,
 }
 
@@ -86,7 +86,7 @@ pub fn code<const RANK: usize>(adc: Adc) -> u16 {
     adc.jdr(RANK).read().jdata()
 }
 
-/// Whether a sequence has ended since [`acknowledge`].
+/// Returns `true` if a sequence has ended since [`acknowledge`].
 #[inline(always)]
 pub fn ended(adc: Adc) -> bool {
     adc.isr().read().jeos()

@@ -141,7 +141,7 @@ const ENCODER: Incremental = match Incremental::new(CONFIGURATION.joint.motor.en
     None => panic!("no incremental encoder has so few counts"),
 };
 
-/// What the control interrupt measures with.
+/// Sensors of the control interrupt.
 pub struct Sensors {
     encoder: Incremental,
     counts_kept: bool,
@@ -299,7 +299,7 @@ impl Sensors {
         }
     }
 
-    /// What is known now; temperatures and overrun are filled in by the caller.
+    /// Measurements known now; temperatures and overrun are filled in by the caller.
     #[inline(always)]
     pub fn measure(&mut self) -> Measurements {
         let tim = pac::TIM4;
@@ -332,7 +332,7 @@ impl Sensors {
     pub fn complete(&mut self) {}
 }
 
-/// Whether one of the chip's alarms has switched the outputs off.
+/// Returns `true` if one of the chip's alarms has switched the outputs off.
 #[inline(always)]
 fn tim1_broke() -> bool {
     pac::TIM1.sr().read().sbif()
@@ -382,7 +382,7 @@ extern "C" fn TIM1_UP_TIM16() {
     tim.cr1().modify(|w| w.set_udis(false));
 }
 
-/// Whether the joint may start: nothing of this board has to get ready first.
+/// Returns `true` if the joint may start: nothing of this board has to get ready first.
 #[inline(always)]
 pub const fn is_started() -> bool {
     true
@@ -392,12 +392,12 @@ pub const fn is_started() -> bool {
 #[inline(always)]
 pub const fn ask_reset(_waits: bool) {}
 
-/// Whether the button is pressed, which says that somebody is at the joint; it stops the bridge, too.
+/// State of the button, `true` while pressed, which says that somebody is at the joint; it stops the bridge, too.
 pub fn button() -> Option<bool> {
     Some(pac::GPIOC.idr().read().idr(10) == pac::gpio::vals::Idr::LOW)
 }
 
-/// What the board tells of its hardware.
+/// Report of the board on its hardware.
 pub fn hardware() -> Hardware {
     Hardware { options: super::options::found(), ..Hardware::default() }
 }

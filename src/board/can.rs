@@ -1,7 +1,7 @@
 //! FDCAN1 at 1 Mbit/s with classic frames: the receive interrupt, and the queues between it and the task below.
 //!
-//! What has to be quick happens in the interrupt, second in priority to the control interrupt alone: NMT, SYNC, RPDOs,
-//! and the synchronous TPDOs. For the task it leaves what is addressed to this node's SDO server, and LSS.
+//! Work that has to be quick happens in the interrupt, second in priority to the control interrupt alone: NMT, SYNC,
+//! RPDOs, and the synchronous TPDOs. For the task it leaves what is addressed to this node's SDO server, and LSS.
 //!
 //! embassy's driver sets the controller up: clock, pins, bit timing, message RAM, filters. Its interrupt handler is not
 //! used, because frames would wait in its channel until a task runs; this one reads the controller's FIFO itself, in
@@ -63,7 +63,7 @@ static LOAD: AtomicU32 = AtomicU32::new(0);
 /// Reaction to a collision, by its number, that the receive interrupt has not seen yet: the task's. Zero is none.
 static COLLISION: AtomicU32 = AtomicU32::new(0);
 
-/// Everything that the receive interrupt owns.
+/// State that the receive interrupt owns.
 struct Bus {
     shared: &'static canopen_node::Shared,
     receiver: Receiver<'static>,
@@ -79,7 +79,7 @@ static BUS: Owned = Owned(UnsafeCell::new(MaybeUninit::uninit()));
 
 static RECEIVED: Channel<CriticalSectionRawMutex, Frame, TO_TASK> = Channel::new();
 static SENDING: Mutex<RefCell<TransmitQueue<TO_BUS>>> = Mutex::new(RefCell::new(TransmitQueue::new()));
-/// What the slower tasks know of the joint.
+/// Observation of the joint for the slower tasks.
 static OBSERVED: Mutex<Cell<Option<Observed>>> = Mutex::new(Cell::new(None));
 
 /// Frames that were not taken, since the start.
@@ -102,7 +102,7 @@ pub struct Dropped {
     pub overwritten: u32,
 }
 
-/// How the controller takes part in the bus (ISO 11898-1, fault confinement).
+/// Fault confinement state of the controller (ISO 11898-1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
 pub enum Condition {
     /// All is well, or nearly.
@@ -190,12 +190,12 @@ pub fn collide(reaction: CollisionReaction) {
     }
 }
 
-/// What TPDOs carry of the joint from now on; the control step's part is taken from its own report.
+/// Sets what TPDOs carry of the joint from now on; the control step's part is taken from its own report.
 pub fn observe(observed: &Observed) {
     critical_section::with(|section| OBSERVED.borrow(section).set(Some(*observed)));
 }
 
-/// What was told by [`observe`], with the newest control step.
+/// Observation given to [`observe`], with the newest control step.
 pub fn observed() -> Option<Observed> {
     let mut observed = critical_section::with(|section| OBSERVED.borrow(section).get())?;
     if let Some(report) = control::report() {
@@ -220,7 +220,7 @@ pub fn send(frame: Frame, shared: &canopen_node::Shared) {
     });
 }
 
-/// Whether [`send`] has room for another frame of the task's.
+/// Returns `true` if [`send`] has room for another frame of the task's.
 pub fn has_room() -> bool {
     critical_section::with(|section| SENDING.borrow_ref(section).room() > RESERVED)
 }
@@ -240,7 +240,7 @@ pub fn dropped() -> Dropped {
     Dropped { controller, task, bus, overwritten }
 }
 
-/// How the controller takes part in the bus.
+/// Fault confinement state of the controller.
 pub fn condition() -> Condition {
     let status = pac::FDCAN1.psr().read();
     match (status.bo(), status.ep()) {

@@ -19,18 +19,18 @@ use joint_firmware::joint::{Active, Bridge, BridgeState, Command, Coupled, Deman
 use joint_firmware::motor::open_loop::Window;
 use joint_firmware::motor::phases::Phases;
 
-/// Everything that the control interrupt owns.
+/// State that the control interrupt owns.
 struct Control {
     sensors: Sensors,
     joint: Joint,
     ends: Ends,
     /// The step before had not ended when this one should have begun.
     overrun: bool,
-    /// What the joint is commanded with while it is held off.
+    /// Demand on the joint while it is held off.
     off: Demand,
 }
 
-/// What tasks command the joint with; each of the two has one owner.
+/// Commands of the tasks to the joint; each of the two has one owner.
 pub struct Commands {
     /// Set-points and the controlword: the newest counts, from the next control step on; a set-point in the next round
     /// of the motion loop.
@@ -54,8 +54,7 @@ struct Owned(UnsafeCell<MaybeUninit<Control>>);
 unsafe impl Sync for Owned {}
 static CONTROL: Owned = Owned(UnsafeCell::new(MaybeUninit::uninit()));
 
-/// What control interrupt and tasks tell each other in single words; in one place, so that the interrupt needs one
-/// address.
+/// Single words that control interrupt and tasks exchange; in one place, so that the interrupt needs one address.
 struct Words {
     steps: AtomicU32,
     last_cycles: AtomicU32,
@@ -118,7 +117,7 @@ static WORDS: Words = Words {
 
 static ACTIVE: Replaced<Active> = Replaced::new();
 static DEMAND: Newest<Demand> = Newest::new(NOBODY);
-/// What is commanded before anybody does.
+/// Demand before anybody commands.
 const NOBODY: Demand = Demand {
     controlword: Controlword::DISABLE_VOLTAGE,
     command: Command::NOTHING,
@@ -130,8 +129,8 @@ static WINDOW: Newest<Window> = Newest::new(Window::NOTHING);
 /// Tasks of both executors read it, one at a time.
 static READER: Mutex<RefCell<Option<Subscriber<Report>>>> = Mutex::new(RefCell::new(None));
 
-/// What the joint found and did in a control step: in one of each round of the motion loop, and in each in which the
-/// bridge is off.
+/// Findings and actions of the joint in a control step: in one of each round of the motion loop, and in each in which
+/// the bridge is off.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Report {
     /// The step.
@@ -148,7 +147,7 @@ impl Report {
         Self { telemetry: Telemetry::NOTHING, latched: Faults::NONE, phase_currents: Phases::uniform(0.0) };
 }
 
-/// What is known of the control steps since the start; a copy.
+/// Statistics of the control steps since the start; a copy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
 pub struct Statistics {
     /// Control steps; wraps.
@@ -159,9 +158,9 @@ pub struct Statistics {
     pub longest_cycles: u32,
     /// Steps that had not ended when the next one should have begun: a step is missing after each.
     pub overruns: u32,
-    /// Whether the bridge switches.
+    /// `true` while the bridge switches.
     pub switching: bool,
-    /// Whether [`stop`] was called.
+    /// `true` once [`stop`] was called.
     pub stopped: bool,
 }
 
@@ -177,7 +176,7 @@ pub fn statistics() -> Statistics {
     }
 }
 
-/// Whether the control interrupt has been started.
+/// Returns `true` once the control interrupt has been started.
 pub fn is_enabled() -> bool {
     NVIC::is_enabled(Interrupt::ADC1_2)
 }
@@ -191,8 +190,8 @@ pub fn stop() {
 /// where it is under current; then nothing may be written. For the task that writes, and before the control interrupt
 /// starts.
 ///
-/// What the control interrupt runs only while operation is enabled may lie in flash on such a board: with this it never
-/// waits for a write.
+/// Code that the control interrupt runs only while operation is enabled may lie in flash on such a board: with this it
+/// never waits for a write.
 pub fn hold_off() -> bool {
     if !super::SINGLE_BANK || WORDS.held_off.load(Ordering::Relaxed) {
         return true;
@@ -210,7 +209,7 @@ pub fn hold_off() -> bool {
     true
 }
 
-/// Nothing is written any more: the joint does again what it is commanded.
+/// Ends the hold after the last write: the joint does again what it is commanded.
 pub fn release() {
     WORDS.held_off.store(false, Ordering::Release);
 }

@@ -20,7 +20,7 @@ pub struct Drv8353 {
 }
 
 impl Drv8353 {
-    /// What came back; silence where the bus itself fails.
+    /// Answer to a word; silence where the bus itself fails.
     fn frame(&mut self, word: u16) -> u16 {
         let mut words = [word];
         self.select.set_low();
@@ -50,7 +50,7 @@ impl Drv8353 {
         self.write(CONTROL, control | CLEAR_FAULTS);
     }
 
-    /// Whether the registers hold what they were configured with.
+    /// Checks that the registers hold what they were configured with.
     ///
     /// # Errors
     /// The driver is silent, or one does not.
@@ -70,7 +70,7 @@ impl Drv8353 {
     /// enabled for 1 ms, and the bridge be off.
     ///
     /// # Errors
-    /// As [`Drv8353::verify`].
+    /// Those of [`Drv8353::verify`].
     pub fn configure(&mut self) -> Result<(), Setup> {
         for (register, content) in REGISTERS {
             self.write(register, content);

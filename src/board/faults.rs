@@ -34,7 +34,7 @@ const STORES_CHECK: u32 = 0x5354_4F00;
 /// Words of the parameter slots that read with a double error: torn by a loss of power while they were written.
 static TORN_WORDS: AtomicU32 = AtomicU32::new(0);
 
-/// What reset the chip, [`LastReset::causes`](joint_firmware::reset_record::LastReset::causes).
+/// Causes of the chip's reset, [`LastReset::causes`](joint_firmware::reset_record::LastReset::causes).
 static CAUSES: AtomicU8 = AtomicU8::new(0);
 
 unsafe extern "C" {
@@ -112,7 +112,7 @@ pub fn keep_stores_left(left: u8) {
     unsafe { addr_of_mut!(STORES_LEFT).cast::<u32>().write_volatile(u32::from(left) ^ STORES_CHECK) };
 }
 
-/// What [`report`] has logged.
+/// Last reset, as [`report`] has logged it.
 #[inline(never)]
 pub fn last_reset() -> LastReset {
     LastReset { causes: CAUSES.load(Ordering::Relaxed), stop: Record::decode(&words()) }

@@ -25,7 +25,7 @@ const LOOK: Duration = Duration::from_millis(1);
 /// Looks from one check of the registers to the next, while the bridge is off.
 const CHECK: u32 = 100;
 
-/// What the control interrupt is told of the driver.
+/// State of the driver as the control interrupt is told.
 #[derive(Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 enum State {
@@ -49,25 +49,25 @@ static UNREAD: AtomicBool = AtomicBool::new(false);
 /// A fault reset waits for the driver.
 static RESET: AtomicBool = AtomicBool::new(false);
 
-/// Whether the fault line is low.
+/// Returns `true` while the fault line is low.
 #[inline(always)]
 fn line_is_low() -> bool {
     pac::GPIOB.idr().read().idr(6) == pac::gpio::vals::Idr::LOW
 }
 
-/// Whether the driver has been ready since the start; control interrupt.
+/// Returns `true` if the driver has been ready since the start; control interrupt.
 #[inline(always)]
 pub fn is_started() -> bool {
     STATE.load(Ordering::Acquire) != State::Starting as u8
 }
 
-/// Whether the current amplifiers have power; control interrupt.
+/// Returns `true` while the current amplifiers have power; control interrupt.
 #[inline(always)]
 pub fn amplifies() -> bool {
     STATE.load(Ordering::Relaxed) != State::Asleep as u8
 }
 
-/// Whether the bridge may not switch; a fault stays one until the task has cleared it. Control interrupt.
+/// Returns `true` while the bridge may not switch; a fault stays one until the task has cleared it. Control interrupt.
 #[inline(always)]
 pub fn is_faulty() -> bool {
     if STATE.load(Ordering::Acquire) != State::Ready as u8 {
@@ -89,7 +89,7 @@ pub fn ask_reset(waits: bool) {
     }
 }
 
-/// What is known of it; task.
+/// State of the gate driver as known now; task.
 pub fn report() -> GateDriver {
     let status = STATUS.load(Ordering::Relaxed);
     GateDriver {
@@ -117,11 +117,11 @@ pub struct Gate {
     pub enable: Output<'static>,
 }
 
-/// What the board cannot start without.
+/// Parts that the board cannot start without.
 pub enum Parts {
     /// All is there.
     Gate(Gate),
-    /// Nothing may be driven, or measured.
+    /// Missing parts: nothing may be driven, or measured.
     Missing(Setup, u8),
 }
 
@@ -243,7 +243,7 @@ impl Gate {
         defmt::info!("gate driver: cleared");
     }
 
-    /// Whether it is the fault that it reports, or that it does not answer.
+    /// Kind of the fault: one that it reports, or that it does not answer.
     fn missing(&mut self) -> Setup {
         self.driver.verify().err().unwrap_or(Setup::Fault)
     }

@@ -51,10 +51,10 @@ use embassy_stm32::peripherals::IWDG;
 pub use joint_firmware::default_configuration::BoardConfiguration;
 pub use shared::{Offering, Prepared, Publisher, Subscriber};
 
-/// What a started board hands to the program.
+/// Parts of a started board, for the program.
 pub struct Parts {
-    /// What the control interrupt measures with. None where it may not start; the bridge then stays off, and the
-    /// watchdog does not wait for it.
+    /// Sensors of the control interrupt. None where it may not start; the bridge then stays off, and the watchdog does
+    /// not wait for it.
     pub sensors: Option<Sensors>,
     /// The gate driver, for its task.
     #[cfg(feature = "moteus-r4")]
@@ -87,7 +87,7 @@ impl Led {
     }
 }
 
-/// Why a board does not start.
+/// Reason for which a board does not start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
 pub enum StartError {
     /// A converter did not get ready.

@@ -110,12 +110,12 @@ pub fn start_clocks(peripherals: &mut Peripherals) {
 /// Family and revision, by the pins.
 static REVISION: AtomicU8 = AtomicU8::new(0);
 
-/// What the control interrupt measures with.
+/// Sensors of the control interrupt.
 pub struct Sensors {
     /// Codes of the currents, as they were when the amplifiers last had power.
     currents: [u16; 3],
     angle: u32,
-    /// What the encoder answered in the last frame.
+    /// Answer of the encoder in the last frame.
     answer: Option<u16>,
 }
 
@@ -200,7 +200,7 @@ pub const fn button() -> Option<bool> {
     None
 }
 
-/// What the board tells of its hardware.
+/// Report of the board on its hardware.
 pub fn hardware() -> Hardware {
     Hardware { driver: gate::report(), revision: REVISION.load(Ordering::Relaxed), options: super::options::found() }
 }
@@ -311,7 +311,7 @@ impl Sensors {
     /// For boards that count an encoder.
     pub fn set_encoder_counts(&mut self, _counts: u32) {}
 
-    /// What is known now; temperatures and overrun are filled in by the caller.
+    /// Measurements known now; temperatures and overrun are filled in by the caller.
     ///
     /// The encoder's angle is the one that the frame of the period before brought, which runs while the control step
     /// does: two periods old, because an answer is to the command of the frame before. Waiting for a frame of this

@@ -3,7 +3,7 @@
 use embassy_stm32::pac;
 use joint_firmware::hardware::chip_options::ChipOptions;
 
-/// As loaded.
+/// Options as loaded.
 pub fn found() -> ChipOptions {
     ChipOptions { found: pac::FLASH.optr().read().0 }
 }

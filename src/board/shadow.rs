@@ -26,7 +26,7 @@ pub fn withdraw() {
     MODEL.store(null_mut(), Ordering::Release);
 }
 
-/// Whether there is a model.
+/// Returns `true` if there is a model.
 pub fn runs() -> bool {
     !MODEL.load(Ordering::Acquire).is_null()
 }
@@ -48,7 +48,7 @@ pub fn prepare(active: &mut Offering<Active>, image: &[u8]) -> bool {
     true
 }
 
-/// What the model would add; none where there is none. 1,000 times a second, by one task.
+/// Torque that the model would add; none where there is no model. 1,000 times a second, by one task.
 pub fn torque(memory: &mut Memory, telemetry: &Telemetry) -> Option<Torque> {
     // SAFETY: not null, it was prepared, and is withdrawn before it changes; the task that does so waits while this one
     // runs.

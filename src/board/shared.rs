@@ -32,7 +32,7 @@ unsafe impl<T: Send> Send for Publisher<T> {}
 unsafe impl<T: Send> Send for Subscriber<T> {}
 
 impl<T: Copy> Newest<T> {
-    /// What is read before anything was published.
+    /// Place with `start`, which is read before anything was published.
     pub const fn new(start: T) -> Self {
         Self { sides: exchange::Newest::new(), places: UnsafeCell::new([start; 3]) }
     }
@@ -97,7 +97,7 @@ unsafe impl<T: Send> Send for Offering<T> {}
 unsafe impl<T: Send> Send for InUse<T> {}
 
 impl<T> Replaced<T> {
-    /// Nothing offered yet. A value that is replaced is overwritten, not dropped.
+    /// Empty place: nothing offered yet. A value that is replaced is overwritten, not dropped.
     pub const fn new() -> Self {
         assert!(!core::mem::needs_drop::<T>());
         Self { sides: exchange::Handover::new(), places: UnsafeCell::new([const { MaybeUninit::uninit() }; 2]) }

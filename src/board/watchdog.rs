@@ -15,7 +15,7 @@ use static_cell::StaticCell;
 
 /// Longest time without food, µs; runs on the low-speed oscillator, which is off by up to 10 % over temperature.
 const TIMEOUT_US: u32 = 100_000;
-/// How often it is to be fed, ms; by the medium executor, whose life the feeding itself proves.
+/// Feeding period, ms; fed by the medium executor, whose life the feeding itself proves.
 pub const FEED_MS: u32 = 20;
 /// Longest time that the slow executor may be busy: the proof of an image takes 0.1 s alone, and some ten times as long
 /// beside control steps that leave it a tenth of the core.
@@ -24,7 +24,7 @@ const PATIENCE: Duration = Duration::from_secs(5);
 /// Counts up whenever the slow executor runs its task.
 static SLOW: AtomicU32 = AtomicU32::new(0);
 
-/// Who has to be alive, as last seen.
+/// Watchdog, and the signs of life of all that have to be alive, as last seen.
 pub struct Watchdog {
     hardware: IndependentWatchdog<'static, IWDG>,
     control: u32,

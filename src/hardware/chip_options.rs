@@ -14,7 +14,7 @@ pub const SRAM_PE: u32 = 1 << 24;
 pub const N_SWBOOT0: u32 = 1 << 26;
 /// BOOT0 is low, where it is an option bit.
 pub const N_BOOT0: u32 = 1 << 27;
-/// What is written to object 2303h:4 to set them: "OPTB".
+/// Number that is written to object 2303h:4 to set them: "OPTB".
 pub const COMMAND: u32 = u32::from_le_bytes(*b"OPTB");
 
 /// The option bytes as the chip has loaded them. 0 where there is no chip.
@@ -33,7 +33,7 @@ impl ChipOptions {
         }
     }
 
-    /// Which of the three are wrong: bit 0 SRAM_PE, bit 1 nSWBOOT0, bit 2 nBOOT0.
+    /// Mask of the wrong ones of the three: bit 0 SRAM_PE, bit 1 nSWBOOT0, bit 2 nBOOT0.
     pub const fn wrong(self) -> u8 {
         let different = self.found ^ self.needed();
         (different >> 24 & 1 | different >> 25 & 0b110) as u8
@@ -44,7 +44,7 @@ impl ChipOptions {
 mod tests {
     use super::*;
 
-    /// As an STM32G431CB is delivered.
+    /// Options of an STM32G431CB as delivered.
     const DELIVERED: u32 = 0xffaf_f8aa;
 
     #[test]

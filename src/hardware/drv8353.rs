@@ -40,7 +40,7 @@ pub const LAST: u16 = 7;
 pub const AMPLIFIERS: u16 = 6;
 /// Amplifiers: their inputs are shorted, for calibration.
 pub const CALIBRATE: u16 = 0b111 << 2;
-/// What a bus reads that nobody drives: the line is pulled up.
+/// Word read from a bus that nobody drives: the line is pulled up.
 pub const SILENCE: u16 = 0x7ff;
 
 /// Codes of a field: what each stands for, in the order of the codes.
@@ -63,8 +63,8 @@ const fn code<const N: usize>(values: [u16; N], value: u16) -> u16 {
     code as u16
 }
 
-/// What a board asks of the driver. The rest is the same everywhere: three PWM inputs, over-current latched and
-/// switching all half bridges off, faults reported cycle by cycle, reference of the amplifiers halved.
+/// Settings of the driver that differ between boards. The rest is the same everywhere: three PWM inputs, over-current
+/// latched and switching all half bridges off, faults reported cycle by cycle, reference of the amplifiers halved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
     /// Source and sink current of the high-side gates, mA.

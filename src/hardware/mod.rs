@@ -11,7 +11,7 @@ use chip_options::ChipOptions;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Setup {
-    /// Nothing is missing, or the board has no gate driver that is set up.
+    /// Complete set-up: nothing is missing, or the board has no gate driver that is set up.
     #[default]
     Complete = 0,
     /// The gate driver has just been enabled.
@@ -51,13 +51,13 @@ pub struct GateDriver {
     pub status: [u16; 2],
     /// Faults since the start.
     pub faults: u16,
-    /// What is missing.
+    /// Missing part of the set-up.
     pub setup: Setup,
     /// The fault line is low, and the status words have not been read yet.
     pub unread: bool,
 }
 
-/// What a board tells of its hardware. All zero where it has nothing to tell.
+/// Report of a board on its hardware. All zero where it has nothing to tell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Hardware {
     /// The gate driver.

@@ -66,7 +66,7 @@ const MEMORY: f32 = 0.01;
 const DRIFT: f32 = 0.05;
 /// Mean velocity from which on the joint moves, over the standstill velocity.
 const MOVES: f32 = 5.0;
-/// What is left of a voltage in its filter from one control step to the next: a time constant of 8 steps.
+/// Part of a voltage that is left in its filter from one control step to the next: a time constant of 8 steps.
 const LEFT: f32 = 0.875;
 /// Part of the voltage of a round of the motion loop that goes into the filter.
 pub(super) const VOLTAGE_FILTER: f32 = 1.0 - LEFT * LEFT * LEFT * LEFT * LEFT;
@@ -134,7 +134,7 @@ impl Scales {
     }
 }
 
-/// How the joint follows commands, per round of the motion loop.
+/// Gains with which the joint follows commands, per round of the motion loop.
 #[derive(Clone, Copy, Debug)]
 pub struct MotionGains {
     /// Rounds a second, Hz.
@@ -175,9 +175,9 @@ pub struct GuardGains {
     pub mean: f32,
     /// s/rad: the joint moves where its mean velocity times this is above 1, and at 2 for certain.
     pub moves: f32,
-    /// What is taken away in a round.
+    /// Part that is taken away in a round.
     pub back_off: f32,
-    /// What comes back in a round.
+    /// Part that comes back in a round.
     pub recovery: f32,
 }
 
@@ -194,12 +194,12 @@ impl GuardGains {
     }
 }
 
-/// What compensation uses besides the friction model.
+/// Values that compensation uses besides the friction model.
 #[derive(Clone, Copy, Debug)]
 pub struct CompensationGains {
     /// Gain, clamp, slew.
     pub settings: Settings,
-    /// Which velocity.
+    /// Source of the velocity.
     pub source: VelocitySource,
     /// 1 / standstill velocity, s/rad.
     pub inverse_standstill: f32,
@@ -213,10 +213,10 @@ pub struct CompensationGains {
     pub guard: GuardGains,
 }
 
-/// What adaptation in service uses, beside what all use.
+/// Values that adaptation in service uses, beside what all use.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AdaptationGains {
-    /// What it does.
+    /// Requested adaptation.
     pub request: AdaptationRequest,
     /// The compensation's gain, 0 to 1.
     pub gain: f32,
@@ -241,13 +241,13 @@ pub struct Active {
     pub field_oriented: FieldOrientedGains,
     /// Observer.
     pub observer: ObserverGains,
-    /// How the encoder sits on the motor.
+    /// Alignment of the encoder on the motor.
     pub alignment: EncoderAlignment,
     /// Rotor to joint.
     pub scales: Scales,
     /// Limits, the board's among them.
     pub limits: Limits,
-    /// How the torque fades towards them.
+    /// Gains of the torque's fade towards them.
     pub limit_gains: LimitGains,
     /// Velocity beyond which it is a fault, rad/s.
     pub over_speed: f32,
@@ -263,7 +263,7 @@ pub struct Active {
     pub implausible_voltage: Dq,
     /// And besides without current, where none of the dead time is compensated, V.
     pub uncompensated_voltage: f32,
-    /// How much less of it an ampere of torque current leaves, V/A.
+    /// Decrease of it per ampere of torque current, V/A.
     pub compensated_slope: f32,
     /// Electrical constants for that check: resistance, Ω, inductances, H, and flux linkage, Wb.
     pub resistance: f32,
@@ -300,7 +300,7 @@ pub struct Active {
     pub thermal: ThermalSettings,
     /// The verified friction model; none: no compensation.
     pub friction: Option<FrictionModel>,
-    /// How it stops.
+    /// Gains of its stops.
     pub stops: StopGains,
     /// Brake chopper.
     pub chopper: ChopperGains,
@@ -327,13 +327,13 @@ impl Configuration {
         Ok(place.write(checked.active(self, bridge)))
     }
 
-    /// Whether [`Configuration::prepare`] would refuse it.
+    /// Checks whether [`Configuration::prepare`] would refuse it.
     pub fn verify(&self, bridge: &BridgeConfiguration) -> Result<(), ConfigurationError> {
         Checked::of(self, bridge).map(|_| ())
     }
 }
 
-/// What of an [`Active`] can be refused.
+/// Parts of an [`Active`] that can be refused.
 struct Checked {
     field_oriented: FieldOrientedGains,
     observer: ObserverGains,

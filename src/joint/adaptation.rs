@@ -33,7 +33,8 @@ use crate::motor::number::{exceeds, greater, lesser, limited, magnitude, or_zero
 use friction_compensation::compensation::{Acting, Reason};
 use friction_compensation::sine::cos_sin_of;
 
-/// Whether this program adapts. With the feature `little-room` a chip's program does not; on the host nothing changes.
+/// `true` if this program adapts. With the feature `little-room` a chip's program does not; on the host nothing
+/// changes.
 pub const ADAPTS: bool = !cfg!(all(feature = "little-room", target_os = "none"));
 /// Looks a second, Hz.
 pub const LOOK_RATE: f32 = 1_000.0;
@@ -51,7 +52,7 @@ pub const MEMORY: f32 = 8.0;
 const FORGETTING: f32 = 1.0 - ROW / MEMORY + 0.5 * (ROW / MEMORY) * (ROW / MEMORY);
 /// Lowest and highest factor of the image's friction that acts.
 pub const FACTOR: (f32, f32) = (0.25, 2.5);
-/// How far the factor may be from 1 with an image that still fits.
+/// Largest deviation of the factor from 1 with an image that still fits.
 pub const MISFIT: f32 = 0.2;
 /// Estimated numbers: factor, viscous coefficient, inertia, gravity along sine and cosine, offset.
 const N: usize = 6;
@@ -82,7 +83,7 @@ const LEAST_NOISE: f32 = 4e-4;
 /// Least friction, as a part of the torque limit.
 const LEAST_FRICTION: f32 = 1e-3;
 
-/// What acts of the image in service.
+/// Corrections in effect on the image in service.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Factors {
     /// Factor of the image's friction, within [`FACTOR`].
@@ -102,7 +103,7 @@ impl Default for Factors {
     }
 }
 
-/// Why nothing is learned, or that something is.
+/// Learning state: the reason for which nothing is learned, or that something is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Learning {
@@ -127,14 +128,14 @@ pub enum Learning {
     Touched = 8,
 }
 
-/// What is known of adaptation at one instant.
+/// State of adaptation at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Report {
-    /// What acts, or in shadow would act.
+    /// Corrections in effect, or in shadow those that would be.
     pub factors: Factors,
     /// Standard deviation of the factor.
     pub deviation: f32,
-    /// Whether the joint learns.
+    /// Learning state of the joint.
     pub learning: Learning,
 }
 
@@ -146,22 +147,22 @@ impl Default for Report {
 }
 
 impl Report {
-    /// Whether friction is surely no more what the image says: [`MISFIT`] off, and two deviations. The image is to be
-    /// made anew.
+    /// Returns `true` if friction is surely no more what the image says: [`MISFIT`] off, and two deviations. The image
+    /// is to be made anew.
     pub fn misfits(&self) -> bool {
         ADAPTS && magnitude(self.factors.factor - 1.0) > MISFIT + 2.0 * self.deviation
     }
 
-    /// Whether it may be what the image says, again or still.
+    /// Returns `true` if friction may be what the image says, again or still.
     pub fn fits(&self) -> bool {
         magnitude(self.factors.factor - 1.0) < MISFIT
     }
 }
 
-/// What adaptation needs of a configuration.
+/// Settings of adaptation, from a configuration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// What it does.
+    /// Requested adaptation.
     pub request: AdaptationRequest,
     /// The compensation's gain, 0 to 1.
     pub gain: f32,
@@ -242,7 +243,7 @@ impl Default for Adaptation {
 }
 
 impl Adaptation {
-    /// Nothing seen yet.
+    /// Initial state: nothing seen yet.
     pub const NOTHING: Self = Self {
         window: Window { looks: 0, torque: 0.0, friction: 0.0, velocity: 0.0, sine: 0.0, cosine: 0.0, slope: 0.0 },
         learning: Learning::Off,
@@ -274,12 +275,12 @@ impl Adaptation {
         if settings.request == AdaptationRequest::On { self.factors(settings) } else { Factors::IMAGE }
     }
 
-    /// What is known now.
+    /// State of adaptation now.
     pub fn report(&self, settings: &Settings) -> Report {
         Report { factors: self.factors(settings), deviation: self.deviation, learning: self.learning }
     }
 
-    /// What acts, or would act.
+    /// Corrections in effect, or those that would be.
     pub fn factors(&self, settings: &Settings) -> Factors {
         if self.rows == 0 {
             return Factors::IMAGE;
@@ -322,7 +323,7 @@ impl Adaptation {
         }
     }
 
-    /// What the image leaves of a row's torque, Nm, and the row: friction, velocity as a part of the limit,
+    /// Residual torque of a row against the image, Nm, and the row: friction, velocity as a part of the limit,
     /// acceleration as a part of the ramp's, sine, cosine, one.
     fn row(&self, settings: &Settings) -> (f32, [f32; N]) {
         let Window { torque, friction, velocity, sine, cosine, slope, .. } = self.window;
@@ -356,7 +357,8 @@ impl Adaptation {
         self.solve(&[PRIOR, friction, limit, GRAVITY * limit, GRAVITY * limit, friction]);
     }
 
-    /// Whether a row that leaves so much torque unexplained, Nm, is of a joint that is touched, or was a moment ago.
+    /// Returns `true` if a row that leaves so much torque unexplained, Nm, is of a joint that is touched, or was a
+    /// moment ago.
     fn is_touched(&mut self, left: f32) -> bool {
         let knows = self.rows >= KNOWN.0 && self.deviation < KNOWN.1;
         if knows && left > TOUCHED * square_root(self.noise) {
@@ -423,7 +425,7 @@ pub(super) fn image_torque(telemetry: &Telemetry) -> f32 {
     telemetry.compensated.output.torque.to_bits() as f32 * (1.0 / 65_536.0)
 }
 
-/// Whether a control step tells something of friction.
+/// Learning state of a control step: whether it tells something of friction.
 fn learning(settings: &Settings, telemetry: &Telemetry) -> Learning {
     let output = &telemetry.compensated.output;
     let velocity = telemetry.motion.velocity;

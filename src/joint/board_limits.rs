@@ -1,4 +1,4 @@
-//! What a board bears, and what its converters can see: no joint on it may be configured for more; task, host.
+//! Limits of a board and ranges of its converters: no joint on it may be configured for more; task, host.
 //!
 //! They are checked with the [whole configuration](super::configuration::Configuration::prepare), and what the control
 //! step uses is held to them once more, so that no record from elsewhere switches a protection off. A reading at the

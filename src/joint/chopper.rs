@@ -14,7 +14,7 @@
 use super::configuration::Limits;
 use crate::motor::number::greater;
 
-/// Whether this program has one.
+/// `true` if this program has one.
 pub const CHOPS: bool = !cfg!(all(target_os = "none", feature = "little-room"));
 /// Time over which the mean is taken, s.
 const MEMORY: f32 = 10.0;
@@ -85,7 +85,7 @@ impl Chopper {
         }
     }
 
-    /// Whether it conducts.
+    /// Returns `true` while it conducts.
     #[inline(always)]
     pub const fn conducts(&self) -> bool {
         self.conducts

@@ -1,4 +1,4 @@
-//! What the joint is asked to do; written by a task, read by the control step.
+//! Command to the joint; written by a task, read by the control step.
 
 use super::state_machine::Controlword;
 use crate::motor::number::greater;
@@ -86,7 +86,7 @@ impl CommandLimits {
 /// One set-point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Command {
-    /// Which of the fields count.
+    /// Mode, which decides the fields that count.
     pub mode: Mode,
     /// rad; position and impedance modes.
     pub position: f32,
@@ -145,7 +145,7 @@ impl Default for Command {
     }
 }
 
-/// Everything that is asked of the joint in a control step. The set-point is looked at once a round of the motion loop.
+/// Demand on the joint in a control step. The set-point is looked at once a round of the motion loop.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Demand {
     /// For the state machine.

@@ -1,5 +1,5 @@
-//! What a joint is and may do: one record in SI units, checked as a whole and prepared for the control step; task,
-//! host.
+//! Configuration of a joint, what it is and may do: one record in SI units, checked as a whole and prepared for the
+//! control step; task, host.
 //!
 //! It is separate from the friction image: it changes when the joint is built or its limits are set, the image whenever
 //! the friction is learned anew.
@@ -34,7 +34,7 @@ pub struct MotorConfiguration {
     /// Largest d current that weakens the field, A; 0 (off) to the current limit, and to flux linkage over inductance.
     /// See [`crate::motor::field_weakening`].
     pub field_weakening_current: f32,
-    /// How the encoder sits on the motor.
+    /// Alignment of the encoder on the motor.
     pub alignment: EncoderAlignment,
     /// Age of an encoder sample when the control step sees it, s; 0 to 1 ms.
     pub encoder_latency: f32,
@@ -52,7 +52,7 @@ pub struct GearConfiguration {
     pub zero: f32,
 }
 
-/// What the joint may never exceed.
+/// Limits that the joint may never exceed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
     /// Torque at the joint, Nm; 0.01 to 2000.
@@ -98,7 +98,7 @@ impl Limits {
     }
 }
 
-/// How the joint follows its commands.
+/// Gains with which the joint follows its commands.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gains {
     /// Bandwidth of the current loop, Hz; 10 to an eighteenth of the control rate.
@@ -122,7 +122,7 @@ pub struct Gains {
     pub braking_time: f32,
 }
 
-/// Which velocity friction is computed for.
+/// Source of the velocity that friction is computed for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum VelocitySource {
     /// The command's velocity where the mode has one (velocity, position, impedance), the measured one in torque mode.
@@ -139,11 +139,11 @@ pub enum VelocitySource {
 /// moving (docs/energy-guard.md).
 pub const FRICTION_UNCERTAINTY: f32 = 0.6;
 
-/// What adaptation in service does ([`super::adaptation`]).
+/// Request of adaptation in service ([`super::adaptation`]).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum AdaptationRequest {
-    /// Nothing.
+    /// No adaptation.
     #[default]
     Off = 0,
     /// It learns and reports, and does not act.
@@ -152,10 +152,10 @@ pub enum AdaptationRequest {
     On = 2,
 }
 
-/// How much compensation acts.
+/// Configuration of compensation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CompensationConfiguration {
-    /// What is asked for.
+    /// Requested compensation.
     pub request: friction_compensation::compensation::Request,
     /// Share of the estimate that is added; 0 to 1.
     pub gain: f32,
@@ -163,18 +163,18 @@ pub struct CompensationConfiguration {
     pub clamp: f32,
     /// Largest change of the compensation torque, Nm/s.
     pub slew: f32,
-    /// Which velocity friction is computed for.
+    /// Source of the velocity that friction is computed for.
     pub velocity_source: VelocitySource,
     /// Velocity below which compensation fades out in proportion, rad/s; 0.0001 to 10.
     pub standstill_velocity: f32,
-    /// By how much friction may be less than gain times the model, as a part of it; 0 to 1. It is what the energy
-    /// guard may take of a compensation for the measured velocity; see [`super::friction_feedforward`].
+    /// Uncertainty of friction: by how much it may be less than gain times the model, as a part of it; 0 to 1. It is
+    /// what the energy guard may take of a compensation for the measured velocity; see [`super::friction_feedforward`].
     pub uncertainty: f32,
-    /// What adaptation does.
+    /// Requested adaptation.
     pub adaptation: AdaptationRequest,
 }
 
-/// Which torques of the configured load the joint adds by itself ([`super::load_feedforward`]).
+/// Torques of the configured load that the joint adds by itself ([`super::load_feedforward`]).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum LoadFeedforwardRequest {
@@ -223,7 +223,7 @@ pub const LOAD_UNCERTAINTY: f32 = 0.3;
 /// against gravity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LoadConfiguration {
-    /// Which torques are added.
+    /// Torques that are added.
     pub request: LoadFeedforwardRequest,
     /// Inertia about the joint, rotor times the gear ratio squared included, without payload, kg m²; 0 to 1000.
     pub inertia: f32,
@@ -244,7 +244,7 @@ pub struct LoadConfiguration {
 }
 
 impl LoadConfiguration {
-    /// Nothing is known, and nothing is added.
+    /// Unknown load: nothing is added.
     pub const NONE: Self = Self {
         request: LoadFeedforwardRequest::Off,
         inertia: 0.0,
@@ -295,7 +295,7 @@ pub struct BridgeConfiguration {
     pub counts_an_encoder: bool,
     /// The board has an output for a brake chopper.
     pub has_chopper_output: bool,
-    /// What no configuration may exceed.
+    /// Limits that no configuration may exceed.
     pub limits: BoardLimits,
 }
 
@@ -328,7 +328,7 @@ pub const FACTORY_TRIM: u8 = 64;
 /// off by at any temperature.
 const TRIM_STEPS: f32 = 10.0;
 
-/// Everything that a joint is and may do.
+/// Configuration of a joint: everything that it is and may do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Configuration {
     /// Node on the CAN bus, 1 to 127; 255 where none is assigned yet.
@@ -353,7 +353,7 @@ pub struct Configuration {
     pub thermal: ThermalConfiguration,
 }
 
-/// Why a configuration is refused.
+/// Reason for which a configuration is refused.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ConfigurationError {
     /// A value is out of its range.

@@ -161,7 +161,7 @@ impl Settings {
 }
 
 impl ExternalTorque {
-    /// Nothing seen yet.
+    /// Initial state: nothing seen yet.
     pub const NOTHING: Self =
         Self { given: None, known: 0.0, report: Report::NOTHING, noise: 0.0, near: 1.0, above: 0, quiet: 0 };
 

@@ -1,4 +1,4 @@
-//! What can go wrong, and what the joint does about it; control step.
+//! Faults of the joint, and its reactions to them; control step.
 
 /// Faults that the control step detects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,7 +38,7 @@ pub enum Fault {
     BridgeDriver = 16,
 }
 
-/// What a fault leads to.
+/// Reaction to a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reaction {
     /// All transistors off in the same step: without trustworthy current, angle or supply nothing else is safe.
@@ -68,7 +68,7 @@ impl Fault {
         Self::BridgeDriver,
     ];
 
-    /// What it leads to.
+    /// Reaction to this fault.
     pub const fn reaction(self) -> Reaction {
         match self {
             Self::OverSpeed
@@ -155,7 +155,7 @@ impl Faults {
         Self(bits)
     }
 
-    /// Whether this fault is there and no other.
+    /// Returns `true` if this fault is there and no other.
     #[inline(always)]
     pub const fn is_only(self, fault: Fault) -> bool {
         self.0 == fault.bit()
@@ -167,19 +167,19 @@ impl Faults {
         self.0 |= (present as u32) << fault as u32;
     }
 
-    /// Whether there is none.
+    /// Returns `true` if there is none.
     #[inline(always)]
     pub const fn is_empty(self) -> bool {
         self.0 == 0
     }
 
-    /// Whether a fault is in the set.
+    /// Returns `true` if a fault is in the set.
     #[inline(always)]
     pub const fn contains(self, fault: Fault) -> bool {
         self.0 & fault.bit() != 0
     }
 
-    /// What is in both sets.
+    /// Faults in both sets.
     #[inline(always)]
     pub const fn intersection(self, other: Self) -> Self {
         Self(self.0 & other.0)

@@ -34,12 +34,12 @@ pub const RELEASE: f32 = 1.0;
 /// Growth of the speed against its mean, as a fraction, from which the joint counts as speeding up.
 const GROWTH: f32 = 0.01;
 
-/// What compensation does until the next round.
+/// Compensation until the next round.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Compensated {
     /// Torque to add, Nm.
     pub torque: f32,
-    /// What the model said, and why.
+    /// Output of the model, with the reason for it.
     pub output: Output,
     /// Part that standstill and guard let through, 0 to 1.
     pub permitted: f32,
@@ -56,7 +56,7 @@ impl Default for Compensated {
     }
 }
 
-/// What friction depends on besides this joint's motion and torque.
+/// Variables that friction depends on besides this joint's motion and torque.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surroundings {
     /// Of the gear, °C.
@@ -77,7 +77,7 @@ pub struct FrictionFeedforward {
     drift: f32,
     /// Part that the fade at standstill let through in the round before, 0 to 1.
     moving: f32,
-    /// What adaptation adds to the image's torque, Nm.
+    /// Torque that adaptation adds to the image's, Nm.
     adapted: f32,
     /// Reference velocity, rad/s, as a first-order lag follows it; what it lacks is its acceleration.
     reference: Option<f32>,
@@ -185,8 +185,8 @@ impl FrictionFeedforward {
         Compensated { torque, output, permitted }
     }
 
-    /// What adaptation adds to the image's torque: within clamp and slew limit, and nothing of its own where the image
-    /// fades.
+    /// Computes the torque that adaptation adds to the image's: within clamp and slew limit, and nothing of its own
+    /// where the image fades.
     #[inline(always)]
     fn adapt(&mut self, gains: &AdaptationGains, velocity: f32, output: &Output, factors: &Factors) {
         let image = output.torque.to_bits() as f32 * (1.0 / 65536.0);

@@ -83,7 +83,7 @@ impl Packed {
 #[derive(Clone, Copy, Debug)]
 pub struct History {
     ring: [Packed; LENGTH],
-    /// Where the next step goes.
+    /// Place of the next step.
     next: usize,
     frozen: bool,
 }
@@ -120,7 +120,7 @@ impl History {
         self.frozen = false;
     }
 
-    /// Whether a fault stopped it.
+    /// Returns `true` if a fault stopped it.
     pub const fn is_frozen(&self) -> bool {
         self.frozen
     }

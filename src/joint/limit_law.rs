@@ -231,7 +231,7 @@ mod tests {
         assert!(near(highest(2.0 - 0.6, 5.5), 45.0) && highest(2.0 - 0.57, 5.5) < 44.0);
     }
 
-    /// How far a joint gets behind its limit, as a part of the margin, that the whole torque drives onto it from afar.
+    /// Excursion behind its limit, as a part of the margin, of a joint that the whole torque drives onto it from afar.
     /// `inertia` is what of the torque the quick stop's deceleration takes, `damping` counts from T / sqrt(a m) on.
     fn farthest(inertia: f32, damping: f32) -> f32 {
         let active = prepared(|configuration| {

@@ -50,7 +50,7 @@ pub struct Load {
 }
 
 impl Load {
-    /// As configured.
+    /// Load as configured.
     pub fn of(load: &LoadConfiguration) -> Self {
         let moment = load.payload_mass * load.payload_arm;
         Self {
@@ -70,9 +70,9 @@ impl Load {
 /// Parameters of the feedforward, from a configuration.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LoadGains {
-    /// Which torques.
+    /// Torques that are requested.
     pub request: LoadFeedforwardRequest,
-    /// What is moved.
+    /// Load that is moved.
     pub load: Load,
     /// Largest acceleration, rad/s².
     pub acceleration: f32,

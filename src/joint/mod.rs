@@ -78,7 +78,7 @@ use stopping::{QUICK_STOP, Stopping};
 /// Speed below which a braking joint counts as standing, as a part of the velocity limit.
 pub(crate) const STANDING: f32 = 0.01;
 
-/// What the slow task knows and the control step uses.
+/// Values that the slow task knows and the control step uses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slow {
     /// Part of current and torque limit that the winding's temperature permits, 0 to 1. That of the bridge is the
@@ -86,7 +86,7 @@ pub struct Slow {
     pub derating: f32,
     /// Temperature of the gear, °C: for friction.
     pub gear_temperature: f32,
-    /// What friction is in service beside what the image says.
+    /// Corrections in service to the friction of the image.
     pub factors: Factors,
 }
 
@@ -128,7 +128,7 @@ pub struct Joint {
     mean_torque: MeanTorque,
 }
 
-/// What the last step found and did, besides what other parts remember.
+/// Findings and actions of the last step, besides what other parts remember.
 #[derive(Clone, Copy, Debug, Default)]
 struct Found {
     faults: Faults,
@@ -261,7 +261,7 @@ impl Joint {
         bridge
     }
 
-    /// What the last step found and did.
+    /// Findings and actions of the last step.
     pub fn telemetry(&self) -> Telemetry {
         let mut telemetry = Telemetry::NOTHING;
         self.report(&mut telemetry);
@@ -298,7 +298,7 @@ impl Joint {
         self.found.outputs = Outputs::OFF;
     }
 
-    /// What the board's outputs are to do.
+    /// States that the board's outputs are to take.
     #[inline(always)]
     pub fn outputs(&self) -> Outputs {
         self.found.outputs
@@ -321,13 +321,14 @@ impl Joint {
         self.open_loop.window()
     }
 
-    /// Whether the last step completed it.
+    /// Returns `true` if the last step completed it.
     #[inline(always)]
     pub fn has_new_window(&self) -> bool {
         self.machine.state() == State::OpenLoop && self.open_loop.is_complete()
     }
 
-    /// Whether a fault reset waits until the gate driver's fault has been cleared: the board is asked to clear it.
+    /// Returns `true` while a fault reset waits until the gate driver's fault has been cleared: the board is asked to
+    /// clear it.
     #[inline(always)]
     pub fn waits_for_driver(&self) -> bool {
         self.machine.waits_for_driver()
@@ -374,7 +375,7 @@ impl Joint {
         self.offsets.taken_from(measured)
     }
 
-    /// What the observer is given. A few missing samples it bridges with its prediction; a lost encoder counts as
+    /// Encoder sample for the observer. A few missing samples it bridges with its prediction; a lost encoder counts as
     /// standing where it was last seen, because a prediction that nothing corrects runs away.
     #[inline(always)]
     fn encoder_sample(&mut self, active: &Active, measured: &Measurements) -> Option<u32> {
@@ -509,7 +510,8 @@ impl Joint {
         (state, faults)
     }
 
-    /// Whether braking is over. One that operation is enabled after, in the middle of it, may have closed the brake.
+    /// Returns `true` if braking is over. One that operation is enabled after, in the middle of it, may have closed the
+    /// brake.
     #[inline(always)]
     fn has_stopped(&mut self, active: &Active, word: Controlword, motion: &JointMotion) -> bool {
         let closed = self.stopping.closes_brake();

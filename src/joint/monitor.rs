@@ -54,7 +54,7 @@ struct Bucket {
 }
 
 impl Bucket {
-    /// Whether it is full after one more step: after `steps` bad ones in a row.
+    /// Counts one more step; returns `true` if it is full then: after `steps` bad ones in a row.
     #[inline(always)]
     fn step(&mut self, bad: bool, steps: u32) -> bool {
         let full = steps.saturating_mul(2);
@@ -72,19 +72,19 @@ impl Bucket {
     }
 }
 
-/// What the checks that take several steps remember.
+/// Memory of the checks that take several steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Monitor {
     current_sum: Bucket,
     encoder: Bucket,
     /// Steps since the encoder answered.
     silent: u32,
-    /// How many turns the rotor has made is not known any more.
+    /// `true` once the rotor's number of turns is not known any more.
     adrift: bool,
     voltage: Voltage,
 }
 
-/// What the current loop did since it was checked: sums over control steps.
+/// Sums over control steps of the current loop's values since it was checked.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Sums {
     /// Control steps.
@@ -110,7 +110,7 @@ struct Voltage {
     unexplained: Dq,
     /// The same across the magnet's flux in the last round alone, V.
     last_unexplained: f32,
-    /// What the rotor's turning explains, V.
+    /// Voltage that the rotor's turning explains, V.
     induced: Dq,
     /// Current of the rounds' last steps, A.
     current: Dq,
@@ -120,11 +120,11 @@ struct Voltage {
     rounds: Bucket,
     /// Of these rounds, those in which the current missed its reference less the others.
     missed: i32,
-    /// What the last check found.
+    /// Faults that the last check found.
     found: Faults,
 }
 
-/// Whether a value lies within bounds. What is not a number does not.
+/// Returns `true` if a value lies within bounds. What is not a number does not.
 #[inline(always)]
 fn within(value: f32, low: f32, high: f32) -> bool {
     value >= low && value <= high
@@ -139,8 +139,8 @@ fn filter(state: &mut Dq, value: Dq) {
 }
 
 impl Monitor {
-    /// Whether the encoder is lost: it did not answer in several steps. Also at the start, when nothing else is
-    /// watched.
+    /// Returns `true` if the encoder is lost: it did not answer in several steps. Also at the start, when nothing else
+    /// is watched.
     ///
     /// After more than `bridged` silent steps in a row it stays lost, whatever it says: nobody knows how many turns it
     /// made meanwhile.
@@ -206,8 +206,8 @@ impl Monitor {
         faults
     }
 
-    /// What the current loop did in a step in which the bridge switched. `reference` is the wanted current, A; `way`
-    /// the encoder's since the step before, 2^32 a turn: the observer's speed takes some milliseconds to see a
+    /// Takes the current loop's values of a step in which the bridge switched. `reference` is the wanted current, A;
+    /// `way` the encoder's since the step before, 2^32 a turn: the observer's speed takes some milliseconds to see a
     /// rotor stopped by an obstacle, and what its estimate then induces would look like a fault.
     #[inline(always)]
     pub fn current_loop(&mut self, reference: Dq, output: &FieldOrientedOutput, way: f32) {

@@ -7,7 +7,7 @@ use super::command::{Command, CommandLimits, Mode, PROFILES};
 use super::limit_law::Bounds;
 use crate::motor::number::{greater, lesser, limited, or_zero};
 
-/// What a command wants in this round.
+/// Torque, velocity and push that a command wants in this round.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Wanted {
     /// Torque before friction compensation, within every limit, Nm.
@@ -94,7 +94,7 @@ impl MotionLaw {
         zero != before
     }
 
-    /// What the torque of this round must not exceed, compensation included.
+    /// Bounds of the torque of this round, compensation included.
     #[inline(always)]
     pub fn bounds(&self) -> &Bounds {
         &self.bounds
@@ -132,7 +132,7 @@ impl MotionLaw {
         self.position = motion.position;
     }
 
-    /// Whether braking's ramp has come to its end.
+    /// Returns `true` if braking's ramp has come to its end.
     pub fn ramp_is_over(&self) -> bool {
         self.velocity == 0.0
     }

@@ -44,7 +44,7 @@ pub struct MotionLoop {
     held: bool,
 }
 
-/// What a round sees of the joint.
+/// State of the joint as a round sees it.
 pub struct Seen<'a> {
     /// The joint's motion.
     pub motion: &'a JointMotion,
@@ -52,9 +52,9 @@ pub struct Seen<'a> {
     pub derating: f32,
     /// Torque of the measured current, Nm.
     pub measured_torque: f32,
-    /// What else friction depends on.
+    /// Other variables that friction depends on.
     pub surroundings: Surroundings,
-    /// What friction is in service beside what the image says.
+    /// Corrections in service to the friction of the image.
     pub factors: &'a Factors,
 }
 
@@ -111,7 +111,7 @@ impl MotionLoop {
         self.release = active.stops.release_rounds;
     }
 
-    /// Whether an enabled joint holds where it is, because its brake opens or because it is to stop.
+    /// Returns `true` while an enabled joint holds where it is, because its brake opens or because it is to stop.
     #[inline(always)]
     pub fn is_held(&self) -> bool {
         self.held
@@ -184,7 +184,7 @@ impl MotionLoop {
         self.stage
     }
 
-    /// What the command wants.
+    /// Torque, velocity and push that the command wants.
     #[inline(always)]
     pub fn wanted(&self) -> &Wanted {
         &self.wanted
@@ -197,13 +197,13 @@ impl MotionLoop {
         self.law.position()
     }
 
-    /// What compensation adds.
+    /// Compensation that is added.
     #[inline(always)]
     pub fn compensated(&self) -> &Compensated {
         &self.compensated
     }
 
-    /// Whether braking's ramp has come to its end.
+    /// Returns `true` if braking's ramp has come to its end.
     #[inline(always)]
     pub fn ramp_is_over(&self) -> bool {
         self.law.ramp_is_over()

@@ -26,17 +26,17 @@ pub struct Offsets {
     /// Steps of the measurement; behind it, those since something could cause a current.
     steps: u32,
     mean: Phases,
-    /// How often the measurement began anew.
+    /// Number of restarts of the measurement.
     restarts: u32,
 }
 
 impl Offsets {
-    /// Whether the measurement is complete.
+    /// Returns `true` once the measurement is complete.
     pub const fn are_known(&self) -> bool {
         self.steps >= OFFSET_STEPS
     }
 
-    /// Whether the sensors read too much without current, again and again.
+    /// Returns `true` if the sensors read too much without current, again and again.
     pub const fn are_refused(&self) -> bool {
         self.restarts >= REFUSED_READINGS
     }
@@ -107,7 +107,7 @@ impl Joint {
     }
 }
 
-/// Whether sound sensors may read this without current, A; not numbers they may not.
+/// Returns `true` if sound sensors may read this without current, A; not numbers they may not.
 fn are_sound(measured: Phases, largest: f32) -> bool {
     let sound = |value: f32| value <= largest && value >= -largest;
     sound(measured.a) && sound(measured.b) && sound(measured.c)

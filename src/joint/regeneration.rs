@@ -28,7 +28,7 @@ const RECOVERY_STEPS: f32 = 200.0;
 /// again.
 const HYSTERESIS: f32 = 1.25;
 
-/// How much of a braking current is withheld, from one control step to the next.
+/// Withheld part of a braking current, from one control step to the next.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Regeneration {
     /// Part of the current, 0 to 1.

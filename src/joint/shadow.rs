@@ -19,13 +19,14 @@ impl Shadow {
         Self { model, memory: Memory::default() }
     }
 
-    /// What the model would add, for the velocity that was asked for or else measured.
+    /// Torque that the model would add, for the velocity that was asked for or else measured.
     pub fn torque(&mut self, telemetry: &Telemetry) -> Torque {
         torque(&self.model, &mut self.memory, telemetry)
     }
 }
 
-/// What `model` would add, for the velocity that was asked for or else measured, where model and memory lie apart.
+/// Torque that `model` would add, for the velocity that was asked for or else measured, where model and memory lie
+/// apart.
 pub fn torque(model: &FrictionModel, memory: &mut Memory, telemetry: &Telemetry) -> Torque {
     let q16 = |value: f32| (value * 65_536.0) as i32;
     let motion = &telemetry.motion;

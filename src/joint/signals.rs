@@ -1,10 +1,10 @@
-//! What the board measures for a control step, and what the control step tells the board to do; control step.
+//! Measurements of the board for a control step, and the step's commands to the board; control step.
 //!
 //! These two types are the whole seam between the joint and a board, real, emulated or virtual.
 
 use crate::motor::phases::Phases;
 
-/// Everything that one control step knows about the outside world.
+/// Measurements of one control step: everything that it knows about the outside world.
 ///
 /// The board scales its codes to these units with nominal gains; offsets of the current sensors are the joint's
 /// business.
@@ -16,9 +16,9 @@ pub struct Measurements {
     pub bus_voltage: f32,
     /// Rotor angle as a fraction of a mechanical turn, 2^32 a turn, in the encoder's own direction and zero.
     pub encoder: u32,
-    /// Whether the encoder answered, with a good parity or checksum where it has one.
+    /// `true` if the encoder answered, with a good parity or checksum where it has one.
     pub encoder_valid: bool,
-    /// Whether the encoder's zero is where it always is: false for an incremental encoder that has not met its index
+    /// `true` if the encoder's zero is where it always is: false for an incremental encoder that has not met its index
     /// since power-on.
     pub encoder_referenced: bool,
     /// Temperature of the winding's sensor, °C; NaN where the board has none.
@@ -41,10 +41,10 @@ pub enum BridgeState {
     Switching,
 }
 
-/// What the board is to do in the next PWM period.
+/// Command to the board for the next PWM period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bridge {
-    /// Whether the bridge switches at all.
+    /// Switching state of the bridge.
     pub state: BridgeState,
     /// Fraction of the period that the high side conducts, 0 to 1; one half in every phase while the bridge is off.
     pub duties: Phases,
@@ -55,12 +55,12 @@ impl Bridge {
     pub const OFF: Self = Self { state: BridgeState::Off, duties: Phases::uniform(0.5) };
 }
 
-/// What the board's outputs are to do, a bit each; they are off where nobody asks anything of them.
+/// States that the board's outputs are to take, a bit each; they are off where nobody asks anything of them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Outputs(u8);
 
 impl Outputs {
-    /// Nothing: the brake is closed.
+    /// All outputs off: the brake is closed.
     pub const OFF: Self = Self(0);
 
     /// The holding brake is to open; the brake chopper conducts.

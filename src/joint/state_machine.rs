@@ -1,6 +1,6 @@
 //! The drive's state machine (CiA 402-2, "Power drive system finite state automaton"); control step.
 //!
-//! What the network asks for comes as the controlword, what the drive is comes out as the statusword; the bridge
+//! Requests of the network come as the controlword, the state of the drive comes out as the statusword; the bridge
 //! switches only in [`State::OperationEnabled`], [`State::QuickStopActive`], while a fault reaction brakes, and in
 //! [`State::OpenLoop`].
 //!
@@ -111,7 +111,7 @@ impl Controlword {
         self.has(1 << 1)
     }
 
-    /// How far the command lets the machine go, whether or not bit 7 is set.
+    /// Farthest transition that the command permits the machine, whether or not bit 7 is set.
     #[inline(always)]
     const fn permits(self) -> Permits {
         if !self.enables_voltage() {
@@ -128,7 +128,7 @@ impl Controlword {
     }
 }
 
-/// How far a command lets the machine go.
+/// Farthest transition that a command permits the machine.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd)]
 #[repr(u8)]
 enum Permits {
@@ -139,7 +139,7 @@ enum Permits {
     Operation,
 }
 
-/// What the machine is told in a control step besides the controlword.
+/// Inputs of the machine in a control step besides the controlword.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Events<'a> {
     /// The start is complete, and what the mode needs is known.
@@ -154,7 +154,7 @@ pub struct Events<'a> {
     pub stopped: bool,
     /// No command came for longer than a joint permits that then makes a quick stop.
     pub late: bool,
-    /// How the joint stops.
+    /// Configuration of the joint's stops.
     pub stops: &'a StopConfiguration,
 }
 
@@ -172,13 +172,13 @@ pub struct StateMachine {
 }
 
 impl StateMachine {
-    /// Whether a fault reset waits for the gate driver.
+    /// Returns `true` while a fault reset waits for the gate driver.
     #[inline(always)]
     pub const fn waits_for_driver(&self) -> bool {
         self.waits > 0
     }
 
-    /// Where it is.
+    /// State of the machine.
     pub const fn state(&self) -> State {
         self.state
     }
@@ -273,7 +273,7 @@ impl State {
         }
     }
 
-    /// Whether the current loop makes a torque.
+    /// Returns `true` if the current loop makes a torque.
     pub const fn makes_torque(self) -> bool {
         matches!(self, Self::OperationEnabled | Self::QuickStopActive | Self::FaultReactionActive)
     }

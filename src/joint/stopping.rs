@@ -1,5 +1,5 @@
-//! How the joint stops, and who bears its load then: the option codes of CiA 402-2 and a holding brake; task and
-//! control step.
+//! Stops of the joint, and who bears its load then: the option codes of CiA 402-2 and a holding brake; task and control
+//! step.
 //!
 //! | object | what ends the operation | 0 | 1 | 2 | 5, 6 |
 //! |---|---|---|---|---|---|
@@ -25,7 +25,7 @@ use super::{JointMotion, STANDING};
 /// Control steps for which a joint must stand before its bridge switches off.
 const STANDING_STEPS: u32 = 400;
 
-/// How the joint stops, in the numbers of the profile's option codes.
+/// Stop options of the joint, in the numbers of the profile's option codes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StopConfiguration {
     /// Quick stop, 605Ah: 0, 1, 2, 5 or 6.
@@ -50,7 +50,7 @@ pub struct StopConfiguration {
 pub const QUICK_STOP: u8 = 3;
 
 impl StopConfiguration {
-    /// What the profile has, but for "disable operation", which has the bridge off at once.
+    /// Defaults of the profile, but for "disable operation", which has the bridge off at once.
     pub const DEFAULT: Self = Self {
         quick_stop: 2,
         shutdown: 0,
@@ -62,7 +62,7 @@ impl StopConfiguration {
         brake_apply: 0.0,
     };
 
-    /// Whether there is such an option everywhere.
+    /// Returns `true` if there is such an option everywhere.
     pub const fn is_possible(&self) -> bool {
         matches!(self.quick_stop, 0..=2 | 5 | 6)
             && self.shutdown <= 1
@@ -72,7 +72,7 @@ impl StopConfiguration {
             && matches!(self.late_command, 1 | QUICK_STOP)
     }
 
-    /// Whether a quick stop ends in holding.
+    /// Returns `true` if a quick stop ends in holding.
     #[inline(always)]
     pub const fn holds(&self) -> bool {
         self.quick_stop > 2
@@ -96,7 +96,7 @@ pub struct StopGains {
     pub apply_steps: u32,
 }
 
-/// How far a stop has come.
+/// Progress of a stop.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Stopping {
     /// Control steps that it took so far; those of a joint that stands and holds do not count.
@@ -109,7 +109,7 @@ pub struct Stopping {
 }
 
 impl Stopping {
-    /// Whether a stop is under way that may end in the state in which it began.
+    /// Returns `true` while a stop is under way that may end in the state in which it began.
     #[inline(always)]
     pub const fn is_under_way(&self) -> bool {
         self.steps > 0

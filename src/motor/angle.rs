@@ -1,4 +1,4 @@
-//! Where the rotor's magnetic axis is: electrical angle from the encoder's, with sine and cosine; control step.
+//! Angle of the rotor's magnetic axis: electrical angle from the encoder's, with sine and cosine; control step.
 //!
 //! Angles are 32-bit fractions of a turn and wrap with the integers, so a multiple of the encoder's angle is exact
 //! however often it wraps.
@@ -48,7 +48,7 @@ impl ElectricalAngle {
     }
 }
 
-/// Which way the encoder counts while the field turns forward, from phase A to B to C.
+/// Counting direction of the encoder while the field turns forward, from phase A to B to C.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Direction {
     /// Up.
@@ -69,14 +69,14 @@ impl Direction {
     }
 }
 
-/// How the encoder sits on the motor.
+/// Alignment of the encoder on the motor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EncoderAlignment {
     /// Pairs of poles: electrical turns in a mechanical one.
     pub pole_pairs: u32,
-    /// Which way the encoder counts.
+    /// Counting direction of the encoder.
     pub direction: Direction,
-    /// What `direction * pole_pairs * encoder` reads where the d axis lies on phase A.
+    /// Reading of `direction * pole_pairs * encoder` where the d axis lies on phase A.
     pub electrical_zero: ElectricalAngle,
 }
 

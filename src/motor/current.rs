@@ -13,8 +13,8 @@
 //! computing and holding: one and a half periods. Seen from one period to the next, with a = exp(-R T / L), the gains
 //! of that are k_p = w_c L (1 + R T / 2 L) and k_i T = w_c R T.
 //!
-//! What the bridge could not apply is taken out of the integral as if the reference had been one that it could follow
-//! (Hanus' conditioning), so nothing winds up.
+//! Voltage that the bridge could not apply is taken out of the integral as if the reference had been one that it could
+//! follow (Hanus' conditioning), so nothing winds up.
 
 use super::number::{limited, or_zero};
 use super::setting::{SettingError, in_range};
@@ -27,7 +27,7 @@ pub const DELAY_PERIODS: f32 = 1.5;
 /// the integrator's 90° a phase margin of 60° is left.
 pub const LEAST_PERIODS: f32 = 18.0;
 
-/// What the current loop has to know of the motor.
+/// Constants of the motor for the current loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotorConstants {
     /// Resistance of a phase, Ω; 0.001 to 100.
@@ -41,7 +41,7 @@ pub struct MotorConstants {
     pub flux_linkage: f32,
 }
 
-/// What the current loop is to do.
+/// Settings of the current loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CurrentSettings {
     /// The motor.

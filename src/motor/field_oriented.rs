@@ -38,7 +38,7 @@ impl FieldOrientedGains {
     }
 }
 
-/// What a step of field-oriented control starts from.
+/// Inputs of a step of field-oriented control.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FieldOrientedInput {
     /// Phase currents without the sensors' offsets, A.
@@ -53,7 +53,7 @@ pub struct FieldOrientedInput {
     pub reference: Dq,
 }
 
-/// What a step of field-oriented control leads to.
+/// Outputs of a step of field-oriented control.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FieldOrientedOutput {
     /// Duties for the next PWM period; always within the modulation's limits.
@@ -62,7 +62,7 @@ pub struct FieldOrientedOutput {
     pub current: Dq,
     /// Voltage that the duties apply, V.
     pub voltage: Dq,
-    /// Whether less was applied than the loop asked for.
+    /// `true` if less was applied than the loop asked for.
     pub limited: bool,
 }
 

@@ -35,7 +35,7 @@ pub const INDUCED: f32 = 0.7;
 /// The current loop's bandwidth over that of the integrator.
 const SLOWER: f32 = 10.0;
 
-/// What the integrator starts from.
+/// Settings of field weakening.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WeakeningSettings {
     /// Largest d current, A; 0 (off) to flux linkage over inductance.
@@ -85,7 +85,7 @@ impl WeakeningGains {
         }
     }
 
-    /// Whether the field is ever weakened.
+    /// Returns `true` if the field is ever weakened.
     #[inline(always)]
     pub fn is_on(&self) -> bool {
         self.current > 0.0

@@ -19,7 +19,7 @@ use super::transform::{AlphaBeta, Dq, FRAC_1_SQRT_3};
 /// 2 / sqrt 3: from the circle in the hexagon to its corners.
 pub const HIGHEST_VOLTAGE_FRACTION: f32 = 1.154_700_5;
 
-/// How the bridge modulates.
+/// Settings of the bridge's modulation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ModulationSettings {
     /// Longest voltage vector as a fraction of the longest one that fits at any angle: 0.1 to 2 / sqrt 3; up to 1 no
@@ -45,7 +45,7 @@ pub struct Modulated {
     pub duties: Phases,
     /// Voltage at the motor, V: what was asked for, less what did not fit.
     pub applied: AlphaBeta,
-    /// Whether a duty met its limit or the supply was too low.
+    /// `true` if a duty met its limit or the supply was too low.
     pub limited: bool,
 }
 

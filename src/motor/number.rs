@@ -32,7 +32,7 @@ pub fn magnitude(value: f32) -> f32 {
     f32::from_bits(value.to_bits() & !SIGN)
 }
 
-/// Whether a magnitude is greater than a bound, which must not be negative; so is that of NaN.
+/// Returns `true` if a magnitude is greater than a bound, which must not be negative; so is that of NaN.
 #[inline(always)]
 pub fn exceeds(value: f32, bound: f32) -> bool {
     value.to_bits() & !SIGN > bound.to_bits() & !SIGN
@@ -105,7 +105,7 @@ mod tests {
         }
     }
 
-    /// What [`limited`] does, by comparisons of numbers.
+    /// Reference for [`limited`], by comparisons of numbers.
     fn limited_by_comparison(value: f32, bound: f32) -> f32 {
         if value > bound {
             bound

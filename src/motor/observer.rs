@@ -26,7 +26,7 @@ use super::angle::{STEPS, TAU};
 use super::number::{limited, or_zero};
 use super::setting::{SettingError, in_range};
 
-/// How the observer tracks.
+/// Settings of the observer's tracking.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ObserverSettings {
     /// Frequency of the three poles, Hz; 1 Hz to a tenth of the rate.
@@ -110,7 +110,7 @@ impl Motion {
     }
 }
 
-/// What a step of the observer found.
+/// Results of a step of the observer.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Observation {
     /// Motion now: the samples' age is made up for.

@@ -24,7 +24,7 @@ pub const SLEW: f32 = 50.0;
 pub const HIGHEST_SPEED: f32 = 50.0;
 /// Longest time between two commands, s.
 pub const DEADLINE: f32 = 0.1;
-/// What is left of the voltages after a step in which the current exceeded its limit: they halve in 44 steps.
+/// Part of the voltages that is left after a step in which the current exceeded its limit: they halve in 44 steps.
 const BACK_OFF: f32 = 63.0 / 64.0;
 /// One step of the field speed, electrical turns/s.
 const SPEED_STEP: f32 = 0.01;
@@ -84,7 +84,7 @@ pub struct Window {
     pub encoder: u32,
     /// Field in the last step, 2^32 an electrical turn.
     pub field: u32,
-    /// Whether the encoder's zero is known.
+    /// `true` if the encoder's zero is known.
     pub referenced: bool,
 }
 
@@ -104,7 +104,7 @@ impl Window {
     };
 }
 
-/// What depends on the control rate.
+/// Gains that depend on the control rate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OpenLoopGains {
     /// Change of a voltage in a step, V.
@@ -122,7 +122,7 @@ impl OpenLoopGains {
     }
 }
 
-/// What a step starts from.
+/// Inputs of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OpenLoopInput {
     /// Phase currents without the sensors' offsets, A.
@@ -135,11 +135,11 @@ pub struct OpenLoopInput {
     pub bus_voltage: f32,
     /// Encoder, 2^32 a turn.
     pub encoder: u32,
-    /// Whether the encoder's zero is known.
+    /// `true` if the encoder's zero is known.
     pub referenced: bool,
 }
 
-/// What a step leads to.
+/// Outputs of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OpenLoopOutput {
     /// Duties for the next period, within the modulation's limits.
@@ -261,7 +261,7 @@ impl OpenLoop {
         &self.window
     }
 
-    /// Whether the last step completed it.
+    /// Returns `true` if the last step completed it.
     #[inline(always)]
     pub fn is_complete(&self) -> bool {
         self.complete

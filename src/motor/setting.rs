@@ -1,4 +1,4 @@
-//! How a setting of the current loop that is out of its range is refused; task, host.
+//! Refusal of a setting of the current loop that is out of its range; task, host.
 
 /// Names of settings and units of their numbers, in the order of their numbers on the bus (object 2100h:3), and index
 /// and sub-index of the object that sets it or what it is computed from; zeros where that is nobody's to set over the
@@ -111,8 +111,8 @@ impl Name {
         NAMES.get(usize::from(self.0)).map_or("", |(_, unit, ..)| unit)
     }
 
-    /// As object 2100h:3 carries it: index of its object in bits 16 to 31, sub-index in bits 8 to 15, the name's number
-    /// in bits 0 to 7.
+    /// Code as object 2100h:3 carries it: index of its object in bits 16 to 31, sub-index in bits 8 to 15, the name's
+    /// number in bits 0 to 7.
     pub fn code(self) -> u32 {
         /// Objects of the names, without texts.
         static PLACES: [u16; NAMES.len()] = places();
@@ -145,7 +145,7 @@ const fn places() -> [u16; NAMES.len()] {
     places
 }
 
-/// Whether two texts are the same, while compiling.
+/// Returns `true` if two texts are the same, while compiling.
 const fn same(a: &str, b: &str) -> bool {
     let (a, b) = (a.as_bytes(), b.as_bytes());
     let mut at = 0;
@@ -170,7 +170,7 @@ impl PartialEq<&str> for Name {
 /// A setting beyond its range.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SettingError {
-    /// What was to be set.
+    /// Name of the setting.
     pub name: Name,
     /// The refused value.
     pub value: f32,

@@ -1,4 +1,4 @@
-//! How hot the winding is and how much current it still bears; slow task, 100 Hz or so.
+//! Temperature of the winding, and the current that it still bears; slow task, 100 Hz or so.
 //!
 //! Two nodes: copper loss heats the winding, the winding heats the housing (stator iron and shell), the housing heats
 //! the surroundings. Makers of small motors state just these four constants: two thermal resistances and two time

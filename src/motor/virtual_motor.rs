@@ -78,7 +78,7 @@ impl Default for VirtualMotor {
 }
 
 impl VirtualMotor {
-    /// How the encoder really sits on the motor.
+    /// Real alignment of the encoder on the motor.
     pub fn alignment(&self) -> EncoderAlignment {
         let turns = self.encoder_offset * self.pole_pairs as f64 * self.direction.sign() as f64;
         let electrical_zero = ElectricalAngle((turns.rem_euclid(1.0) * 2f64.powi(32)) as u64 as u32);

@@ -57,19 +57,19 @@ pub struct Objects<'a, P> {
     configuration: Configuration,
     staged: Configuration,
     refused: Refused,
-    /// As it was when its number was read.
+    /// Window as it was when its number was read.
     window: Cell<Window>,
     single_bank: bool,
     stores: StoreBudget,
     now: u64,
     heartbeat_lost: bool,
-    /// Whether the start has been reported.
+    /// `true` once the start has been reported.
     told_reset: bool,
     /// A stored object has another value than when it was asked for last.
     changed: bool,
-    /// Whether a master has started the node since the program began.
+    /// `true` if a master has started the node since the program began.
     was_started: bool,
-    /// As it was when communication began; what is stored holds for it.
+    /// Node id as it was when communication began; what is stored holds for it.
     node_id: Cell<u8>,
     reports: Reports,
     profile_modes: [ProfileModes; PROFILE_MODES],
@@ -187,12 +187,12 @@ impl<'a, P: Program> Objects<'a, P> {
         }
     }
 
-    /// What is to be sent as EMCY by [`Server::emergency`](canopen_node::Server::emergency), one at a time.
+    /// Takes the next EMCY that [`Server::emergency`](canopen_node::Server::emergency) is to send, one at a time.
     pub fn take_emergency(&mut self) -> Option<Emergency> {
         self.emergencies.pop_front()
     }
 
-    /// What the program is to do with an image; how that went it tells by [`Objects::finished`].
+    /// Takes the next action of the program on an image; how that went it tells by [`Objects::finished`].
     pub fn take_action(&mut self) -> Action {
         self.images.take_action()
     }
@@ -207,7 +207,7 @@ impl<'a, P: Program> Objects<'a, P> {
         (self.images.staging(), &mut self.program)
     }
 
-    /// How an action went, and what the slots hold now. The next action is there to be taken.
+    /// Takes the outcome of an action, and what the slots hold now. The next action is there to be taken.
     pub fn finished(&mut self, outcome: Result<(), SlotError>, stored: StoredImages) {
         self.images.set_stored(stored);
         if let Some(emergency) = self.images.finished(outcome, self.observed.latched) {
@@ -246,8 +246,8 @@ impl<'a, P: Program> Objects<'a, P> {
         !matches!(state, State::NotReadyToSwitchOn | State::SwitchOnDisabled | State::Fault)
     }
 
-    /// Whether the joint cannot do without its control steps for as long as the erasing of a page takes them on one
-    /// bank: it is armed, or turns so fast that the encoder would lose count of the turns.
+    /// Returns `true` if the joint cannot do without its control steps for as long as the erasing of a page takes them
+    /// on one bank: it is armed, or turns so fast that the encoder would lose count of the turns.
     fn needs_control(&self) -> bool {
         let rotor = self.observed.telemetry.motion.velocity * self.configuration.gear.ratio;
         self.armed() || exceeds(rotor, QUARTER_TURN / ERASING)
@@ -270,8 +270,8 @@ impl<'a, P: Program> Objects<'a, P> {
         }
     }
 
-    /// Whether what is staged differs in any object: a loop over the table is a tenth of the code of comparing the
-    /// records.
+    /// Returns `true` if what is staged differs in any object: a loop over the table is a tenth of the code of
+    /// comparing the records.
     fn is_changed(&self) -> bool {
         table::OBJECTS.iter().any(|object| match object.field {
             Field::Setting(setting) | Field::AtOnce(setting) => {

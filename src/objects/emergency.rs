@@ -63,7 +63,7 @@ fn register(faults: Faults) -> u8 {
     faults.iter().fold(0, |register, fault| register | register_bit(fault))
 }
 
-/// What has been reported.
+/// Reports made so far.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Reports {
     faults: Faults,
@@ -127,7 +127,7 @@ pub(super) fn over(latched: Faults) -> Emergency {
     Emergency { code: RESET, register: register(latched), information: [0; 5] }
 }
 
-/// What a refused image is reported as.
+/// EMCY of a refused image.
 pub(super) fn of_refusal(refusal: Refusal, latched: Faults) -> Emergency {
     let code = match refusal {
         Refusal::TagMissing | Refusal::TagWrong { .. } | Refusal::KeyDamaged => AUTHENTICATION,

@@ -10,7 +10,7 @@ use crate::joint::fault::Faults;
 use friction_compensation::parameters::fault_log::{LOGGED, LoggedFault};
 use heapless::Deque;
 
-/// Whether this program has the log.
+/// `true` if this program has the log.
 pub const LOGS: bool = !cfg!(all(feature = "little-room", target_os = "none"));
 
 /// Faults that may be written at once.
@@ -26,7 +26,7 @@ const WAITING: usize = 8;
 /// Bytes of a fault in 2305h:3.
 const BYTES: usize = 12;
 
-/// What waits to be written, and how much may be.
+/// Faults that wait to be written, and how many may be.
 #[derive(Debug)]
 pub(super) struct FaultLogging {
     left: u8,
@@ -42,7 +42,7 @@ pub(super) struct FaultLogging {
 }
 
 impl FaultLogging {
-    /// Nothing waits, and nothing may be written yet.
+    /// Initial state: nothing waits, and nothing may be written yet.
     pub(super) const fn new() -> Self {
         Self { left: 0, since: 0, waiting: Deque::new(), missed: 0, seen: Faults::NONE, counted: true }
     }

@@ -1,11 +1,11 @@
-//! What an object of this joint is about; any context. The [table](super::table) says which index means which field,
+//! Fields of the objects of this joint; any context. The [table](super::table) says which index means which field,
 //! nothing else does.
 
 use super::operation::Operation;
 use super::settings::Setting;
 use crate::joint::PROFILES;
 
-/// What an object reads or writes.
+/// Field that an object reads or writes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Field {
     /// Served by [`canopen`](canopen_node).
@@ -14,13 +14,13 @@ pub enum Field {
     Highest(u8),
     /// A number that never changes.
     Constant(Constant),
-    /// What is asked of the joint.
+    /// Set-point of the joint.
     SetPoint(SetPoint),
     /// The range of a part of the impedance frame.
     Range(Range),
     /// A number for the profile modes or the statusword.
     Profile(ProfileParameter),
-    /// What the joint measures and does.
+    /// Actual value of the joint.
     Actual(Actual),
     /// A setting of the configuration: staged, and taken with all others by a command.
     Setting(Setting),
@@ -36,13 +36,13 @@ pub enum Field {
     OpenLoop(OpenLoopField),
     /// The life of a parameter image.
     Image(ImageField),
-    /// Who owns the joint.
+    /// Ownership of the joint.
     Owner(OwnerField),
     /// The control steps before a fault.
     History,
-    /// Why the program started.
+    /// Reason for the program's start.
     Reset(ResetField),
-    /// What the board tells of its hardware.
+    /// Report of the board on its hardware.
     Hardware(HardwareField),
     /// State of the storage.
     Storage(StorageField),
@@ -79,7 +79,7 @@ pub enum HardwareField {
     DriverStatus2,
     /// Faults of the gate driver since the start.
     DriverFaults,
-    /// What is missing of the gate driver's set-up.
+    /// Missing part of the gate driver's set-up.
     DriverSetup,
     /// Family and revision of the board.
     Revision,
@@ -87,7 +87,7 @@ pub enum HardwareField {
     OptionsFound,
     /// The same as they are needed.
     OptionsNeeded,
-    /// Which of them are wrong.
+    /// Mask of the wrong ones.
     OptionsWrong,
     /// Sets them.
     SetOptions,
@@ -113,13 +113,13 @@ impl Constant {
 /// A part of why the program started.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ResetField {
-    /// What reset the chip.
+    /// Causes of the chip's reset.
     Causes,
-    /// What stopped the program.
+    /// Cause of the program's stop.
     Stop,
     /// Address of the instruction that it stopped at.
     Address,
-    /// What there is to say of it.
+    /// Detail of that cause.
     Detail,
     /// Stops in a row.
     Repeats,
@@ -127,7 +127,7 @@ pub enum ResetField {
     Place,
 }
 
-/// What is asked of the joint. Everything but the mode ends with the NMT state.
+/// Set-point of the joint. Everything but the mode ends with the NMT state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum SetPoint {
@@ -193,17 +193,17 @@ pub enum ProfileParameter {
     FollowingErrorWindow = 0,
     /// For how long it has to be beyond, ms.
     FollowingErrorTime = 1,
-    /// How near the joint has to be to its target, raw position.
+    /// Distance to the target within which the joint has to be, raw position.
     PositionWindow = 2,
     /// For how long, ms.
     PositionTime = 3,
-    /// How near the velocity has to be to its target, raw velocity.
+    /// Difference to the target velocity within which the velocity has to be, raw velocity.
     VelocityWindow = 4,
     /// Below it the joint stands, raw velocity.
     VelocityThreshold = 5,
     /// Position that the joint has where it is homed, raw.
     HomeOffset = 6,
-    /// How the zero is found.
+    /// Method of finding the zero.
     HomingMethod = 7,
     /// Speed on the way to the index, raw velocity.
     HomingSpeed = 8,
@@ -221,7 +221,7 @@ pub enum ProfileParameter {
 pub(super) const PROFILE_PARAMETERS: usize = if PROFILES { 13 } else { 0 };
 
 impl ProfileParameter {
-    /// Whether it may have this value: not an acceleration of zero, nor a method that there is none of.
+    /// Returns `true` if it may have this value: not an acceleration of zero, nor a method that there is none of.
     pub(super) const fn permits(self, value: u32) -> bool {
         match self {
             Self::HomingMethod => matches!(value, 0 | 33 | 34 | 35 | 37),
@@ -270,7 +270,7 @@ impl Range {
     }
 }
 
-/// What the joint measures and does. The receive interrupt has all of it, for TPDOs that follow SYNC.
+/// Actual value of the joint. The receive interrupt has all of it, for TPDOs that follow SYNC.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Actual {
     /// State machine.
@@ -287,13 +287,13 @@ pub enum Actual {
     TorqueDemand,
     /// Position that the command asks for at this instant.
     PositionDemand,
-    /// What is missing to it.
+    /// Distance that is missing to it.
     FollowingError,
     /// Current that makes torque.
     Current,
     /// Supply, in the profile's unit.
     DcLink,
-    /// What permille of torque refer to.
+    /// Torque that permille of torque refer to.
     RatedTorque,
     /// Code of the first latched fault.
     ErrorCode,
@@ -311,17 +311,17 @@ pub enum Actual {
     GearTemperature,
     /// Faults since the last acknowledgement, a bit each.
     LatchedFaults,
-    /// Which friction model acts.
+    /// Friction model that acts.
     ActingModel,
-    /// Why less acts than was asked for.
+    /// Reason for which less acts than was asked for.
     Reason,
-    /// How often the joint left the range that its friction was learned in.
+    /// Number of departures from the range that the joint's friction was learned in.
     Violations,
-    /// How far the full model would be from what acts.
+    /// Distance of the full model from what acts.
     ShadowRms,
     /// Part of the compensation that standstill and energy guard let through.
     Permitted,
-    /// Whether adaptation learns, or why not.
+    /// Learning state of adaptation: that it learns, or why not.
     Learning,
     /// Factor of the image's friction.
     AdaptedFactor,
@@ -337,9 +337,9 @@ pub enum Actual {
     Collisions,
     /// Version of the image in use.
     ImageVersion,
-    /// Where a staged image stands.
+    /// State of a staged image.
     ImageState,
-    /// What the board's outputs do.
+    /// States of the board's outputs.
     Outputs,
 }
 
@@ -348,7 +348,7 @@ pub enum Actual {
 pub enum ConfigurationField {
     /// 1 takes what is staged, 2 forgets it.
     Command,
-    /// What came of the last command.
+    /// Result of the last command.
     Result,
     /// The setting that was refused.
     RefusedSetting,
@@ -358,7 +358,7 @@ pub enum ConfigurationField {
     Lowest,
     /// Greatest value that is possible.
     Highest,
-    /// Whether what is staged differs from what is in use.
+    /// Flag: what is staged differs from what is in use.
     Changed,
 }
 
@@ -393,7 +393,7 @@ pub enum OpenLoopField {
     Field,
     /// Mean supply.
     BusVoltage,
-    /// Whether the encoder's zero is known.
+    /// Flag: the encoder's zero is known.
     Referenced,
     /// Control steps a second.
     ControlRate,
@@ -408,19 +408,19 @@ pub enum ImageField {
     Staging,
     /// The image in use, as it is stored.
     Active,
-    /// What is to be done with what is staged.
+    /// Command on what is staged.
     Command,
-    /// Why the last command was refused.
+    /// Reason for which the last command was refused.
     Result,
     /// Bytes staged.
     Length,
     /// Of the bytes staged.
     Checksum,
-    /// What is left of a trial.
+    /// Remaining time of a trial.
     TrialLeft,
     /// Time of the trials that follow.
     TrialTime,
-    /// How the last trial ended by itself.
+    /// Reason for which the last trial ended by itself.
     Ending,
     /// A stored image.
     Stored(Which, StoredField),
@@ -433,19 +433,19 @@ pub enum ImageField {
 /// A part of the joint's ownership.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OwnerField {
-    /// Whether the joint has an owner.
+    /// Flag: the joint has an owner.
     KeyPresent,
     /// Number of the key.
     KeyNumber,
     /// The key itself, to be written.
     Key,
-    /// What the next response answers.
+    /// Challenge that the next response answers.
     Challenge,
     /// Opens a session, or takes the key back.
     Response,
-    /// What is left of the session; 0 ends it.
+    /// Remaining time of the session; 0 ends it.
     Session,
-    /// Whether somebody is at the joint.
+    /// Flag: somebody is at the joint.
     Presence,
     /// Takes the key back where somebody is.
     Forget,
@@ -456,11 +456,11 @@ pub enum OwnerField {
 pub enum Which {
     /// In use.
     Active,
-    /// What a roll back would make active.
+    /// Image that a roll back would make active.
     Previous,
 }
 
-/// What is told of a stored image.
+/// Property of a stored image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StoredField {
     /// Version.
@@ -469,8 +469,8 @@ pub enum StoredField {
     Checksum,
     /// Physical model alone, or with a network.
     Model,
-    /// Where it lies.
+    /// Slot in which it lies.
     Slot,
-    /// When it was made.
+    /// Time at which it was made.
     Created,
 }

@@ -1,5 +1,5 @@
-//! How well compensation does over time: departures from the range that friction was learned in, and how far the full
-//! model is from what acts; a task that looks at telemetry at an even rate.
+//! Statistics of compensation over time: departures from the range that friction was learned in, and the distance of
+//! the full model from what acts; a task that looks at telemetry at an even rate.
 
 use crate::joint::Telemetry;
 use crate::motor::number::{or_zero, square_root};

@@ -1,4 +1,4 @@
-//! What the board tells of its hardware, objects 2302h and 2303h; the task.
+//! Report of the board on its hardware, objects 2302h and 2303h; the task.
 
 use super::field::HardwareField;
 use crate::hardware::Hardware;

@@ -13,16 +13,16 @@ use friction_compensation::parameters::authentication::STAGING;
 use friction_compensation::parameters::life_cycle::{Action, Conditions, Ending, LifeCycle, Refusal, State};
 use friction_compensation::parameters::slots::{Slot, SlotError};
 
-/// What the slots hold.
+/// Content of the slots.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StoredImages {
     /// In use, with the slot that it lies in.
     pub active: Option<(Summary, Slot)>,
-    /// What a roll back would make active.
+    /// Image that a roll back would make active.
     pub previous: Option<(Summary, Slot)>,
 }
 
-/// What is true of the joint while an object is written.
+/// State of the joint while an object is written.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Circumstances {
     pub(super) now: u64,
@@ -35,7 +35,7 @@ pub(super) struct Circumstances {
 pub struct Images<'a> {
     staging: &'a mut [u8; STAGING],
     life: LifeCycle,
-    /// Whose key tags are checked with.
+    /// Owner with whose key tags are checked.
     pub(super) owner: Ownership,
     stored: StoredImages,
     action: Action,
@@ -50,7 +50,7 @@ impl<'a> Images<'a> {
         Self { staging, life, owner, stored, action: Action::Nothing, uploads: false, reading: None }
     }
 
-    /// As [`Images::new`], with the owner that there is.
+    /// Restarts as [`Images::new`], with the owner that there is.
     pub(super) fn restart(&mut self, life: LifeCycle, stored: StoredImages) {
         (self.life, self.stored) = (life, stored);
         (self.action, self.uploads, self.reading) = (Action::Nothing, false, None);
@@ -89,7 +89,7 @@ impl<'a> Images<'a> {
         core::mem::replace(&mut self.action, Action::Nothing)
     }
 
-    /// What an action led to, and what is to be reported of it.
+    /// Takes the outcome of an action; returns what is to be reported of it.
     pub(super) fn finished(&mut self, outcome: Result<(), SlotError>, latched: Faults) -> Option<Emergency> {
         self.demand(|life| life.finished(outcome));
         outcome.err().map(|error| of_refusal(error.into(), latched))
@@ -196,7 +196,7 @@ impl<'a> Images<'a> {
         self.stored.active.map_or(0, |(summary, _)| summary.length)
     }
 
-    /// Whether the bytes from `offset` on are of the image whose first bytes were read.
+    /// Returns `true` if the bytes from `offset` on are of the image whose first bytes were read.
     pub(super) fn is_same_image(&mut self, offset: u32) -> bool {
         let now = self.stored.active.map(|(summary, _)| summary.checksum);
         if offset == 0 {
@@ -206,7 +206,7 @@ impl<'a> Images<'a> {
     }
 }
 
-/// Why an upload is not taken.
+/// Reason for which an upload is not taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Failure {
     /// By the life cycle.

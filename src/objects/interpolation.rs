@@ -18,7 +18,7 @@ pub(super) struct Interpolation {
     target: Option<Target>,
     /// Set-point in force when it came.
     from: f32,
-    /// When it came, µs.
+    /// Time at which it came, µs.
     begun: u32,
 }
 

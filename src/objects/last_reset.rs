@@ -1,4 +1,4 @@
-//! Why the program started, as objects and EMCY say it; the task.
+//! Reason for the program's start, as objects and EMCY say it; the task.
 
 use super::emergency::{Emergency, STOPPED, WATCHDOG};
 use super::field::ResetField;
@@ -22,7 +22,7 @@ pub(super) fn place(reset: &LastReset) -> &[u8] {
     reset.stop.as_ref().map_or(&[], |stop| stop.place_bytes())
 }
 
-/// What is sent behind the boot-up message; none where the start was wanted.
+/// EMCY that is sent behind the boot-up message; none where the start was wanted.
 pub(super) fn emergency(reset: &LastReset) -> Option<Emergency> {
     let code = match reset.stop {
         Some(_) => STOPPED,

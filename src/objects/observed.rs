@@ -1,5 +1,4 @@
-//! What is known of the joint at one instant, and the actual values that objects show of it; receive interrupt and
-//! task.
+//! Observation of the joint at one instant, and the actual values that objects show of it; receive interrupt and task.
 
 use super::field::{Actual, SetPoint};
 use super::friction_statistics::FrictionStatistics;
@@ -58,7 +57,7 @@ impl Observed {
         self.telemetry.torque() - self.feedforward_torque - self.telemetry.compensated.torque
     }
 
-    /// Where the joint should be at this instant, rad: where nothing says so, where it is.
+    /// Demanded position at this instant, rad: where nothing demands one, the actual position.
     pub(super) fn position_demand(&self) -> f32 {
         let t = &self.telemetry;
         if t.state.makes_torque() { t.position_demand } else { t.motion.position }
@@ -123,7 +122,7 @@ impl Observed {
     }
 }
 
-/// As an object carries it: the low bytes are the value's, whatever its length.
+/// Value as an object carries it: the low bytes are the value's, whatever its length.
 pub(super) fn signed(value: i32) -> u64 {
     i64::from(value) as u64
 }

@@ -48,7 +48,7 @@ impl Operation {
         self as i8
     }
 
-    /// What the joint does in it while it follows a target.
+    /// Mode of the joint in it while it follows a target.
     pub const fn of_the_joint(self) -> Mode {
         match self {
             Self::OpenLoop => Mode::OpenLoop,
@@ -61,7 +61,7 @@ impl Operation {
         }
     }
 
-    /// Whether 6502h names a profile mode.
+    /// Returns `true` if 6502h names a profile mode.
     pub const fn has_profiles(supported: u32) -> bool {
         supported & (1 << (Self::ProfilePosition as i8 - 1)) != 0
     }

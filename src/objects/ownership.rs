@@ -17,11 +17,11 @@ use friction_compensation::parameters::image::Target;
 /// Presence of sessions and of the rotation of keys in this program. With the feature `little-room` a chip's program
 /// has none: its board has a button, and who presses it is taken for the owner. On the host nothing changes.
 pub const SESSIONS: bool = !cfg!(all(feature = "little-room", target_os = "none"));
-/// How long a session lasts after what was last written in it, ms.
+/// Duration of a session after what was last written in it, ms.
 pub const SESSION: u64 = 60_000;
-/// How long after its supply has come a joint without a button takes its client for somebody who is there, ms.
+/// Time after its supply has come in which a joint without a button takes its client for somebody who is there, ms.
 pub const POWER_UP: u64 = 60_000;
-/// What makes a joint forget its key, where somebody is present: "back".
+/// Number that makes a joint forget its key, where somebody is present: "back".
 pub const FORGET: u32 = u32::from_le_bytes(*b"back");
 /// Longest upload: a masked key and its response.
 pub(super) const UPLOAD: usize = if SESSIONS { KEY + TAG } else { KEY };
@@ -33,21 +33,21 @@ const BOXED: [Setting; 5] =
 /// Number of settings that are remembered as the owner set them.
 const OWNED: usize = if SESSIONS { BOXED.len() } else { 0 };
 
-/// What of the owner is to be kept.
+/// Change of ownership that is to be kept.
 #[derive(Clone, Debug)]
 pub(super) enum Change {
     /// Another key, or the first.
     Key(Key),
     /// No key any more.
     Forgotten,
-    /// What was damaged is kept anew with the key that was left.
+    /// Repaired guard: what was damaged is kept anew with the key that was left.
     Repaired,
 }
 
-/// What is true of the joint when an upload ends.
+/// State of the joint when an upload ends.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
-    /// Whose challenge it is.
+    /// Joint whose challenge it is.
     pub(super) target: Target,
     pub(super) now: u64,
     /// Somebody is at the joint.
@@ -89,7 +89,7 @@ impl Ownership {
         self.key.as_ref()
     }
 
-    /// What was kept is damaged.
+    /// Returns `true` if what was kept is damaged.
     pub(super) fn is_locked(&self) -> bool {
         self.locked
     }
@@ -98,7 +98,7 @@ impl Ownership {
         self.locked || self.key.is_some()
     }
 
-    /// What is to be kept with a floor and a count of failures.
+    /// Guard to be kept, with a floor and a count of failures.
     pub(super) fn guard(&self, floor: u32, failures: u16) -> Guard {
         Guard { floor, failures, key: self.key.clone(), locked: self.locked }
     }
@@ -110,7 +110,7 @@ impl Ownership {
         }
     }
 
-    /// Whether what changes what the joint can do may be written at `now` (ms); the session lasts on then.
+    /// Returns `true` if what changes what the joint can do may be written at `now` (ms); the session lasts on then.
     pub(super) fn permits(&mut self, now: u64) -> bool {
         if !self.is_owned() {
             return true;
@@ -122,14 +122,14 @@ impl Ownership {
         open
     }
 
-    /// Whether a setting that acts at once asks for no more compensation than the owner set, which is open to all. The
-    /// numbers compare as the settings do: each is a choice that rises, or a REAL32, whose bits rise from 0 on and
-    /// are larger for what is negative.
+    /// Returns `true` if a setting that acts at once asks for no more compensation than the owner set, which is open to
+    /// all. The numbers compare as the settings do: each is a choice that rises, or a REAL32, whose bits rise from 0 on
+    /// and are larger for what is negative.
     pub(super) fn is_lowered(&self, setting: Setting, number: u32) -> bool {
         BOXED.iter().zip(&self.owned).any(|(one, owned)| *one == setting && number <= *owned)
     }
 
-    /// What is left of the session, ms.
+    /// Remaining time of the session, ms.
     fn left(&self, now: u64) -> u32 {
         if self.is_owned() { self.end.saturating_sub(now) as u32 } else { 0 }
     }
@@ -171,7 +171,7 @@ impl Ownership {
         }
     }
 
-    /// Whether an upload is for this.
+    /// Returns `true` if an upload is for this.
     pub(super) fn is_receiving(&self) -> bool {
         self.upload.is_some()
     }
@@ -255,7 +255,8 @@ impl Ownership {
         Ok(Some(Change::Key(new)))
     }
 
-    /// Whether somebody who is present may have the joint forget its key, or repair what is damaged of it.
+    /// Change by which the joint forgets its key, or what is damaged of it is repaired, if whoever is present may have
+    /// that.
     pub(super) fn forget(&self, number: u32, place: &Place) -> Result<Change, Abort> {
         match number {
             FORGET if !place.present => Err(Abort::LOCAL_CONTROL),
@@ -265,7 +266,7 @@ impl Ownership {
         }
     }
 
-    /// What there is to keep of a change.
+    /// Guard to be kept of a change.
     pub(super) fn changed(&self, change: &Change, floor: u32, failures: u16) -> Guard {
         match change {
             Change::Key(key) => Guard { floor, failures, key: Some(key.clone()), locked: false },
@@ -280,7 +281,7 @@ impl Ownership {
     }
 }
 
-/// Why an upload is not taken.
+/// Reason for which an upload is not taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Wrong {
     /// Not the response to the challenge: to be counted.

@@ -47,7 +47,7 @@ pub struct JointImage<'a> {
     reaction: [Option<CollisionReaction>; LOADS as usize],
 }
 
-/// What has arrived of an RPDO.
+/// Parts of an RPDO that have arrived.
 #[derive(Clone, Copy, Debug, Default)]
 struct Arrived {
     /// Something that is asked of the joint.
@@ -90,7 +90,7 @@ impl<'a> JointImage<'a> {
         }
     }
 
-    /// What TPDOs carry from now on. Before [`Receiver::receive`](canopen_node::Receiver::receive), at least where
+    /// Sets what TPDOs carry from now on. Before [`Receiver::receive`](canopen_node::Receiver::receive), at least where
     /// the frame is SYNC.
     pub fn observe(&mut self, observed: &Observed) {
         self.observed = *observed;
@@ -132,7 +132,7 @@ impl<'a> JointImage<'a> {
         }
     }
 
-    /// What is asked of the joint at the time that [`JointImage::at`] told.
+    /// Demand on the joint at the time that [`JointImage::at`] told.
     pub fn demand(&self) -> Demand {
         let coupled = Coupled { velocity: self.points.coupled_velocity(), sequence: self.coupled_sequence };
         if self.state != NmtState::Operational {

@@ -16,7 +16,7 @@ use crate::motor::number::{self, magnitude};
 use canopen_node::Abort;
 use core::f32::consts::TAU;
 
-/// How many there are of [`ProfileModes`]: none where a program does not have these modes.
+/// Number of [`ProfileModes`]: none where a program does not have these modes.
 pub(super) const PROFILE_MODES: usize = PROFILES as usize;
 
 /// Bits of the statusword.
@@ -29,19 +29,19 @@ const ERROR: u16 = 1 << 13;
 const TO_INDEX_BACKWARDS: u32 = 33;
 const TO_INDEX: u32 = 34;
 
-/// How long a signal has been within or beyond a limit.
+/// Time since which a signal has been within or beyond a limit.
 #[derive(Clone, Copy, Debug, Default)]
 struct Since(Option<u64>);
 
 impl Since {
-    /// Whether `holds` has been true for `time`, ms.
+    /// Returns `true` if `holds` has been true for `time`, ms.
     fn lasts(&mut self, holds: bool, now: u64, time: u32) -> bool {
         self.0 = holds.then(|| self.0.unwrap_or(now));
         self.0.is_some_and(|since| now.saturating_sub(since) >= u64::from(time))
     }
 }
 
-/// Where homing is.
+/// State of homing.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 enum Homing {
     /// Not begun, or interrupted.
@@ -61,10 +61,10 @@ enum Homing {
     Failed,
 }
 
-/// What is to be done.
+/// Action that is to be done.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Wish {
-    /// Nothing.
+    /// No action.
     Nothing,
     /// This is to be the joint's zero, rad (2102h:2). How that went [`ProfileModes::answer`] is told.
     Zero(f32),
@@ -76,7 +76,7 @@ pub(super) struct ProfileModes {
     arrived: Since,
     astray: Since,
     homing: Homing,
-    /// What is to be known of the wish once it has come true.
+    /// Values that are to be known of the wish once it has come true.
     shift: (f32, f32),
     /// The start of homing was asked for when it was looked at last.
     started: bool,
@@ -230,7 +230,7 @@ impl ProfileModes {
         (wish, bits)
     }
 
-    /// How the wish went. One that the control step had no place for comes again.
+    /// Takes the outcome of the wish. One that the control step had no place for comes again.
     pub(super) fn answer(&mut self, taken: Result<(), Abort>) {
         self.homing = match taken {
             Ok(()) => Homing::Taken(self.shift.0, self.shift.1),

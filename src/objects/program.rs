@@ -1,4 +1,4 @@
-//! What the objects need done at once by the program around them; the task.
+//! Services that the objects need at once of the program around them; the task.
 
 use crate::hardware::Hardware;
 use crate::joint::configuration::{BridgeConfiguration, Configuration, ConfigurationError};
@@ -11,7 +11,7 @@ use friction_compensation::parameters::fault_log::LoggedFault;
 use friction_compensation::parameters::guard::Guard;
 use friction_compensation::parameters::slots::SlotError;
 
-/// Why a configuration is not in use.
+/// Reason for which a configuration is not in use.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum NotConfigured {
     /// It is refused.
@@ -20,7 +20,7 @@ pub enum NotConfigured {
     Busy,
 }
 
-/// What a board, or a simulation of one, does for the objects.
+/// Services of a board, or of a simulation of one, for the objects.
 pub trait Program {
     /// Prepares a configuration, with the friction model in use, and has the control step swap it in.
     fn configure(&mut self, configuration: &Configuration) -> Result<(), NotConfigured>;
@@ -37,13 +37,13 @@ pub trait Program {
     /// Makes a record outlast a loss of power. At start it goes to [`Stored::decode`](super::Stored::decode).
     fn store(&mut self, record: &[u8]) -> Result<(), SlotError>;
 
-    /// Which of images and key was found damaged: bits as of EMCY [`LOST`](super::emergency::LOST). Whether a
-    /// configuration was, [`Start`](super::Start) says.
+    /// Damaged ones of images and key: bits as of EMCY [`LOST`](super::emergency::LOST). Whether a configuration was,
+    /// [`Start`](super::Start) says.
     fn damaged(&self) -> u8 {
         0
     }
 
-    /// So many times a record may still be written: to be kept over a reset that is no power-up.
+    /// Notes how many times a record may still be written: to be kept over a reset that is no power-up.
     fn note_stores_left(&mut self, left: u8);
 
     /// Keeps what guards the joint. The client is answered after that.
@@ -52,7 +52,7 @@ pub trait Program {
     /// Random bytes that nobody can tell in advance; none where there are none, and then no challenge.
     fn random(&mut self) -> Option<[u8; CHALLENGE]>;
 
-    /// Whether the board's button is pressed; none where it has none.
+    /// State of the board's button, `true` while pressed; none where it has none.
     fn button(&self) -> Option<bool> {
         None
     }
@@ -64,7 +64,7 @@ pub trait Program {
     /// step up, which then keeps the bridge off.
     fn history<R>(&self, read: impl FnOnce(&History) -> R) -> Option<R>;
 
-    /// Why the program started; the same until the next start, but for the stops in a row.
+    /// Reason for the program's start; the same until the next start, but for the stops in a row.
     fn last_reset(&self) -> LastReset;
 
     /// Appends a fault to the log that outlives the power: error code, number of the fault, time since the start, s.
@@ -86,7 +86,7 @@ pub trait Program {
         0
     }
 
-    /// What the board tells of its hardware. Where there is none, all zero.
+    /// Report of the board on its hardware. Where there is none, all zero.
     fn hardware(&self) -> Hardware {
         Hardware::default()
     }

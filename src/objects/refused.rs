@@ -1,4 +1,4 @@
-//! What came of the last configuration, readable object by object; the task.
+//! Result of the last configuration, readable object by object; the task.
 
 use super::field::ConfigurationField;
 use crate::joint::configuration::ConfigurationError;

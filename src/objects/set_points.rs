@@ -30,8 +30,8 @@ pub(super) struct SetPoints {
     open_loop: Frame,
 }
 
-/// Which targets there are. A joint must not run to zero, or to where it was to go an hour ago, because nobody said
-/// where to.
+/// Set of the targets that there are. A joint must not run to zero, or to where it was to go an hour ago, because
+/// nobody said where to.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Targets {
     torque: bool,
@@ -45,7 +45,7 @@ struct Targets {
 const UNLIMITED: u32 = u32::MAX;
 /// Those of the profile modes at first: no limits, no offsets.
 const MORE: [u32; 6] = [UNLIMITED, UNLIMITED, UNLIMITED, 1_000, 0, 0];
-/// How many of them are choices, which stay.
+/// Number of choices among them, which stay.
 const CHOICES: usize = 4;
 
 const fn more() -> [u32; PROFILE_SET_POINTS] {
@@ -76,7 +76,8 @@ impl SetPoints {
         open_loop: Frame { voltage: 0, speed: 0, along: 0, across: 0 },
     };
 
-    /// As if there had never been one. Mode, profile and largest torque are choices, not set-points, and stay.
+    /// Set-points as if there had never been one. Mode, profile and largest torque are choices, not set-points, and
+    /// stay.
     pub(super) fn forgotten(&self) -> Self {
         let mut none = Self { mode: self.mode, ..Self::NONE };
         none.more.iter_mut().zip(self.more).take(CHOICES).for_each(|(place, value)| *place = value);
@@ -84,8 +85,8 @@ impl SetPoints {
         none
     }
 
-    /// What an RPDO, or a value by SDO, makes of the set-points `before` it. `position` tells whether it carries one,
-    /// `actual` where the joint is, raw.
+    /// Transition from the set-points `before` an RPDO, or a value by SDO, to these. `position` tells whether it
+    /// carries one, `actual` where the joint is, raw.
     ///
     /// Where it enables operation or enters another mode no target counts: the joint holds where it is until one comes.
     /// A position has to be another one then, because a PDO carries all of its objects, also those that the master has
@@ -151,7 +152,7 @@ impl SetPoints {
         self.targets.position |= set_point == SetPoint::TargetPosition;
     }
 
-    /// Whether there is a target for the mode, and nothing halts the joint.
+    /// Returns `true` if there is a target for the mode, and nothing halts the joint.
     fn follows(&self) -> bool {
         let target = match self.mode {
             Operation::Torque => self.targets.torque,
@@ -291,7 +292,7 @@ impl SetPoints {
         1e-6 * self.position.saturating_add(offset) as f32
     }
 
-    /// What is added to the target of one mode, raw.
+    /// Offset that is added to the target of one mode, raw.
     fn offset(&self, mode: Operation, set_point: SetPoint) -> i32 {
         if PROFILES && self.mode == mode { self.more(set_point) as i32 } else { 0 }
     }

@@ -1,4 +1,4 @@
-//! What the receive interrupt and the task both need of the objects; atomics, any context. A static that both borrow.
+//! State of the objects that the receive interrupt and the task share; atomics, any context. A static that both borrow.
 //!
 //! The set-points belong to the interrupt: RPDOs set them, and an RPDO counts as a whole. A set-point that the task is
 //! written by SDO goes through a place for one value, which the interrupt empties; what the task reads of set-points is
@@ -29,13 +29,13 @@ pub struct Shared {
     rated_current: AtomicU32,
     follows: AtomicBool,
     locked: AtomicBool,
-    /// Where a program has them.
+    /// Profile modes, where a program has them.
     profile: [ProfileModes; PROFILES as usize],
     image_version: AtomicU32,
     image_state: AtomicU8,
 }
 
-/// What interrupt and task tell each other of the profile modes.
+/// Words that interrupt and task exchange about the profile modes.
 #[derive(Debug)]
 struct ProfileModes {
     parameters: [AtomicU32; PROFILE_PARAMETERS],
@@ -48,7 +48,7 @@ struct ProfileModes {
     position: AtomicU32,
     /// Bits of the statusword. Task.
     status: AtomicU16,
-    /// Where homing goes, rad. Task.
+    /// Destination of homing, rad. Task.
     homing: AtomicU32,
     homes: AtomicBool,
 }
@@ -96,7 +96,7 @@ impl Value {
 }
 
 impl Shared {
-    /// Nothing written, default ranges; torque counts as 0 until the task has said what it refers to.
+    /// Initial state: nothing written, default ranges; torque counts as 0 until the task has said what it refers to.
     #[allow(clippy::new_without_default, reason = "it belongs into a static")]
     pub const fn new() -> Self {
         let [position, velocity, stiffness, damping, torque] = DEFAULT_RANGES;
@@ -122,8 +122,8 @@ impl Shared {
         }
     }
 
-    /// Whether a set-point that came by SDO waits for [`JointImage::follow`](super::JointImage::follow). The task looks
-    /// here after each SDO request and then has the interrupt run.
+    /// Returns `true` while a set-point that came by SDO waits for [`JointImage::follow`](super::JointImage::follow).
+    /// The task looks here after each SDO request and then has the interrupt run.
     pub fn has_written(&self) -> bool {
         self.written.load(Ordering::Acquire)
     }
@@ -199,7 +199,7 @@ impl Shared {
         }
     }
 
-    /// What the permille of torque refer to, Nm; 0 before the task has said so.
+    /// Torque that permille of torque refer to, Nm; 0 before the task has said so.
     pub(super) fn rated_torque(&self) -> f32 {
         f32::from_bits(self.rated_torque.load(Ordering::Relaxed))
     }
@@ -215,7 +215,7 @@ impl Shared {
         self.rated_torque.store(torque.to_bits(), Ordering::Relaxed);
     }
 
-    /// What the permille of current refer to, A; 0 before the task has said so.
+    /// Current that permille of current refer to, A; 0 before the task has said so.
     pub(super) fn rated_current(&self) -> f32 {
         f32::from_bits(self.rated_current.load(Ordering::Relaxed))
     }
@@ -296,7 +296,7 @@ impl Shared {
         }
     }
 
-    /// Where homing goes, rad, at what speed and acceleration, raw.
+    /// Destination of homing, rad, its speed and acceleration, raw.
     pub(super) fn homing(&self) -> Option<(f32, u32, u32)> {
         let modes = self.profile.first().filter(|modes| modes.homes.load(Ordering::Acquire))?;
         let acceleration = self.parameter(ProfileParameter::HomingAcceleration);
@@ -312,7 +312,7 @@ impl Shared {
         modes.homes.store(position.is_some(), Ordering::Release);
     }
 
-    /// Whether the joint, once enabled, follows its mode's target.
+    /// Returns `true` if the joint, once enabled, follows its mode's target.
     pub(super) fn follows(&self) -> bool {
         self.follows.load(Ordering::Relaxed)
     }

@@ -1,5 +1,5 @@
-//! What object 1010h stores: configuration, impedance ranges and communication parameters as one record of bytes; the
-//! task, host.
+//! Content of object 1010h's store: configuration, impedance ranges and communication parameters as one record of
+//! bytes; the task, host.
 //!
 //! | offset | bytes | content |
 //! |---|---|---|
@@ -47,7 +47,7 @@ pub struct Stored {
 /// A part of a new record.
 #[derive(Clone, Copy, Debug)]
 pub enum Part<T> {
-    /// As in the record before.
+    /// Unchanged from the record before.
     Kept,
     /// Left out: defaults.
     Removed,
@@ -80,7 +80,7 @@ fn parse(record: &[u8]) -> Option<(u8, u8, impl Iterator<Item = (u16, u8, u32)>)
     Some((if matches!(node_id, 1..=127) { node_id } else { NO_NODE_ID }, of, items))
 }
 
-/// Whether an index is one of the server's objects.
+/// Returns `true` if an index is one of the server's objects.
 const fn is_communication(index: u16) -> bool {
     index < 0x2000
 }
@@ -131,7 +131,7 @@ impl Writer<'_> {
 }
 
 impl Stored {
-    /// What there is without a record.
+    /// Content without a record.
     pub const NOTHING: Self = Self { node_id: NO_NODE_ID, lost: false, application: None };
 
     /// The configuration to start with, where `defaults` are the board's. It may hold values out of their ranges, if
@@ -216,7 +216,7 @@ impl Update<'_> {
     }
 }
 
-/// Whether a range can be used.
+/// Returns `true` if a range can be used.
 pub(super) fn is_range(range: Range, value: f32) -> bool {
     value > 0.0 && value <= range.widest()
 }

@@ -1,4 +1,4 @@
-//! What the codes of a board's converters mean: phase currents and the supply; control step.
+//! Meaning of the codes of a board's converters: phase currents and the supply; control step.
 
 use crate::motor::phases::Phases;
 

@@ -4,7 +4,7 @@
 /// as one state of A and B, and its edge depends on the direction.
 const INDEX_TOLERANCE: u16 = 4;
 
-/// What turns counts into an angle.
+/// Conversion of counts into an angle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Incremental {
     counts_per_turn: u16,
@@ -38,8 +38,8 @@ impl Incremental {
         (count as u32).wrapping_mul(self.scale).wrapping_sub(self.zero)
     }
 
-    /// Whether the angle's zero is the index: without it a rotor that was switched on elsewhere has another electrical
-    /// zero.
+    /// Returns `true` if the angle's zero is the index: without it a rotor that was switched on elsewhere has another
+    /// electrical zero.
     #[inline(always)]
     pub const fn is_referenced(&self) -> bool {
         self.index.is_some()

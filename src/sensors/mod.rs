@@ -1,4 +1,4 @@
-//! What a sensor's raw word means: pure functions that the board, the emulator and the tests share.
+//! Meaning of a sensor's raw word: pure functions that the board, the emulator and the tests share.
 
 pub mod analog;
 pub mod as5047p;

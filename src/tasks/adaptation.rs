@@ -7,11 +7,11 @@ use critical_section::Mutex;
 use joint_firmware::joint::adaptation::{ADAPTS, Adaptation, Factors, Report, Settings};
 use joint_firmware::joint::{Active, Telemetry};
 
-/// What was prepared last, and how many friction models came before it.
+/// Settings that were prepared last, and the number of friction models before.
 static SETTINGS: Mutex<Cell<(Settings, u32)>> = Mutex::new(Cell::new((Settings::OFF, 0)));
 
-/// What is prepared counts for adaptation from now on; with a model that nothing has been learned for, or with the one
-/// before.
+/// Puts what is prepared into effect for adaptation from now on; with a model that nothing has been learned for, or
+/// with the one before.
 pub fn prepared(active: &Active, new_model: bool) {
     if ADAPTS {
         let settings = Settings::of(active);
@@ -30,7 +30,7 @@ pub struct Adapting {
 }
 
 impl Adapting {
-    /// Nothing learned.
+    /// Initial state: nothing learned.
     pub const NOTHING: Self =
         Self { estimate: [Adaptation::NOTHING; ADAPTS as usize], model: 0, acting: Factors::IMAGE };
 

@@ -9,11 +9,11 @@ use joint_firmware::joint::external_torque::{self, ExternalTorque, Report};
 use joint_firmware::joint::load_feedforward::{LOADS, LoadFeedforward, LoadGains};
 use joint_firmware::joint::{Active, Telemetry};
 
-/// What was prepared last.
+/// Gains and settings that were prepared last.
 static PREPARED: Mutex<Cell<(LoadGains, external_torque::Settings)>> =
     Mutex::new(Cell::new((LoadGains::NONE, external_torque::Settings::NONE)));
 
-/// What is prepared counts from now on.
+/// Puts what is prepared into effect from now on.
 pub fn prepared(active: &Active) {
     if LOADS {
         let settings = external_torque::Settings::of(active);

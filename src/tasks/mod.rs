@@ -22,8 +22,8 @@ const HEALTHY: Duration = Duration::from_secs(10);
 /// A button counts as pressed after so many milliseconds: contacts bounce.
 const DEBOUNCE_MS: u32 = 20;
 
-/// Why the joint does not start. Without the control interrupt the bridge stays off. The watchdog is not started: a
-/// board that stands still is easier to look into than one that resets for ever.
+/// Reason for which the joint does not start. Without the control interrupt the bridge stays off. The watchdog is not
+/// started: a board that stands still is easier to look into than one that resets for ever.
 pub enum NotStarted {
     /// The board.
     Board(StartError),
@@ -51,7 +51,7 @@ impl From<ConfigurationError> for NotStarted {
     }
 }
 
-/// What of the first configuration is needed besides the control step.
+/// Values of the first configuration that are needed besides the control step.
 pub struct Started {
     /// For the thermal model.
     thermal: ThermalSettings,

@@ -14,7 +14,7 @@ const SETTINGS: Settings = Settings {
     acceleration: 30.0,
 };
 
-/// What a joint is that moves to and fro, once in 2 s and 1.5 rad/s at the fastest.
+/// Ground truth of a joint that moves to and fro, once in 2 s and 1.5 rad/s at the fastest.
 #[derive(Clone, Copy)]
 struct Truth {
     factor: f64,

@@ -16,7 +16,7 @@ use std::collections::BTreeSet;
 
 const BOARDS: [(&str, BoardConfiguration); 2] = [("b-g431b-esc1", B_G431B_ESC1), ("moteus-r4", MOTEUS_R4)];
 
-/// What may take part in harming a bridge; each is tried with each other.
+/// Settings that may take part in harming a bridge; each is tried with each other.
 const ELECTRICAL: [Setting; 25] = [
     Setting::Resistance,
     Setting::InductanceD,
@@ -103,7 +103,7 @@ fn started(board: &BoardConfiguration) -> Joint {
     rig::started(&board.joint.prepare(&board.bridge).unwrap())
 }
 
-/// What is accepted is within the facts of the board and of the bridge's timing that no measurement shows.
+/// Asserts that what is accepted is within the facts of the board and of the bridge's timing that no measurement shows.
 fn is_borne(board: &BoardConfiguration, accepted: &Configuration) {
     let (bears, rate) = (&board.bridge.limits, board.bridge.rate);
     let Configuration { motor, gear, limits, gains, .. } = accepted;

@@ -113,7 +113,7 @@ fn every_command_leads_from_every_state_to_the_one_that_the_profile_names() {
     }
 }
 
-/// What the machine does in "operation enabled" with an option, before and after the joint has stopped.
+/// States of the machine from "operation enabled" with an option, before and after the joint has stopped.
 fn with(change: fn(&mut StopConfiguration), word: Controlword, late: bool) -> [State; 2] {
     let mut stops = StopConfiguration::DEFAULT;
     change(&mut stops);

@@ -50,7 +50,8 @@ impl<P: Program> Objects<'_, P> {
         self.program.keep(&self.images.owner.guard(life.floor(), life.failures()))
     }
 
-    /// Whether one more failure is to be kept: whoever sends wrong tags on and on must not wear the flash out.
+    /// Returns `true` if one more failure is to be kept: whoever sends wrong tags on and on must not wear the flash
+    /// out.
     fn is_counted(&self, before: u16) -> bool {
         let count = self.images.life().failures();
         count != before && count.is_power_of_two() && self.is_writable()
@@ -68,7 +69,7 @@ impl<P: Program> Objects<'_, P> {
         self.program.button().unwrap_or_else(new)
     }
 
-    /// What changes what the joint can do wants its owner's session.
+    /// Checks for the owner's session, without which nothing may change what the joint can do.
     pub(super) fn authorise(&mut self) -> Result<(), Abort> {
         if self.images.owner.permits(self.now) || !SESSIONS && self.is_present() {
             Ok(())

@@ -84,15 +84,15 @@ pub struct Object {
     pub sub_index: u8,
     /// Data type.
     pub data_type: DataType,
-    /// What an SDO client may do with it.
+    /// Access of an SDO client.
     pub access: Access,
-    /// Which PDOs it may be part of.
+    /// PDOs that it may be part of.
     pub mappable: Mappable,
-    /// What it is about.
+    /// Field that it reads or writes.
     pub field: Field,
 }
 
-/// What people are told of an entry.
+/// Texts of an entry for people.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Text {
     /// Name of the object: what all its sub-indices share.
@@ -105,7 +105,7 @@ pub struct Text {
     pub scale: f64,
     /// Lowest and highest value that is taken, in that unit, whatever the other settings are.
     pub limits: Option<(f64, f64)>,
-    /// What it is.
+    /// Description of the entry.
     pub description: &'static str,
 }
 
@@ -123,8 +123,8 @@ const fn within(low: f64, high: f64) -> Option<(f64, f64)> {
     Some((low, high))
 }
 
-/// Whether an object is there for the profile modes, homing or the limits and offsets of a command: not every program
-/// has these ([`PROFILES`](crate::joint::PROFILES)).
+/// Returns `true` if an object is there for the profile modes, homing or the limits and offsets of a command: not every
+/// program has these ([`PROFILES`](crate::joint::PROFILES)).
 pub const fn is_of_profiles(object: &Object) -> bool {
     use super::field::{Actual, SetPoint};
     matches!(
@@ -144,21 +144,21 @@ pub const fn is_of_profiles(object: &Object) -> bool {
     )
 }
 
-/// Whether an object is there for the model of the load: not every program has it
+/// Returns `true` if an object is there for the model of the load: not every program has it
 /// ([`LOADS`](crate::joint::load_feedforward::LOADS)).
 pub const fn is_of_the_load(object: &Object) -> bool {
     matches!(object.index, 0x2202 | 0x2203)
 }
 
-/// Whether an object wants room that not every program has: those of the profile modes, of the load, the SYNC counter,
-/// date and time of the configuration, the log of faults. A program has all of these or none; 6502h tells which
-/// ([`Operation::has_profiles`](super::Operation::has_profiles)).
+/// Returns `true` if an object wants room that not every program has: those of the profile modes, of the load, the SYNC
+/// counter, date and time of the configuration, the log of faults. A program has all of these or none; 6502h tells
+/// which ([`Operation::has_profiles`](super::Operation::has_profiles)).
 pub const fn wants_room(object: &Object) -> bool {
     let own = matches!((object.index, object.sub_index), (0x1019 | 0x1020 | 0x2305, _) | (0x1800..=0x19FF, 6));
     own || is_of_profiles(object) || is_of_the_load(object)
 }
 
-/// Whether this program has the row.
+/// Returns `true` if this program has the row.
 const fn is_there(object: &Object) -> bool {
     (crate::joint::PROFILES || !wants_room(object))
         && (crate::joint::load_feedforward::LOADS || !is_of_the_load(object))
@@ -205,11 +205,11 @@ const ROOMS: [Room; 7] =
 
 /// The application's objects, sorted by index and sub-index.
 pub static OBJECTS: [Object; LENGTH] = ALL.0;
-/// What people are told of them, in the same order.
+/// Texts of them for people, in the same order.
 pub static TEXTS: [Text; LENGTH] = ALL.1;
 /// The server's own objects, sorted; those of the PDOs are the same for each of the four.
 pub static COMMUNICATION: [Object; COMMUNICATION_LENGTH] = COMMUNICATION_ALL.0;
-/// What people are told of them, in the same order.
+/// Texts of them for people, in the same order.
 pub static COMMUNICATION_TEXTS: [Text; COMMUNICATION_LENGTH] = COMMUNICATION_ALL.1;
 
 const LENGTH: usize = length(&ROOMS);
@@ -217,7 +217,7 @@ const ALL: ([Object; LENGTH], [Text; LENGTH]) = join(&ROOMS);
 const COMMUNICATION_LENGTH: usize = length(&communication::ROOMS);
 const COMMUNICATION_ALL: ([Object; COMMUNICATION_LENGTH], [Text; COMMUNICATION_LENGTH]) = join(&communication::ROOMS);
 
-/// Whether row `at` is the first of a record.
+/// Returns `true` if row `at` is the first of a record.
 const fn begins_record(objects: &[Object], at: usize) -> bool {
     objects[at].sub_index != 0 && (at == 0 || objects[at - 1].index != objects[at].index)
 }
@@ -293,7 +293,7 @@ pub fn find(index: u16, sub_index: u8) -> Option<&'static Object> {
     OBJECTS.get(place.ok()?)
 }
 
-/// Whether the application has an object of this index.
+/// Returns `true` if the application has an object of this index.
 pub fn exists(index: u16) -> bool {
     OBJECTS.get(OBJECTS.partition_point(|object| object.index < index)).is_some_and(|object| object.index == index)
 }

@@ -11,7 +11,7 @@ The object dictionary of the joint, made from the tables in `src/objects/table/`
 be mapped into RPDOs, T into TPDOs.
 ";
 
-/// What an SDO client may do with it.
+/// Access of an SDO client.
 pub fn access(object: &Object) -> &'static str {
     match object.access {
         Access::ReadOnly => "ro",

@@ -19,7 +19,8 @@ fn text_of(file: &str) -> String {
     std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{file}: {error}"))
 }
 
-/// Whether a file has a test that runs: a function behind `#[test]`, or a name that a harness of its own runs.
+/// Returns `true` if a file has a test that runs: a function behind `#[test]`, or a name that a harness of its own
+/// runs.
 fn is_a_test(file: &str, name: &str) -> bool {
     let text = text_of(file);
     if let Some((before, _)) = text.split_once(&format!("fn {name}(")) {

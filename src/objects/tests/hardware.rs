@@ -1,4 +1,4 @@
-//! What the board tells of its hardware, and what a master may do with it.
+//! Report of the board on its hardware, and what a master may do with it.
 
 use super::Node;
 use crate::hardware::chip_options::{COMMAND, ChipOptions};

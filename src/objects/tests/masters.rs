@@ -40,11 +40,11 @@ struct Touched {
     name: &'static str,
     master: &'static str,
     what_for: &'static str,
-    /// Whether it is written.
+    /// `true` if it is written.
     written: bool,
-    /// Why the joint has none; empty where it has it.
+    /// Reason for which the joint has none; empty where it has it.
     missing: &'static str,
-    /// What shows it.
+    /// Evidence for it.
     tests: &'static [Evidence],
 }
 

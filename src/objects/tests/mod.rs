@@ -54,7 +54,7 @@ pub struct Memory {
     pub record: Option<Vec<u8>>,
     pub kept: Vec<Guard>,
     pub drawn: u8,
-    /// Whether there are random numbers.
+    /// `true` if there are random numbers.
     pub draws: bool,
     pub button: Option<bool>,
     pub image: Vec<u8>,
@@ -64,7 +64,7 @@ pub struct Memory {
     pub damaged: u8,
     pub reset: LastReset,
     pub hardware: Hardware,
-    /// How often the chip's options were set.
+    /// Number of times that the chip's options were set.
     pub options_set: u32,
     /// Number of records that may be written, as told last.
     pub stores_left: Option<u8>,
@@ -73,7 +73,7 @@ pub struct Memory {
     /// Log of faults, and whether the flash takes them.
     pub logged: Vec<LoggedFault>,
     pub logs: bool,
-    /// How often this power-up was counted.
+    /// Number of times that this power-up was counted.
     pub counted: u32,
 }
 
@@ -211,7 +211,7 @@ pub struct Node {
     pub observed: Observed,
     queue: VecDeque<Frame>,
     pub now: u32,
-    /// Everything that came over the bus, as whoever listens has it.
+    /// Frames that came over the bus, as whoever listens has them.
     pub heard: Vec<Frame>,
 }
 

@@ -1,4 +1,4 @@
-//! Who owns the joint: each way in that is not the owner's, tried over SDO.
+//! Ownership of the joint: each way in that is not the owner's, tried over SDO.
 
 use super::*;
 use crate::objects::ownership::{FORGET, POWER_UP, SESSION};
@@ -62,7 +62,7 @@ fn rotation(owner: &Key, new: &Key, challenge: &Challenge) -> Vec<u8> {
     [masked, owner.respond(Purpose::Rotate, challenge, &masked)].concat()
 }
 
-/// What wants the owner, as an object with a value that it takes otherwise.
+/// Objects that want the owner, each with a value that it takes otherwise.
 fn protected() -> Vec<(u16, u8, Vec<u8>)> {
     let real = |value: f32| value.to_le_bytes().to_vec();
     vec![

@@ -96,7 +96,7 @@ fn a_joint_that_was_not_told_where_to_go_holds_where_it_is() {
     }
 }
 
-/// Nothing is asked of the joint but to stay where it is.
+/// Command to stay where it is, and nothing else.
 const HOLD: Command = Command { mode: Mode::Hold, ..Command::NOTHING };
 
 #[test]

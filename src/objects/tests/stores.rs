@@ -23,7 +23,7 @@ impl Node {
         self.objects.program().stores
     }
 
-    /// So many milliseconds after power-up, and from then on.
+    /// Sets the time since power-up, ms, from then on.
     fn is_at(&mut self, now: u32) {
         self.now = now * 1_000;
         let observed = self.observed;

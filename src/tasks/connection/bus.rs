@@ -15,9 +15,9 @@ use friction_compensation::parameters::slots::SlotError;
 use joint_firmware::joint::state_machine::State;
 use joint_firmware::objects::{Objects, StoredImages};
 
-/// How often timers are looked at where nothing arrives.
+/// Period with which timers are looked at where nothing arrives.
 const TICK: Duration = Duration::from_millis(1);
-/// How long the node stays away after bus-off: whatever disturbs the bus is given time to end.
+/// Time for which the node stays away after bus-off: whatever disturbs the bus is given time to end.
 const AWAY: Duration = Duration::from_millis(100);
 
 /// The task's part of the node.
@@ -26,11 +26,11 @@ pub struct Node {
     server: Server<'static>,
     objects: &'static mut Objects<'static, BoardProgram>,
     stored: StoredImages,
-    /// What the control step has not taken yet.
+    /// Action that the control step has not taken yet.
     waiting: Option<Action>,
     /// Bytes of the staged image that is to run in shadow.
     shadow: Option<usize>,
-    /// As it was when looked at last, and since when.
+    /// Condition as it was when looked at last, and since when.
     condition: (Condition, Instant),
 }
 
@@ -54,7 +54,7 @@ pub async fn serve(node: &'static mut Node) {
     }
 }
 
-/// Nothing is under current.
+/// Returns `true` if nothing is under current.
 const fn is_off(state: State) -> bool {
     matches!(state, State::NotReadyToSwitchOn | State::SwitchOnDisabled | State::Fault)
 }
@@ -154,7 +154,8 @@ impl Node {
         }
     }
 
-    /// How an action went; none while the control step has not taken what it was offered before.
+    /// Carries out an action and returns its outcome; none while the control step has not taken what it was offered
+    /// before.
     fn carry_out(&mut self, action: Action) -> Option<Result<(), SlotError>> {
         let configuration = *self.objects.configuration();
         let (staging, program) = self.objects.staging_and_program();

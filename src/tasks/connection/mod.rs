@@ -21,11 +21,11 @@ use joint_firmware::objects::{FrictionStatistics, Observed};
 use program::BoardProgram;
 use store::Store;
 
-/// What of the board belongs to the bus.
+/// Parts of the board that belong to the bus.
 pub struct Parts {
     /// The CAN controller.
     pub can: CanConfigurator<'static>,
-    /// Where parameters lie.
+    /// Flash in which parameters lie.
     pub flash: Peri<'static, FLASH>,
 }
 
@@ -61,7 +61,7 @@ impl Connection {
     }
 }
 
-/// What the bus shows of the joint beside its control steps.
+/// State of the joint that the bus shows beside its control steps.
 pub struct Watching {
     statistics: FrictionStatistics,
     /// Of the model in shadow.

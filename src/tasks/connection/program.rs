@@ -1,4 +1,4 @@
-//! What the board does for the objects: configurations and friction models to the control step, records to flash.
+//! Services of the board for the objects: configurations and friction models to the control step, records to flash.
 //! Thread mode.
 
 use super::super::{adaptation, load};
@@ -33,7 +33,7 @@ pub struct BoardProgram {
     window: RefCell<Subscriber<Window>>,
     /// The flash.
     pub store: Store,
-    /// As kept in flash.
+    /// Guard as kept in flash.
     pub guard: Guard,
     /// The master asked for a start of the whole program.
     pub restart: bool,

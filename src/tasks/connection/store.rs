@@ -1,4 +1,4 @@
-//! What the board keeps in flash: friction images, the stored record of objects, the key with what guards it. Thread
+//! Storage of the board in flash: friction images, the stored record of objects, the key with what guards it. Thread
 //! mode.
 //!
 //! | pages from the end | kind | content |
@@ -57,7 +57,7 @@ impl Store {
         Ok(Self { flash, images, records, guards, log })
     }
 
-    /// What the image slots hold.
+    /// Content of the image slots.
     pub fn stored_images(&mut self) -> StoredImages {
         let (active, previous) = (self.images.active(), self.images.previous());
         StoredImages { active: self.summary(active), previous: self.summary(previous) }
@@ -113,7 +113,7 @@ impl Store {
         self.records.store(&mut self.flash, record)
     }
 
-    /// What guards the joint. Where it is damaged the joint is locked, and that is kept with the key that is left: the
+    /// Guard of the joint. Where it is damaged the joint is locked, and that is kept with the key that is left: the
     /// slot that is damaged is given up, and may have held a higher floor, or a key.
     pub fn guard(&mut self) -> Guard {
         let mut bytes = [0; GUARD];
