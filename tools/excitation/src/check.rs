@@ -1,10 +1,10 @@
-//! Whether a table of samples keeps the joint's limits, is a motion at all, and what it tells apart; host.
+//! Check of a table of samples: whether it keeps the joint's limits, is a motion at all, and what it tells apart; host.
 
 use super::Bounds;
 use super::regressor::condition_number;
 use plant::excitation::Reference;
 
-/// What a table of samples is found to be.
+/// Findings about a table of samples.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Findings {
     /// Lowest and highest position, rad.
@@ -15,7 +15,7 @@ pub struct Findings {
     pub acceleration: f64,
     /// Condition number of the regressor.
     pub condition_number: f64,
-    /// What is wrong with it, in words; nothing where it may be run.
+    /// Defects, in words; none where it may be run.
     pub defects: Vec<String>,
 }
 

@@ -13,7 +13,7 @@ pub const SAMPLE_PERIOD: f64 = 1e-3;
 /// Columns of a table.
 const COLUMNS: [&str; 4] = ["time_s", "position_rad", "velocity_rad_s", "acceleration_rad_s2"];
 
-/// Why a file is no excitation.
+/// Reason for which a file is no excitation.
 #[derive(Debug, thiserror::Error)]
 pub enum ExcitationFileError {
     /// The file cannot be read.
@@ -21,7 +21,7 @@ pub enum ExcitationFileError {
     Unreadable {
         /// The file.
         file: PathBuf,
-        /// What the operating system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// Not TOML, an unknown key, a missing key or a value of the wrong type.
@@ -37,7 +37,7 @@ pub enum ExcitationFileError {
     Coefficients {
         /// The file.
         file: PathBuf,
-        /// What is wrong.
+        /// Defect.
         reason: String,
     },
     /// Not a table with the columns of an excitation.
@@ -45,7 +45,7 @@ pub enum ExcitationFileError {
     Table {
         /// The file.
         file: PathBuf,
-        /// What is wrong, with its line.
+        /// Defect, with its line.
         reason: String,
     },
 }
@@ -82,7 +82,7 @@ pub fn table(excitation: &Excitation) -> String {
     table_in(excitation, "rad")
 }
 
-/// As [`table`], with positions in `unit` (rad or m).
+/// Table as of [`table`], with positions in `unit` (rad or m).
 #[must_use]
 pub fn table_in(excitation: &Excitation, unit: &str) -> String {
     let mut text = COLUMNS.join(",").replace("rad", unit) + "\n";
@@ -98,7 +98,7 @@ pub fn table_in(excitation: &Excitation, unit: &str) -> String {
 pub struct Samples {
     /// Time, s.
     pub time: Vec<f64>,
-    /// Where the joint should be.
+    /// Reference motion of the joint.
     pub motion: Vec<Reference>,
 }
 
@@ -112,7 +112,7 @@ pub fn read(file: &Path) -> Result<Samples, ExcitationFileError> {
     parse(&text, file)
 }
 
-/// As [`read`], from the text of a file that is only named.
+/// Parses as [`read`], from the text of a file that is only named.
 pub(super) fn parse(text: &str, file: &Path) -> Result<Samples, ExcitationFileError> {
     if file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) {
         let (time, motion) = parse_coefficients(text, file)?.samples(SAMPLE_PERIOD).unzip();

@@ -19,7 +19,7 @@ pub use optimise::{Effort, Found, optimise};
 use plant::excitation::Reference;
 use plant::fourier::FourierSeries;
 
-/// What a motion may not exceed.
+/// Bounds that a motion may not exceed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
     /// Lowest and highest position, rad.
@@ -41,7 +41,7 @@ pub struct Excitation {
     pub duration: f64,
 }
 
-/// Why there is no excitation.
+/// Reason for which there is no excitation.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ExciteError {
     /// A choice outside its range.
@@ -90,7 +90,7 @@ impl Bounds {
         0.5 * (self.position.0 + self.position.1)
     }
 
-    /// How much of the tightest bound a motion uses; above 1 beyond it.
+    /// Part of the tightest bound that a motion uses; above 1 beyond it.
     #[must_use]
     pub fn use_of(&self, motion: &Reference) -> f64 {
         let half = 0.5 * (self.position.1 - self.position.0);
@@ -100,7 +100,7 @@ impl Bounds {
 }
 
 impl Excitation {
-    /// Where the joint should be at `time` (s).
+    /// Reference of the joint at `time` (s).
     #[must_use]
     pub fn at(&self, time: f64) -> Reference {
         let mut motion = self.series.faded(time, self.duration);

@@ -20,7 +20,7 @@ const SHARE: f64 = 0.995;
 /// First step of the pattern search, in units of the coefficients' RMS, and the step at which it ends.
 const STEPS: (f64, f64) = (0.5, 0.01);
 
-/// How long and how hard is searched.
+/// Length and effort of the search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Effort {
     /// Duration of the motion, s; 2 to 600.
@@ -36,7 +36,7 @@ pub struct Effort {
 }
 
 impl Effort {
-    /// What `jointctl excite` takes its time for.
+    /// Effort of `jointctl excite`.
     pub const THOROUGH: Self = Self { duration: 10.0, harmonics: 5, draws: 256, restarts: 16, seed: 1 };
     /// Enough for a simulation.
     pub const QUICK: Self = Self { draws: 32, restarts: 2, ..Self::THOROUGH };
@@ -49,7 +49,7 @@ impl Effort {
     }
 }
 
-/// What was found.
+/// Result of the search.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Found {
     /// The best series.

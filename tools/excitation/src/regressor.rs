@@ -1,4 +1,4 @@
-//! What samples tell apart: the regressor of the joint's linear model and its condition number; host.
+//! Regressor of the joint's linear model and its condition number: what samples tell apart; host.
 //!
 //! torque = inertia a + gravity_s sin q + gravity_c cos q + Coulomb sign(v) + viscous v + offset. Each column is
 //! measured in units of its bound (acceleration over the largest acceleration, velocity over the largest velocity), so
@@ -26,7 +26,7 @@ pub struct Regressor {
 }
 
 impl Regressor {
-    /// Nothing sampled yet.
+    /// Empty regressor: nothing sampled yet.
     #[must_use]
     pub fn new(bounds: &Bounds) -> Self {
         Self { velocity: bounds.velocity, acceleration: bounds.acceleration, gram: SMatrix::zeros() }

@@ -1,4 +1,4 @@
-//! What an epoch of training costs: one evaluation of the normal equations of the 5-5-5-5-1 network on one core.
+//! Cost of an epoch of training: one evaluation of the normal equations of the 5-5-5-5-1 network on one core.
 //!
 //! Run with `cargo bench -p identification --bench train`. The time must grow in proportion to the number of samples.
 

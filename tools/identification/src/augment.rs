@@ -16,7 +16,7 @@ const POSITION: usize = 0;
 /// Inputs that change their sign when the joint moves the other way; the temperature does not.
 const ODD_INPUTS: usize = 4;
 
-/// What is added. The default adds nothing.
+/// Mirrored and noisy copies of samples that are added. The default adds nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Augment {
     /// Add every sample in the opposite direction: for joints whose friction and load are symmetric.

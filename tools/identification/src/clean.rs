@@ -35,7 +35,7 @@ pub struct Stretch {
     pub row: Vec<usize>,
 }
 
-/// What was done to a run.
+/// Repairs of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Repairs {
     /// Missing rows that were bridged.

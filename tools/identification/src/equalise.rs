@@ -10,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use std::collections::BTreeMap;
 
-/// How samples are equalised.
+/// Settings of the equalisation of samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Equalise {
     /// Most samples that a draw returns.
@@ -114,7 +114,7 @@ fn frequencies(sizes: &[usize], blend: f64) -> Vec<f64> {
     sizes.iter().map(|&size| (1.0 - blend) * size as f64 / total as f64 + blend / sizes.len() as f64).collect()
 }
 
-/// How many samples each stratum gives: `limit` in all, none more than it has. `limit` is at most the sum of sizes.
+/// Number of samples from each stratum: `limit` in all, none more than it has. `limit` is at most the sum of sizes.
 fn quotas(sizes: &[usize], frequencies: &[f64], limit: usize) -> Vec<usize> {
     let mut quotas = vec![0; sizes.len()];
     let mut open: Vec<usize> = (0..sizes.len()).collect();

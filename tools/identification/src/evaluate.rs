@@ -64,7 +64,7 @@ pub fn error_tables(
     test_sets.iter().map(table).collect()
 }
 
-/// What a prediction leaves of the effort, and what the rigid part alone leaves, for every continuous recording.
+/// Residuals of the effort after a prediction, and after the rigid part alone, for every continuous recording.
 fn lost(samples: &Samples, prediction: &Prediction, rigid: &Prediction, counts: &[bool]) -> Vec<Lost> {
     let left = |i: usize, predicted: &Prediction| samples.effort[i] - predicted.effort[i];
     let mut recordings = Vec::new();

@@ -8,7 +8,7 @@ use sci_rs::signal::filter::{sosfilt_dyn, sosfilt_zi_dyn, sosfiltfilt_dyn};
 use std::f64::consts::PI;
 use thiserror::Error;
 
-/// Why a signal cannot be filtered.
+/// Reason for which a signal cannot be filtered.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 pub enum FilterError {
     /// The order is zero or beyond what second-order sections in double precision were checked for.

@@ -28,7 +28,7 @@ pub const STRIBECK_PEAK: f64 = 2.331_643_981_597_124;
 
 /// Number of ripple series.
 pub const RIPPLES: usize = friction_compensation::friction::ripple::RIPPLES;
-/// How far each pre-sliding element is bent: z, -1 to 1.
+/// Deflection of each pre-sliding element: z, -1 to 1.
 pub type Bent = [f64; ELEMENTS];
 
 /// One summand, or one factor, of the friction formula that can be on or off.
@@ -143,7 +143,7 @@ impl From<Terms> for Vec<Term> {
     }
 }
 
-/// What friction depends on, in the units of the joint (rad or m, s, Nm or N, A, V; degrees Celsius).
+/// Variables that friction depends on, in the units of the joint (rad or m, s, Nm or N, A, V; degrees Celsius).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct JointState {
     /// Position q.
@@ -156,7 +156,7 @@ pub struct JointState {
     pub load: f64,
     /// Temperature T.
     pub temperature: f64,
-    /// How far the pre-sliding elements are bent.
+    /// Deflection of the pre-sliding elements.
     pub bent: Bent,
 }
 

@@ -20,7 +20,7 @@ use friction_compensation::quantity::Torque;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Why a text is not an image.
+/// Reason for which a text is not an image.
 #[derive(Debug, thiserror::Error)]
 pub enum TextError {
     /// Not TOML, an unknown key, a missing key or a value of the wrong type; the message has line and column.
@@ -39,7 +39,7 @@ pub enum TextError {
         key: &'static str,
         /// The value.
         found: String,
-        /// What it may be.
+        /// Values that it may have.
         known: String,
     },
     /// Too few or too many entries of a list.
@@ -49,7 +49,7 @@ pub enum TextError {
         key: &'static str,
         /// Entries present.
         found: usize,
-        /// What is needed.
+        /// Number that is needed.
         expected: String,
     },
     /// A number that the image cannot hold.

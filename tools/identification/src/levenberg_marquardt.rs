@@ -27,7 +27,7 @@ pub trait LeastSquares {
     fn normal_equations(&self, x: &DVector<f64>) -> NormalEquations;
 }
 
-/// What mu is multiplied with before it is added to J^T J.
+/// Factor of mu before it is added to J^T J.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Damping {
     /// The unit matrix (Levenberg; for networks, whose weights are of like scale).
@@ -36,7 +36,7 @@ pub enum Damping {
     Diagonal,
 }
 
-/// When to stop and how to damp.
+/// Options for the end of the iteration and its damping.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// Limit on accepted steps.
@@ -55,7 +55,7 @@ pub struct Options {
     pub bounds: Vec<(f64, f64)>,
 }
 
-/// Why the iteration ended.
+/// Reason for the end of the iteration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stop {
     /// The gradient fell below the tolerance.
@@ -70,7 +70,7 @@ pub enum Stop {
     Caller,
 }
 
-/// Where the iteration ended.
+/// Result at the end of the iteration.
 #[derive(Clone, Debug)]
 pub struct Solution {
     /// Parameters.
@@ -79,7 +79,7 @@ pub struct Solution {
     pub at: NormalEquations,
     /// Accepted steps.
     pub iterations: usize,
-    /// Why it ended.
+    /// Reason for its end.
     pub stop: Stop,
 }
 

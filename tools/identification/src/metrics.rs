@@ -1,4 +1,4 @@
-//! How far a predicted effort is from the measured one, overall and per motion state; host.
+//! Error of a predicted effort against the measured one, overall and per motion state; host.
 //!
 //! RMSE as a percentage of the RMS of the measured effort is the relative error that the EMPS benchmark publishes.
 //! The relative torque error is equation 11 of the mobile-robot paper (001), whose section 3.1 also defines the four
@@ -11,7 +11,7 @@ use serde::Serialize;
 /// error. The paper excludes "data that are too small" without saying how small.
 pub const RELATIVE_FLOOR: f64 = 0.1;
 
-/// Why an error could not be computed.
+/// Reason for which an error could not be computed.
 #[derive(Debug, PartialEq, thiserror::Error)]
 pub enum MetricsError {
     /// The columns are not of equal length.
@@ -119,7 +119,7 @@ pub fn metrics(measured: &[f64], predicted: &[f64], floor: f64) -> Result<Option
 /// Each state is judged against its own RMS and mean, all with the same `floor`.
 ///
 /// # Errors
-/// As [`metrics`], and `state` of another length than `measured`.
+/// Those of [`metrics`], and `state` of another length than `measured`.
 pub fn metrics_by_state(
     measured: &[f64],
     predicted: &[f64],

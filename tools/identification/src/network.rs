@@ -20,7 +20,7 @@ pub const INPUT_NAMES: [&str; INPUTS] =
 /// Hidden layers of the network that the firmware runs.
 pub const FIRMWARE_HIDDEN: [usize; 3] = [5, 5, 5];
 
-/// Why a network or its box cannot be built.
+/// Reason for which a network or its box cannot be built.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum NetworkError {
     /// A limit of the box is not a number or the limits are exchanged.
@@ -111,7 +111,7 @@ impl InputBox {
         &self.high
     }
 
-    /// Which inputs the network sees: used and of non-zero width.
+    /// Inputs that the network sees: used and of non-zero width.
     pub fn active(&self) -> &[bool; INPUTS] {
         &self.active
     }
@@ -141,7 +141,7 @@ pub struct Shape {
     sizes: Vec<usize>,
 }
 
-/// Where one layer lies in the parameter vector.
+/// Place of one layer in the parameter vector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LayerShape {
     /// Values that enter each neuron.

@@ -1,11 +1,10 @@
-//! How far pre-sliding elements are bent along a recording: the twin of the firmware's Maxwell-slip elements in f64;
-//! host.
+//! Deflection of pre-sliding elements along a recording: the twin of the firmware's Maxwell-slip elements in f64; host.
 
 use crate::friction_model::Bent;
 use crate::samples::Samples;
 
-/// How far the elements of these stiffnesses (1/rad or 1/m) are bent after each sample. Every run begins at rest:
-/// nobody recorded what was before.
+/// Deflection of the elements of these stiffnesses (1/rad or 1/m) after each sample. Every run begins at rest: nobody
+/// recorded what was before.
 pub fn bent(samples: &Samples, stiffness: &[f64]) -> Vec<Bent> {
     let mut elements = Bent::default();
     let period = samples.period();

@@ -96,7 +96,7 @@ impl FromStr for Preset {
     }
 }
 
-/// What is free in an identification: the terms and what their parameters share.
+/// Degrees of freedom of an identification: the terms and what their parameters share.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Structure {
     /// Terms that are on.

@@ -32,7 +32,7 @@ pub enum Gravity {
     SineAndCosine,
 }
 
-/// Which regressors the rigid part has.
+/// Regressors of the rigid part.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RigidModel {
     /// Inertia times acceleration.
@@ -41,7 +41,7 @@ pub struct RigidModel {
     pub gravity: Gravity,
     /// Adds regressors in proportion to m l^2 and m l; needs the columns `mass` (kg) and `length` (m) of the samples.
     pub mass_and_length: bool,
-    /// How many of [`LAGS`] have a regressor; not without inertia.
+    /// Number of [`LAGS`] that have a regressor; not without inertia.
     pub lags: usize,
     /// A rigid part that is computed elsewhere (a robot's); needs the column `rigid` of the samples.
     pub given: bool,
@@ -175,7 +175,7 @@ impl RigidModel {
     }
 }
 
-/// What the rigid part depends on.
+/// Variables that the rigid part depends on.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RigidState {
     /// Position q, rad or m.

@@ -3,7 +3,7 @@
 use crate::friction_model::Bent;
 use std::collections::BTreeMap;
 
-/// What a sample may be used for. Test samples are never seen by identification, training or selection.
+/// Use of a sample. Test samples are never seen by identification, training or selection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     /// Identification and training.
@@ -53,7 +53,7 @@ pub struct Samples {
     pub temperature: Vec<f64>,
     /// Theoretical torque: the rigid-body part of the effort. Empty until the rigid body is identified.
     pub load: Vec<f64>,
-    /// How far each pre-sliding element of the identified model is bent. Empty until there is one.
+    /// Deflection of each pre-sliding element of the identified model. Empty until there is one.
     pub bent: Vec<Bent>,
     /// Index of the run (continuous recording) that the sample belongs to.
     pub run: Vec<u32>,

@@ -1,4 +1,4 @@
-//! Which samples train, which validate and which judge; host.
+//! Division of samples into those that train, validate and judge; host.
 //!
 //! Neighbouring samples of one recording are almost the same sample, so a split never draws single samples: it takes
 //! files, runs, values of a column, or blocks of time. The default shares are those of the legged-robot paper:
@@ -39,7 +39,7 @@ pub struct Assignment {
     pub empty: Vec<String>,
 }
 
-/// What a split looks at; all columns are of equal length, samples of one run are contiguous.
+/// Columns that a split looks at; all are of equal length, samples of one run are contiguous.
 #[derive(Clone, Copy, Debug)]
 pub struct Recorded<'a> {
     /// Time since the start of the run, s.

@@ -5,13 +5,13 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// Why a key is not read or not made.
+/// Reason for which a key is not read or not made.
 #[derive(Debug, thiserror::Error)]
 pub enum KeyFileError {
     /// The operating system refused.
     #[error("cannot {action} {}: {source}", path.display())]
     Io {
-        /// What was tried.
+        /// Action that was tried.
         action: &'static str,
         /// On which path.
         path: PathBuf,
@@ -44,7 +44,7 @@ pub enum KeyFileError {
     Refused {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Cause.
         source: KeyRefusal,
     },
     /// No random numbers.
@@ -88,7 +88,7 @@ fn open_new(path: &Path) -> io::Result<File> {
 /// Reads a key; blanks and line ends around and between digits do not count.
 ///
 /// # Errors
-/// What is wrong with the file.
+/// Defects of the file.
 pub fn read(path: &Path) -> Result<Key, KeyFileError> {
     let unreadable = |source| KeyFileError::Io { action: "read", path: path.to_owned(), source };
     let text = fs::read_to_string(path).map_err(unreadable)?;

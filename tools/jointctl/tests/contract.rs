@@ -1,5 +1,5 @@
-//! What scripts may rely on, of every command that the program has: docs/commands.md, and its exit codes.
-//! `UPDATE_DOCS=1 cargo test -p jointctl --test contract` writes the page anew.
+//! Contract with scripts, of every command that the program has: docs/commands.md, and its exit codes. `UPDATE_DOCS=1
+//! cargo test -p jointctl --test contract` writes the page anew.
 
 use clap::error::ErrorKind;
 use jointctl::commands::arguments;

@@ -122,7 +122,7 @@ fn python_canopen(python: Option<&Path>) -> Result<(), Failed> {
     })
 }
 
-/// Whether a text is another one but for its numbers, which are within 0.05 of the other's.
+/// Returns `true` if a text is another one but for its numbers, which are within 0.05 of the other's.
 fn is_about(text: &str, other: &str) -> bool {
     let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
     let (text, other) = (words(text), words(other));

@@ -1,6 +1,6 @@
 //! Numbers as people read them: four significant digits, no exponent where none is needed; host.
 
-/// What stands for a number that does not exist.
+/// Placeholder of a number that does not exist.
 pub const NONE: &str = "–";
 
 /// `value` with `digits` significant digits, as a decimal between 1e-4 and 1e7, else with an exponent.

@@ -8,13 +8,13 @@ use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Component, Path, PathBuf};
 
-/// Why an output was not written. What was there before is still there.
+/// Reason for which an output was not written. What was there before is still there.
 #[derive(Debug, thiserror::Error)]
 pub enum OutputError {
     /// The operating system refused.
     #[error("cannot {action} {}: {source}", path.display())]
     Io {
-        /// What was tried.
+        /// Action that was tried.
         action: &'static str,
         /// On which path.
         path: PathBuf,
@@ -92,7 +92,8 @@ pub fn write_directory(directory: &Path, files: &[OutputFile]) -> Result<(), Out
     write_directory_with(directory, files, |from, to| fs::rename(from, to))
 }
 
-/// As [`write_directory`], with the renaming passed in, because that is the step whose failure must be undone.
+/// Implementation of [`write_directory`] with the renaming passed in, because that is the step whose failure must be
+/// undone.
 fn write_directory_with(
     directory: &Path,
     files: &[OutputFile],
@@ -129,7 +130,7 @@ fn write_directory_with(
     result
 }
 
-/// How to take back one step.
+/// Reversal of one step.
 enum Undo {
     Rename { from: PathBuf, to: PathBuf },
     RemoveDirectory(PathBuf),

@@ -93,14 +93,14 @@ pub struct JointErrors {
     pub bodies: f64,
     /// RMS error of rigid part and image.
     pub image: f64,
-    /// That of rigid part and image in % of the effort's RMS.
+    /// RMS error of rigid part and image in % of the effort's RMS.
     pub relative_percent: f64,
 }
 
 /// Samples that are judged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Judged {
-    /// All that the description uses.
+    /// All samples that the description uses.
     All,
     /// Those of its test sets.
     Test,

@@ -22,14 +22,14 @@ pub enum Friction {
     Simple,
     /// Coulomb friction of each direction, and in proportion to the load.
     Load,
-    /// That of `Load` with Stribeck columns.
+    /// Friction of `Load` with Stribeck columns.
     Stribeck,
-    /// That of `Load` with pre-sliding elements.
+    /// Friction of `Load` with pre-sliding elements.
     PreSliding,
 }
 
 impl Friction {
-    /// All that compete, simplest first.
+    /// Competing models, simplest first.
     pub const ALL: [Self; 4] = [Self::Simple, Self::Load, Self::Stribeck, Self::PreSliding];
 
     /// Name in reports.

@@ -37,7 +37,7 @@ const OF_ONE_JOINT: [&str; 3] = ["excitation", "drift", "inertia"];
 /// Degrees in rad.
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
-/// Why a robot was not identified.
+/// Reason for which a robot was not identified.
 #[derive(Debug, thiserror::Error)]
 pub enum RobotFitError {
     /// A file cannot be read.
@@ -45,7 +45,7 @@ pub enum RobotFitError {
     Read {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Cause.
         source: std::io::Error,
     },
     /// The recording's description.
@@ -53,7 +53,7 @@ pub enum RobotFitError {
     Description {
         /// The file.
         path: PathBuf,
-        /// What is wrong and what to do.
+        /// Defect and what to do.
         reason: String,
     },
     /// The robot's files.
@@ -66,7 +66,7 @@ pub enum RobotFitError {
         path: PathBuf,
         /// The joint.
         joint: String,
-        /// What is wrong.
+        /// Cause.
         source: Box<DatasetError>,
     },
     /// A joint that did not move.
@@ -120,7 +120,7 @@ pub enum RobotFitError {
     Undetermined {
         /// The recording's description.
         path: PathBuf,
-        /// What is wrong and what to do.
+        /// Defect and what to do.
         reason: String,
     },
     /// The friction of one joint.

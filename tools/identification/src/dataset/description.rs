@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 pub struct Description {
     /// Short name, for reports.
     pub name: String,
-    /// Where the recordings come from.
+    /// Origin of the recordings.
     pub origin: Option<String>,
     /// Under which licence.
     pub licence: Option<String>,
@@ -28,9 +28,9 @@ pub struct Description {
     pub reference_temperature: f64,
     /// Files.
     pub source: Source,
-    /// Which column is which signal.
+    /// Assignment of columns to signals.
     pub columns: Columns,
-    /// Which rows are used.
+    /// Rows that are used.
     #[serde(default)]
     pub select: Select,
     /// Dropouts, outliers, gaps, uneven sampling.
@@ -39,7 +39,7 @@ pub struct Description {
     /// Low-pass filters, delays and decimation.
     #[serde(default)]
     pub filter: Filter,
-    /// How velocity is obtained.
+    /// Method of obtaining velocity.
     #[serde(default)]
     pub differentiate: Differentiate,
     /// Thresholds of the motion states.
@@ -48,7 +48,7 @@ pub struct Description {
     /// The rigid body that is identified beside the friction.
     #[serde(default)]
     pub rigid: RigidDescription,
-    /// What is kept for training, validation and judging.
+    /// Parts that are kept for training, validation and judging.
     #[serde(default)]
     pub split: Split,
     /// Choice of the model.
@@ -56,7 +56,7 @@ pub struct Description {
     pub choice: Choice,
 }
 
-/// Where the tables are.
+/// Location of the tables.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Source {
@@ -75,7 +75,7 @@ pub struct Source {
     pub decimal: char,
 }
 
-/// Which column is which signal.
+/// Assignment of columns to signals.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Columns {
@@ -208,7 +208,7 @@ impl EffortUnit {
     }
 }
 
-/// Which rows are used.
+/// Rows that are used.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Select {
@@ -282,18 +282,18 @@ impl Default for RigidDescription {
     }
 }
 
-/// What is kept for training, validation and judging.
+/// Parts that are kept for training, validation and judging.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Split {
     /// Named test sets; they may overlap. Absent: 30 % of the time, in blocks, named `test`.
     #[serde(default)]
     pub test: Vec<Rule>,
-    /// What of the rest is for validation. Absent: two sevenths of the time, in blocks.
+    /// Part of the rest for validation. Absent: two sevenths of the time, in blocks.
     pub validation: Option<Rule>,
 }
 
-/// Which samples belong to a part; the tests that are given must all hold.
+/// Samples that belong to a part; the tests that are given must all hold.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Rule {
@@ -323,7 +323,7 @@ pub struct Blocks {
     pub length: f64,
     /// Length of the pattern, blocks.
     pub modulo: usize,
-    /// Which blocks of each pattern, from 0.
+    /// Blocks of each pattern, from 0.
     pub index: Vec<usize>,
 }
 
@@ -333,7 +333,7 @@ pub struct Blocks {
 pub struct Fraction {
     /// The share, between 0 and 1.
     pub of: f64,
-    /// What is drawn.
+    /// Unit of the draw.
     #[serde(default)]
     pub by: FractionBy,
     /// Length of a block, s. Absent: a fortieth of the whole recording.
@@ -343,7 +343,7 @@ pub struct Fraction {
     pub seed: u64,
 }
 
-/// What a share is drawn from.
+/// Unit that a share is drawn from.
 #[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "lowercase")]
 pub enum FractionBy {

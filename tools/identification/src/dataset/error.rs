@@ -1,11 +1,11 @@
-//! What can be wrong with a data set, said so that the file, line or column can be corrected without a debugger; host.
+//! Errors of a data set, said so that the file, line or column can be corrected without a debugger; host.
 
 use crate::choice::grouping::NoGroups;
 use crate::filter::FilterError;
 use std::path::PathBuf;
 use thiserror::Error;
 
-/// Why a data set could not be prepared.
+/// Reason for which a data set could not be prepared.
 #[derive(Debug, Error)]
 pub enum DatasetError {
     /// A file that is named by the command line or by the description cannot be read.
@@ -13,7 +13,7 @@ pub enum DatasetError {
     Unreadable {
         /// The file.
         file: PathBuf,
-        /// What the operating system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// The description is not TOML, has an unknown key, lacks one, or a value has the wrong type.
@@ -33,7 +33,7 @@ pub enum DatasetError {
         key: String,
         /// The value that was found.
         value: String,
-        /// What would have been accepted.
+        /// Values that would have been accepted.
         expected: String,
     },
     /// The root folder begins with an environment variable that is not set and has no default.
@@ -51,7 +51,7 @@ pub enum DatasetError {
     Gzip {
         /// The file.
         file: PathBuf,
-        /// What the decompressor said.
+        /// Error of the decompressor.
         source: std::io::Error,
     },
     /// A file without any row of data.
@@ -77,7 +77,7 @@ pub enum DatasetError {
     Csv {
         /// The file.
         file: PathBuf,
-        /// What the reader said.
+        /// Error of the reader.
         message: String,
     },
     /// A column that the description names does not exist.
@@ -89,7 +89,7 @@ pub enum DatasetError {
         column: String,
         /// The columns that exist.
         available: Vec<String>,
-        /// What may be meant, or nothing.
+        /// Hint at what may be meant, or nothing.
         hint: String,
     },
     /// A column that the description names exists twice.
@@ -111,7 +111,7 @@ pub enum DatasetError {
         column: String,
         /// The text in the field.
         text: String,
-        /// What may be meant, or nothing.
+        /// Hint at what may be meant, or nothing.
         hint: &'static str,
     },
     /// A field that should be a finite number is NaN or infinite.
@@ -168,7 +168,7 @@ pub enum DatasetError {
         /// Number of samples.
         count: usize,
     },
-    /// Nothing, or almost nothing, is left to identify from.
+    /// Too few samples, or none, are left to identify from.
     #[error("{found} usable samples are left {stage}: expected at least {required}")]
     TooFewSamples {
         /// After which stage.
@@ -269,7 +269,7 @@ pub enum DatasetError {
         part: String,
         /// Usable samples in the whole data set.
         usable: usize,
-        /// What to look at.
+        /// Hint at what to look at.
         hint: String,
     },
     /// MCAP or Parquet.

@@ -163,7 +163,7 @@ pub fn decompress(bytes: Vec<u8>, path: &Path) -> Result<Vec<u8>, DatasetError> 
     Ok(text)
 }
 
-/// How one wanted column of a file is read.
+/// Destination of one wanted column of a file, and how it is read.
 enum Target<'a> {
     Number { field: usize, name: &'a str, values: Vec<f64> },
     Text { field: usize, name: &'a str, column: TextColumn },
@@ -271,7 +271,7 @@ fn targets<'a>(
     Ok(targets)
 }
 
-/// Which delimiter a header of one field may have meant.
+/// Delimiter that a header of one field may have meant.
 fn delimiter_hint(header: &[String]) -> Option<String> {
     let [only] = header else { return None };
     let delimiter = [";", "\t", ",", "|"].into_iter().find(|delimiter| only.contains(delimiter))?;

@@ -42,7 +42,7 @@ pub struct Prepared {
     pub folds: Folds,
     /// Boundaries of the motion states.
     pub thresholds: Thresholds,
-    /// What each stage did.
+    /// Notes on what each stage did.
     pub notes: Vec<Note>,
     /// Position and velocity as the joint's observer sees them; where `samples` has those (`filter.causal_motion`), as
     /// filtered. None where nothing is filtered zero-phase.
@@ -75,14 +75,14 @@ pub struct Recording {
     pub period: f64,
 }
 
-/// What a stage did, for the report.
+/// Note on what a stage did, for the report.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Note {
     /// Stage of the preparation.
     pub stage: &'static str,
     /// Number of things it was done to.
     pub count: usize,
-    /// What was done, to follow the number.
+    /// Treatment, to follow the number.
     pub what: &'static str,
 }
 
@@ -97,7 +97,7 @@ pub fn prepare(path: &Path) -> Result<Prepared, DatasetError> {
     prepare_with(path, &|name| std::env::var(name).ok())
 }
 
-/// As [`prepare`], with the description changed by `change` after it was read.
+/// Prepares as [`prepare`], with the description changed by `change` after it was read.
 pub fn prepare_as(path: &Path, change: impl FnOnce(&mut Description)) -> Result<Prepared, DatasetError> {
     prepare_changed(path, &|name| std::env::var(name).ok(), change)
 }
@@ -117,7 +117,7 @@ fn prepare_changed(
     prepare_text(&text, path, environment, change)
 }
 
-/// As [`prepare_with`], from a description's text; what it names is relative to `path`.
+/// Prepares as [`prepare_with`], from a description's text; what it names is relative to `path`.
 pub fn prepare_text(
     text: &str,
     path: &Path,

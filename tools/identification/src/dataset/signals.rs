@@ -67,7 +67,7 @@ pub struct Extracted {
     pub runs: Vec<RunSignals>,
     /// For each row of the table whether it is used (`select.use`, saturation, frozen read-outs).
     pub used: Vec<bool>,
-    /// What was found.
+    /// Findings in the signals.
     pub findings: Findings,
 }
 

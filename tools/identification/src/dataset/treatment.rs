@@ -23,7 +23,7 @@ pub struct Clean {
     pub max_gap: Option<f64>,
     /// A row is unused where the magnitude of a column reaches a limit.
     pub saturation: Vec<Limit>,
-    /// Whether rows are interpolated onto evenly spaced times.
+    /// Interpolation of rows onto evenly spaced times.
     pub resample: Resample,
     /// Sampling period, s. Absent: the median of each run.
     pub sample_period: Option<f64>,
@@ -92,11 +92,11 @@ pub struct Limit {
     pub limit: f64,
 }
 
-/// Whether rows are interpolated onto evenly spaced times.
+/// Condition for the interpolation of rows onto evenly spaced times.
 #[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "lowercase")]
 pub enum Resample {
-    /// Where a period differs from the median by more than 2 %, or the sampling period is given.
+    /// Automatic: where a period differs from the median by more than 2 %, or the sampling period is given.
     #[default]
     Auto,
     /// Always.
@@ -175,12 +175,12 @@ pub struct Decimate {
     /// frequency, as the `decimate` of MATLAB and SciPy does.
     #[serde(default)]
     pub anti_alias: bool,
-    /// Which samples are kept.
+    /// Samples that are kept.
     #[serde(default)]
     pub keep: Keep,
 }
 
-/// Which samples a decimation keeps.
+/// Samples that a decimation keeps.
 #[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "lowercase")]
 pub enum Keep {
@@ -191,7 +191,7 @@ pub enum Keep {
     Last,
 }
 
-/// How velocity is obtained; the acceleration is always the central difference of the velocity.
+/// Method of obtaining velocity; the acceleration is always the central difference of the velocity.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Differentiate {

@@ -1,4 +1,4 @@
-//! What the values of a description may be; host.
+//! Ranges of the values of a description; host.
 //!
 //! Everything that can be judged without the recordings is judged here, so that a mistake shows before a large file is
 //! read.
@@ -25,7 +25,8 @@ pub fn parse(text: &str, file: &Path) -> Result<Description, DatasetError> {
     Ok(description)
 }
 
-/// Whether two columns can be compared is known only when they are read; all else is checked here.
+/// Checks of a description without its recordings: whether two columns can be compared is known only when they are
+/// read.
 struct Check<'a> {
     file: &'a Path,
 }

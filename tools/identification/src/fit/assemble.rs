@@ -20,7 +20,7 @@ const SLOPE_ROOM: f64 = 1.5;
 /// A loop gain through the measured torque that no image may exceed.
 const TORQUE_GAIN_LIMIT: f64 = 0.5;
 
-/// What an image says beside its parameters.
+/// Contents of an image beside its parameters.
 pub struct Context<'a> {
     /// Unit of the effort.
     pub effort: EffortUnit,
@@ -34,7 +34,7 @@ pub struct Context<'a> {
 pub struct Built {
     /// The image.
     pub image: Image,
-    /// What is proved of it.
+    /// Bounds that are proved of it.
     pub certificate: Certificate,
     /// The model, without network where the certificate refuses it.
     pub learned: Learned,

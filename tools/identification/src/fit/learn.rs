@@ -27,15 +27,15 @@ const FADE_TIME: f64 = 0.02;
 pub struct Learned {
     /// Physical model and networks, in f64.
     pub float: FloatFriction,
-    /// Which parameter set applies when.
+    /// Selector of the parameter set that applies.
     pub selector: Selector,
     /// The box that the networks were trained in.
     pub input_box: Option<InputBox>,
-    /// What became of the network.
+    /// Outcome of the network.
     pub outcome: NetworkOutcome,
     /// Error on left-out motions with network, whether kept or not; None where no network was tried.
     pub unseen_rmse: Option<f64>,
-    /// How the network and its inputs were chosen.
+    /// Notes on the choice of the network and its inputs.
     pub notes: Vec<String>,
     /// Parameters of the networks.
     pub parameters: usize,

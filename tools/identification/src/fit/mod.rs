@@ -46,7 +46,7 @@ use serde::Serialize;
 pub struct Options {
     /// Physical models that compete: the simplest that no other beats on motions that were left out is used.
     pub presets: Vec<Preset>,
-    /// How the network is trained; None trains none.
+    /// Trainer of the network; None trains none.
     pub trainer: Option<Trainer>,
     /// Networks that are trained from different first weights.
     pub restarts: usize,
@@ -58,7 +58,7 @@ pub struct Options {
     pub seed: u64,
     /// Most training samples that a network sees.
     pub samples: usize,
-    /// How far their selection departs from natural frequencies towards equal ones, 0 to 1.
+    /// Departure of their selection from natural frequencies towards equal ones, 0 to 1.
     pub equalise: f64,
     /// Copies of training samples.
     #[serde(skip)]
@@ -67,9 +67,9 @@ pub struct Options {
     /// velocity, and those that pay of position, the theoretical torque where there is gravity, and the
     /// temperature where it varies by 10 K.
     pub inputs: Option<[bool; 5]>,
-    /// Who decides about the network; `Choose`: as the description of the data set says.
+    /// Decision about the network; `Choose`: as the description of the data set says.
     pub network: Decision,
-    /// Who decides about lagged accelerations in the rigid part; `Choose`: as the description of the data set says.
+    /// Decision about lagged accelerations in the rigid part; `Choose`: as the description of the data set says.
     pub lags: Decision,
     /// Terms of the full model that are forced or forbidden, beside those of the description.
     pub terms: Vec<TermRule>,
@@ -80,7 +80,7 @@ pub struct Options {
     pub regimes: Vec<Measure>,
     /// Train the legged-robot paper's network too, for comparison.
     pub reference: bool,
-    /// How far beyond the trained box the network fades out, in half widths.
+    /// Distance beyond the trained box over which the network fades out, in half widths.
     pub margin: f64,
     /// Version of the image.
     pub version: u32,
@@ -114,7 +114,7 @@ impl Default for Options {
     }
 }
 
-/// Why a fit ended without an image.
+/// Reason for which a fit ended without an image.
 #[derive(Debug, thiserror::Error)]
 pub enum FitError {
     /// Identification of the physical models.
@@ -122,7 +122,7 @@ pub enum FitError {
     Identify {
         /// The model.
         preset: Preset,
-        /// What is wrong.
+        /// Cause.
         source: identify::IdentifyError,
     },
     /// No physical model was asked for.
@@ -157,7 +157,7 @@ pub enum FitError {
 pub struct Fitted {
     /// The image.
     pub image: Image,
-    /// What is proved of it.
+    /// Bounds that are proved of it.
     pub certificate: Certificate,
     /// Rigid part that was identified beside the friction.
     pub rigid: RigidParameters,

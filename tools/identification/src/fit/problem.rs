@@ -1,4 +1,4 @@
-//! What a network is to learn, from which samples.
+//! Training problem of a network: what it is to learn, from which samples.
 
 use super::Options;
 use super::trainer::Task;
@@ -15,14 +15,14 @@ use friction_compensation::friction::state::JointState;
 /// Least number of training samples, and of validation samples, with which a network is trained.
 pub(super) const MINIMUM_SAMPLES: usize = 300;
 
-/// What a network is to learn: the part of the effort that the physical model leaves.
+/// Training problem of a network: the part of the effort that the physical model leaves.
 pub(super) struct Problem<'a> {
     pub samples: &'a Samples,
     /// The firmware's view of every sample.
     pub states: &'a [JointState],
     pub physical: &'a Identified,
     pub thresholds: &'a Thresholds,
-    /// Which inputs of the network the recording supports.
+    /// Inputs of the network that the recording supports.
     pub inputs: [bool; 5],
     /// Motions that are left out in turn.
     pub folds: &'a Folds,
@@ -33,7 +33,7 @@ pub(super) struct Problem<'a> {
 }
 
 impl Problem<'_> {
-    /// What rigid part and physical friction leave of the effort.
+    /// Residual of the effort after rigid part and physical friction.
     pub fn residual(&self, i: usize) -> f64 {
         let Self { samples, physical, .. } = self;
         samples.effort[i] - physical.rigid_effort(samples, i) - physical.friction(samples, i)

@@ -1,4 +1,4 @@
-//! What a fit tells: its stages, candidates, predictions and certificate as the report's rows.
+//! Summary of a fit: its stages, candidates, predictions and certificate as the report's rows.
 
 use super::{Learned, Options};
 use crate::certificate_search::Found;
@@ -92,13 +92,13 @@ pub(super) fn candidates(
     all
 }
 
-/// How the error on left-out motions changes from the chosen model to another.
+/// Change of the error on left-out motions from the chosen model to another.
 fn against(other: &Identified, chosen: &Identified) -> String {
     let change = compare(&chosen.fold_errors(), &other.fold_errors());
     format!("{:+.1} ± {:.1} % on left-out motions", change.percent(), 100.0 * change.standard_error)
 }
 
-/// How the model was chosen, for the report.
+/// Choice of the model, for the report.
 pub(super) fn choice(
     folds: &Folds,
     identified: &[Identified],

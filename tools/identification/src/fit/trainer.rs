@@ -1,4 +1,4 @@
-//! Which trainer runs, with which seeds, and how it tells its progress.
+//! Choice of the trainer, with its seeds, and how it tells its progress.
 
 use super::{FitError, Options};
 use crate::network::InputBox;

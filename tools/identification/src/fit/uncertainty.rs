@@ -87,8 +87,8 @@ fn counts(samples: &Samples, i: usize) -> bool {
     matches!(samples.part[i], Part::Train | Part::Validation)
 }
 
-/// What a model states too much, by cell: 1 - measured / model, with twice the standard error, of the cells with
-/// enough passes. `friction` is the measured one and the model's of a sample, None where it does not count.
+/// Excess of a model, by cell: 1 - measured / model, with twice the standard error, of the cells with enough passes.
+/// `friction` is the measured one and the model's of a sample, None where it does not count.
 fn excess(
     samples: &Samples,
     cells: &[Option<Cell>],

@@ -1,4 +1,4 @@
-//! Where a recording says nothing: points of the trained box in cells that no sample visits; host.
+//! Gaps of a recording: points of the trained box in cells that no sample visits; host.
 //!
 //! Most of a box is empty: a trajectory visits few pairs of position and velocity. Between the samples a network may
 //! take any value, up to many times the friction. So it is trained towards nothing there, which leaves the physical

@@ -1,4 +1,4 @@
-//! Whether a network helps on motions that were left out, and with which inputs; host.
+//! Benefit of a network on motions that were left out: whether it helps, and with which inputs; host.
 //!
 //! For every fold a network is trained without it, on what the physical model, fitted without it too, leaves; and
 //! judged on it. Of several seeds the one counts that stops at the lowest error, as for the network that is used. They
@@ -40,7 +40,7 @@ pub(super) struct Verdict {
     pub inputs: [bool; 5],
     /// Error on each fold with the network of these inputs.
     pub errors: Vec<f64>,
-    /// Why it is not taken; None: it is.
+    /// Reason for which it is not taken; None: it is.
     pub refusal: Option<String>,
     /// Every set of inputs that was tried.
     pub notes: Vec<String>,
@@ -94,7 +94,7 @@ pub(super) fn judge(
     Ok(Some(Verdict { inputs, errors, refusal, notes }))
 }
 
-/// Why a network is not taken, from its change against the physical model and against the simplest model.
+/// Reason for which a network is not taken, from its change against the physical model and against the simplest model.
 fn refusal(change: &Comparison, simplest: &Comparison, least_gain: f64) -> Option<String> {
     if !simplest.harmless() {
         let worst = 100.0 * simplest.worst.exp_m1();

@@ -9,7 +9,7 @@ use crate::friction_model::FrictionModel;
 use crate::rigid::RigidParameters;
 use rayon::prelude::*;
 
-/// How far a fold descends.
+/// Length of a fold's descent.
 const DESCENT: Effort = Effort { iterations: 10, tolerance: 1e-5 };
 
 /// A structure fitted without one fold.

@@ -1,4 +1,4 @@
-//! Which terms the data tell from all others; host.
+//! Terms that the data tell from all others; host.
 //!
 //! The measure is the part of a column's square that the other linear columns do not explain: the inverse of its
 //! variance inflation factor. Where it is small, noise decides how the sum of several terms is divided among them, and

@@ -1,4 +1,4 @@
-//! What was identified, parameter by parameter, with standard errors from the normal equations at the solution; host.
+//! Estimates, parameter by parameter, with standard errors from the normal equations at the solution; host.
 
 use super::layout::Parameter;
 use super::linear::{dependences, inverse};

@@ -1,4 +1,5 @@
-//! Where the descents start: a coarse grid over the shapes, with the linear parameters solved at every point; host.
+//! Starting points of the descents: a coarse grid over the shapes, with the linear parameters solved at every point;
+//! host.
 //!
 //! The mean square has many minima only over the shapes (slopes, hysteresis, harmonic frequency), a handful of numbers.
 //! They are gone through group by group, the other groups held at the best point so far.
@@ -26,9 +27,9 @@ const WIDTHS: [f64; 4] = [-0.7, 0.3, 1.0, 3.0];
 const FREQUENCIES: usize = 1_000;
 /// Grid points from which a search descends.
 const STARTS: usize = 3;
-/// How far a search descends.
+/// Length of a search's descent.
 const SEARCH: Effort = Effort { iterations: 60, tolerance: 1e-7 };
-/// How far a search descends that starts near the minimum.
+/// Length of the descent of a search that starts near the minimum.
 const NEARBY: Effort = Effort { iterations: 30, tolerance: 1e-6 };
 
 /// The values of one shape that a grid tries.

@@ -1,4 +1,4 @@
-//! How the parameters of a model are laid out in the vector that is searched: columns, links, bounds; host.
+//! Layout of a model's parameters in the vector that is searched: columns, links, bounds; host.
 //!
 //! One column may serve several parameters (symmetric Coulomb friction, coupled slopes) and one parameter may be the
 //! sum of two columns (breakaway = Coulomb friction + excess, so that F_brk >= F_c is a bound on one number). Slopes
@@ -37,7 +37,7 @@ const PERIODS_BESIDE_GRAVITY: f64 = 1.5;
 /// without limit against each other, and friction becomes many times the measured effort for hardly any gain.
 const FREQUENCY_ABOVE_GRAVITY: f64 = 2.0;
 
-/// How a column enters the model.
+/// Role of a column in the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
     /// The model is linear in it.
@@ -74,7 +74,7 @@ impl Parameter {
 pub struct Column {
     /// Name for messages.
     pub name: String,
-    /// How it enters the model.
+    /// Role in the model.
     pub role: Role,
     /// Bounds of the physical value.
     pub bounds: (f64, f64),
@@ -98,7 +98,7 @@ pub struct Link {
 pub struct Layout {
     /// Searched numbers.
     pub columns: Vec<Column>,
-    /// How parameters follow from them.
+    /// Links by which parameters follow from them.
     pub links: Vec<Link>,
 }
 

@@ -56,7 +56,7 @@ pub struct Options {
     pub search_samples: usize,
     /// Motions that are left out in turn; None: blocks of time.
     pub folds: Option<Folds>,
-    /// Who decides about lagged accelerations in the rigid part.
+    /// Decision about lagged accelerations in the rigid part.
     pub lags: Decision,
     /// Terms of `Preset::Full` that are forced or forbidden.
     pub terms: Vec<TermRule>,
@@ -76,7 +76,7 @@ impl Default for Options {
     }
 }
 
-/// Why nothing was identified.
+/// Reason for which nothing was identified.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum IdentifyError {
     /// A column has another length than the others.
@@ -142,7 +142,7 @@ pub struct Identified {
     pub train_rmse: f64,
     /// The same model fitted without each fold, with its error there.
     pub folds: Vec<FoldFit>,
-    /// What was left out or could not be determined, and why.
+    /// Notes on what was left out or could not be determined, and why.
     pub notes: Vec<String>,
 }
 

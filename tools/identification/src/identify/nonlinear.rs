@@ -11,7 +11,7 @@ use crate::rigid::{RigidParameters, RigidRegressor};
 use nalgebra::DVector;
 use std::ops::ControlFlow;
 
-/// What all fits of one identification share.
+/// Data that all fits of one identification share.
 #[derive(Clone, Debug)]
 pub struct Problem {
     /// All rows for training and validation.
@@ -51,11 +51,11 @@ pub struct Candidate {
     pub layout: Layout,
     /// The problem's template with the terms of the structure.
     pub template: FrictionModel,
-    /// Which columns the data cannot tell apart.
+    /// Notes on the columns that the data cannot tell apart.
     pub notes: Vec<String>,
 }
 
-/// How far to descend.
+/// Length of a descent.
 #[derive(Clone, Copy, Debug)]
 pub struct Effort {
     /// Limit on accepted steps.
@@ -67,7 +67,7 @@ pub struct Effort {
 /// A fitted structure.
 #[derive(Clone, Debug)]
 pub struct Fit {
-    /// What was fitted.
+    /// Fitted model.
     pub candidate: Candidate,
     /// Searched numbers.
     pub x: DVector<f64>,

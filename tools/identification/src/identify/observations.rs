@@ -16,7 +16,7 @@ const POSITION_VISITS: usize = 5;
 /// One sample, ready for evaluation.
 #[derive(Clone, Copy, Debug)]
 pub struct Row {
-    /// What friction depends on.
+    /// Variables that friction depends on.
     pub joint: JointState,
     /// Values of all regressors of the rigid part.
     pub regressors: [f64; RigidRegressor::ALL.len()],
@@ -47,7 +47,7 @@ pub struct Limits {
     pub elements: usize,
     /// Ripples whose frequencies were chosen.
     pub ripples: usize,
-    /// Which of them may have a part whatever the direction.
+    /// `true` for those of them that may have a part whatever the direction.
     pub ripple_torques: [bool; RIPPLES],
 }
 

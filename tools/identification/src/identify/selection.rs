@@ -82,7 +82,7 @@ impl Crossed {
         overall(&self.errors).unwrap_or(f64::INFINITY)
     }
 
-    /// How the error changes from `self` to `other`.
+    /// Change of the error from `self` to `other`.
     fn to(&self, other: &Self) -> Comparison {
         compare(&self.errors, &other.errors)
     }
@@ -127,7 +127,7 @@ impl Rules<'_> {
     }
 }
 
-/// What the structure can lose; the terms of every model stay, and what is forced.
+/// Freedoms that the structure can lose; the terms of every model stay, and what is forced.
 fn freedoms(structure: &Structure, rules: &Rules) -> Vec<Freedom> {
     let terms = structure.terms.iter().filter(|&term| !ALWAYS.contains(&term) && !rules.forced(term));
     let sides = [

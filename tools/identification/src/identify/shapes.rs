@@ -135,7 +135,7 @@ fn elements(problem: &Problem, samples: &Samples, base: &[[f64; BASE]]) -> Vec<f
     taken.into_iter().map(|element| offered[element - BASE]).collect()
 }
 
-/// How far one element is bent at the samples that identification uses.
+/// Deflection of one element at the samples that identification uses.
 fn bent_at_used(samples: &Samples, stiffness: f64) -> Vec<f64> {
     let bent = pre_sliding::bent(samples, &[stiffness]);
     observations::used(samples).into_iter().map(|i| bent[i][0]).collect()
@@ -226,7 +226,7 @@ fn frequencies(problem: &Problem, samples: &Samples, base: &[[f64; BASE]]) -> Ve
     found
 }
 
-/// What the linear columns and the chosen elements leave of the effort, over rows as they are searched.
+/// Residuals of the effort after the linear columns and the chosen elements, over rows as they are searched.
 fn residuals(problem: &Problem, base: &[[f64; BASE]]) -> Vec<Residual> {
     let n = BASE + problem.limits.elements;
     let rows: Vec<usize> = (0..base.len()).step_by(base.len().div_ceil(FREQUENCY_ROWS).max(1)).collect();

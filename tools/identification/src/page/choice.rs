@@ -1,5 +1,5 @@
-//! How the model was chosen, as a section of the page: the folds with the errors there, the steps, and what was
-//! overruled; host.
+//! Choice of the model, as a section of the page: the folds with the errors there, the steps, and what was overruled;
+//! host.
 
 use super::{Choice, Report};
 use maud::{Markup, html};

@@ -3,7 +3,7 @@
 use super::ErrorTable;
 use report::number::{NONE, optional, percent};
 
-/// How the model was chosen, in lines for a terminal.
+/// Choice of the model, in lines for a terminal.
 pub fn choice(choice: &super::Choice) -> String {
     let mut lines = vec![format!("Chosen by {}.", choice.grouping)];
     lines.push(format!("Terms: {}.", choice.terms.join(", ")));

@@ -21,7 +21,7 @@ use report::output::{OutputError, OutputFile, write_directory};
 use serde::Serialize;
 use std::path::Path;
 
-/// Everything that the report shows.
+/// Content of the report.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Report {
     /// Heading of the page.
@@ -30,23 +30,23 @@ pub struct Report {
     pub data_set: String,
     /// Units of the joint's quantities.
     pub units: Units,
-    /// What the result was made from and with.
+    /// Provenance of the result: what it was made from and with.
     pub provenance: Provenance,
     /// Suspected defects of the data.
     pub warnings: Vec<Warning>,
-    /// What each stage did to the data, in order.
+    /// Notes on what each stage did to the data, in order.
     pub stages: Vec<StageNote>,
     /// Identified physical parameters.
     pub parameters: Vec<Parameter>,
     /// The models that were compared on motions that were left out, best first.
     pub candidates: Vec<Candidate>,
-    /// How the model was chosen.
+    /// Choice of the model.
     pub choice: Choice,
-    /// What became of the network.
+    /// Outcome of the network.
     pub network: NetworkOutcome,
     /// Errors on test data, one table for each test set. The verdict looks at all of them.
     pub errors: Vec<ErrorTable>,
-    /// What fixed-point arithmetic costs. None where no image was made.
+    /// Cost of fixed-point arithmetic. None where no image was made.
     pub fixed_point: Option<FixedPointDifference>,
     /// Training of the network, one curve for each seed.
     pub training: Vec<TrainingCurve>,
@@ -64,14 +64,14 @@ pub struct Report {
 pub struct Uncertainty {
     /// The part, 0.1 to 1.
     pub value: f64,
-    /// Where it was found.
+    /// Cell in which it was found.
     pub worst: String,
     /// Directions, speeds and loads of motions that were judged.
     pub cells: usize,
 }
 
 impl Uncertainty {
-    /// What it is and what to do with it.
+    /// Sentence on what it is and what to do with it.
     pub fn sentence(&self) -> String {
         let Self { value, worst, cells } = self;
         format!(
@@ -94,7 +94,7 @@ pub struct Units {
     pub effort: String,
 }
 
-/// What a result was made from and with; enough to make it again.
+/// Provenance of a result: what it was made from and with; enough to make it again.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Provenance {
     /// Version of the program.
@@ -107,16 +107,16 @@ pub struct Provenance {
     pub options: Vec<(String, String)>,
     /// Seed of all random numbers.
     pub seed: u64,
-    /// When, as text (ISO 8601).
+    /// Time, as text (ISO 8601).
     pub created: String,
 }
 
-/// What one stage of the pipeline did.
+/// Note on one stage of the pipeline.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct StageNote {
     /// Name of the stage: clean, filter, classify, split.
     pub stage: String,
-    /// What it did, in a sentence.
+    /// Action of the stage, in a sentence.
     pub note: String,
     /// Numbers of samples, by what happened to them.
     pub counts: Vec<(String, u64)>,
@@ -141,7 +141,7 @@ pub struct Parameter {
     pub truth: Option<f64>,
 }
 
-/// How the model was chosen.
+/// Choice of the model.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Choice {
     /// The groupings of the folds, in words.
@@ -180,11 +180,11 @@ pub struct Candidate {
     pub unseen_rmse: f64,
     /// This is the model that is used.
     pub kept: bool,
-    /// Why it is, or why it is not.
+    /// Reason for which it is, or is not.
     pub reason: String,
 }
 
-/// What became of the network.
+/// Outcome of the network.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum NetworkOutcome {
@@ -195,12 +195,12 @@ pub enum NetworkOutcome {
     Kept,
     /// It does not pay; the image holds the physical model alone.
     Rejected {
-        /// Why, as a clause: "it raises the validation error by 2 %".
+        /// Reason, as a clause: "it raises the validation error by 2 %".
         reason: String,
     },
 }
 
-/// Which part a row of an error table plays in the comparison.
+/// Role of a row of an error table in the comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Role {
@@ -286,14 +286,14 @@ pub struct TrainingCurve {
     pub best_epoch: usize,
     /// This is the seed whose network is used.
     pub chosen: bool,
-    /// Why training ended.
+    /// Reason for the end of training.
     pub stop: String,
 }
 
 /// One proof of the certificate.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct CertificateItem {
-    /// What is proven.
+    /// Name of what is proven.
     pub name: String,
     /// The value that the proof gives.
     pub value: f64,
@@ -368,7 +368,7 @@ impl TestSamples {
     }
 }
 
-/// Why a report was not written.
+/// Reason for which a report was not written.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
     /// A test column has another length than the time column.

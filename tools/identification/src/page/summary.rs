@@ -5,7 +5,8 @@ use super::{NetworkOutcome, Report, Role};
 use report::number::{percent, significant};
 use serde::Serialize;
 
-/// How much worse than the best physical model of the same table what the joint would run may be on a test set.
+/// Largest ratio of the error of what the joint would run to that of the best physical model of the same table, on a
+/// test set.
 const SIMPLER: f64 = 1.02;
 
 /// The result in one sentence.
@@ -27,7 +28,7 @@ pub(super) struct Pooled {
     pub percent_of_rms: Option<f64>,
 }
 
-/// What one looks for first.
+/// Errors that one looks for first.
 pub(super) struct Headline<'a> {
     /// With the rigid body alone.
     pub before: Pooled,

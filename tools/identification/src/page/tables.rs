@@ -249,7 +249,7 @@ pub fn warnings(report: &Report) -> Markup {
     )
 }
 
-/// What each stage did to the samples.
+/// Table of what each stage did to the samples.
 pub fn stages(report: &Report) -> Markup {
     let rows: Vec<_> = report
         .stages

@@ -121,7 +121,7 @@ fn a_report_is_written_as_a_directory() {
     assert_eq!(fs::read_dir(place.path().join("figures")).unwrap().count(), 10);
 }
 
-/// What is shown must be made of numbers; JSON has no word for what is none.
+/// Asserts that what is shown is made of numbers; JSON has no word for what is none.
 fn assert_no_nan(report: &Report) {
     for file in render(report).unwrap() {
         let contents = String::from_utf8(file.contents).unwrap();

@@ -45,7 +45,7 @@ pub fn from_q16(bits: i32) -> f64 {
     f64::from(bits) / Q16
 }
 
-/// What one unit at full scale is in SI, for a coefficient of this dimension; `shifts` as of
+/// Value of one unit at full scale in SI, for a coefficient of this dimension; `shifts` as of
 /// [`Domain::shifts`](friction_compensation::friction::domain::Domain::shifts).
 fn unit(dimension: Dimension, shifts: &[u32; SIGNALS]) -> f64 {
     match dimension.per {

@@ -12,7 +12,7 @@ use friction_compensation::friction::network::{
 /// Largest sum of a neuron's weights and bias that fits: Q25 in layer 0, Q15 times at least 10 fraction bits in the
 /// others.
 const SUM_LIMIT: f64 = 64.0;
-/// What the firmware multiplies a 16-bit bias with, instead of one.
+/// Factor with which the firmware multiplies a 16-bit bias, instead of one.
 const BIAS_INPUT: f64 = 32767.0 / 32768.0;
 
 /// Quantises `network`. Its box must be the one of the image's domain, to a step of Q16.16.

@@ -107,7 +107,7 @@ pub fn dequantize(parameters: &PhysicalParameters, domain: &Domain) -> FrictionM
     }
 }
 
-/// Which signals the model depends on, in the order of [`Signal`](friction_compensation::friction::state::Signal).
+/// Signals that the model depends on, in the order of [`Signal`](friction_compensation::friction::state::Signal).
 pub fn depends_on(model: &FrictionModel) -> [bool; SIGNALS] {
     let any = |terms: &[Term]| terms.iter().any(|&term| model.terms.contains(term));
     use Term::*;

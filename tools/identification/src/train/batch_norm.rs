@@ -65,14 +65,14 @@ impl MiniBatch {
     }
 }
 
-/// What the forward pass of one layer leaves for the backward pass.
+/// Values that the forward pass of one layer leaves for the backward pass.
 struct LayerTrace {
     layer: LayerShape,
     /// Index of the layer's first input among all values.
     first: usize,
     standardised: Vec<Vec<f64>>,
     inverse_deviation: Vec<f64>,
-    /// What the dense layer received.
+    /// Inputs of the dense layer.
     entered: Vec<Vec<f64>>,
     output: Vec<Vec<f64>>,
 }

@@ -14,7 +14,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::ops::ControlFlow;
 
-/// What is trained and when it stops.
+/// Options of what is trained and when it stops.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// Neurons of each hidden layer.

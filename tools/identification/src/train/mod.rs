@@ -82,7 +82,7 @@ impl TrainingSet {
     }
 }
 
-/// Why training cannot start.
+/// Reason for which training cannot start.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum TrainError {
     /// The columns of a set differ in length.
@@ -104,7 +104,7 @@ pub enum TrainError {
         set: &'static str,
         /// Index of the sample.
         sample: usize,
-        /// Which value of the sample.
+        /// Name of the value of the sample.
         column: &'static str,
         /// The value.
         value: f64,
@@ -132,7 +132,7 @@ pub enum TrainError {
         option: &'static str,
         /// Its value.
         value: f64,
-        /// What is allowed.
+        /// Range that is allowed.
         range: &'static str,
     },
     /// The network's shape is impossible.
@@ -140,7 +140,7 @@ pub enum TrainError {
     Network(#[from] NetworkError),
 }
 
-/// Why training ended.
+/// Reason for the end of training.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stop {
     /// The validation error did not improve for the set number of epochs.
@@ -179,7 +179,7 @@ pub struct TrainingCurve {
     pub validation_mse: Vec<f64>,
     /// Epoch of the lowest validation error, whose network is kept.
     pub best_epoch: usize,
-    /// Why training ended.
+    /// Reason for the end of training.
     pub stop: Stop,
 }
 
@@ -188,7 +188,7 @@ pub struct TrainingCurve {
 pub struct Trained {
     /// The network of the best epoch.
     pub network: Network,
-    /// How it came about.
+    /// Curve of its training.
     pub curve: TrainingCurve,
     /// Seed of the run that it came from.
     pub seed: u64,
@@ -216,7 +216,7 @@ pub struct Progress {
     pub validation_mse: f64,
 }
 
-/// What a trainer calls after every epoch, from several threads.
+/// Callback of a trainer after every epoch, from several threads.
 pub type OnProgress<'a> = &'a (dyn Fn(Progress) + Sync);
 
 /// Checked and normalised samples of a training run.

@@ -13,7 +13,7 @@ use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
-/// What is trained and for how long.
+/// Options of what is trained and for how long.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// Neurons of each hidden layer.

@@ -1,4 +1,4 @@
-//! What both trainers promise, on samples whose truth is known.
+//! Promises of both trainers, on samples whose truth is known.
 
 use super::*;
 use crate::network::FIRMWARE_HIDDEN;

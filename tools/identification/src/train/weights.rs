@@ -7,7 +7,7 @@ use crate::network::Shape;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-/// How far the weights and biases may go.
+/// Bounds of the weights and biases.
 ///
 /// The firmware's format needs sum |w| + |b| < 64 for every neuron and |w| < 32 for every weight (DESIGN, number
 /// formats). Bounds of single weights keep the training problem simple (a box); they are chosen so that no neuron can

@@ -12,7 +12,7 @@ pub enum Board {
     MoteusR4,
 }
 
-/// What is behind a board.
+/// Parts behind a board.
 #[derive(Debug)]
 #[cfg_attr(not(feature = "emulator"), allow(dead_code, reason = "the emulator alone reads it"))]
 pub enum Behind {

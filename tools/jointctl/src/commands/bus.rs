@@ -211,7 +211,7 @@ impl Scan {
     }
 }
 
-/// What a node says of itself.
+/// Description of a node, as it says itself.
 struct Described {
     name: String,
     product: u32,

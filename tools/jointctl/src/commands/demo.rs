@@ -22,7 +22,7 @@ use rayon::prelude::*;
 use report::output::{OutputFile, write_directory};
 use std::path::PathBuf;
 
-/// What the joint is put through before and after.
+/// Scenarios of the joint before and after.
 const SCENARIOS: [Scenario; 2] = [Scenario::SlowReversal, Scenario::PayloadChange];
 
 /// Arguments of `demo`.

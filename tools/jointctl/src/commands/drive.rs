@@ -24,7 +24,7 @@ struct Held {
 }
 
 impl Held {
-    /// Whether the duration was over, and what is left of the joint's motion.
+    /// Returns `true` if the duration was over, and what is left of the joint's motion.
     fn run(&self, command: Command, duration: f64) -> Result<(bool, String), CommandError> {
         let joint = self.on.joint()?;
         catch_interrupts()?;

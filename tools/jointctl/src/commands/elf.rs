@@ -35,7 +35,7 @@ pub struct Bench<'a> {
     pub stop: &'a AtomicBool,
 }
 
-/// What keeps a board busy on a bus.
+/// Session of a board on a bus.
 struct Session<'a> {
     elf: &'a Path,
     bus: &'a str,

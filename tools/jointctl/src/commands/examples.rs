@@ -2,7 +2,7 @@
 
 use clap::Command;
 
-/// What a command is called below `jointctl`, and lines as one types them. `JOINTCTL_BUS` and `JOINTCTL_NODE` stand for
+/// Names of commands below `jointctl`, and lines as one types them. `JOINTCTL_BUS` and `JOINTCTL_NODE` stand for
 /// `--bus` and `--node`.
 const EXAMPLES: [(&str, &[&str]); 42] = [
     ("demo", &["jointctl demo", "jointctl demo --seed 7 --out demo-7"]),
@@ -116,7 +116,7 @@ mod tests {
     use crate::commands::arguments;
     use clap::ArgMatches;
 
-    /// What was asked for, below `jointctl`.
+    /// Names of the command that was asked for, below `jointctl`.
     fn path(matches: &ArgMatches) -> Vec<&str> {
         matches.subcommand().map_or_else(Vec::new, |(name, matches)| [&[name], &path(matches)[..]].concat())
     }

@@ -32,7 +32,7 @@ impl Force {
     /// The same for the files `names` of `folder`.
     ///
     /// # Errors
-    /// As [`Force::permits`].
+    /// Those of [`Force::permits`].
     pub fn permits_in(self, folder: &Path, names: &[&str]) -> Result<(), CommandError> {
         self.permits(names.iter().map(|name| folder.join(name)).collect::<Vec<PathBuf>>())
     }

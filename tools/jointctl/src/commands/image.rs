@@ -105,7 +105,7 @@ impl Convert {
     }
 }
 
-/// Whether the tag behind an image is of this key.
+/// Checks that the tag behind an image is of this key.
 fn verify_tag(upload: &[u8], path: &Path, key: &Key) -> Result<(), CommandError> {
     let refused = |reason: String| Err(CommandError::Image { path: path.to_owned(), reason });
     match split(upload) {

@@ -23,7 +23,7 @@ pub struct JointChoice {
 }
 
 impl JointChoice {
-    /// What is behind an emulated board: what is named, as its motor is wired and its encoder mounted.
+    /// Parts behind an emulated board: what is named, as its motor is wired and its encoder mounted.
     pub fn behind(&self) -> Result<Behind, CommandError> {
         Ok(match (&self.plant, self.joint) {
             (Some(path), _) => Behind::Described(Box::new(read_plant(path)?)),

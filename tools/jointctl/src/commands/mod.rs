@@ -124,7 +124,7 @@ pub fn arguments() -> clap::Command {
     examples::with_examples(Arguments::command())
 }
 
-/// Anything that ends a command.
+/// Error that ends a command.
 #[derive(Debug, thiserror::Error)]
 pub enum CommandError {
     /// The data set.
@@ -159,7 +159,7 @@ pub enum CommandError {
     PlantFile {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Reason.
         reason: String,
     },
     /// The configuration of a joint.
@@ -185,7 +185,7 @@ pub enum CommandError {
     Excitation {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Defects of it.
         defects: String,
     },
     /// A file that cannot be read.
@@ -193,7 +193,7 @@ pub enum CommandError {
     Read {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Cause.
         source: std::io::Error,
     },
     /// An image that cannot be used.
@@ -201,7 +201,7 @@ pub enum CommandError {
     Image {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Reason.
         reason: String,
     },
     /// A file that is no image that can be used.

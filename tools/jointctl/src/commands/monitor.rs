@@ -13,7 +13,7 @@ use std::collections::VecDeque;
 use std::fmt::Write;
 use std::time::Duration;
 
-/// Everything that fits into the four TPDOs and that one looks at.
+/// Signals that one looks at, as many as fit into the four TPDOs.
 const SIGNALS: [Actual; 13] = [
     Actual::Position,
     Actual::Velocity,
@@ -52,7 +52,7 @@ pub struct Monitor {
     json: bool,
 }
 
-/// What has been seen of a joint, newest last.
+/// Samples of a joint, newest last.
 #[derive(Debug, Default)]
 struct History {
     node: u8,

@@ -24,7 +24,7 @@ pub struct OnBoard {
 }
 
 impl OnBoard {
-    /// Whether a program is named.
+    /// Returns `true` if a program is named.
     pub const fn is_named(&self) -> bool {
         self.elf.is_some()
     }

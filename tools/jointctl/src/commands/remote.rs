@@ -1,4 +1,4 @@
-//! What the commands on a joint over a bus share: which joint, how long it may take, and when to stop.
+//! Options that the commands on a joint over a bus share: which joint, how long it may take, and when to stop.
 
 use super::CommandError;
 use crate::key_file;
@@ -75,7 +75,7 @@ pub fn catch_interrupts() -> Result<(), CommandError> {
     caught.map_err(|error| CommandError::Arguments(format!("Ctrl-C cannot be caught: {error}")))
 }
 
-/// Whether nobody has asked to stop.
+/// Returns `true` while nobody has asked to stop.
 pub fn running() -> bool {
     !STOP.load(Ordering::Relaxed)
 }

@@ -69,7 +69,7 @@ struct Task {
     part: Part,
 }
 
-/// What came of it, and the time that it took, s.
+/// Result of the run, and the time that it took, s.
 struct Done {
     run: Run,
     elapsed: f64,

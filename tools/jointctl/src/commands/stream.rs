@@ -27,7 +27,7 @@ pub fn read(path: &Path) -> Result<Vec<u8>, CommandError> {
 /// Checks that a file can be written, as [`Force::permits`]; standard output always can.
 ///
 /// # Errors
-/// As [`Force::permits`].
+/// Those of [`Force::permits`].
 pub fn permits(force: Force, path: &Path) -> Result<(), CommandError> {
     if is_stream(path) { Ok(()) } else { force.permits([path]) }
 }

@@ -1,4 +1,4 @@
-//! The progress of a command on a terminal.
+//! Progress of a command on a terminal.
 
 use identification::progress::Progress;
 use indicatif::{ProgressBar, ProgressStyle};

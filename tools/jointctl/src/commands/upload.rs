@@ -11,7 +11,7 @@ use clap::Args;
 use identification::image_file::bytes;
 use std::path::PathBuf;
 
-/// How long a shadow runs where nobody says, s.
+/// Duration of a shadow where nobody says, s.
 const SHADOW: f64 = 600.0;
 
 /// Arguments of `upload`.

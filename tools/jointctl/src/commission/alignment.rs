@@ -27,7 +27,7 @@ const LARGEST_LAG: f64 = 1.0 / 6.0;
 const LESS_CURRENT: f64 = 0.6;
 /// Largest difference of the zeros, electrical turns: 8 degrees, which cost 1 % of the torque.
 const LARGEST_DIFFERENCE: f64 = 8.0 / 360.0;
-/// How far the measured ratio of turns may be from a whole number.
+/// Largest deviation of the measured ratio of turns from a whole number.
 const LARGEST_FRACTION: f64 = 0.2;
 /// Field's speed and turns of the first sweep, which finds the pole pairs, and the most turns of the last.
 const FIRST_SPEED: f64 = 2.0;
@@ -43,7 +43,7 @@ const WIDEST: f64 = 0.4;
 /// Times that a sweep is begun anew because the encoder has met its index.
 const ATTEMPTS: usize = 3;
 
-/// How the encoder sits on the motor, and what the sweeps showed of the magnet.
+/// Alignment of the encoder on the motor, and what the sweeps showed of the magnet.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Alignment {
     /// Pairs of poles.
@@ -52,15 +52,15 @@ pub struct Alignment {
     pub ratio: f64,
     /// The encoder counts down while the field turns forward.
     pub reversed: bool,
-    /// What `direction * pole pairs * encoder` reads where the d axis lies on phase A, electrical turns, 0 to 1. Its
+    /// Reading of `direction * pole pairs * encoder` where the d axis lies on phase A, electrical turns, 0 to 1. Its
     /// error is the scatter of the electrical turns, with what an eccentric encoder adds.
     pub zero: Estimate,
-    /// How far the rotor lagged behind the field, electrical turns.
+    /// Lag of the rotor behind the field, electrical turns.
     pub lag: f64,
     /// Flux linkage of the magnet, peak, Vs. Its error is no standard error: it is what may be hidden by what the legs
     /// lose, see `hidden`.
     pub flux: Estimate,
-    /// By how much the zero differs with less current, electrical turns.
+    /// Difference of the zero with less current, electrical turns.
     pub difference: f64,
     /// Electrical turns that were evaluated each way, and their speed, turns/s.
     pub swept: (u32, f64),
@@ -86,7 +86,7 @@ pub(super) struct First {
     pub speed: f64,
 }
 
-/// What the sweeps go by.
+/// Quantities that the sweeps go by.
 pub(super) struct Known<'k> {
     pub resistance: &'k Resistance,
     pub inductance: &'k Inductance,
@@ -195,7 +195,7 @@ fn ratio(sweep: &Sweep) -> Result<f64, Failure> {
     Ok(2.0 * field / (forward + backward).abs())
 }
 
-/// How the encoder sits on the motor but for its zero.
+/// Alignment of the encoder on the motor but for its zero.
 struct Seat {
     pole_pairs: u32,
     reversed: bool,

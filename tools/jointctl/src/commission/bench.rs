@@ -54,7 +54,7 @@ pub struct Window {
     pub referenced: bool,
 }
 
-/// What a joint tells of itself while nothing flows.
+/// Condition of a joint while nothing flows, as it tells itself.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Condition {
     /// Words for its state.
@@ -73,7 +73,7 @@ pub struct Condition {
     pub bridge: f64,
 }
 
-/// Why the joint does not go on applying.
+/// Reason for which the joint does not go on applying.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Stopped {
     /// The user has asked to stop.
@@ -143,7 +143,7 @@ pub trait Bench {
     /// [`Stopped`], also where the fault stays.
     fn acknowledge(&mut self) -> Result<(), Stopped>;
 
-    /// What the joint tells of itself.
+    /// Condition of the joint, as it tells itself.
     ///
     /// # Errors
     /// [`Stopped`].
@@ -192,7 +192,7 @@ pub trait Bench {
     fn motion(&mut self) -> Result<[f64; 3], Stopped>;
 }
 
-/// Which set-point a motion has.
+/// Set-point of a motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Motion {
     /// Velocity, rad/s.

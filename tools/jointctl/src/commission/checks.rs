@@ -13,10 +13,10 @@ const APPLICABLE: f64 = 0.5;
 /// Distance that a temperature must have from its limit, K.
 const COOL: f64 = 20.0;
 
-/// What the joint is like before anything flows.
+/// State of the joint before anything flows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Checked {
-    /// What it tells of itself.
+    /// Condition, as it tells itself.
     pub condition: Condition,
     /// Control steps per second, Hz.
     pub rate: f64,
@@ -63,7 +63,7 @@ pub(super) fn check<B: Bench>(bench: &mut B, acknowledge: bool) -> Result<Checke
     })
 }
 
-/// Whether a current leaves room below the motor's limit.
+/// Checks that a current leaves room below the motor's limit.
 pub(super) fn current(current: f64, limit: f64) -> Result<(), Failure> {
     let limits = [LEAST_CURRENT, limit / ROOM];
     // A limit that the joint holds as a REAL32 is a little less than the number that was meant.

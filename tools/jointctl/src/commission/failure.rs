@@ -1,8 +1,8 @@
-//! Why a commissioning ended: with what was measured, where, against which limit, and what to do.
+//! Reasons for the end of a commissioning: with what was measured, where, against which limit, and what to do.
 
 use super::bench::Stopped;
 
-/// Why a commissioning ended.
+/// Reason for the end of a commissioning.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Failure {
     /// The joint does not go on, or the user does not want to.
@@ -28,7 +28,7 @@ pub enum Failure {
     },
     /// Something is too hot to begin.
     Hot {
-        /// Which part.
+        /// Name of the part.
         part: &'static str,
         /// °C.
         temperature: f64,
@@ -44,7 +44,7 @@ pub enum Failure {
     },
     /// A number that the user gave is out of its range.
     Range {
-        /// Which number.
+        /// Name of the number.
         what: &'static str,
         /// Its value.
         value: f64,
@@ -96,7 +96,7 @@ pub enum Failure {
         turns: f64,
         /// Mechanical turns.
         limit: f64,
-        /// How long it was waited for, s.
+        /// Time for which it was waited for, s.
         seconds: f64,
     },
     /// No motor has this resistance.
@@ -152,9 +152,9 @@ pub enum Failure {
     },
     /// The motor has another number of pole pairs than its data sheet says.
     PolePairs {
-        /// What was counted.
+        /// Number of pole pairs that was counted.
         counted: u32,
-        /// What was expected.
+        /// Number of pole pairs that was expected.
         expected: u32,
     },
     /// Friction is too high for the current.

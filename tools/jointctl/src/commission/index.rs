@@ -12,7 +12,7 @@ const LONGEST: f64 = 1.1;
 /// Electrical turns of the field after which a rotor that has not followed by half stands at a stop.
 const STALLED: f64 = 1.5;
 
-/// How the index was met.
+/// Encounter with the index.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Index {
     /// Mechanical turns that the rotor made until then, by the encoder's counts; 0 where it had been met before.

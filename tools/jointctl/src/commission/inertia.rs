@@ -28,7 +28,7 @@ const LONGEST: f64 = 3.0;
 /// Largest standard error, as a part of the inertia.
 const CLEAR: f64 = 0.1;
 
-/// What the joint measured of an inertia.
+/// Measurement of an inertia by the joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Inertia {
     /// kg m^2 at the joint, as the user says.

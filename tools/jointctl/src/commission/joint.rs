@@ -9,20 +9,20 @@ use joint_firmware::motor::setting::Name;
 use joint_firmware::objects::field::{Actual, ConfigurationField, Field, OpenLoopField, SetPoint};
 use joint_firmware::objects::settings::Setting;
 
-/// How long a change of state may take, and how often it is looked for, s.
+/// Longest time of a change of state, and the interval at which it is looked for, s.
 const STATE: f64 = 1.0;
 const LOOK: f64 = 0.002;
 /// Longest time that braking may take, s: the longest of a configuration.
 const BRAKING: f64 = 11.0;
-/// How often storing is asked for, and how long it is waited between, s: a board with one bank of flash writes at rest
+/// Number of requests to store, and the waiting time between them, s: a board with one bank of flash writes at rest
 /// only.
 const STORES: usize = 20;
 const REST: f64 = 0.1;
-/// How often a joint is asked whether it has started, and how long it is waited before, s.
+/// Number of times that a joint is asked whether it has started, and the waiting time before each, s.
 const STARTS: usize = 5;
 const START: f64 = 0.2;
-/// How often a configuration is offered to a control step that has not taken the one before, and how long that is
-/// waited for, s.
+/// Number of times that a configuration is offered to a control step that has not taken the one before, and the waiting
+/// time for that, s.
 const OFFERS: usize = 20;
 const TAKEN: f64 = 0.05;
 /// Object 2100h:1 and 2.
@@ -63,7 +63,7 @@ pub trait Objects {
     fn pass(&mut self, seconds: f64) -> Result<(), Stopped>;
 }
 
-/// What the joint has been told to do.
+/// Instruction that the joint has been given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Told {
     Nothing,
@@ -84,7 +84,7 @@ impl<O: Objects> Joint<O> {
         Self { objects, told: Told::Nothing }
     }
 
-    /// What carries its objects.
+    /// Carrier of its objects.
     pub const fn objects(&mut self) -> &mut O {
         &mut self.objects
     }
@@ -115,7 +115,7 @@ impl<O: Objects> Joint<O> {
         Ok(drive::faults_of(self.raw(Field::Actual(Actual::LatchedFaults))? as u16))
     }
 
-    /// Why the joint is not in the state that it should be in.
+    /// Reason for which the joint is not in the state that it should be in.
     fn stopped(&mut self, state: State) -> Stopped {
         match self.faults() {
             Ok(faults) if faults == [Fault::StaleCommand] => Stopped::Late,

@@ -7,14 +7,14 @@ use super::estimate::Estimate;
 use super::failure::Failure;
 use joint_firmware::objects::settings::Setting;
 
-/// How far the joint goes aside before it comes back, rad.
+/// Distance that the joint goes aside before it comes back, rad.
 const ASIDE: f64 = 0.05;
 /// Between two set-points, s; how long a position is approached, and how long it is held.
 const PERIOD: f64 = 0.01;
 const APPROACH: f64 = 1.0;
 const HELD: f64 = 0.5;
 
-/// What the joint measured of a load.
+/// Measurement of a load by the joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Load {
     /// Nm, as the user says.

@@ -53,10 +53,10 @@ use joint_firmware::objects::settings::Setting;
 /// Times that a part is repeated for a joint that missed this program's frames.
 const LATE: usize = 3;
 
-/// Where a commissioning is.
+/// Stage of a commissioning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Stage {
-    /// Nothing flows.
+    /// Checks while nothing flows.
     Checks,
     /// Voltage over current.
     Resistance,
@@ -100,17 +100,17 @@ impl Stage {
     }
 }
 
-/// Who leads a person through it.
+/// Guide of a person through it.
 pub trait Guide {
     /// A stage begins; under current where it is one of [`Stage::UNDER_CURRENT`].
     fn stage(&mut self, stage: Stage);
     /// Something was found.
     fn found(&mut self, text: &str);
-    /// Whether to go on; only ever asked while the bridge is off.
+    /// Returns `true` to go on; only ever asked while the bridge is off.
     fn agrees(&mut self, question: &str) -> bool;
 }
 
-/// What a commissioning found.
+/// Results of a commissioning.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Found {
     /// The joint before.
@@ -125,17 +125,17 @@ pub struct Found {
     pub resistance: Resistance,
     /// Winding.
     pub inductance: Inductance,
-    /// How the encoder's index was met; none where it needs none or had met it.
+    /// Encounter with the encoder's index; none where it needs none or had met it.
     pub index: Option<Index>,
     /// Encoder and magnet.
     pub alignment: Alignment,
-    /// What the joint took, in the unit of each object.
+    /// Settings that the joint took, in the unit of each object.
     pub settings: Vec<(Setting, f64)>,
-    /// How the motor turned with it.
+    /// Motion of the motor with it.
     pub turned: Option<Turned>,
-    /// What it measured of a known load.
+    /// Measurement of a known load.
     pub load: Option<Load>,
-    /// What it measured of a known inertia.
+    /// Measurement of a known inertia.
     pub inertia: Option<Inertia>,
 }
 
@@ -237,7 +237,7 @@ pub fn find_index<B: Bench>(bench: &mut B, plan: &Plan, guide: &mut impl Guide) 
     Ok(index)
 }
 
-/// What was known before is set for the time of the measurement; the settings that it replaces.
+/// Sets what was known before for the time of the measurement; returns the settings that it replaces.
 fn prepare<B: Bench>(bench: &mut B, plan: &Plan, limit: f64) -> Result<Vec<(Setting, f64)>, Failure> {
     if let Some(counts) = plan.counts
         && bench.setting(Setting::EncoderCounts)? != f64::from(counts)

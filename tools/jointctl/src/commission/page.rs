@@ -1,4 +1,4 @@
-//! What a commissioning found, as a page and as text.
+//! Results of a commissioning, as a page and as text.
 
 use super::estimate::Estimate;
 use super::{Found, Stage};
@@ -53,7 +53,7 @@ pub fn text(found: &Found, node: u8) -> String {
     text
 }
 
-/// What a setting was measured as.
+/// Measured estimate of a setting.
 fn estimate(found: &Found, setting: Setting) -> Option<Estimate> {
     Some(match setting {
         Setting::Resistance => found.resistance.at_25(),

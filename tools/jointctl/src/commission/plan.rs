@@ -1,8 +1,8 @@
-//! What a user says of a joint before it is commissioned, and what of it is a number that cannot be.
+//! Plan of a commissioning: what a user says of a joint before it, and what of it is a number that cannot be.
 
 use super::failure::Failure;
 
-/// What is known of the joint, and how it is to be commissioned. What is absent stays as the joint has it.
+/// Known values of the joint, and how it is to be commissioned. What is absent stays as the joint has it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plan {
     /// Current that the rotor is held and turned with, A: enough to overcome friction and load with ease.

@@ -37,7 +37,7 @@ const LONGEST: f64 = 4.0;
 /// one leg loses.
 const ALONG_A: f64 = 4.0 / 3.0;
 
-/// What the winding is along phase A.
+/// Resistance of the winding along phase A.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Resistance {
     /// Ω at the winding's present temperature; leads and transistors included.
@@ -51,7 +51,7 @@ pub struct Resistance {
 }
 
 impl Resistance {
-    /// What the joint has: resistance at 25 °C, for a winding at `temperature`; nothing known of what legs lose.
+    /// Values that the joint has: resistance at 25 °C, for a winding at `temperature`; nothing known of what legs lose.
     pub fn configured(at_25: f64, temperature: f64) -> Self {
         let exactly = |value| Estimate { value, error: 0.0 };
         let resistance = exactly(at_25 * copper(temperature));

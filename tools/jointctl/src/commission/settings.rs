@@ -26,7 +26,7 @@ const LIMIT_DAMPING: f64 = 5.05;
 const CURRENT_BANDWIDTH: f64 = 500.0;
 const OBSERVER_BANDWIDTH: f64 = 200.0;
 
-/// Whether motor and torque constant are the placeholders of a board's program.
+/// Returns `true` if motor and torque constant are the placeholders of a board's program.
 pub(super) fn is_new<B: Bench>(bench: &mut B) -> Result<bool, Stopped> {
     // The same placeholders on every board.
     let mut placeholder = B_G431B_ESC1.joint;

@@ -42,9 +42,9 @@ pub(super) struct Sweep {
     pub backward: Way,
 }
 
-/// How a sweep ends.
+/// End of a sweep.
 pub(super) enum Swept {
-    /// As planned.
+    /// Complete sweep, as planned.
     Whole(Sweep),
     /// The encoder has met its index: its angle has jumped, and the field has been stopped where it is.
     Index,
@@ -165,7 +165,7 @@ pub(super) fn sweep<B: Bench>(
 }
 
 impl Sweep {
-    /// Where what is evaluated begins and ends, electrical turns.
+    /// Begin and end of what is evaluated, electrical turns.
     fn ends(&self) -> [f64; 2] {
         [CATCH_UP, CATCH_UP + f64::from(self.turns)]
     }

@@ -21,7 +21,7 @@ const REST: f64 = 0.1;
 /// Mean velocity over the second half of each way, as a part of what is wanted: least and most.
 const RIGHT: [f64; 2] = [0.7, 1.3];
 
-/// How the motor turned.
+/// Motion of the motor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Turned {
     /// rad/s at the joint.
@@ -32,7 +32,7 @@ pub struct Turned {
     pub samples: Vec<[f64; 3]>,
 }
 
-/// How far and how fast a joint may turn here.
+/// Largest speed and travel of a joint here.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Reach {
     /// rad/s.

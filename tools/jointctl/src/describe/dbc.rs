@@ -16,7 +16,7 @@ use std::fmt::Write;
 /// "Does not exist" in a PDO's COB-ID.
 const INVALID: u32 = 1 << 31;
 
-/// How a signal lies in its frame.
+/// Position of a signal in its frame.
 struct Place {
     /// Least significant bit first, or most significant bit first with the number of that bit.
     start: u32,

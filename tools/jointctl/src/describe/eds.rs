@@ -19,13 +19,14 @@ const DOMAIN: u8 = 2;
 const VARIABLE: u8 = 7;
 const RECORD: u8 = 9;
 
-/// Why a file has no vendor.
+/// Reason for which a file has no vendor.
 const NO_VENDOR: &str = "VendorNumber: joints answer 0 (1018h:1), as this project has no vendor ID of CiA";
-/// Why a file that was made without a joint has no product.
+/// Reason for which a file that was made without a joint has no product.
 const ANY_PRODUCT: &str =
     "ProductNumber, RevisionNumber: 0 is any; each board has its own, which --bus BUS --node N reads (1018h:2, 3)";
 
-/// Who a joint is, as its object 1018h says; of a joint that is not known everything is 0, which masters take for any.
+/// Identity of a joint, as its object 1018h says; of a joint that is not known everything is 0, which masters take for
+/// any.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Identity {
     /// 1018h:1.
@@ -184,7 +185,7 @@ fn object(
     writeln!(text)
 }
 
-/// What a joint has that nobody has set up; none where that is a matter of the joint.
+/// Value in a joint that nobody has set up; none where that is a matter of the joint.
 fn default(entry: &Entry, defaults: &CommunicationParameters, identity: Identity) -> Option<String> {
     let object = entry.object;
     // Parameters were made for node id 0: what depends on it is said as CiA 306 does.

@@ -1,4 +1,4 @@
-//! What each key of `joint.toml` means, in which unit and within which range; host.
+//! Meaning of each key of `joint.toml`, with its unit and range; host.
 //!
 //! The ranges are those of `Configuration` in the firmware, which is what checks them; a test holds both together.
 

@@ -16,7 +16,7 @@ use joint_firmware::motor::thermal::WindingTemperature;
 use mirror::Text;
 use std::path::{Path, PathBuf};
 
-/// Why a file is not the configuration of a joint.
+/// Reason for which a file is not the configuration of a joint.
 #[derive(Debug, thiserror::Error)]
 pub enum JointTextError {
     /// The file cannot be read.
@@ -24,7 +24,7 @@ pub enum JointTextError {
     Unreadable {
         /// The file.
         file: PathBuf,
-        /// What the operating system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// Not TOML, an unknown key, a missing key or a value of the wrong type.
@@ -40,7 +40,7 @@ pub enum JointTextError {
     Refused {
         /// The file.
         file: PathBuf,
-        /// Which, and what it may be.
+        /// Refused value, and what it may be.
         source: ConfigurationError,
     },
 }
@@ -68,7 +68,7 @@ pub fn from_text(text: &str, file: &Path, bridge: &BridgeConfiguration) -> Resul
     Ok(configuration)
 }
 
-/// What a joint checks when it starts: the record as a whole, and its thermal model, which the slow task makes of it.
+/// Checks of a joint when it starts: the record as a whole, and its thermal model, which the slow task makes of it.
 fn check(configuration: &Configuration, bridge: &BridgeConfiguration) -> Result<(), ConfigurationError> {
     let active = configuration.prepare(bridge)?;
     WindingTemperature::new(&active.thermal, configuration.thermal.ambient)?;

@@ -6,9 +6,9 @@ use bus::client::sdo::Settings;
 use bus::client::{ClientError, Network, NmtState};
 use std::time::{Duration, Instant};
 
-/// How long a node that has an id may take to say so.
+/// Time in which a node that has an id has to say so.
 const PROBE: Duration = Duration::from_millis(50);
-/// How often it is asked whether there is a node without an id.
+/// Number of questions for a node without an id.
 const QUESTIONS: u32 = 5;
 
 /// A joint that got its node id.
@@ -16,11 +16,11 @@ const QUESTIONS: u32 = 5;
 pub struct Addressed {
     /// Its node id now.
     pub node: u8,
-    /// What tells it from every other.
+    /// Address that tells it from every other.
     pub address: Address,
 }
 
-/// Whether some node has this id.
+/// Returns `true` if some node has this id.
 fn is_taken(network: &Network, id: u8) -> Result<bool, RemoteError> {
     let node = network.node(id)?.with_settings(Settings { timeout: PROBE, ..Settings::default() });
     match node.upload(0x1000, 0) {

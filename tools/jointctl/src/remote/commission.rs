@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 /// Longest sleep before the user is asked whether to go on.
 const PART: Duration = Duration::from_millis(10);
-/// How long a joint may take to boot.
+/// Longest time in which a joint has to boot.
 const BOOT: Duration = Duration::from_secs(10);
 
 /// A joint on a bus. Where this ends, the joint is left in PRE-OPERATIONAL, in which nothing moves.

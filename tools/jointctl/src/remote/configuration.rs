@@ -89,7 +89,7 @@ pub(super) fn explained(joint: &RemoteJoint, error: RemoteError) -> RemoteError 
     details().unwrap_or(error)
 }
 
-/// Which sub-index of 1010h and 1011h.
+/// Sub-index of 1010h and 1011h.
 fn sub_index(group: Group) -> u8 {
     match group {
         Group::All => 1,

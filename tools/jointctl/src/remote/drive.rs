@@ -8,7 +8,7 @@ use joint_firmware::joint::state_machine::State;
 use joint_firmware::objects::field::{Actual, Field, StorageField};
 use std::time::{Duration, Instant};
 
-/// How long a joint may take to brake: the longest braking time of a configuration.
+/// Longest time in which a joint has to brake: the longest braking time of a configuration.
 pub(super) const BRAKING: Duration = Duration::from_secs(11);
 /// Between two looks at a node.
 pub(super) const LOOK: Duration = Duration::from_millis(5);

@@ -84,12 +84,12 @@ impl Entry {
         }
     }
 
-    /// Whether it carries something beside the number of a record's entries.
+    /// Returns `true` if it carries something beside the number of a record's entries.
     pub fn is_content(&self) -> bool {
         !self.text.description.is_empty()
     }
 
-    /// Whether it can be read.
+    /// Returns `true` if it can be read.
     pub fn is_readable(&self) -> bool {
         self.object.access != Access::WriteOnly
     }
@@ -120,7 +120,7 @@ impl Entry {
         }
     }
 
-    /// What [`Self::listed`] tells, as a JSON object.
+    /// JSON object of what [`Self::listed`] tells.
     pub fn json(&self) -> serde_json::Value {
         let limits = self.text.limits.map(|(low, high)| [low, high]);
         serde_json::json!({

@@ -1,4 +1,4 @@
-//! What can go wrong between this program and a joint, in one line each: what, where, which limit; host.
+//! Errors between this program and a joint, in one line each: what, where, which limit; host.
 
 use bus::BusError;
 use bus::client::ClientError;
@@ -17,7 +17,7 @@ impl std::fmt::Display for Short {
 }
 
 impl RemoteError {
-    /// Whether what was asked for is wrong, whatever the joint is and does.
+    /// Returns `true` if what was asked for is wrong, whatever the joint is and does.
     #[must_use]
     pub const fn is_usage(&self) -> bool {
         matches!(
@@ -31,7 +31,7 @@ impl RemoteError {
     }
 }
 
-/// Why something did not happen.
+/// Reason for which something did not happen.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum RemoteError {
     /// The bus.
@@ -47,7 +47,7 @@ pub enum RemoteError {
         node: u8,
         /// Number of the joint's key.
         number: u32,
-        /// What is missing.
+        /// Missing part.
         problem: String,
     },
     /// Nobody has this node id, or the node is silent. Many nodes send nothing unless they are asked.
@@ -61,13 +61,13 @@ pub enum RemoteError {
     NoJoint {
         /// Node id.
         node: u8,
-        /// What it says it is.
+        /// Device type that it states.
         device_type: u32,
     },
     /// No object has this name.
     #[error("'{name}' is no object of a joint{}", suggestion(near))]
     UnknownName {
-        /// What was asked for.
+        /// Name that was asked for.
         name: String,
         /// Names that are like it.
         near: Vec<String>,
@@ -75,7 +75,7 @@ pub enum RemoteError {
     /// Several objects have this name.
     #[error("'{name}' is the name of several objects: {}", names.join(", "))]
     AmbiguousName {
-        /// What was asked for.
+        /// Name that was asked for.
         name: String,
         /// Their full names.
         names: Vec<String>,
@@ -83,7 +83,7 @@ pub enum RemoteError {
     /// A record, where one of its entries is meant.
     #[error("'{name}' is a record; its entries are {}", names.join(", "))]
     Record {
-        /// What was asked for.
+        /// Name that was asked for.
         name: String,
         /// Its entries.
         names: Vec<String>,
@@ -93,7 +93,7 @@ pub enum RemoteError {
     Value {
         /// The object, with its index.
         object: String,
-        /// Why not.
+        /// Reason.
         problem: String,
     },
     /// A setting that does not fit the others.
@@ -106,7 +106,7 @@ pub enum RemoteError {
         node: u8,
         /// Its name.
         setting: String,
-        /// What was asked for.
+        /// Value that was asked for.
         value: f64,
         /// Least that is possible.
         low: f64,
@@ -126,7 +126,7 @@ pub enum RemoteError {
     Armed {
         /// Node id.
         node: u8,
-        /// What was asked for.
+        /// Name of what was asked for.
         what: &'static str,
         /// The joint's state.
         state: State,
@@ -147,11 +147,11 @@ pub enum RemoteError {
     State {
         /// Node id.
         node: u8,
-        /// Where it is.
+        /// State in which it is.
         state: State,
-        /// Where it should be.
+        /// State in which it should be.
         wanted: State,
-        /// How long it was waited for, ms.
+        /// Time for which it was waited for, ms.
         within_ms: u64,
     },
     /// A joint that is not enabled because of what it has, or has not, stored.
@@ -168,7 +168,7 @@ pub enum RemoteError {
     Stopped {
         /// Node id.
         node: u8,
-        /// Where it is.
+        /// State in which it is.
         state: State,
         /// The latched faults.
         faults: Vec<Fault>,
@@ -188,7 +188,7 @@ pub enum RemoteError {
     NoSamples {
         /// Node id.
         node: u8,
-        /// How long they were waited for, ms.
+        /// Time for which they were waited for, ms.
         within_ms: u64,
     },
     /// Two producers of SYNC.
@@ -206,7 +206,7 @@ pub enum RemoteError {
         state: NmtState,
         /// The NMT state that was asked for.
         wanted: NmtState,
-        /// How long it was waited for, ms.
+        /// Time for which it was waited for, ms.
         within_ms: u64,
     },
     /// Beyond a limit of the joint.
@@ -217,9 +217,9 @@ pub enum RemoteError {
     Limit {
         /// Node id.
         node: u8,
-        /// What was asked for.
+        /// Name of what was asked for.
         what: &'static str,
-        /// How much.
+        /// Value of it.
         value: f64,
         /// Lowest.
         low: f64,
@@ -235,13 +235,13 @@ pub enum RemoteError {
     Refused {
         /// Node id.
         node: u8,
-        /// Which step.
+        /// Name of the step.
         step: &'static str,
         /// Number of the reason, object 2212h:3.
         code: u16,
         /// The reason.
         text: String,
-        /// What is in use.
+        /// Image that is still in use, in words.
         unchanged: String,
     },
     /// Something else about an image.
@@ -249,13 +249,13 @@ pub enum RemoteError {
     Image {
         /// Node id.
         node: u8,
-        /// What.
+        /// Problem.
         problem: String,
     },
     /// More signals than TPDOs carry.
     #[error("{signals} signals of {bits} bits do not fit into {} TPDOs of 64 bits", canopen_node::PDOS)]
     TooManySignals {
-        /// How many.
+        /// Number of signals.
         signals: usize,
         /// Their lengths together.
         bits: u32,
@@ -263,9 +263,9 @@ pub enum RemoteError {
     /// A time or rate that makes no sense.
     #[error("{what} is {} {unit}, must lie in {} to {} {unit}", Short(*value), Short(*low), Short(*high))]
     Range {
-        /// What.
+        /// Name of the quantity.
         what: &'static str,
-        /// How much.
+        /// Value of it.
         value: f64,
         /// Least.
         low: f64,
@@ -277,7 +277,7 @@ pub enum RemoteError {
     /// Node ids have run out.
     #[error("no node id from {first} to 127 is free for the joint with {address}")]
     NoFreeId {
-        /// From where on was looked for.
+        /// First node id that was looked for.
         first: u8,
         /// LSS address.
         address: String,

@@ -18,11 +18,11 @@ use identification::progress::Progress;
 use joint_firmware::objects::field::{Actual, Field, ImageField, StoredField, Which};
 use std::time::{Duration, Instant};
 
-/// How long storing may take: two pages erased and written take less than a tenth of it.
+/// Longest time of storing: two pages erased and written take less than a tenth of it.
 const STORING: Duration = Duration::from_secs(5);
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
-/// What becomes of an uploaded image.
+/// Use of an uploaded image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Use {
     /// It is verified and waits.
@@ -42,7 +42,7 @@ pub struct StoredImage {
     pub version: u32,
     /// Its checksum.
     pub checksum: u32,
-    /// Whether it has a network.
+    /// `true` if it has a network.
     pub network: bool,
     /// 1 or 2.
     pub slot: u8,
@@ -50,21 +50,21 @@ pub struct StoredImage {
     pub created: u32,
 }
 
-/// Where images stand.
+/// State of the images.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImageStatus {
     /// Of the image that is staged; [`State::Active`] where none is and one is in use.
     pub state: State,
-    /// What is left of a trial or shadow, s; 0 outside.
+    /// Remaining time of a trial or shadow, s; 0 outside.
     pub left: f64,
     /// Stored and in use, but for a trial.
     pub active: Option<StoredImage>,
-    /// What a roll back would make active.
+    /// Image that a roll back would make active.
     pub previous: Option<StoredImage>,
 }
 
 impl RemoteJoint {
-    /// Where a staged image stands.
+    /// State of a staged image.
     pub fn image_state(&self) -> Result<State, RemoteError> {
         let number = self.raw(Field::Actual(Actual::ImageState))?;
         image_state(number as u8).ok_or_else(|| {
@@ -73,7 +73,7 @@ impl RemoteJoint {
         })
     }
 
-    /// Where images stand.
+    /// State of the images.
     pub fn image_status(&self) -> Result<ImageStatus, RemoteError> {
         Ok(ImageStatus {
             state: self.image_state()?,
@@ -196,7 +196,7 @@ impl RemoteJoint {
         Err(RemoteError::Image { node: self.id(), problem })
     }
 
-    /// Whether the staging buffer has as many bytes as these, and whole ones.
+    /// Returns `true` if the staging buffer has as many bytes as these, and whole ones.
     fn received(&self, upload: &[u8]) -> Result<bool, RemoteError> {
         let raw = |field| self.raw(Field::Image(field));
         Ok(raw(ImageField::Length)? == upload.len() as u64

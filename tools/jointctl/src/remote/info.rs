@@ -136,7 +136,7 @@ pub fn page(joint: &RemoteJoint) -> Result<String, RemoteError> {
     Ok(page)
 }
 
-/// Why a joint does not learn, by the number of object 2201h:2.
+/// Reasons for which a joint does not learn, by the number of object 2201h:2.
 const LEARNING: [&str; 9] = [
     "learns",
     "off",
@@ -207,10 +207,10 @@ pub fn show_entry(joint: &RemoteJoint, entry: Entry) -> Result<String, RemoteErr
     })
 }
 
-/// What reset the chip, in the order of the bits of object 2301h:1.
+/// Causes of the chip's reset, in the order of the bits of object 2301h:1.
 const CAUSES: [&str; 7] =
     ["option bytes", "reset pin", "power", "the program", "the watchdog", "the window watchdog", "low-power mode"];
-/// What stops a program, by its number in object 2301h:2, from 1 on.
+/// Causes of a program's stop, by its number in object 2301h:2, from 1 on.
 const STOPS: [&str; 4] = ["a panic", "a hard fault", "a non-maskable interrupt", "an interrupt without a handler"];
 
 /// Object 2301h in words.
@@ -252,7 +252,7 @@ fn stored(image: Option<StoredImage>) -> String {
     format!("version {version}, {model}, CRC-32 {checksum:08X}h, slot {slot}{created}")
 }
 
-/// Where a staged image stands, in words.
+/// State of a staged image, in words.
 pub fn life(state: State, left: f64) -> String {
     match state {
         State::Empty => "nothing staged, none in use".into(),

@@ -26,9 +26,9 @@ pub struct LoadDifference {
     pub quantity: &'static str,
     /// kg m² or Nm.
     pub unit: &'static str,
-    /// As configured, payload included.
+    /// Value as configured, payload included.
     pub configured: f64,
-    /// As the torque shows it.
+    /// Value as the torque shows it.
     pub measured: f64,
     /// Standard error of that.
     pub standard_error: f64,
@@ -46,7 +46,7 @@ impl fmt::Display for LoadDifference {
     }
 }
 
-/// What is configured, with the payload; zero where the joint has no such objects.
+/// Load that is configured, with the payload; zero where the joint has no such objects.
 pub fn configured(joint: &RemoteJoint) -> Result<Load, RemoteError> {
     let setting = |setting| match joint.number(Field::AtOnce(setting)) {
         Err(RemoteError::Client(ClientError::Aborted { abort: Abort::NO_OBJECT, .. })) => Ok(0.0),
@@ -61,7 +61,7 @@ pub fn configured(joint: &RemoteJoint) -> Result<Load, RemoteError> {
     }))
 }
 
-/// What differs by more than the tolerance. What is not configured, or was not identified, is no difference.
+/// Differences of more than the tolerance. What is not configured, or was not identified, is no difference.
 pub fn differences(configured: &Load, identified: &[Parameter]) -> Vec<LoadDifference> {
     let of = |regressor: RigidRegressor| {
         let found = identified.iter().find(|parameter| parameter.symbol == regressor.symbol());

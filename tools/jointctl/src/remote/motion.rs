@@ -18,7 +18,7 @@ const LOOK: Duration = Duration::from_millis(50);
 /// Longest motion, s: a day.
 const LONGEST: f64 = 86_400.0;
 
-/// What is asked of the joint.
+/// Motion that is asked of the joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
     /// Mode, and set-points in SI units. The joint ramps to velocities and positions by itself, within its limits.
@@ -31,7 +31,7 @@ pub struct Motion {
     pub acknowledge: bool,
 }
 
-/// What the joint does.
+/// Observed state of the joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observation {
     /// Since it was enabled, s.
@@ -51,14 +51,14 @@ impl std::fmt::Display for Observation {
     }
 }
 
-/// How it ended.
+/// Outcome of the motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outcome {
     /// The last look before the joint was disabled; none where it ended before the first.
     pub last: Option<Observation>,
     /// The state that the joint is left in.
     pub state: State,
-    /// Whether the time was over; false where somebody ended it before.
+    /// `true` if the time was over; false where somebody ended it before.
     pub complete: bool,
 }
 

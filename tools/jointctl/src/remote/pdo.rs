@@ -1,4 +1,4 @@
-//! What the PDOs of a joint carry: read, changed and put back; host.
+//! Contents of the PDOs of a joint: read, changed and put back; host.
 
 use super::error::RemoteError;
 use super::joint::RemoteJoint;
@@ -9,7 +9,7 @@ const INVALID: u32 = 1 << 31;
 /// The identifier in a COB-ID.
 const IDENTIFIER: u32 = 0x7FF;
 
-/// Which way.
+/// Direction of a PDO.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
     /// To the joint.
@@ -21,7 +21,7 @@ pub enum Direction {
 /// One of the four PDOs of a direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pdo {
-    /// Which way.
+    /// Direction.
     pub direction: Direction,
     /// 0 to 3.
     pub number: u8,
@@ -45,7 +45,7 @@ impl Pdo {
         self.communication() + 0x200
     }
 
-    /// What the joint has.
+    /// Parameters that the joint has.
     pub fn read(self, joint: &RemoteJoint) -> Result<PdoParameters, RemoteError> {
         let node = joint.node();
         let (communication, mapping) = (self.communication(), self.mapping());
@@ -130,7 +130,7 @@ pub struct Change {
 }
 
 impl Change {
-    /// What it is now.
+    /// Parameters that it has now.
     pub fn parameters(&self) -> &PdoParameters {
         &self.now
     }

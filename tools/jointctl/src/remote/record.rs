@@ -24,7 +24,7 @@ const COLUMNS: [(&str, usize, Actual); 4] = [
 /// The signals that a table needs.
 pub const SIGNALS: [Actual; 4] = [Actual::Position, Actual::Velocity, Actual::Torque, Actual::GearTemperature];
 
-/// Who marks the instants.
+/// Node that marks the instants.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Pace {
     /// This program, so many times a second.
@@ -45,7 +45,7 @@ pub struct Recorder {
     samples: Vec<Sample>,
 }
 
-/// What was recorded.
+/// Recorded samples.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
     /// The signals of a sample, in their order.

@@ -1,4 +1,5 @@
-//! Why a joint refuses an image: its number (object 2212h:3) in words, with what both sides are known to be; host.
+//! Reasons for which a joint refuses an image: the number (object 2212h:3) in words, with what both sides are known to
+//! be; host.
 //!
 //! The joint tells a number. What stands behind it in [`Refusal`] is read from the joint and from the image, and said
 //! in the firmware's own words; what cannot be known from here is said in general ones.
@@ -65,12 +66,12 @@ pub fn words(code: u16) -> &'static str {
     known.map_or("a reason that this program does not know; is it older than the joint's?", |(_, words)| words)
 }
 
-/// What the joint refused: the step, and the bytes where there are some.
+/// Refused attempt: the step, and the bytes where there are some.
 #[derive(Clone, Copy, Debug)]
 pub struct Attempt<'a> {
     /// The command; none for the upload itself.
     pub command: Option<Command>,
-    /// What was uploaded: an image, and a tag where there is one. Empty where it is about stored images.
+    /// Uploaded bytes: an image, and a tag where there is one. Empty where it is about stored images.
     pub upload: &'a [u8],
 }
 

@@ -52,7 +52,7 @@ const SPARE: f64 = 20.0;
 const OFF: u64 = 0;
 const PHYSICAL_AND_NETWORK: u64 = 2;
 
-/// Why a round ended without a new image. The joint is as it was.
+/// Reason for which a round ended without a new image. The joint is as it was.
 #[derive(Debug, thiserror::Error)]
 pub enum RetrainError {
     /// The joint.
@@ -78,7 +78,7 @@ pub enum RetrainError {
     Key {
         /// Node id.
         node: u8,
-        /// What is missing.
+        /// Missing part.
         problem: String,
     },
     /// Somebody's image is on its way.
@@ -86,9 +86,9 @@ pub enum RetrainError {
     Busy {
         /// Node id.
         node: u8,
-        /// Where it stands.
+        /// State of the image.
         state: State,
-        /// What is left of a trial or shadow, s.
+        /// Remaining time of a trial or shadow, s.
         left: f64,
     },
     /// Ended by the user.
@@ -132,14 +132,14 @@ pub struct Round {
     pub out: PathBuf,
 }
 
-/// What one motion showed.
+/// Results of one motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shown {
-    /// What neither feed-forward nor compensation explain, RMS, Nm.
+    /// Residual torque that neither feed-forward nor compensation explain, RMS, Nm.
     pub residual: f64,
     /// Distance from the reference, RMS, rad.
     pub tracking: f64,
-    /// How far the image in shadow is from what acts, RMS, Nm: what the joint says of itself (2200h:7).
+    /// Difference of the image in shadow from what acts, RMS, Nm: what the joint says of itself (2200h:7).
     pub shadow: f64,
 }
 
@@ -159,13 +159,13 @@ impl Shown {
         if other.residual < self.residual { other } else { self }
     }
 
-    /// Whether this leaves clearly less unexplained. Not a number is no improvement.
+    /// Returns `true` if this leaves clearly less unexplained. Not a number is no improvement.
     fn is_better_than(&self, other: &Self) -> bool {
         self.residual <= (1.0 - LEAST_GAIN) * other.residual
     }
 }
 
-/// What came of a round that was committed.
+/// Outcome of a round that was committed.
 #[derive(Debug)]
 pub struct Outcome {
     /// The fit.
@@ -179,11 +179,11 @@ pub struct Outcome {
     pub before: Shown,
     /// With the new image.
     pub after: Shown,
-    /// Where images stand now.
+    /// State of the images now.
     pub status: ImageStatus,
 }
 
-/// What has to be as it was at the end.
+/// Settings that have to be as they were at the end.
 struct Tidy<'a> {
     joint: &'a RemoteJoint,
     request: u64,
@@ -306,7 +306,7 @@ impl Round {
     }
 }
 
-/// What the motion may use of the joint.
+/// Bounds of the joint for the motion.
 fn bounds(joint: &RemoteJoint) -> Result<Bounds, RemoteError> {
     let setting = |setting| joint.number(Field::Setting(setting));
     let range = joint.number(Field::Range(Range::Position))?;

@@ -23,7 +23,7 @@ const STEEPEST: f64 = 1.875;
 /// Between two looks at the joint's state.
 const LOOK: Duration = Duration::from_millis(100);
 
-/// What a joint follows.
+/// Route that a joint follows.
 #[derive(Clone, Debug)]
 pub struct Route {
     /// About the same position, each beginning and ending at rest there.
@@ -44,12 +44,12 @@ struct Way {
     damping: f64,
 }
 
-/// What came of a route.
+/// Outcome of a route.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Travelled {
     /// From the begin of the lead.
     pub recording: Recording,
-    /// Where the joint should have been at each sample of the series, and the sample's number in the recording.
+    /// Reference of the joint at each sample of the series, and the sample's number in the recording.
     pub references: Vec<(usize, Reference)>,
 }
 

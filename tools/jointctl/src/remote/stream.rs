@@ -50,14 +50,14 @@ pub(super) fn no_set_points() -> RemoteError {
     RemoteError::Value { object, problem: "the open loop has no set-points; `jointctl commission` uses it".into() }
 }
 
-/// What is sent, as a function of the time since it began.
+/// Command that is sent, as a function of the time since it began.
 type Source = Box<dyn FnMut(Duration) -> Command + Send>;
 
-/// What the thread and everyone else share.
+/// State that the thread and everyone else share.
 #[derive(Debug)]
 struct Shared {
     controlword: AtomicU16,
-    /// Why the thread ended.
+    /// Reason for the thread's end.
     failure: Mutex<Option<RemoteError>>,
 }
 
@@ -101,7 +101,7 @@ pub struct Stream {
     /// To the thread, which ends when it is dropped.
     sources: Option<Sender<Source>>,
     thread: Option<JoinHandle<()>>,
-    /// Whether the joint may follow this program. One that does not is not this one's to disable.
+    /// `true` if the joint may follow this program. One that does not is not this one's to disable.
     commanding: bool,
     ended: bool,
 }
@@ -265,7 +265,7 @@ impl Stream {
         }
     }
 
-    /// Whether set-points still go out and the joint follows them; asks the joint.
+    /// Checks that set-points still go out and the joint follows them; asks the joint.
     pub fn check(&self) -> Result<(), RemoteError> {
         self.failure()?;
         match self.joint.state()? {

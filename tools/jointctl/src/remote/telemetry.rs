@@ -1,4 +1,4 @@
-//! What a joint does, sample by sample in SI units: TPDOs that follow SYNC; host.
+//! Telemetry of a joint, sample by sample in SI units: TPDOs that follow SYNC; host.
 //!
 //! [`Telemetry::begin`] packs the wanted signals into as few TPDOs as carry them and has them answer every SYNC, so
 //! that all values of a sample are of one control step. Somebody has to send SYNC: [`bus::client::SyncProducer`], once
@@ -19,7 +19,7 @@ const CONTENT: u32 = 64;
 /// Transmission type: with every SYNC.
 const EVERY_SYNC: u8 = 1;
 
-/// What a joint does, as far as a control engineer wants it first: state, motion, torques, friction.
+/// Signals of a joint that a control engineer wants first: state, motion, torques, friction.
 pub const USUAL: [Actual; 8] = [
     Actual::Position,
     Actual::Velocity,
@@ -38,7 +38,7 @@ pub struct Signal {
     pub entry: Entry,
     /// Unit of the decoded values: the table's, with torques in Nm where the table has parts of the rated torque.
     pub unit: &'static str,
-    /// What the table's value is multiplied by.
+    /// Factor of the table's value.
     factor: f64,
 }
 
@@ -61,7 +61,7 @@ impl Signal {
 /// All signals at one instant.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sample {
-    /// When its first TPDO was received.
+    /// Time at which its first TPDO was received.
     pub at: Instant,
     /// One for each of [`Telemetry::signals`].
     pub values: Vec<f64>,
@@ -118,7 +118,7 @@ impl Telemetry {
         &self.signals
     }
 
-    /// Where a signal stands in a sample.
+    /// Place of a signal in a sample.
     pub fn place(&self, actual: Actual) -> Option<usize> {
         self.signals.iter().position(|signal| signal.field() == Field::Actual(actual))
     }

@@ -20,7 +20,7 @@ pub enum Value {
 }
 
 impl Value {
-    /// As JSON: bytes as an array of numbers; what JSON has no number for as null.
+    /// JSON value: bytes as an array of numbers; what JSON has no number for as null.
     #[must_use]
     pub fn json(&self) -> serde_json::Value {
         match self {
@@ -35,7 +35,7 @@ impl Value {
         }
     }
 
-    /// As a number, where it is one.
+    /// Number, where it is one.
     pub fn number(&self) -> Option<f64> {
         match self {
             Self::Bool(value) => Some(f64::from(u8::from(*value))),
@@ -72,7 +72,7 @@ fn span(bits: u32, signed: bool) -> (i128, i128) {
 }
 
 impl Entry {
-    /// What bytes of the bus mean; none where they are not as many as the type has.
+    /// Value of bytes of the bus; none where they are not as many as the type has.
     pub fn decode(&self, bytes: &[u8]) -> Option<Value> {
         let Some(length) = self.object.data_type.bytes() else {
             return Some(match self.object.data_type {
@@ -87,7 +87,7 @@ impl Entry {
         Some(self.decode_raw(raw))
     }
 
-    /// What the low bits of a PDO's content mean. The entry has a fixed length, as everything has that can be mapped.
+    /// Value of the low bits of a PDO's content. The entry has a fixed length, as everything has that can be mapped.
     pub fn decode_raw(&self, raw: u64) -> Value {
         match (self.object.data_type, integer(self.object.data_type)) {
             (DataType::F32, _) => Value::Real(f32::from_bits(raw as u32).into()),
@@ -97,7 +97,7 @@ impl Entry {
         }
     }
 
-    /// What a person wrote.
+    /// Value of what a person wrote.
     pub fn parse(&self, text: &str) -> Result<Value, RemoteError> {
         let text = text.trim();
         let wrong = |wanted: &str| self.refuse(format!("'{text}' is no {wanted}"));

@@ -1,7 +1,7 @@
-//! How well a joint did: where it was against where it should have been, and the torque that arrived against the
-//! torque that was asked for; host.
+//! Judgement of a joint: where it was against where it should have been, and the torque that arrived against the torque
+//! that was asked for; host.
 //!
-//! What did not arrive is the command before compensation less what the motor gives and friction leaves. It is judged
+//! Torque that did not arrive is the command before compensation less what the motor gives and friction leaves. It is judged
 //! as everywhere ([`mod@identification::torque_error`]): below 20 Hz, as a share of the friction. Beside it stands equation 11
 //! of the mobile-robot paper (001),
 //! |what did not arrive| / |motor torque|, without samples below a tenth of the motor torque's RMS.
@@ -21,7 +21,7 @@ pub struct Judgement {
     pub torque_error: Option<f64>,
     /// The same while the joint was to move.
     pub torque_error_in_motion: Option<f64>,
-    /// What arrived against the motor torque, for equation 11. None without samples.
+    /// Torque that arrived against the motor torque, for equation 11. None without samples.
     pub torque: Option<Metrics>,
     /// Share of the samples in motion for which the image was faded out, %.
     pub faded: f64,

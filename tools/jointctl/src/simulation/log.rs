@@ -1,4 +1,4 @@
-//! What a simulated run records: what the joint knows, and what is true; host.
+//! Record of a simulated run: what the joint knows, and what is true; host.
 //!
 //! The table is written with the name and unit of each column in its header. Columns that begin with `true_` are not
 //! measured by anything: a fit may use the others only.
@@ -10,9 +10,9 @@ use std::fmt::Write;
 pub struct Row {
     /// Time since the motion started, s.
     pub time: f64,
-    /// Where the joint should be, rad.
+    /// Reference position of the joint, rad.
     pub reference_position: f64,
-    /// How fast it should be, rad/s.
+    /// Reference velocity of the joint, rad/s.
     pub reference_velocity: f64,
     /// Position as the joint knows it, rad.
     pub position: f64,

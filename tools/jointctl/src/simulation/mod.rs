@@ -23,7 +23,7 @@ pub use motion::Motion;
 pub use run::{Choices, Ending, Run, run};
 pub use scenario::{Part, Scenario};
 
-/// Why nothing was simulated.
+/// Reason for which nothing was simulated.
 #[derive(Debug, thiserror::Error)]
 pub enum SimulationError {
     /// Plant, configuration or the joint's start.
@@ -40,7 +40,7 @@ pub enum SimulationError {
     Recording {
         /// Number of the run, from 0.
         run: usize,
-        /// When, and which fault.
+        /// Time, and fault.
         reason: String,
     },
     /// A torque that is not a number.

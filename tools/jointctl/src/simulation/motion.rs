@@ -1,4 +1,4 @@
-//! What a joint is asked to do over time; host.
+//! Motion that is asked of a joint over time; host.
 //!
 //! A reference in time is followed in impedance mode, as a robot's controller would: position, velocity and the torque
 //! that the rigid body needs for it, at a stiffness and damping. Targets are reached in position mode, where the joint
@@ -58,7 +58,7 @@ pub struct Targets {
     pub interval: f64,
 }
 
-/// How a controller commands the joint.
+/// Control law with which a controller commands the joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Controller {
     /// Impedance mode's stiffness, Nm/rad.
@@ -159,7 +159,7 @@ impl Motion {
         }
     }
 
-    /// Where the joint should be at `time` (s). None where the joint makes its own ramp.
+    /// Reference of the joint at `time` (s). None where the joint makes its own ramp.
     #[must_use]
     pub fn reference(&self, time: f64) -> Option<Reference> {
         match self {
@@ -170,7 +170,7 @@ impl Motion {
         }
     }
 
-    /// What a controller sends at `time` (s) to a joint at `position` (rad), knowing the rigid body of `joint`.
+    /// Command that a controller sends at `time` (s) to a joint at `position` (rad), knowing the rigid body of `joint`.
     #[must_use]
     pub fn command(&self, time: f64, position: f64, joint: &JointParameters, controller: &Controller) -> Command {
         if let Self::Targets(targets) = self {

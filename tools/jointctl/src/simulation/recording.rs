@@ -18,7 +18,7 @@ pub const HEADER: &str = "run,t_s,position_rad,velocity_rad_s,torque_Nm,temperat
 /// Excites the joint and records it: the table that [`DESCRIPTION`] describes. The same `seed` gives the same table.
 ///
 /// # Errors
-/// What plant or firmware refuse, and a run that a fault ended.
+/// Refusals of plant or firmware, and a run that a fault ended.
 pub fn record(plant: &ActuatorParameters, setup: &Setup, seed: u64) -> Result<String, SimulationError> {
     let excitation = Excitation::for_joint(&plant.joint, seed)?;
     let runs = excitation.runs.par_iter().enumerate();

@@ -21,7 +21,7 @@ pub const USUAL_SAMPLE_PERIOD: f64 = 4e-3;
 /// Commands a second.
 pub const COMMAND_RATE: f64 = 1000.0;
 
-/// How a part is run.
+/// Options of a part's run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Choices {
     /// Seed of the sensors' noise.
@@ -36,18 +36,18 @@ impl Default for Choices {
     }
 }
 
-/// How a run ended.
+/// End of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Ending {
     /// The motion was run to its end.
     Whole,
     /// The joint left "operation enabled".
     Stopped {
-        /// When, s since the motion started.
+        /// Time, s since the motion started.
         time: f64,
         /// The state that it went to.
         state: State,
-        /// Why.
+        /// Faults that caused it.
         faults: Faults,
     },
 }
@@ -64,12 +64,12 @@ impl std::fmt::Display for Ending {
     }
 }
 
-/// What came of a run.
+/// Results of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Run {
-    /// What was recorded until it ended.
+    /// Log until it ended.
     pub log: Log,
-    /// How it ended.
+    /// End of it.
     pub ending: Ending,
     /// Time that was simulated, with the joint's start, s.
     pub simulated: f64,
@@ -78,7 +78,7 @@ pub struct Run {
 /// Runs a part with `friction` as the joint's friction model.
 ///
 /// # Errors
-/// What plant or firmware refuse, and a joint that cannot be enabled. A fault in motion is no error: the run ends with
+/// Refusals of plant or firmware, and a joint that cannot be enabled. A fault in motion is no error: the run ends with
 /// it.
 pub fn run(
     part: &Part,
@@ -111,7 +111,7 @@ pub fn run(
 /// that was simulated, with the joint's start, s.
 ///
 /// # Errors
-/// What plant or firmware refuse, and a joint that cannot be enabled.
+/// Refusals of plant or firmware, and a joint that cannot be enabled.
 pub fn drive(
     part: &Part,
     setup: &Setup,
@@ -157,7 +157,7 @@ pub(super) fn every(time: f64, period: f64) -> u64 {
     (time / period).round().max(1.0) as u64
 }
 
-/// What the joint knows and what is true, after a control step.
+/// Values that the joint knows, and the true ones, after a control step.
 fn row(joint: &VirtualJoint) -> Row {
     let (telemetry, truth) = (joint.joint().telemetry(), &joint.actuator().state().joint);
     let value = f64::from;

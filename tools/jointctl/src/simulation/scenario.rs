@@ -39,9 +39,9 @@ pub struct Part {
     pub plant: ActuatorParameters,
     /// Temperature at the start, °C.
     pub temperature: f64,
-    /// What is in the link's way.
+    /// Contact in the link's way.
     pub contact: Option<Contact>,
-    /// What the joint is asked to do.
+    /// Motion that is asked of the joint.
     pub motion: Motion,
     /// Natural frequency of the impedance as a share of the position loop's.
     pub softness: f64,

@@ -14,11 +14,11 @@ pub struct Line {
     pub scenario: &'static str,
     /// Its part, where it has several.
     pub part: Option<&'static str>,
-    /// Whether compensation acted.
+    /// `true` if compensation acted.
     pub compensated: bool,
-    /// How well the joint did.
+    /// Judgement of the joint.
     pub judgement: Judgement,
-    /// How the run ended.
+    /// End of the run.
     pub ending: Ending,
 }
 
@@ -47,7 +47,7 @@ impl Line {
         })
     }
 
-    /// Why the run did not come to its end, in a sentence.
+    /// Reason for which the run did not come to its end, in a sentence.
     #[must_use]
     pub fn stop(&self) -> Option<String> {
         (self.ending != Ending::Whole)

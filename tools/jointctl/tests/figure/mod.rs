@@ -46,7 +46,7 @@ fn drawn(off: &Path, on: &Path) -> String {
     over_time("slow-reversal", "Slow reversals without and with compensation", "", &plots).unwrap().standalone()
 }
 
-/// Whether two drawings are the same but for numbers that are near each other.
+/// Returns `true` if two drawings are the same but for numbers that are near each other.
 fn is_near(one: &str, other: &str) -> bool {
     let parts = |text: &str| -> (String, Vec<f64>) {
         let is_of_number = |c: char| c.is_ascii_digit() || c == '.' || c == '-';

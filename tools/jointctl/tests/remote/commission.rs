@@ -37,7 +37,7 @@ impl Objects for Slowed<'_> {
     }
 }
 
-/// What a commissioning finds, made wrong.
+/// Replaces what a commissioning finds by wrong values.
 fn forget(joint: &RemoteJoint) {
     let wrong = [("resistance", "1.0"), ("pole-pairs", "3"), ("electrical-zero", "0.1")];
     let pairs = wrong.map(|(name, text)| {

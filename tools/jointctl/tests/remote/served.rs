@@ -18,7 +18,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// How long a joint may take for an answer: these joints run in real time, and the machine may have much else to do.
+/// Longest time for an answer of a joint: these joints run in real time, and the machine may have much else to do.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// The program, with that patience.

@@ -11,7 +11,7 @@ use std::ops::Range;
 pub struct Axis {
     range: Range<f64>,
     ticks: Vec<(f64, String)>,
-    /// What is measured and its unit.
+    /// Quantity and its unit.
     pub label: String,
     logarithmic: bool,
 }

@@ -1,4 +1,4 @@
-//! Many samples as few marks: thinning, ranges that outliers do not spoil, and means over bins; host.
+//! Reduction of many samples to few marks: thinning, ranges that outliers do not spoil, and means over bins; host.
 
 use std::ops::Range;
 

@@ -1,4 +1,4 @@
-//! What all figures share: paper, panels with axes, a legend above the plot, and the marks; host.
+//! Elements that all figures share: paper, panels with axes, a legend above the plot, and the marks; host.
 
 use super::FigureError;
 use super::axis::Axis;
@@ -40,7 +40,7 @@ pub fn paper(width: u32, height: u32, draw: impl FnOnce(&Area) -> Result<()>) ->
     ))
 }
 
-/// How a legend shows an ink.
+/// Swatch of an ink in a legend.
 #[derive(Clone, Copy, Debug)]
 pub enum Swatch {
     /// A line.

@@ -7,7 +7,7 @@
 
 use plotters::style::RGBColor;
 
-/// What a mark in a figure stands for.
+/// Meaning of a mark in a figure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ink {
     /// Letters.

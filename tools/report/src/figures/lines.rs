@@ -14,7 +14,7 @@ const HEIGHT: u32 = 200;
 /// One curve.
 #[derive(Clone, Debug)]
 pub struct Curve<'a> {
-    /// What it stands for. The same in all panels.
+    /// Meaning of the curve. The same in all panels.
     pub ink: Ink,
     /// Name in the legend.
     pub name: &'a str,
@@ -25,7 +25,7 @@ pub struct Curve<'a> {
 /// One panel.
 #[derive(Clone, Debug)]
 pub struct Plot<'a> {
-    /// What is shown, and its unit.
+    /// Quantity that is shown, and its unit.
     pub label: &'a str,
     /// Curves, the first below the others.
     pub curves: Vec<Curve<'a>>,

@@ -15,7 +15,7 @@ pub use lines::{Curve, Plot, over_time};
 use plotters::drawing::DrawingAreaErrorKind;
 use std::convert::Infallible;
 
-/// Why a figure could not be drawn: the layout or a font failed. The text is that of plotters.
+/// Error of drawing a figure: the layout or a font failed. The text is that of plotters.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot draw a figure: {0}")]
 pub struct FigureError(#[from] DrawingAreaErrorKind<Infallible>);

@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 /// Part of travel and velocity that a motion uses: the rest is left to the controllers.
 const SHARE: f64 = 0.9;
 
-/// What a motion may not exceed.
+/// Bounds that a motion may not exceed.
 #[derive(Clone, Debug)]
 pub struct Task<'a> {
     /// The robot.
@@ -34,7 +34,7 @@ pub struct Task<'a> {
     pub floor: Option<f64>,
 }
 
-/// How long and how hard is searched.
+/// Length and effort of the search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Effort {
     /// Duration of the motion, s; 4 to 600.
@@ -52,7 +52,7 @@ pub struct Effort {
 }
 
 impl Effort {
-    /// What `jointctl robot excite` takes its time for.
+    /// Effort of `jointctl robot excite`.
     pub const THOROUGH: Self = Self { duration: 20.0, harmonics: 5, draws: 64, restarts: 4, rounds: 30, seed: 1 };
 
     fn validate(&self) -> Result<(), ExciteError> {
@@ -64,7 +64,7 @@ impl Effort {
     }
 }
 
-/// Why there is no excitation of a robot.
+/// Reason for which there is no excitation of a robot.
 #[derive(Debug, thiserror::Error)]
 pub enum RobotExciteError {
     /// A joint without a limit.
@@ -104,7 +104,7 @@ pub enum RobotExciteError {
         floor: f64,
         /// Lowest frame of the pose in which it is highest, m.
         highest: f64,
-        /// That frame's link.
+        /// Link of that frame.
         frame: String,
     },
     /// A motion whose samples leave parameters open.

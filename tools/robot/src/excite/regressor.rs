@@ -20,7 +20,7 @@ const LEAST_EFFORT: f64 = 1e-6;
 /// The motion of every joint, sample by sample.
 pub type Motion = Vec<Vec<Reference>>;
 
-/// What tells motions apart.
+/// Regressor that tells motions apart.
 #[derive(Clone, Debug)]
 pub struct Regressor<'a> {
     robot: &'a Robot,

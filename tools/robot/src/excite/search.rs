@@ -40,7 +40,7 @@ const STEPS: (f64, f64) = (0.5, 0.05);
 /// Fall of the cost in a round, below which steps are halved.
 const GAIN: f64 = 0.01;
 
-/// What was found.
+/// Result of the search.
 #[derive(Clone, Debug)]
 pub struct Found {
     /// The series of every joint.
@@ -162,7 +162,7 @@ impl Task<'_> {
         heights.fold((f64::INFINITY, 0), |low, (i, height)| if height < low.0 { (height, i) } else { low })
     }
 
-    /// How much of its tightest bound a joint uses at a sample about `centre`; above 1 beyond it.
+    /// Part of its tightest bound that a joint uses at a sample about `centre`; above 1 beyond it.
     fn used(&self, joint: usize, centre: f64, about: &Reference) -> f64 {
         let bounds = &self.bounds[joint];
         let end = if about.position > 0.0 { bounds.position.1 } else { bounds.position.0 };

@@ -1,4 +1,4 @@
-//! What a whole preparation makes of a recording.
+//! Results of a whole preparation of a recording.
 
 use super::*;
 use crate::samples::Part;

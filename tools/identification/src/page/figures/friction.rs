@@ -1,4 +1,4 @@
-//! What was measured against what the models say: friction over velocity, and predicted over measured effort; host.
+//! Measurements against models: friction over velocity, and predicted over measured effort; host.
 
 use crate::page::Report;
 use report::figures::axis::Axis;
@@ -95,7 +95,7 @@ pub fn compensated_ink(report: &Report) -> (Ink, &'static str) {
     }
 }
 
-/// How many values lie beyond their [`robust_extent`].
+/// Number of values beyond their [`robust_extent`].
 pub fn outside(values: &[f64]) -> usize {
     let range = robust_extent(values);
     values.iter().filter(|value| !(range.start..=range.end).contains(*value)).count()

@@ -1,4 +1,4 @@
-//! What the models leave unexplained: its distribution, and whether it still depends on something; host.
+//! Residuals of the models: their distribution, and whether they still depend on something; host.
 
 use super::friction::{compensated_ink, outside};
 use crate::page::Report;

@@ -28,13 +28,13 @@ use std::path::{Path, PathBuf};
 /// Least fall of the error on the days that were left out for which a new image is kept.
 const LEAST_GAIN: f64 = 0.02;
 
-/// What became of a joint.
+/// Outcome for a joint.
 #[derive(Clone, Debug, Serialize)]
 struct Outcome {
     joint: String,
     /// RMS error of the image before on the days that were left out, Nm.
     before_nm: Option<f64>,
-    /// That of the new image.
+    /// RMS error of the new image, Nm.
     after_nm: Option<f64>,
     /// Version of the image that is kept.
     version: Option<u32>,

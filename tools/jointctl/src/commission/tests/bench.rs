@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 pub const RATE: f64 = 20_000.0;
 const STEPS: u32 = 128;
 
-/// What is done to the joint in the middle of something.
+/// Intervention on the joint in the middle of something.
 pub type Event = fn(&mut Simulated);
 
 pub struct Simulated {
@@ -17,7 +17,7 @@ pub struct Simulated {
     pub settings: Vec<(Setting, f64)>,
     /// The encoder has an index, and counts from anywhere until it meets it.
     pub incremental: bool,
-    /// What the encoder reads at first, 2^32 a turn.
+    /// Initial reading of the encoder, 2^32 a turn.
     pub start: u32,
     pub condition: Condition,
     /// Called before each control step.

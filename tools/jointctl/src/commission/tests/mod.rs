@@ -326,7 +326,7 @@ fn a_motor_too_salient_for_the_current_is_told_by_the_rotor_s_lag() {
 #[test]
 fn a_joint_that_is_not_fit_to_begin_is_left_alone() {
     type Spoil = fn(&mut Simulated);
-    /// Whether it is the failure that was to come.
+    /// Returns `true` if it is the failure that was to come.
     type Expected = fn(&Failure) -> bool;
     let spoilt: [(Spoil, Expected); 6] = [
         (|b| b.condition.faults = "over-current (2310h)".into(), |f| matches!(f, Failure::Fault { .. })),
