@@ -32,14 +32,14 @@ use std::path::Path;
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
 
-/// Where the programs are built.
+/// Folder in which the programs are built.
 const TEMPORARY: &str = env!("CARGO_TARGET_TMPDIR");
 /// Inputs that each network evaluates; as many as the program `networks` has room for.
 const INPUTS: usize = 200;
 /// Control interrupts of a board's program that are taken apart: more than come between two that do what a task asks
 /// for.
 const INTERRUPTS: usize = 1000;
-/// How long the boards' programs run, s.
+/// Duration of the boards' programs, s.
 const RUN: f64 = 1.2;
 
 /// A row of the first table: its name, its parts, and the most instructions and cycles that it should take.
@@ -357,7 +357,8 @@ fn around<W: Wired>(emulation: &mut Emulation<W>, path: &Path) -> Outcome<[u64; 
     Ok(spread(board))
 }
 
-/// Whether an instruction of the handler belongs to the joint's control step; none for what is called out of line.
+/// Returns `true` if an instruction of the handler belongs to the joint's control step; none for what is called out of
+/// line.
 fn belongs(loader: &addr2line::Loader, address: u32) -> Option<bool> {
     let mut frames = loader.find_frames(address.into()).ok()?;
     let (mut joint, mut handler) = (false, false);

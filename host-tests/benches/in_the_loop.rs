@@ -41,7 +41,7 @@ fn main() {
     layers(&without, &with, &alone);
 }
 
-/// What the joints differ in.
+/// Ranges in which the joints differ.
 fn ranges(joints: &[RandomJoint]) {
     type Value = fn(&ActuatorParameters) -> f64;
     let rows: [(&str, Value); 16] = [

@@ -99,7 +99,7 @@ impl Core {
     /// Writes words to a symbol.
     ///
     /// # Errors
-    /// As for [`write`](Self::write).
+    /// Those of [`write`](Self::write).
     pub fn write_words(&mut self, symbol: &str, words: impl IntoIterator<Item = i32>) -> Result<(), String> {
         let bytes: Vec<u8> = words.into_iter().flat_map(i32::to_le_bytes).collect();
         self.write(symbol, &bytes)
@@ -118,7 +118,7 @@ impl Core {
     /// Goes on to the next breakpoint; with what each call of `function` took, one behind the other.
     ///
     /// # Errors
-    /// As for [`run`](Self::run).
+    /// Those of [`run`](Self::run).
     pub fn calls(&mut self, function: &str) -> Result<Vec<Cost>, String> {
         self.cpu.set_watch(Some(Watch::new().function(self.address(function)?)));
         self.run()?;
@@ -130,7 +130,7 @@ impl Core {
     /// on; none where it ends.
     ///
     /// # Errors
-    /// What it prints is no word.
+    /// Output that is no word.
     pub fn printed(&mut self) -> Result<Option<u32>, String> {
         if self.cpu.register(0) != WRITE {
             return Ok(None);

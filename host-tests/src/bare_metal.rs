@@ -9,7 +9,7 @@ use std::process::Command;
 /// Target of both boards.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
 
-/// Whether the board's target is installed.
+/// Returns `true` if the board's target is installed.
 pub fn target_installed() -> bool {
     let output = Command::new("rustc").args(["--print", "target-libdir", "--target", TARGET]).output();
     output.is_ok_and(|output| {
@@ -44,7 +44,7 @@ impl Board {
     /// probe's.
     ///
     /// # Errors
-    /// What the compiler says.
+    /// Messages of the compiler.
     pub fn probe(
         &self,
         program: &str,
@@ -121,7 +121,7 @@ fn built(mut command: Command, program: &str, temporary: &str, place: PathBuf) -
 /// Builds a board's program as it is flashed, below a test's temporary folder; its path.
 ///
 /// # Errors
-/// What the compiler says.
+/// Messages of the compiler.
 pub fn build(board: &str, temporary: &str) -> Result<PathBuf, String> {
     let folder = Path::new(temporary).join("flashed");
     std::fs::create_dir_all(&folder).map_err(|error| error.to_string())?;

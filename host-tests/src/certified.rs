@@ -7,7 +7,7 @@ use rand::{Rng, RngExt};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 
-/// What is random for the image `seed`: 0 the image itself, any other number something that goes with it.
+/// Random source for the image `seed`: 0 the image itself, any other number something that goes with it.
 pub fn random(seed: u64, stream: u64) -> ChaCha8Rng {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     random.set_stream(stream);
@@ -18,7 +18,7 @@ pub fn random(seed: u64, stream: u64) -> ChaCha8Rng {
 /// around what can be proved of it.
 ///
 /// # Errors
-/// Why the certificate refuses it.
+/// Refusal by the certificate.
 pub fn drawn(seed: u64) -> Result<Image, Refusal> {
     let mut random = random(seed, 0);
     let friction = if seed % 3 == 2 { extreme(&mut random) } else { tame(&mut random) };

@@ -8,11 +8,11 @@ use jointctl::simulation::recording::{DESCRIPTION, record};
 use plant::actuator::ActuatorParameters;
 use plant::virtual_joint::Setup;
 
-/// What commissioning leaves.
+/// Results of commissioning.
 pub struct Commissioned {
     /// The model as the board would run it.
     pub model: FrictionModel,
-    /// Whether a network is part of it.
+    /// `true` if a network is part of it.
     pub network: bool,
     /// Part of its friction that the joint may not have, as the fit states it.
     pub uncertainty: Option<f32>,

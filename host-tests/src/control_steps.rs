@@ -92,14 +92,14 @@ pub fn friction(most_sets: usize) -> FrictionParameters {
 /// The model as bytes.
 ///
 /// # Panics
-/// Where the certificate refuses it.
+/// Panics if the certificate refuses it.
 pub fn image_bytes(most_sets: usize) -> Vec<u8> {
     let friction = friction(most_sets);
     prove(&friction).unwrap_or_else(|error| panic!("{error:?}"));
     encoded(&image(&mut ChaCha8Rng::seed_from_u64(6), friction, 1))
 }
 
-/// What the program `step` is built around: the image behind its length, then the steps.
+/// Input that the program `step` is built around: the image behind its length, then the steps.
 pub fn input(image: &[u8], steps: &[[u32; WORDS]]) -> Vec<u8> {
     let mut runs = (image.len() as u16).to_le_bytes().to_vec();
     runs.extend_from_slice(image);

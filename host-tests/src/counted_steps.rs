@@ -33,15 +33,15 @@ pub const PARTS: [(&str, &[&str]); 17] = [
     ("step itself", &["joint::Joint::step", "joint::Joint::control_step", "joint::Joint::coupled"]),
 ];
 
-/// Where a part is in [`PARTS`].
+/// Index of a part in [`PARTS`].
 ///
 /// # Panics
-/// Where there is none of this name.
+/// Panics if no part has this name.
 pub fn place(name: &str) -> usize {
     PARTS.iter().position(|(known, _)| *known == name).unwrap_or_else(|| panic!("no part {name}"))
 }
 
-/// What one step cost.
+/// Cost of one step.
 #[derive(Clone, Copy, Default)]
 pub struct Step {
     /// All of it.

@@ -35,7 +35,7 @@ pub fn demand(joint: &VirtualJoint, trajectory: &Trajectory, n: u64) -> Demand {
 /// Moves over most of a joint's travel and speed, again and again, for at least `duration` (s).
 ///
 /// # Errors
-/// What the plant refuses.
+/// Refusals of the plant.
 pub fn moves(parameters: &ActuatorParameters, duration: f64) -> Result<Trajectory, String> {
     let limits = &parameters.joint.limits;
     let acceleration = parameters.joint.usable_acceleration().min(20.0);

@@ -25,7 +25,7 @@ pub struct Errors {
     pub torque: f64,
     /// RMS of the position error, rad.
     pub tracking: f64,
-    /// How often a layer held compensation back.
+    /// Shares of the steps in which a layer held compensation back.
     pub shares: Shares,
 }
 
@@ -64,7 +64,7 @@ pub struct RandomJoint {
     pub parameters: ActuatorParameters,
     /// Its configuration, compensation off.
     pub off: Setup,
-    /// What its owner found.
+    /// Findings of its owner.
     pub found: Commissioned,
     moves: Trajectory,
     reversals: Trajectory,
@@ -107,7 +107,7 @@ impl RandomJoint {
     /// Draws, excites, records and fits joint number `seed`.
     ///
     /// # Errors
-    /// What plant, firmware or fit refuse, and a fault on the way.
+    /// Refusals of plant, firmware or fit, and a fault on the way.
     pub fn commissioned(seed: u64) -> Result<Self, String> {
         let parameters = ActuatorParameters::randomised(seed).aligned();
         let off = Setup::of(&parameters);
@@ -166,9 +166,9 @@ impl RandomJoint {
         Ok(Moved { moves: errors(&self.moves)?, reversals: errors(&self.reversals)? })
     }
 
-    /// By how much a hand changes what adaptation adds, root of the mean square as a part of Coulomb friction, %: after
-    /// 20 s the joint moves on, and for 8 s a torque as large as Coulomb friction acts on the link, forward, or against
-    /// the motion.
+    /// Change by a hand of what adaptation adds, root of the mean square as a part of Coulomb friction, %: after 20 s
+    /// the joint moves on, and for 8 s a torque as large as Coulomb friction acts on the link, forward, or against the
+    /// motion.
     ///
     /// # Errors
     /// A fault on the way.

@@ -22,7 +22,7 @@ const LEARNED: f64 = 10.0;
 /// Error of every parameter of the model.
 pub const ERROR: f64 = 0.5;
 
-/// What a joint did in a scenario.
+/// Motion of a joint in a scenario.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Seen {
     /// Largest distance from the start before the push, rad.
@@ -39,7 +39,7 @@ pub struct Seen {
     pub withheld: f64,
 }
 
-/// How a joint is left alone.
+/// Way in which a joint is left alone.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Alone {
     /// Torque mode, no torque.
@@ -299,7 +299,7 @@ pub fn run(
     Ok(seen)
 }
 
-/// Whether a joint that was left alone moved by itself; with what it did without compensation.
+/// Returns `true` if a joint that was left alone moved by itself; with what it did without compensation.
 pub fn moves_by_itself(alone: Alone, with: &Seen, without: &Seen) -> bool {
     // A weight that is borne wrong moves a joint that its friction does not hold, whatever compensation does.
     let falls = alone.gravity().is_some() && without.drift > 1e-3;

@@ -14,7 +14,7 @@ const VARIABLE: &str = "JOINT_LIMITS";
 /// A part and the most instructions that it took in a step.
 pub type Most = (&'static str, u64);
 
-/// What the compiler calls itself.
+/// Name of the compiler, as it calls itself.
 fn compiler() -> Result<String, String> {
     let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
     let output = Command::new(rustc).arg("--version").output().map_err(|error| format!("rustc: {error}"))?;
@@ -46,7 +46,7 @@ pub fn hold(board: &str, measured: &[Most]) -> Result<(), String> {
     }
 }
 
-/// What takes more than the lines of a file permit.
+/// Parts that take more than the lines of a file permit.
 fn exceeded(text: &str, compiler: &str, measured: &[Most]) -> Vec<String> {
     let same = text.lines().next() == Some(compiler);
     let limit = |name: &str| {

@@ -16,15 +16,15 @@ const FASTEST_SLEW: f32 = 30e3;
 /// A compensation that differs from the default in one layer.
 #[derive(Clone, Copy)]
 pub struct Variant {
-    /// What differs.
+    /// Name of the difference.
     pub name: &'static str,
-    /// How, in the configuration of joint and bridge.
+    /// Change of the configuration of joint and bridge.
     pub configure: fn(&mut Setup),
-    /// How, in what the configuration does not offer.
+    /// Change of what the configuration does not offer.
     pub prepare: fn(&mut Active),
 }
 
-/// As [`Setup::of`] configures it, physical model and network.
+/// Configuration of [`Setup::of`], physical model and network.
 pub const DEFAULT: Variant = Variant { name: "all layers", configure: |_| {}, prepare: |_| {} };
 
 /// The default with adaptation.
@@ -73,7 +73,7 @@ impl Variant {
     /// A joint with this compensation and `model`, switched on, at rest and `warmth` (K) above the ambient temperature.
     ///
     /// # Errors
-    /// What plant or firmware refuse.
+    /// Refusals of plant or firmware.
     pub fn enabled(
         &self,
         parameters: &ActuatorParameters,

@@ -257,7 +257,7 @@ fn recorded() -> Result<String, String> {
     Ok(text)
 }
 
-/// Where the controller around the computed torque closes its loop.
+/// Place in which the controller around the computed torque closes its loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Loop {
     /// In the joints, by impedance mode with low gains: they know the reference velocity.

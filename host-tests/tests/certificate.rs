@@ -24,7 +24,7 @@ struct Tightness {
     velocity_slope: f64,
 }
 
-/// What a search is after.
+/// Aim of a search.
 #[derive(Clone, Copy, Debug)]
 enum Quest {
     Output,

@@ -59,7 +59,7 @@ fn factors() -> [(&'static str, FrictionFactors); 6] {
     ]
 }
 
-/// Everything that is asserted of a joint.
+/// Values of a joint that are asserted.
 struct Found {
     /// Without compensation, and with it.
     moved: [Moved; 2],

@@ -40,9 +40,9 @@ const PACKAGES: Packages = Packages {
     install: &["canopen==2.4.1", "python-can==4.6.1", "msgpack==1.2.4"],
     import: "canopen, can, msgpack",
 };
-/// How much later than a period after the one before a control step may begin, ps: 1 us.
+/// Longest delay of a control step's begin beyond a period after the one before, ps: 1 us.
 const LATEST: f64 = 1e6;
-/// What the script says where a part of its run begins.
+/// Words of the script where a part of its run begins.
 const PARTS: [&str; 3] = ["moving", "uploading", "uploaded"];
 
 fn main() {
@@ -67,7 +67,7 @@ fn image(version: u32, part: f64) -> Image {
     Image { version, ..parameters::image(&mut ChaCha8Rng::seed_from_u64(6), friction, 4) }
 }
 
-/// What the control steps of a part were like.
+/// Summary of the control steps of a part.
 #[derive(Clone, Copy, Debug, Default)]
 struct Seen {
     steps: u64,

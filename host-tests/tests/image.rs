@@ -120,7 +120,7 @@ fn lengths_and_numbers_appear_in_the_messages() {
     assert!(message(b"ELF of some kind").starts_with("not a parameter image"));
 }
 
-/// What the documented layout says of a byte.
+/// Meaning of a byte by the documented layout.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Byte {
     /// Any value may stand here.

@@ -17,7 +17,7 @@ pub const OUTPUTS: usize = 11;
 /// Words of settings: request, gain, clamp, slew limit, and whether there is a model.
 pub const SETTINGS: usize = 5;
 
-/// What the words of an evaluation are.
+/// Names of the words of an evaluation.
 #[allow(dead_code, reason = "the program prints nothing")]
 pub const NAMES: [&str; OUTPUTS] = [
     "regime",
@@ -56,7 +56,7 @@ pub struct Evaluator {
 }
 
 impl Evaluator {
-    /// Everything that is known of friction in this state.
+    /// Everything known of friction in this state.
     pub fn step(
         &mut self,
         parameters: &FrictionParameters,
@@ -87,12 +87,12 @@ impl Evaluator {
     }
 }
 
-/// Which model acted, as a number.
+/// Number of the model that acted.
 pub fn acting(acting: Acting) -> i32 {
     acting as i32
 }
 
-/// Why, as a number.
+/// Number of the reason.
 pub fn reason(reason: Reason) -> i32 {
     match reason {
         Reason::Off => 0,

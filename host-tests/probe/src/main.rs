@@ -45,7 +45,7 @@ extern "C" fn run() -> ! {
     exit()
 }
 
-/// What a joint does with an image before it uses it: decode, certificate, golden vectors. None where it is refused.
+/// Verification by a joint before it uses an image: decode, certificate, golden vectors. None where it is refused.
 fn verify(bytes: &[u8]) -> Option<u32> {
     let image = Image::decode(bytes).ok()?;
     let certificate = certify(&image.friction, &image.limits).ok()?;

@@ -16,7 +16,7 @@ use joint_firmware::joint::{
 };
 use joint_firmware::motor::phases::Phases;
 
-/// What a run does.
+/// Scenario of a run.
 #[derive(Clone, Copy)]
 pub struct Scenario {
     /// Mode of operation.
@@ -93,7 +93,7 @@ pub fn prepare(scenario: &Scenario, image: &[u8]) -> Option<Active> {
     Some(active.with_friction(Some(FrictionModel::new(&image.friction, bridge.motion_rate()))))
 }
 
-/// What is asked for in step `n` of the start.
+/// Demand in step `n` of the start.
 pub fn starting(n: u32) -> Demand {
     let controlword = match n {
         0..=OFFSET_STEPS => Controlword::DISABLE_VOLTAGE,
@@ -104,7 +104,7 @@ pub fn starting(n: u32) -> Demand {
     Demand { controlword, ..Demand::default() }
 }
 
-/// What is asked for in step `n` of a run: half of it one way, then the other.
+/// Demand in step `n` of a run: half of it one way, then the other.
 pub fn demand(scenario: &Scenario, n: u32) -> Demand {
     let forward = n < STEPS / 2;
     let time = (n / COMMAND_STEPS * COMMAND_STEPS) as f32 / 20_000.0;
@@ -164,5 +164,5 @@ pub fn hash(sum: u32, joint: &Joint, bridge: &Bridge) -> u32 {
     words.fold(sum, |sum, word| (sum ^ word).wrapping_mul(0x0100_0193))
 }
 
-/// What a hash begins with.
+/// Initial value of a hash.
 pub const SEED: u32 = 0x811c_9dc5;

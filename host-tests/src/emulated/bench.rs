@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 /// Voltage of the supply, V.
 pub const SUPPLY: f64 = 18.0;
-/// What runs at most between two looks at the log, whose buffer is small, ps.
+/// Longest run between two looks at the log, whose buffer is small, ps.
 const PART: u64 = 20_000_000_000;
 /// A turn of the rotor and some more, rad.
 const TURN: f64 = 1.1 * std::f64::consts::TAU;
@@ -29,7 +29,7 @@ pub fn actuator() -> ActuatorParameters {
 /// A board's program as it is flashed, below a test's temporary folder.
 ///
 /// # Errors
-/// What the compiler says, or a file that is no program.
+/// Messages of the compiler, or a file that is no program.
 pub fn program(board: &str, temporary: &str) -> Result<Program, Failed> {
     let elf = std::fs::read(build(board, temporary)?)?;
     Ok(Program::parse(elf)?)
@@ -48,7 +48,7 @@ impl<W: Wired> Bench<W> {
     /// Powered up, with the bench's [`actuator`] and with nothing in flash but the program.
     ///
     /// # Errors
-    /// What plant or emulation refuse.
+    /// Refusals of plant or emulation.
     pub fn new(board: impl FnOnce(Drivetrain) -> W, program: &Program) -> Result<Self, Failed> {
         Self::with(board, &actuator(), program)
     }
@@ -56,7 +56,7 @@ impl<W: Wired> Bench<W> {
     /// The same with another actuator; its encoder has the counts that are usual on the board.
     ///
     /// # Errors
-    /// What plant or emulation refuse.
+    /// Refusals of plant or emulation.
     pub fn with(
         board: impl FnOnce(Drivetrain) -> W,
         actuator: &ActuatorParameters,
@@ -98,7 +98,7 @@ impl<W: Wired> Bench<W> {
     /// Runs on; whatever ends the run before is an error.
     ///
     /// # Errors
-    /// What ended it.
+    /// Reason for its end.
     pub fn run(&mut self, seconds: f64) -> Result<(), Failed> {
         self.run_with(seconds, |_| Ok(()))
     }
@@ -106,7 +106,7 @@ impl<W: Wired> Bench<W> {
     /// The same; wherever the core's watch stops it, `reached` looks, and the run goes on.
     ///
     /// # Errors
-    /// What ended it, or what `reached` says.
+    /// Reason for its end, or the error of `reached`.
     pub fn run_with(
         &mut self,
         seconds: f64,
@@ -118,7 +118,7 @@ impl<W: Wired> Bench<W> {
     /// The same up to an instant.
     ///
     /// # Errors
-    /// As above.
+    /// Those above.
     pub fn run_until(
         &mut self,
         end: Instant,
@@ -141,7 +141,7 @@ impl<W: Wired> Bench<W> {
     /// index. `reached` as in [`run_with`](Self::run_with).
     ///
     /// # Errors
-    /// As there; or the link is stuck.
+    /// Those of it; or the link is stuck.
     pub fn turn_by_hand(
         &mut self,
         mut reached: impl FnMut(&mut Emulation<W>) -> Result<(), Failed>,
@@ -166,7 +166,7 @@ impl<W: Wired> Bench<W> {
         messages.iter().map(|message| format!("{}\n", message.text)).collect()
     }
 
-    /// What the log says of the joint, last of all.
+    /// State of the joint by the log, last of all.
     pub fn state(&self) -> String {
         let log = self.log();
         let line = log.lines().rfind(|line| line.starts_with("joint: ")).unwrap_or_default();

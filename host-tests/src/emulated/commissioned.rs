@@ -79,7 +79,7 @@ impl<W: Wired> Objects for OnBoard<'_, W> {
 #[derive(Debug)]
 pub struct Telling {
     stage: Rc<Cell<Stage>>,
-    /// All that it was told, line by line.
+    /// Lines of all that it was told.
     pub told: Vec<String>,
 }
 

@@ -27,7 +27,7 @@ pub fn configuration<W: Observed>(actuator: &ActuatorParameters, node: u8, reque
 /// Pages of the program's slots.
 const PAGES: usize = 6;
 
-/// What is kept.
+/// Contents that are kept.
 #[derive(Clone, Copy, Debug)]
 pub struct Kept<'a> {
     /// Its node id is the one that LSS stored.
@@ -40,7 +40,7 @@ impl Kept<'_> {
     /// Writes it into the flash of a board that has not been started.
     ///
     /// # Errors
-    /// What does not fit.
+    /// Contents that do not fit.
     pub fn write<W: Wired>(&self, emulation: &mut Emulation<W>, program: &Program) -> Result<(), Failed> {
         let mut flash = Flash::erased(PAGES);
         let mut store = |first, kind, bytes: &[u8]| -> Result<(), Failed> {

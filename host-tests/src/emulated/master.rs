@@ -31,7 +31,7 @@ pub fn send<W: Wired>(emulation: &mut Emulation<W>, id: u16, data: &[u8]) -> Res
     Ok(())
 }
 
-/// What the joint has sent since this was last asked.
+/// Frames that the joint has sent since this was last asked.
 pub fn heard<W: Wired>(emulation: &mut Emulation<W>) -> Vec<Heard> {
     let line = emulation.cpu.bus.wiring_mut().line();
     let frames = std::iter::from_fn(|| line.receive());

@@ -51,7 +51,7 @@ pub struct Moving<W: Wired = MoteusR4> {
     pub silent: bool,
     /// Controlword instead of those that enable the joint.
     pub controlword: Option<u16>,
-    /// What it is configured for.
+    /// Configuration that it is for.
     pub configuration: Configuration,
     /// Frames of the joint.
     heard: Vec<Heard>,

@@ -1,4 +1,4 @@
-//! What a [`Twin`](super::Twin) reads on each board, and how.
+//! Variables that a [`Twin`](super::Twin) reads on each board, and how.
 
 use emulator::board::{BG431BEsc1, MoteusR4, Wired};
 use emulator::bus::{Bus as _, Width};
@@ -8,17 +8,17 @@ use joint_firmware::default_configuration::{B_G431B_ESC1, BoardConfiguration, MO
 use joint_firmware::sensors::as5047p;
 use libtest_mimic::Failed;
 
-/// What the twin reads on a board.
+/// Variables that the twin reads on a board.
 pub trait Observed: Wired + Sized {
     /// The board's part of the configuration.
     const CONFIGURATION: BoardConfiguration;
     /// Injected data registers of the phases a, b, c and of the supply.
     const CODES: [u32; 4];
-    /// Whether there is a sensor on the motor's winding; where there is none, its temperature is not a number.
+    /// `true` if there is a sensor on the motor's winding; where there is none, its temperature is not a number.
     const WINDING_SENSOR: bool;
     /// The program adapts friction in service.
     const ADAPTS: bool;
-    /// Whether the encoder has to meet its index before the joint can be enabled.
+    /// `true` if the encoder has to meet its index before the joint can be enabled.
     const INDEX: bool;
     /// Variable that tells whether the gate driver is ready, 1, or has not been since the start, 0; none where there is
     /// nothing to get ready.
@@ -26,19 +26,19 @@ pub trait Observed: Wired + Sized {
     /// Variables of the control interrupt that [`Observed::encoder`] and [`Observed::encoder_taken`] read.
     const ENCODER: &'static [&'static str];
 
-    /// Whether the bridge has switched itself off.
+    /// Returns `true` if the bridge has switched itself off.
     ///
     /// # Errors
-    /// What the chip refuses.
+    /// Refusals of the chip.
     fn bridge_fault(memory: &mut Memory<'_, Self>) -> Result<bool, Failed>;
 
     /// The encoder before a control step.
     ///
     /// # Errors
-    /// What the chip refuses.
+    /// Refusals of the chip.
     fn encoder(memory: &mut Memory<'_, Self>, variables: &[Variable<'_>]) -> Result<Reading, Failed>;
 
-    /// What the step took of it, seen after the step; `before` is what it was then.
+    /// Reading that the step took of it, seen after the step; `before` is what it was then.
     ///
     /// # Errors
     /// It took something else.
@@ -51,12 +51,12 @@ pub trait Observed: Wired + Sized {
     }
 }
 
-/// What an encoder says.
+/// Reading of an encoder.
 #[derive(Clone, Copy, Debug)]
 pub struct Reading {
     /// 2^32 a turn; none where it does not answer, or is known to be wrong.
     pub angle: Option<u32>,
-    /// Whether its zero is known.
+    /// `true` if its zero is known.
     pub referenced: bool,
 }
 
@@ -155,7 +155,7 @@ impl<'c, W: Observed> Memory<'c, W> {
     /// A word, as the core would read it.
     ///
     /// # Errors
-    /// What the chip refuses.
+    /// Refusals of the chip.
     pub fn word(&mut self, address: u32) -> Result<u32, Failed> {
         Ok(self.bus.read(self.now, address, Width::Word).map_err(|refusal| format!("{address:#x}: {refusal:?}"))?)
     }

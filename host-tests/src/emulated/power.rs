@@ -22,7 +22,7 @@ pub struct Writing<W: Wired> {
 }
 
 impl<W: Wired + Clone> Writing<W> {
-    /// What a request that has not been sent yet makes the program write.
+    /// Writes that a request that has not been sent yet makes the program do.
     ///
     /// # Errors
     /// The run ended.

@@ -18,7 +18,7 @@ pub const CONTROL: u16 = 16 + 18;
 /// Control interrupts that are taken apart for the network.
 const TAKEN_APART: u32 = 20 * MOTION_STEPS;
 
-/// What was taken.
+/// Statistics taken of a run.
 #[derive(Clone, Debug, Default)]
 pub struct Taken {
     /// Rounds of the motion loop.
@@ -38,7 +38,7 @@ impl Taken {
         acting.map(|(_, rounds)| rounds).sum()
     }
 
-    /// That the network acted in 99 of 100 rounds.
+    /// Checks that the network acted in 99 of 100 rounds.
     ///
     /// # Errors
     /// It did not.

@@ -22,7 +22,7 @@ use joint_firmware::motor::modulation::compare_value;
 use libtest_mimic::Failed;
 use std::collections::BTreeMap;
 
-/// What a step was given.
+/// Inputs of a step.
 struct Given {
     demand: Demand,
     slow: Slow,
@@ -32,11 +32,11 @@ struct Given {
     /// The board has what the joint cannot start without.
     started: bool,
     mean_square_wanted: bool,
-    /// Which place the parameters were in before the step.
+    /// Place of the parameters before the step.
     place: Option<u64>,
 }
 
-/// What the steps were like so far.
+/// Summary of the steps so far.
 #[derive(Clone, Debug, Default)]
 pub struct Seen {
     /// Steps that were compared.
@@ -53,7 +53,7 @@ pub struct Seen {
 pub struct Twin<'v> {
     variables: Fields<'v>,
     joint: Joint,
-    /// What the board is going to be offered, until it is taken.
+    /// Configuration that the board is going to be offered, until it is taken.
     coming: Option<Active>,
     active: Option<Active>,
     /// The encoder's last good angle.
@@ -79,7 +79,7 @@ impl<'v> Twin<'v> {
         })
     }
 
-    /// What was compared.
+    /// Summary of what was compared.
     pub const fn seen(&self) -> &Seen {
         &self.seen
     }
@@ -266,7 +266,7 @@ struct Fields<'v> {
     mean_square_current: Variable<'v>,
     switching: Variable<'v>,
     held: [Variable<'v>; 3],
-    /// Which place the newest demand lies in, unless there is a fresher one, and that.
+    /// Place of the newest demand, unless there is a fresher one, and that.
     taken: Variable<'v>,
     between: Variable<'v>,
     demands: [Demanded<'v>; 3],

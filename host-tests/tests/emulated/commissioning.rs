@@ -35,7 +35,7 @@ const PERIOD: f64 = 0.01;
 const OFF: f64 = 0.01;
 /// The joint's node id.
 pub const NODE: u8 = 5;
-/// How well a winding has to be known, and the electrical zero, degrees.
+/// Tolerance of a winding's values, and of the electrical zero, degrees.
 const WINDING: f64 = 0.05;
 const ZERO: f64 = 3.0;
 /// Counts a turn of incremental encoders.
@@ -70,10 +70,10 @@ pub fn built(board: &'static str) -> Result<&'static Program, Failed> {
 
 /// A motor, its encoder, and what its data sheet says.
 pub struct Motor {
-    /// As it is.
+    /// Parameters as they are.
     pub parameters: ActuatorParameters,
     encoder: Encoder,
-    /// As its data sheet has it.
+    /// Plan as its data sheet has it.
     pub plan: Plan,
 }
 
@@ -158,7 +158,7 @@ impl Motor {
         (direction < 0.0, direction * pole_pairs * reading - phases * windings.electrical_zero / TAU)
     }
 
-    /// What is wrong with what was found, and how far it is off.
+    /// Defects of what was found, and how far it is off.
     fn judge(&self, found: &Found) -> Result<String, String> {
         let ActuatorParameters { joint, windings, inverter, .. } = &self.parameters;
         let resistance = joint.motor.resistance / 1.5 + inverter.on_resistance;

@@ -26,14 +26,14 @@ pub fn trials() -> Vec<Trial> {
     ]
 }
 
-/// What carries a controlword.
+/// Carrier of a controlword.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum By {
     Rpdo,
     Sdo,
 }
 
-/// What stops a commissioning.
+/// Cause that stops a commissioning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Cause {
     /// The controlword asks for less.
@@ -106,7 +106,7 @@ const fn longest_frame(bytes: u64) -> u64 {
 /// Looks at the bus until no frame is under way, s, and how many: two of the longest frames.
 const FRAME_LOOK: f64 = 2e-6;
 const FRAME_LOOKS: u32 = 135;
-/// What the task may take that answers SDO requests, from the frame on, s.
+/// Longest time of the task that answers SDO requests, from the frame on, s.
 const TASK: f64 = 0.0005;
 /// The joint's dead man, and its button's debouncing, s.
 const DEAD_MAN: f64 = 0.1;
@@ -120,7 +120,7 @@ const LOOK: f64 = 0.0005;
 const TURNS: f64 = 0.1;
 /// A millisecond's tick of the task that looks at the button, s.
 const TICK: f64 = 0.001;
-/// How far into a stage it is stopped: at this object that the client reads.
+/// Instant in a stage at which it is stopped: at this object that the client reads.
 const LOOKS: u32 = 120;
 
 fn stops<W: Wired + Clone>(board: &'static str, wired: fn(Drivetrain) -> W) -> Result<(), Failed> {

@@ -183,7 +183,7 @@ fn same_steps() -> Result<(), Failed> {
     Ok(())
 }
 
-/// Which board a joint is on: both have models, temperatures and faults of all kinds.
+/// Board of a joint: both have models, temperatures and faults of all kinds.
 const fn board(joint: u64) -> usize {
     (joint / 2 % 2) as usize
 }
@@ -255,7 +255,7 @@ fn drive<W: Observed>(
     Ok((twin.seen().clone(), times.most))
 }
 
-/// What the board will prepare of it.
+/// Configuration that the board will prepare.
 fn prepared<W: Observed>(configuration: &Configuration, image: &[u8]) -> Result<Active, Failed> {
     let bridge = W::CONFIGURATION.bridge;
     let mut active = configuration.prepare(&bridge).map_err(|error| error.to_string())?;

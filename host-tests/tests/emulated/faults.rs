@@ -21,13 +21,13 @@ use plant::actuator::{Channel, Failure, Fault, Phase};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Where the limits stand.
+/// Document in which the limits stand.
 const DOCUMENT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/emulated-board.md");
 /// Instants at which a fault is brought in.
 const INSTANTS: usize = 6;
 /// The joint is at least so fast then, rad/s: what stands still shows little of what is broken.
 const MOVING: f64 = 0.8;
-/// How long the bus is disturbed, s.
+/// Duration of the disturbance of the bus, s.
 const DISTURBED: f64 = 0.4;
 /// Of the supply: what it rises to, what it falls to, and what is left of it where it is lost; the chip's regulators
 /// need more.
@@ -49,9 +49,9 @@ struct Documented {
     within: f64,
     /// Error codes, of which one is to be read over the bus.
     codes: Vec<u16>,
-    /// What the log is to say.
+    /// Lines that the log is to have.
     log: Vec<String>,
-    /// What reset the chip, as object 2301h:1 is to say.
+    /// Cause of the chip's reset, as object 2301h:1 is to say.
     reset: Option<&'static Cause>,
 }
 
@@ -86,7 +86,7 @@ type Bring<W> = fn(&mut Moving<W>, &Program) -> Result<Instant, Failed>;
 struct Broken<W: Wired> {
     name: &'static str,
     bring: Bring<W>,
-    /// How often it is brought in.
+    /// Number of times that it is brought in.
     instants: usize,
     /// From the fault to the last of what the joint has to say of it, s.
     afterwards: f64,

@@ -21,15 +21,15 @@ use std::f64::consts::TAU;
 const NODE: u8 = 5;
 /// Between two set-points, s.
 const SET_POINT: f64 = 0.001;
-/// How often a second the joint goes to and fro: it keeps up, and its current crosses zero often.
+/// Reversals of the joint per second: it keeps up, and its current crosses zero often.
 const REVERSALS: f64 = 5.0;
-/// How long each load lasts, in set-points.
+/// Duration of each load, in set-points.
 const LASTS: u32 = 200;
-/// How long each flood lasts, in set-points: longer than the watchdog's time-out.
+/// Duration of each flood, in set-points: longer than the watchdog's time-out.
 const FLOODED: u32 = 300;
 /// Part of the core that is left to the tasks.
 const LEFT: f64 = 0.05;
-/// How much earlier or later than a period after the one before a control step may begin, ps: 1 us.
+/// Permitted deviation of a control step's begin from a period after the one before, ps: 1 us.
 const JITTER: u64 = 1_000_000;
 /// The bus is full: part of the time that frames and what is between them take.
 const FULL: f64 = 0.99;
@@ -46,7 +46,7 @@ pub fn trials() -> Vec<Trial> {
     ]
 }
 
-/// What others send in the time of a set-point, besides it.
+/// Frames that others send in the time of a set-point, besides it.
 type Load = (&'static str, fn(u32) -> Vec<Heard>);
 
 const LOADS: [Load; 3] = [

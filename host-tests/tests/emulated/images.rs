@@ -27,7 +27,7 @@ const ESC1: &str = "b-g431b-esc1";
 const VERSION: u32 = 7;
 /// Golden vectors: with more, an image of four networks is longer than a slot.
 const GOLDEN: usize = 6;
-/// What a joint's own configuration permits, Nm and Nm/Nm in Q16.16.
+/// Limits of a joint's own configuration, Nm and Nm/Nm in Q16.16.
 const OUTPUT: u32 = 2_621;
 const TORQUE_GAIN: u32 = 1 << 16;
 /// States and commands of 2212h.

@@ -1,4 +1,4 @@
-//! Who owns a board: its first key by who is at it, and what only its owner may change. On the moteus, which has no
+//! Ownership of a board: its first key by who is at it, and what only its owner may change. On the moteus, which has no
 //! button, sessions by the chip's random numbers; on the B-G431B-ESC1 the button.
 
 use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired};

@@ -46,13 +46,13 @@ pub fn trials() -> Vec<Trial> {
 }
 
 type Board = Bench<MoteusR4>;
-/// What is read back of a content, object by object.
+/// Objects that are read back of a content, one by one.
 type Read = Vec<Vec<u8>>;
 
 /// Something that the program keeps.
 struct Content {
     name: &'static str,
-    /// How many are stored before the one that is cut short.
+    /// Number of contents stored before the one that is cut short.
     before: u32,
     /// Brings content number so and so up to the last request, which makes the program write it and is not sent.
     request: fn(&mut Board, u32) -> Result<Heard, Failed>,
@@ -180,7 +180,7 @@ impl Content {
 }
 
 impl Content {
-    /// What a loss of power on the way from one content to another may leave.
+    /// Contents that a loss of power on the way from one to another may leave.
     fn permitted(&self, old: &Read, new: &Read) -> [Read; 3] {
         let between = new.iter().take(self.first).chain(old.iter().skip(self.first)).cloned().collect();
         [old.clone(), between, new.clone()]
@@ -200,7 +200,7 @@ fn stage(bench: &mut Board, number: u32, tag: &[u8]) -> Result<(), Failed> {
     bench.download(NODE, 0x2210, 0, &bytes)
 }
 
-/// What was tried, and what came of it.
+/// Counts of what was tried, and what came of it.
 #[derive(Debug, Default)]
 struct Tally {
     /// Cases with one loss of power, and with a second one, in a start or in the store that followed.
@@ -232,7 +232,7 @@ impl Case<'_> {
         self.find(permitted)
     }
 
-    /// What is there has to be one of `permitted`, and the joint able to move.
+    /// Content that is there, which has to be one of `permitted`, with the joint able to move.
     fn find(&mut self, permitted: &[Read]) -> Result<Read, Failed> {
         let found = (self.content.read)(&mut self.bench)?;
         let fault = self.bench.upload(NODE, 0x603F, 0)?;

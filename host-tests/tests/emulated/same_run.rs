@@ -13,7 +13,7 @@ use plant::ActuatorParameters;
 
 /// Cycles of the core, 170 MHz but for the first moments, between two things that somebody does.
 const STEP: u64 = 170_000;
-/// How many of them: control has begun, and the bus has answered.
+/// Number of steps: control has begun, and the bus has answered.
 const STEPS: u64 = 300;
 
 /// The tests of this file, by name.
@@ -24,7 +24,7 @@ pub fn trials() -> Vec<Trial> {
     ]
 }
 
-/// How a run is made.
+/// Options of a run.
 #[derive(Clone, Copy)]
 struct How {
     /// Calls for a step.
@@ -32,7 +32,7 @@ struct How {
     watched: bool,
     /// At each step a clone goes on instead.
     cloned: bool,
-    /// So often code is come across before it is translated.
+    /// Number of times that code is come across before it is translated.
     translated: Option<u32>,
     /// Seed of the sensors' noise.
     seed: u64,

@@ -14,7 +14,7 @@ use joint_firmware::objects::table::{DataType, Object, Text, described};
 use libtest_mimic::{Failed, Trial};
 
 const NODE: u8 = 5;
-/// Where the boards' facts stand.
+/// Document in which the boards' facts stand.
 const DOCUMENT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/boards.md");
 /// Records of the configuration: motor to holding brake.
 const RECORDS: std::ops::RangeInclusive<u16> = 0x2101..=0x2109;
@@ -41,7 +41,7 @@ pub fn trials() -> Vec<Trial> {
     ]
 }
 
-/// What a board bears at the most, by the table of docs/boards.md.
+/// Limits of a board, by the table of docs/boards.md.
 #[derive(Debug)]
 struct Facts {
     supply: f64,

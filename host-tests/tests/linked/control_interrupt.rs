@@ -38,7 +38,7 @@ fn build(board: &str) -> Result<PathBuf, Failed> {
     Ok(bare_metal::build(board, env!("CARGO_TARGET_TMPDIR"))?)
 }
 
-/// What is wrong with everything that runs from `entry` on.
+/// Defects of everything that runs from `entry` on.
 fn faults(path: &Path, entry: &str, may_lie_in_flash: fn(&str) -> bool) -> Result<Vec<String>, Failed> {
     let program = thumb::Program::parse(&std::fs::read(path)?)?;
     let entry_address = program.address(entry).ok_or(format!("{entry} is not linked"))?;
@@ -62,17 +62,17 @@ fn faults(path: &Path, entry: &str, may_lie_in_flash: fn(&str) -> bool) -> Resul
     Ok(faults)
 }
 
-/// Whether a function belongs to the open loop, by its mangled name.
+/// Returns `true` if a function belongs to the open loop, by its mangled name.
 fn is_open_loop(name: &str) -> bool {
     ["5motor9open_loop", "5joint5Joint15apply_open_loop", "5board7control14publish_window"]
         .iter()
         .any(|part| name.contains(part))
 }
 
-/// Whether a function runs only with the bridge on, in operation ([`Joint::control_step`] asks for the state before) or
-/// in braking: the friction model and what adds it, the approach of a position, the torque's bounds, the brake and what
-/// the supply bears of it; or only while the bridge is off, when a step that would wait for the flash has waited for
-/// its vector already: the offsets. What decides on a state and what begins it runs in both.
+/// Returns `true` if a function runs only with the bridge on, in operation ([`Joint::control_step`] asks for the state
+/// before) or in braking: the friction model and what adds it, the approach of a position, the torque's bounds, the
+/// brake and what the supply bears of it; or only while the bridge is off, when a step that would wait for the flash
+/// has waited for its vector already: the offsets. What decides on a state and what begins it runs in both.
 ///
 /// [`Joint::control_step`]: joint_firmware::joint::Joint::control_step
 fn seldom_or_operating(name: &str) -> bool {

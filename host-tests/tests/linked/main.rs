@@ -1,4 +1,4 @@
-//! What the boards' linked programs show without running as a whole: a file a promise.
+//! Promises of the boards' linked programs that show without running as a whole: a file a promise.
 //!
 //! Needs the target; where it is missing the tests are reported as ignored, by name; with `CI` set they run and fail.
 

@@ -11,8 +11,8 @@ use crate::thumb::stack::{Depth, Stack};
 use host_tests::bare_metal;
 use libtest_mimic::{Failed, Trial};
 
-/// What an exception pushes before its first instruction: 8 core registers, 18 of the floating-point unit's, and a word
-/// to align them (ARM DDI 0403, B1.5.6).
+/// Bytes that an exception pushes before its first instruction: 8 core registers, 18 of the floating-point unit's, and
+/// a word to align them (ARM DDI 0403, B1.5.6).
 const EXCEPTION: u32 = 108;
 
 /// The program whose chip has no byte more.
@@ -21,7 +21,7 @@ const BOARD: &str = "b-g431b-esc1";
 /// these.
 const INTERRUPTS: [&[&str]; 4] =
     [&["NonMaskableInt"], &["ADC1_2", "TIM1_UP_TIM16"], &["FDCAN1_IT0"], &["TIM1_BRK_TIM15"]];
-/// What interrupts a program that is still starting.
+/// Interrupts of a program that is still starting.
 const QUIET: [&str; 2] = ["NonMaskableInt", "TIM1_BRK_TIM15"];
 
 /// Functions that call by way of a table or of a parameter, and what they may call: both by parts of their names.

@@ -79,7 +79,7 @@ fn judged(prepared: &Prepared, predictions: &[Prediction], python: &Path) -> Res
     }
 }
 
-/// What Python finds for a model in the exported table is what the report says: both look at the same rows.
+/// Checks that Python finds for a model in the exported table what the report says: both look at the same rows.
 fn same_rows(found: f64, errors: &ErrorTable, model: &str) -> Result<(), Failed> {
     let row = errors.rows.iter().find(|row| row.model == model).ok_or_else(|| format!("no row {model}"))?;
     let reported = row.errors.overall.as_ref().and_then(|overall| overall.percent_of_rms).ok_or("no effort")?;

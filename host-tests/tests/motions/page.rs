@@ -30,7 +30,7 @@ pub struct Row {
     pub baselines: [f64; 3],
 }
 
-/// What the fit made of the other motions.
+/// Image that the fit made of the other motions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image {
     /// The model that it holds.
@@ -48,7 +48,7 @@ impl Row {
         self.image.as_ref().map(|image| [image.error / best, image.error / image.simplest])
     }
 
-    /// Which of the aims the ratios hold, as they are printed: to a thousandth. Without an image, none.
+    /// Aims that the ratios hold, as they are printed: to a thousandth. Without an image, none.
     fn hold(&self) -> [bool; 2] {
         let rounded = self.ratios().map(|ratios| ratios.map(|ratio| (ratio * 1e3).round() / 1e3));
         rounded.map_or([false; 2], |[best, simplest]| [best <= OF_BEST, simplest <= OF_SIMPLEST])
@@ -91,7 +91,7 @@ pub fn table(rows: &[Row]) -> String {
     text
 }
 
-/// How many rows hold the aims.
+/// Number of rows that hold the aims.
 pub fn summary(rows: &[Row]) -> String {
     let count = |of: &dyn Fn(&Row) -> bool| rows.iter().filter(|row| of(row)).count();
     let worst = |at: usize| rows.iter().filter_map(Row::ratios).map(|ratios| ratios[at]).fold(0.0, f64::max);
@@ -171,7 +171,7 @@ pub fn read(text: &str) -> Result<Vec<Row>, Failed> {
     text.lines().filter(|line| line.starts_with('|')).skip(2).map(row).collect()
 }
 
-/// Where a row is not as published, in words.
+/// Differences of a row from the published one, in words.
 pub fn differences(row: &Row, published: &[Row]) -> Vec<String> {
     let title = format!("{}, {}", row.data_set, row.left_out);
     let same = |one: &&Row| one.data_set == row.data_set && one.left_out == row.left_out;

@@ -1,5 +1,5 @@
-//! What a control step may cost on the board's core, part by part, and that it gives the host's bits: recorded runs of
-//! the whole joint, replayed on an emulated Cortex-M4F, of which every instruction is counted.
+//! Cost of a control step on the board's core, part by part, and that it gives the host's bits: recorded runs of the
+//! whole joint, replayed on an emulated Cortex-M4F, of which every instruction is counted.
 //!
 //! The code is built as each board's program is and runs on the core of `tools/emulator`; the board's own part of the
 //! interrupt (converters, timer, report) is not among it. Most instructions of every part are held to
@@ -29,7 +29,7 @@ pub fn trials(missing: &Missing) -> Vec<Trial> {
     trials.collect()
 }
 
-/// What the program is built around, and the hashes of the runs on this machine.
+/// Input that the program is built around, and the hashes of the runs on this machine.
 type Recorded = (Vec<u8>, Vec<u32>);
 
 fn recorded(board: &Board) -> Result<&'static Recorded, Failed> {

@@ -8,10 +8,10 @@ use emulator::program::Program;
 use host_tests::bare_metal::{BOARDS, build};
 use libtest_mimic::{Failed, Trial};
 
-/// Where the routines work, with as much around it as they might touch.
+/// Memory in which the routines work, with as much around it as they might touch.
 const SRAM: u32 = 0x2000_0000;
 const ROOM: usize = 256;
-/// Where they return to: a breakpoint behind the program.
+/// Return address: a breakpoint behind the program.
 const BACK: u32 = 0x0807_fff0;
 /// Lengths in bytes: of both loops of words and of what is left over.
 const LENGTHS: std::ops::RangeInclusive<usize> = 0..=83;
@@ -22,7 +22,7 @@ pub fn trials(missing: &Missing) -> Vec<Trial> {
     vec![Trial::test("copies_and_clears_move_each_byte_and_none_beside", each_byte).with_ignored_flag(missing.target)]
 }
 
-/// What a routine makes of memory.
+/// Routine that works on memory.
 #[derive(Clone, Copy, PartialEq)]
 enum Routine {
     Clear,

@@ -64,7 +64,7 @@ fn images() -> &'static (Vec<(u64, Image)>, u64) {
     })
 }
 
-/// Which criteria choose an image's set of parameters.
+/// Criteria that choose an image's set of parameters.
 fn selector(image: &Image) -> [u8; 2] {
     image.friction.selector.criteria.map(|criterion| criterion.map_or(0, |criterion| criterion.measure as u8))
 }
@@ -167,7 +167,7 @@ fn compare(
     Ok(())
 }
 
-/// What has occurred: a run in which something never does shows less than it says.
+/// States that have occurred: a run in which something never does shows less than it says.
 #[derive(Default)]
 struct Seen {
     regimes: BTreeSet<i32>,
@@ -204,7 +204,7 @@ impl Seen {
         }
     }
 
-    /// What has not occurred.
+    /// States that have not occurred.
     fn missing(&self) -> Vec<String> {
         let reasons = [Reason::Off, Reason::NoModel, Reason::AsRequested, Reason::NoNetwork].into_iter();
         let outside = Signal::ALL.into_iter().map(Reason::OutsideTrainedBox);

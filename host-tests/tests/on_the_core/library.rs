@@ -105,7 +105,7 @@ fn links_little() -> Result<(), Failed> {
     }
 }
 
-/// What the probe prints when it runs: for each image the hash, and the ticks of its verification.
+/// Output of the probe when it runs: for each image the hash, and the ticks of its verification.
 fn printed() -> Result<Vec<(u32, u32)>, Failed> {
     static PRINTED: OnceLock<Result<Vec<(u32, u32)>, String>> = OnceLock::new();
     PRINTED.get_or_init(|| run_probe().map_err(|error| format!("{error:?}"))).clone().map_err(Failed::from)

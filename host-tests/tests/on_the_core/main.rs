@@ -1,4 +1,4 @@
-//! What the board's core makes of the library, in the programs of the probe: bits, instructions, and what is linked;
+//! Behaviour of the library on the board's core, in the programs of the probe: bits, instructions, and what is linked;
 //! and of the boards' programs the routines that move memory. A file a promise.
 //!
 //! Needs the target `thumbv7em-none-eabihf`, and some tests `qemu-system-arm`. Where they are missing the tests are
@@ -13,10 +13,10 @@ use host_tests::bare_metal::target_installed;
 use libtest_mimic::Arguments;
 use std::process::Command;
 
-/// What is not on this machine and not demanded of it either: the tests that need it are ignored.
+/// Tools that are not on this machine and not demanded of it either: the tests that need them are ignored.
 struct Missing {
     target: bool,
-    /// That, or the target.
+    /// `true` if this is missing, or the target.
     qemu: bool,
 }
 

@@ -56,7 +56,7 @@ pub fn read(text: &str) -> Result<Vec<Row>, Failed> {
     table.take_while(|line| line.starts_with('|')).map(row).collect()
 }
 
-/// Where the rows are not as published, in words.
+/// Differences of the rows from the published ones, in words.
 pub fn differences(rows: &[Row], published: &[Row]) -> Vec<String> {
     let mut found = Vec::new();
     if rows.len() != published.len() {

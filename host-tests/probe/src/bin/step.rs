@@ -25,7 +25,7 @@ fn panic(_: &core::panic::PanicInfo) -> ! {
     exit()
 }
 
-/// What is counted.
+/// Control step that is counted.
 #[unsafe(no_mangle)]
 #[inline(never)]
 fn counted_step(joint: &mut Joint, active: &Active, demand: &Demand, slow: &Slow, measured: &Measurements) -> Bridge {

@@ -1,4 +1,5 @@
-//! What a linked Thumb program can reach from one function: its direct branches and calls, and the linker's veneers.
+//! Code that a linked Thumb program can reach from one function: its direct branches and calls, and the linker's
+//! veneers.
 //!
 //! Encodings: ARM DDI 0403, A5 and A7. Data between instructions is left out by the mapping symbols ($t, $d).
 
@@ -12,13 +13,13 @@ use std::collections::{BTreeMap, BTreeSet};
 pub struct Program {
     functions: BTreeMap<u32, (u32, String)>,
     symbols: BTreeMap<String, u32>,
-    /// Whether code (true) or data begins at an address.
+    /// Kind of content from an address on: code (true) or data.
     mapping: BTreeMap<u32, bool>,
     /// Address and bytes of each section with code.
     code: Vec<(u32, Vec<u8>)>,
 }
 
-/// Where an instruction may go on to, besides the next one.
+/// Destination of an instruction, besides the next one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Flow {
     Next,
@@ -29,14 +30,14 @@ enum Flow {
     Trap,
 }
 
-/// What is reached from an entry.
+/// Code that is reached from an entry.
 #[derive(Default)]
 pub struct Reached {
     /// Address, size and name of every function, the entry included.
     pub functions: Vec<(u32, u32, String)>,
     /// Every word that the code has as a constant, and the function: what it may take for an address.
     pub constants: Vec<(u32, String)>,
-    /// What is wrong with the walk itself, in words.
+    /// Defects of the walk itself, in words.
     pub unclear: Vec<String>,
 }
 
@@ -93,7 +94,7 @@ impl Program {
         self.mapping.range(..=address).next_back().is_none_or(|(_, code)| *code)
     }
 
-    /// Everything that can run once `entry` runs. Functions of which `leaf` is true are in it, but nothing that only
+    /// Functions that can run once `entry` runs. Functions of which `leaf` is true are in it, but nothing that only
     /// they can reach.
     pub fn reachable(&self, entry: u32, leaf: impl Fn(&str) -> bool) -> Reached {
         let mut reached = Reached::default();

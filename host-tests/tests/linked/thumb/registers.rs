@@ -1,4 +1,4 @@
-//! Which constants a function's instructions put into registers: where a call through a register goes that the compiler
+//! Constants that a function's instructions put into registers: where a call through a register goes that the compiler
 //! makes of several calls of one function, and where the linker's veneers go.
 //!
 //! Followed from one instruction to the next, whatever branches there are between them: a register is known while the
@@ -12,7 +12,7 @@ pub struct Registers {
     known: [Option<u32>; 16],
     /// Lower halves that movw has put into each, whatever came in between.
     halves: [u32; 16],
-    /// Everything that was ever loaded into each, as an address of code.
+    /// Registers and values that were ever loaded into them, as addresses of code.
     loaded: Vec<(usize, u32)>,
 }
 

@@ -1,5 +1,5 @@
-//! How much stack a linked Thumb program can take from one function on: the frames of its functions along the deepest
-//! path of calls.
+//! Stack that a linked Thumb program can take from one function on: the frames of its functions along the deepest path
+//! of calls.
 //!
 //! A frame is everything that a function's instructions take from the stack pointer, all of them together: where two of
 //! them never run in one call, more than it takes. A branch out of a function is a tail call, before which the compiler
@@ -29,13 +29,13 @@ impl Depth {
     }
 }
 
-/// What a function does to the stack.
+/// Effect of a function on the stack.
 #[derive(Clone, Debug, Default)]
 struct Body {
     frame: u32,
-    /// Where it goes, and whether its frame is still there then.
+    /// Destinations of calls, and whether its frame is still there then.
     calls: Vec<(u32, bool)>,
-    /// Whether it calls through a register, and whether its frame is still there then.
+    /// Call through a register, and whether its frame is still there then.
     through_register: Option<bool>,
 }
 
@@ -46,12 +46,12 @@ pub struct Stack<'a> {
     targets: &'a dyn Fn(&str) -> Option<Vec<String>>,
     /// None while a function is being looked at: recursion comes back to it then.
     depths: BTreeMap<u32, Option<Depth>>,
-    /// What is wrong, in words.
+    /// Defects, in words.
     pub unclear: Vec<String>,
 }
 
 impl<'a> Stack<'a> {
-    /// Nothing looked at yet.
+    /// Initial state: nothing looked at yet.
     pub fn new(program: &'a Program, targets: &'a dyn Fn(&str) -> Option<Vec<String>>) -> Self {
         Self { program, targets, depths: BTreeMap::new(), unclear: Vec::new() }
     }
@@ -184,7 +184,7 @@ fn narrow_frame(word: u32) -> (u32, bool) {
     }
 }
 
-/// As [`narrow_frame`].
+/// Counterpart of [`narrow_frame`].
 fn wide_frame(first: u32, second: u32) -> (u32, bool) {
     match first {
         // stmdb sp!
