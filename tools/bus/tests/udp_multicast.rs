@@ -40,7 +40,7 @@ fn member(port: u16) -> Arc<dyn Transport> {
     open(&format!("udp:{GROUP}:{port}")).unwrap()
 }
 
-/// Whether a frame comes from one socket of this machine to another.
+/// Returns `true` if a frame comes from one socket of this machine to another.
 fn works() -> bool {
     let bus = format!("udp:{GROUP}:{}", port());
     let (Ok(a), Ok(b)) = (open(&bus), open(&bus)) else { return false };

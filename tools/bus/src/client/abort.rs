@@ -2,7 +2,7 @@
 
 use canopen_node::Abort;
 
-/// What an abort code means: CiA 301 section 7.2.4.3.17, table 22.
+/// Meaning of an abort code: CiA 301 section 7.2.4.3.17, table 22.
 pub fn description(abort: Abort) -> &'static str {
     match abort.description() {
         "" => match abort.0 {

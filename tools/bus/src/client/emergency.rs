@@ -25,7 +25,7 @@ impl Emergency {
         Some(Self { node, code: u16::from_le_bytes([low, high]), register, information: [a, b, c, d, e] })
     }
 
-    /// What the code means: CiA 301 table 26 (classes) and the single codes of its text.
+    /// Meaning of the code: CiA 301 table 26 (classes) and the single codes of its text.
     pub fn meaning(&self) -> &'static str {
         match self.code {
             0x8110 => "CAN overrun: objects lost",
@@ -69,7 +69,7 @@ impl Emergency {
         }
     }
 
-    /// Whether this is the end of an error.
+    /// Returns `true` if this is the end of an error.
     pub fn is_reset(&self) -> bool {
         self.code & 0xFF00 == 0
     }

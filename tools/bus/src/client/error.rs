@@ -1,4 +1,4 @@
-//! What can go wrong between a client and a node, said with node, object and limit; host.
+//! Errors between a client and a node, said with node, object and limit; host.
 
 use super::abort::description;
 use crate::BusError;
@@ -23,7 +23,7 @@ impl fmt::Display for Object {
     }
 }
 
-/// Why something did not happen.
+/// Reason for which something did not happen.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum ClientError {
     /// The bus itself.
@@ -35,9 +35,9 @@ pub enum ClientError {
     /// The node is silent.
     #[error("{object}: no answer within {} ms. {}", timeout.as_millis(), silence(object.node, heard))]
     NoAnswer {
-        /// What was to be read or written.
+        /// Object that was to be read or written.
         object: Object,
-        /// How long it was waited for.
+        /// Time for which it was waited for.
         timeout: Duration,
         /// Nodes that sent anything since the bus was opened.
         heard: Vec<u8>,
@@ -45,9 +45,9 @@ pub enum ClientError {
     /// The node refuses.
     #[error("{object} refused: {:08X}h, {}", abort.0, description(*abort))]
     Aborted {
-        /// What was to be read or written.
+        /// Object that was to be read or written.
         object: Object,
-        /// Why.
+        /// Reason, as an abort code.
         abort: Abort,
     },
     /// Somebody else uses the node's SDO server at the same time. It has one channel, and the transfers destroy each
@@ -56,29 +56,29 @@ pub enum ClientError {
         "{object}: another client is talking to this node's SDO server; the transfer was given up. Stop the other client, or wait for it"
     )]
     OtherClient {
-        /// What was to be read or written.
+        /// Object that was to be read or written.
         object: Object,
     },
-    /// What the node sent is not what the protocol allows here; the transfer was aborted.
+    /// Message of the node that the protocol does not allow here; the transfer was aborted.
     #[error("{object}: {problem}")]
     Protocol {
-        /// What was to be read or written.
+        /// Object that was to be read or written.
         object: Object,
-        /// What was wrong.
+        /// Defect of it.
         problem: String,
     },
     /// Something that was waited for did not come.
     #[error("{what} did not come within {} ms", timeout.as_millis())]
     Silence {
-        /// What.
+        /// Name of what was waited for.
         what: String,
-        /// How long it was waited for.
+        /// Time for which it was waited for.
         timeout: Duration,
     },
     /// An LSS slave refuses.
     #[error("LSS: {what} refused with error {code}{}", specific(*code, *specific_code))]
     Lss {
-        /// What was asked for.
+        /// Name of what was asked for.
         what: &'static str,
         /// Error code of CiA 305; 255 is the manufacturer's.
         code: u8,

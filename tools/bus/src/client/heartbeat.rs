@@ -14,7 +14,7 @@ pub fn parse(frame: &Frame) -> Option<(u8, NmtState)> {
     (state as u8 == byte & 0x7F).then_some((node, state))
 }
 
-/// What changed.
+/// Change of a node's state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Change {
     /// A node booted: it is new, or it was reset, and has forgotten what it was told.

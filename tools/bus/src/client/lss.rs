@@ -86,7 +86,7 @@ pub mod request {
 /// "Begin": every node without an id answers.
 const BEGIN: u8 = 128;
 
-/// What the scan wants.
+/// Next step of the scan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
     /// Send this, and tell by [`Fastscan::answered`] whether anybody answered [`IDENTIFIED`].
@@ -133,7 +133,7 @@ impl Fastscan {
         Self { address: Address::default(), phase: Phase::Begin }
     }
 
-    /// What to do now.
+    /// Step to do now.
     pub fn step(&mut self) -> Step {
         match self.phase {
             Phase::Begin => Step::Ask(request::fastscan(0, BEGIN, 0, 0)),
@@ -146,7 +146,7 @@ impl Fastscan {
         }
     }
 
-    /// Whether anybody answered what [`Fastscan::step`] asked.
+    /// Takes whether anybody answered what [`Fastscan::step`] asked.
     pub fn answered(&mut self, somebody: bool) {
         self.phase = match (self.phase, somebody) {
             (Phase::Begin, true) => Phase::Bit { part: 0, bit: 31 },

@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 
 /// Frames that a subscriber may leave unread; newer ones are dropped and counted.
 const UNREAD: usize = 1 << 14;
-/// How soon the reader notices that nobody needs it any more.
+/// Time after which the reader notices that nobody needs it any more.
 const READ: Duration = Duration::from_millis(20);
 
 /// A frame and when it came.
@@ -23,7 +23,7 @@ const READ: Duration = Duration::from_millis(20);
 pub struct Received {
     /// The frame.
     pub frame: Frame,
-    /// When the reader had it: some tens of microseconds after the bus, a millisecond over USB.
+    /// Time at which the reader had it: some tens of microseconds after the bus, a millisecond over USB.
     pub at: Instant,
 }
 
@@ -35,11 +35,11 @@ struct Subscriber {
     dropped: Arc<AtomicU64>,
 }
 
-/// What the reader and everyone else share.
+/// State that the reader and everyone else share.
 struct Shared {
     transport: Arc<dyn Transport>,
     subscribers: Mutex<Vec<Subscriber>>,
-    /// Why the reader ended.
+    /// Reason for the reader's end.
     failure: Mutex<Option<BusError>>,
     over: AtomicBool,
     /// A bit for every node id that was heard.
@@ -130,7 +130,7 @@ impl Shared {
     }
 }
 
-/// Which node sent this, by the predefined connection set; PDOs may have other identifiers, so they do not count.
+/// Node that sent this, by the predefined connection set; PDOs may have other identifiers, so they do not count.
 fn sender(frame: &Frame) -> Option<u8> {
     let node = (frame.id() & 0x7F) as u8;
     let by_node = matches!(frame.id() & 0x780, cob_id::EMERGENCY | cob_id::SDO_TRANSMIT | cob_id::HEARTBEAT);
@@ -161,7 +161,7 @@ impl Network {
         Self { patience, ..self }
     }
 
-    /// How long a node may take to answer before it counts as silent; 1 s unless told otherwise.
+    /// Time that a node may take to answer before it counts as silent; 1 s unless told otherwise.
     pub fn patience(&self) -> Duration {
         self.patience
     }

@@ -4,7 +4,7 @@ use super::cob_id;
 use super::frame::frame;
 use crate::Frame;
 
-/// What a node is told.
+/// Command to a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Command {
@@ -20,7 +20,7 @@ pub enum Command {
     ResetCommunication = 0x82,
 }
 
-/// Who is told.
+/// Nodes that are told.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Target {
     /// One node, 1 to 127.

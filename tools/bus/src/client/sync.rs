@@ -13,7 +13,7 @@ pub struct SyncProducer {
     thread: Option<JoinHandle<Result<Produced, ClientError>>>,
 }
 
-/// How well the period was kept.
+/// Accuracy with which the period was kept.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Produced {
     /// SYNCs that were sent.

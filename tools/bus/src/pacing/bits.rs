@@ -1,4 +1,4 @@
-//! How many bits a frame is on the wire: ISO 11898-1, classic base format; no I/O, host.
+//! Length of a frame on the wire in bits: ISO 11898-1, classic base format; no I/O, host.
 
 use crate::Frame;
 use std::time::Duration;

@@ -1,4 +1,4 @@
-//! What a paced bus counts: load, and how long frames take; no I/O, host.
+//! Statistics of a paced bus: load, and how long frames take; no I/O, host.
 
 use std::collections::BTreeMap;
 use std::time::Duration;

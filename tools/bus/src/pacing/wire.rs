@@ -10,10 +10,10 @@ use std::time::Duration;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Station(pub usize);
 
-/// Which of its own waiting frames a controller offers to the bus.
+/// Order in which a controller offers its own waiting frames to the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Order {
-    /// That with the lowest identifier; of the same identifier the oldest (FDCAN: queue mode).
+    /// Lowest identifier first; of the same identifier the oldest (FDCAN: queue mode).
     Identifier,
     /// The oldest (FDCAN: FIFO mode). An urgent frame waits behind a lazy one.
     Fifo,
@@ -24,13 +24,13 @@ pub enum Order {
 pub struct Delivery {
     /// The frame.
     pub frame: Frame,
-    /// Who sent it; several where they sent the same at the same time. All others receive it.
+    /// Senders of it; several where they sent the same at the same time. All others receive it.
     pub senders: Vec<Station>,
-    /// When the (first) sender had handed it to its controller.
+    /// Time at which the (first) sender had handed it to its controller.
     pub queued: Duration,
-    /// When its first bit went out.
+    /// Time at which its first bit went out.
     pub started: Duration,
-    /// When it was received: the end of "end of frame". The interframe space follows.
+    /// Time at which it was received: the end of "end of frame". The interframe space follows.
     pub ended: Duration,
 }
 
@@ -47,7 +47,7 @@ struct Controller {
 }
 
 impl Controller {
-    /// Which frame takes part in the arbitration at `start`.
+    /// Frame that takes part in the arbitration at `start`.
     fn offer(&self, start: Duration) -> Option<usize> {
         let present = self.waiting.iter().enumerate().filter(|(_, waiting)| waiting.queued <= start);
         match self.order {
@@ -63,7 +63,7 @@ impl Controller {
 pub struct PacedBus {
     bit_time: Duration,
     controllers: Vec<Controller>,
-    /// When the interframe space of the last frame is over.
+    /// Time at which the interframe space of the last frame is over.
     free: Duration,
     on_wire: Option<Delivery>,
     statistics: Statistics,
@@ -114,8 +114,8 @@ impl PacedBus {
         Some(delivery)
     }
 
-    /// When to call [`PacedBus::advance`] next, if nothing more is sent: at the end of the frame on the wire, or when
-    /// the one that has yet to begin has ended at the earliest. None where nothing waits.
+    /// Time at which to call [`PacedBus::advance`] next, if nothing more is sent: at the end of the frame on the wire,
+    /// or when the one that has yet to begin has ended at the earliest. None where nothing waits.
     pub fn next_change(&self) -> Option<Duration> {
         match &self.on_wire {
             Some(delivery) => Some(delivery.ended),
@@ -123,7 +123,7 @@ impl PacedBus {
         }
     }
 
-    /// What was counted.
+    /// Statistics so far.
     pub fn statistics(&self) -> &Statistics {
         &self.statistics
     }
@@ -133,13 +133,13 @@ impl PacedBus {
         self.statistics = Statistics::since(now);
     }
 
-    /// How often several stations sent different frames with the same identifier at the same time. On a wire that is an
-    /// error frame and a repetition that collides again; here the station that was added first goes first.
+    /// Number of times that several stations sent different frames with the same identifier at the same time. On a wire
+    /// that is an error frame and a repetition that collides again; here the station that was added first goes first.
     pub fn collisions(&self) -> u64 {
         self.collisions
     }
 
-    /// When the next frame begins.
+    /// Time at which the next frame begins.
     fn start(&self) -> Option<Duration> {
         let waiting = self.controllers.iter().flat_map(|controller| &controller.waiting);
         let earliest = waiting.map(|waiting| waiting.queued).min()?;

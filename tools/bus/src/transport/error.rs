@@ -1,9 +1,9 @@
-//! What can go wrong with a bus, said so that the person at the keyboard knows what to do; host.
+//! Errors of a bus, said so that the person at the keyboard knows what to do; host.
 
 use std::io;
 use std::sync::Arc;
 
-/// Why a bus cannot be opened or used. Every message names the bus as it was asked for, and what to do.
+/// Reason for which a bus cannot be opened or used. Every message names the bus as it was asked for, and what to do.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum BusError {
     /// The string is not one that [`super::open`] takes.
@@ -11,7 +11,7 @@ pub enum BusError {
     Malformed {
         /// The string.
         bus: String,
-        /// What is wrong with it.
+        /// Defect of it.
         problem: String,
     },
     /// The interface is not there, is not ours, or does not work.
@@ -19,9 +19,9 @@ pub enum BusError {
     Open {
         /// The string that was opened.
         bus: String,
-        /// What the operating system said.
+        /// Error of the operating system.
         source: Arc<io::Error>,
-        /// What to do.
+        /// Advice.
         advice: String,
     },
     /// The interface answers, and refuses.
@@ -29,9 +29,9 @@ pub enum BusError {
     Refused {
         /// The string that was opened.
         bus: String,
-        /// What it refused.
+        /// Request that it refused.
         problem: String,
-        /// What to do.
+        /// Advice.
         advice: &'static str,
     },
     /// The bus worked and is gone: unplugged, set down, connection closed. It does not come back; open it again.
@@ -39,9 +39,9 @@ pub enum BusError {
     Gone {
         /// The string that was opened.
         bus: String,
-        /// What was seen of it.
+        /// Observation of it.
         problem: String,
-        /// What to do.
+        /// Advice.
         advice: &'static str,
     },
     /// Frames are not taken as fast as they come.
@@ -51,7 +51,7 @@ pub enum BusError {
     Saturated {
         /// The string that was opened.
         bus: String,
-        /// How long it was tried, ms.
+        /// Time for which it was tried, ms.
         within_ms: u64,
     },
 }
@@ -77,7 +77,7 @@ impl BusError {
     }
 }
 
-/// Whether reading or writing may simply go on after this: nothing came, or not all went yet.
+/// Returns `true` if reading or writing may simply go on after this: nothing came, or not all went yet.
 pub(super) fn is_timeout(error: &io::Error) -> bool {
     matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut | io::ErrorKind::Interrupted)
 }

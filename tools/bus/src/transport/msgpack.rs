@@ -21,7 +21,7 @@ struct Outgoing<'a> {
     error_state_indicator: bool,
 }
 
-/// What has to be known of a message; any other key is passed over.
+/// Keys of a message that have to be known; any other key is passed over.
 #[derive(Deserialize)]
 struct Incoming<'a> {
     arbitration_id: u32,
@@ -37,7 +37,7 @@ struct Incoming<'a> {
     data: &'a Bytes,
 }
 
-/// What a datagram says.
+/// Content of a datagram.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Message {
     /// A data frame with an 11-bit identifier.

@@ -34,8 +34,8 @@ fn try_udp(port: u16) -> io::Result<Socket> {
     Ok(socket)
 }
 
-/// As [`try_udp`]: one that does not listen is in the way of none that does, where both may reuse the address, as std
-/// has it.
+/// TCP counterpart of [`try_udp`]: one that does not listen is in the way of none that does, where both may reuse the
+/// address, as std has it.
 fn try_tcp(port: u16) -> io::Result<Socket> {
     let socket = Socket::new(Domain::IPV4, Type::STREAM, None)?;
     #[cfg(unix)]

@@ -12,17 +12,17 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-/// How long an adapter may take to answer the commands that open the channel. One that never answers is taken to have
+/// Longest time of an adapter's answer to the commands that open the channel. One that never answers is taken to have
 /// obeyed: several firmwares do not.
 const ANSWER: Duration = Duration::from_millis(150);
-/// How long a line may take to be written.
+/// Longest time for a line to be written.
 pub(super) const WRITE: Duration = Duration::from_secs(1);
-/// How long a connection may take.
+/// Longest time of a connection.
 const CONNECT: Duration = Duration::from_secs(3);
 
 /// The two directions of a connection.
 pub(super) trait Reader: Read + Send {
-    /// How long the next read waits at most; not zero.
+    /// Sets the longest wait of the next read; not zero.
     fn set_timeout(&mut self, timeout: Duration) -> io::Result<()>;
 }
 

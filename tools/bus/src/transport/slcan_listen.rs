@@ -15,7 +15,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 const ADVICE: &str = "Start anew";
-/// How long a wait for a client may be late.
+/// Longest delay of a wait for a client.
 const PATIENCE: Duration = Duration::from_millis(2);
 
 /// The client at the other end.
@@ -31,7 +31,7 @@ pub(super) struct Listener {
     name: String,
     listener: TcpListener,
     client: Mutex<Option<Client>>,
-    /// Where frames go while the channel is open.
+    /// Destination of frames while the channel is open.
     output: Mutex<Option<Arc<TcpStream>>>,
     lost: AtomicU64,
 }

@@ -12,7 +12,7 @@ const LONGEST: usize = 30;
 /// "Refused".
 pub(super) const BEL: u8 = 0x07;
 
-/// What a line says.
+/// Content of a line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Line {
     /// A data frame with an 11-bit identifier.

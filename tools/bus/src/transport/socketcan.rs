@@ -7,7 +7,7 @@ use socketcan::{CanDataFrame, CanFrame, CanSocket, Socket};
 use std::io;
 use std::time::{Duration, Instant};
 
-/// How long the interface's queue may stay full.
+/// Longest time for which the interface's queue may stay full.
 const SATURATED: Duration = Duration::from_millis(500);
 const ADVICE: &str = "`ip -details link show` tells whether it is up; set it up again with `sudo ip link set can0 up type can bitrate 1000000`";
 /// The queue of the interface is full (Linux errno).

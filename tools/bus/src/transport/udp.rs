@@ -29,7 +29,7 @@ pub(super) struct Multicast {
     name: String,
     input: UdpSocket,
     output: UdpSocket,
-    /// Where this program's own frames come from.
+    /// Address that this program's own frames come from.
     own: SocketAddr,
     lost: AtomicU64,
 }

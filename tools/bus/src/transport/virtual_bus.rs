@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 const UNREAD: usize = 1 << 16;
 /// Frames of one member that may wait for a paced bus.
 const WAITING: usize = 256;
-/// How long a member may wait for its turn on a paced bus.
+/// Longest time for which a member may wait for its turn on a paced bus.
 const SATURATED: Duration = Duration::from_secs(1);
 
 /// Frames that one member has yet to read.

@@ -97,7 +97,7 @@ impl ObjectDictionary for Dictionary {
     fn event(&mut self, _event: Event) {}
 }
 
-/// What the last RPDO set; the TPDO tells it again.
+/// Value that the last RPDO set; the TPDO tells it again.
 #[derive(Default)]
 struct Image(u64);
 
@@ -149,7 +149,7 @@ impl Node {
         Self { receiver: Receiver::new(shared), server, dictionary, image: Image::default() }
     }
 
-    /// Everything that a frame makes the node send at once.
+    /// Frames that a frame makes the node send at once.
     pub fn receive(&mut self, frame: &Frame, now: Duration) -> Vec<Frame> {
         let now = now.as_micros() as u32;
         let mut sent = Vec::new();

@@ -8,7 +8,7 @@ use bus::pacing::{Order, PacedBus};
 use std::time::Duration;
 
 const STEP: Duration = Duration::from_micros(10);
-/// How long client and server take to answer a frame.
+/// Time that client and server take to answer a frame.
 const ANSWER: Duration = Duration::from_micros(50);
 
 /// Writes `data` to a node over a wire at 1 Mbit/s, with a station that sends frames of a higher priority every

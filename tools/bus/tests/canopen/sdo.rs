@@ -13,7 +13,7 @@ const NUMBER: Object = Object { node: NODE, index: 0x2000, sub_index: 0 };
 /// About one full frame.
 const FRAME: Duration = Duration::from_micros(130);
 
-/// What the bus does with a frame.
+/// Fate of a frame on the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Fate {
     Arrives,

@@ -8,7 +8,7 @@ use canopen_node::Abort;
 /// Up to so many bytes the segmented protocol needs no more frames than the block protocol.
 const SEGMENTED: usize = 28;
 const LAST: u8 = 0x80;
-/// So many blocks in a row of which nothing arrives are no accident.
+/// Number of blocks in a row of which nothing arrives that are no accident.
 const FRUITLESS: u8 = 16;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,7 +63,7 @@ impl Download {
         (Self { object, data: data.to_vec(), phase, toggle: 0, may_fall_back, crc: false, fruitless: 0 }, first)
     }
 
-    /// Whether the node has yet to agree.
+    /// Returns `true` if the node has yet to agree.
     pub(super) fn is_beginning(&self) -> bool {
         matches!(self.phase, Phase::Expedited | Phase::Initiated | Phase::BlockInitiated)
     }

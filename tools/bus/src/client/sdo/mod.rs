@@ -25,7 +25,7 @@ const TOGGLE: u8 = 0x10;
 /// Data bytes of a segment.
 const SEGMENT: usize = 7;
 
-/// Which protocol carries the data.
+/// Protocol that carries the data.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Method {
     /// Writing: expedited up to 4 bytes, segmented up to 28, then block; segmented where the node has no block
@@ -38,7 +38,7 @@ pub enum Method {
     Block,
 }
 
-/// How patient a client is, and how much it takes.
+/// Settings of a client: its time-outs, and how much it takes at a time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
     /// Silence of the node after which a transfer is given up.
@@ -56,7 +56,7 @@ impl Default for Settings {
     }
 }
 
-/// Why a transfer failed.
+/// Reason for the failure of a transfer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Failure {
     /// The node was silent for the time-out.
@@ -69,7 +69,7 @@ pub enum Failure {
     Protocol(String),
 }
 
-/// What the transfer waits for.
+/// State of the transfer: what it waits for.
 #[derive(Debug)]
 enum State {
     Download(download::Download),
@@ -77,15 +77,15 @@ enum State {
     Over(Result<Vec<u8>, Failure>),
 }
 
-/// What a message led to.
+/// Effect of a message.
 enum Step {
-    /// Nothing: it belongs to something else.
+    /// No effect: it belongs to something else.
     Ignored,
     /// It was what was waited for, and the message answers it, if there is one.
     Answer(Option<Message>),
     /// The transfer is whole; the message tells the node, if there is one.
     Done(Option<Message>, Vec<u8>),
-    /// What the node sent is wrong; it is told.
+    /// Wrong message of the node; it is told.
     Wrong(Abort, String),
 }
 
@@ -97,7 +97,7 @@ pub struct Transfer {
     state: State,
     /// To be sent at once.
     pending: Option<Message>,
-    /// When the node was last heard, or sent something to answer.
+    /// Time at which the node was last heard, or sent something to answer.
     active: Duration,
     started: bool,
     /// The request that begins the transfer, to be sent again once: a transfer that somebody left half done makes the
@@ -123,7 +123,7 @@ impl Transfer {
         Self { object, settings, state, pending, active: Duration::ZERO, started: false, again: pending }
     }
 
-    /// What is read or written.
+    /// Object that is read or written.
     pub fn object(&self) -> Object {
         self.object
     }
@@ -158,7 +158,7 @@ impl Transfer {
         None
     }
 
-    /// When [`Transfer::poll`] has to be called again if nothing is received; none once it is over.
+    /// Time at which [`Transfer::poll`] has to be called again if nothing is received; none once it is over.
     pub fn deadline(&self) -> Option<Duration> {
         match &self.state {
             State::Over(_) => None,
@@ -218,7 +218,7 @@ impl Transfer {
         }
     }
 
-    /// How it ended: what was read (nothing where it was written). Send what [`Transfer::poll`] still gives before.
+    /// Outcome: what was read (nothing where it was written). Send what [`Transfer::poll`] still gives before.
     pub fn outcome(&self) -> Option<&Result<Vec<u8>, Failure>> {
         match &self.state {
             State::Over(outcome) if self.pending.is_none() => Some(outcome),
@@ -263,7 +263,7 @@ fn request(command: u8, object: Object, data: [u8; 4]) -> Message {
     [command, low, high, object.sub_index, a, b, c, d]
 }
 
-/// Whether a message names this object.
+/// Returns `true` if a message names this object.
 fn names(message: &Message, object: Object) -> bool {
     let &[_, low, high, sub_index, ..] = message;
     u16::from_le_bytes([low, high]) == object.index && sub_index == object.sub_index

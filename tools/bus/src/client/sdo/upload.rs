@@ -16,7 +16,7 @@ enum Phase {
     Block {
         /// The last one that came in its order.
         sequence: u8,
-        /// Whether it was the last of all.
+        /// `true` if it was the last of all.
         last: bool,
     },
     /// All came; length of the last segment and CRC follow.
@@ -31,7 +31,7 @@ pub(super) struct Upload {
     block_size: u8,
     limit: usize,
     toggle: u8,
-    /// What the node announced.
+    /// Size that the node announced.
     announced: Option<usize>,
     crc: bool,
     data: Vec<u8>,
@@ -59,12 +59,12 @@ impl Upload {
         (upload, first)
     }
 
-    /// Whether the node has yet to agree.
+    /// Returns `true` if the node has yet to agree.
     pub(super) fn is_beginning(&self) -> bool {
         matches!(self.phase, Phase::Initiated | Phase::BlockInitiated)
     }
 
-    /// Whether silence may mean that the end of a block was lost.
+    /// Returns `true` if silence may mean that the end of a block was lost.
     pub(super) fn may_acknowledge(&self) -> bool {
         matches!(self.phase, Phase::Block { sequence: 1.., last: false })
     }
