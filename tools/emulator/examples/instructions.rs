@@ -9,7 +9,7 @@ use emulator::cpu::{Cpu, End, Refused};
 use emulator::memory::Memory;
 use std::io::{BufReader, BufWriter, Read, Write};
 
-/// Where the words of memory lie, and the code.
+/// Addresses of the words of memory, and of the code.
 const DATA: u32 = 0x2000_1000;
 const CODE: std::ops::Range<u32> = 0x0800_0000..0x0808_0000;
 const CASE: usize = 2 + 2 + 15 + 2 + 32 + 64;

@@ -1,9 +1,8 @@
-//! What an emulated core is connected to: addresses that answer, time that makes things happen, and lines that
-//! interrupt.
+//! Surroundings of an emulated core: addresses that answer, time that makes things happen, and lines that interrupt.
 
 use std::ops::Range;
 
-/// How much of a word an access takes.
+/// Part of a word that an access takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Width {
     /// 8 bits.
@@ -26,17 +25,17 @@ impl Width {
     }
 }
 
-/// Why an access was not answered.
+/// Reason for which an access was not answered.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Refusal {
-    /// Nothing on the chip answers there: the core takes a precise bus fault.
+    /// No answer: nothing on the chip is there, and the core takes a precise bus fault.
     NoAnswer,
     /// The chip would answer, but that part of it is not modelled: the run ends, so that no result rests on it. In
     /// words, with the section of the reference manual.
     Unmodelled(String),
 }
 
-/// What the bus tells the core besides data. Read after every write to a device, every read of one, and every
+/// Signals of the bus to the core besides data. Read after every write to a device, every read of one, and every
 /// [`Bus::advance`].
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Signals {
@@ -87,7 +86,7 @@ pub trait Bus {
     fn memory(&mut self) -> &mut [u8] {
         &mut []
     }
-    /// Where in [`memory`](Self::memory) a word lies; none where it does not.
+    /// Place of a word in [`memory`](Self::memory); none where it does not lie there.
     fn place(&self, _address: u32) -> Option<usize> {
         None
     }
@@ -98,7 +97,7 @@ pub trait Bus {
     }
     /// Half a word of code.
     fn fetch(&mut self, now: u64, address: u32) -> Result<u16, Refusal>;
-    /// Where code may lie; what the core keeps decoded.
+    /// Ranges in which code may lie; what the core keeps decoded.
     fn code(&self) -> Vec<Range<u32>>;
     /// Cycles that an access there takes more than the core's own.
     fn wait_states(&self, address: u32) -> u32;
@@ -107,16 +106,16 @@ pub trait Bus {
     fn line(&self) -> Option<u32> {
         None
     }
-    /// When something next happens by itself; `u64::MAX` for never.
+    /// Cycle at which something next happens by itself; `u64::MAX` for never.
     fn next_event(&self) -> u64;
     /// Does what is due up to `now`.
     fn advance(&mut self, now: u64);
-    /// Whether there may be signals that it was not told yet. Where there are none, asking for them would change
-    /// nothing.
+    /// Returns `true` if there may be signals that it was not told yet. Where there are none, asking for them would
+    /// change nothing.
     #[inline(always)]
     fn has_news(&self) -> bool {
         true
     }
-    /// What the core has to know; forgets `rewritten` and `reset`, which are told once.
+    /// Signals that the core has to know; forgets `rewritten` and `reset`, which are told once.
     fn signals(&mut self) -> Signals;
 }

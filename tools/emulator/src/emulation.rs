@@ -8,10 +8,10 @@ use crate::cpu::{Cpu, End, Origin};
 use crate::program::Program;
 use crate::rtt::Rtt;
 
-/// Where the vectors lie after power-up.
+/// Address of the vectors after power-up.
 const VECTORS: u32 = 0x0800_0000;
 
-/// Why there is no emulation.
+/// Reason for which there is no emulation.
 #[derive(Debug)]
 pub enum EmulationError {
     /// The program does not fit into the chip's flash.
@@ -99,12 +99,12 @@ impl<W: Wired> Emulation<W> {
         }
     }
 
-    /// When and by whom the chip was reset since power-up.
+    /// Resets of the chip since power-up: when, and by whom.
     pub fn resets(&self) -> &[(Instant, Origin)] {
         &self.resets
     }
 
-    /// Whether the chip has power.
+    /// Returns `true` if the chip has power.
     pub fn is_powered(&self) -> bool {
         self.cpu.bus.is_powered()
     }
@@ -133,7 +133,7 @@ impl<W: Wired> Emulation<W> {
         let _ = self.cpu.reset(VECTORS);
     }
 
-    /// What the program has logged since the last call.
+    /// Bytes that the program has logged since the last call.
     pub fn log(&mut self) -> Vec<u8> {
         let now = self.cpu.now();
         self.rtt.as_ref().and_then(|rtt| rtt.read(&mut self.cpu.bus, now).ok()).unwrap_or_default()

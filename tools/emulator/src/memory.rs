@@ -5,14 +5,14 @@ use crate::chip::memory;
 use crate::cpu::Cpu;
 use std::ops::Range;
 
-/// Where accesses are those of SRAM, without wait states.
+/// Range in which accesses are those of SRAM, without wait states.
 const SRAM: Range<u32> = 0x2000_0000..0x4000_0000;
 
 /// Blocks of memory, each of which can be loaded, stored and executed, and a line of which the test decides.
 #[derive(Clone, Default)]
 pub struct Memory {
     blocks: Vec<Block>,
-    /// What the core is told; `rewritten` and `reset` are told once.
+    /// Signals that the core is told; `rewritten` and `reset` are told once.
     pub signals: Signals,
     /// Cycles that every access outside of SRAM takes more.
     pub wait_states: u32,

@@ -8,14 +8,14 @@ use object::{Endianness, Object, ObjectSymbol, SymbolKind};
 use std::collections::{BTreeMap, HashMap};
 use std::fmt;
 
-/// Why a file is not a program.
+/// Reason for which a file is not a program.
 #[derive(Debug)]
 pub enum ProgramError {
     /// Not a 32-bit ELF file, or a damaged one.
     Elf(object::Error),
     /// A segment whose bytes the file does not have, by its physical address.
     Segment(u32),
-    /// Nothing in it would be flashed.
+    /// Empty program: nothing in it would be flashed.
     Empty,
 }
 
@@ -91,7 +91,7 @@ impl Program {
         Ok(Self { segments, symbols, functions, elf })
     }
 
-    /// What is flashed: physical address and bytes of each segment.
+    /// Segments that are flashed: physical address and bytes of each.
     pub fn segments(&self) -> impl Iterator<Item = (u32, &[u8])> {
         self.segments.iter().map(|(address, bytes)| (*address, &**bytes))
     }

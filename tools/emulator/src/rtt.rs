@@ -1,4 +1,4 @@
-//! What the program logs: SEGGER's real-time transfer read out of its memory, and the defmt messages in it.
+//! Log of the program: SEGGER's real-time transfer read out of its memory, and the defmt messages in it.
 //!
 //! Host only. The control block is that of `defmt-rtt`: a name of 16 bytes, the number of channels in each direction,
 //! then for each channel name, buffer, size, write offset, read offset, flags, a word each. A debug probe does the same
@@ -24,7 +24,7 @@ pub struct Rtt {
     channel: u32,
 }
 
-/// Why nothing could be read.
+/// Reason for which nothing could be read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum RttError {
     /// Its memory does not answer.
@@ -33,9 +33,9 @@ pub enum RttError {
     Damaged {
         /// Bytes of the buffer.
         size: u32,
-        /// Where the program writes next.
+        /// Offset at which the program writes next.
         write: u32,
-        /// Where the host reads next.
+        /// Offset at which the host reads next.
         read: u32,
     },
 }
@@ -107,7 +107,7 @@ impl Messages {
 /// Bytes become messages, as they come.
 pub struct Decoder<'t> {
     stream: Box<dyn StreamDecoder + Send + Sync + 't>,
-    /// Whether the encoding shows where the next message begins.
+    /// `true` if the encoding shows where the next message begins.
     recovers: bool,
 }
 
@@ -118,7 +118,7 @@ pub struct Message {
     pub timestamp: String,
     /// "error", "warn", "info", "debug", "trace"; None for what is printed without a level.
     pub level: Option<&'static str>,
-    /// What it says.
+    /// Text of the message.
     pub text: String,
 }
 

@@ -15,23 +15,23 @@ type Source<'a> = EndianSlice<'a, LittleEndian>;
 type Unit<'a> = gimli::Unit<Source<'a>>;
 type Entry<'e, 'a> = gimli::DebuggingInformationEntry<'e, 'e, Source<'a>>;
 
-/// Why a variable is not known.
+/// Reason for which a variable is not known.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum VariableError {
     /// The debug information is damaged, or there is none.
     Debug(String),
     /// There is no such static, or several.
     Static {
-        /// What was looked for.
+        /// Name that was looked for.
         name: String,
-        /// How many there are.
+        /// Number of them.
         count: usize,
     },
     /// A variable has no such part.
     Part {
         /// Path to it.
         path: String,
-        /// What was looked for in it.
+        /// Part that was looked for in it.
         part: String,
     },
     /// Its memory does not answer.
@@ -200,7 +200,7 @@ impl Variables {
 }
 
 impl<'v> Variable<'v> {
-    /// Where one of its bytes lies.
+    /// Address of one of its bytes.
     fn address(&self, byte: u32) -> Result<u32, VariableError> {
         let at = self.offset + byte;
         let holds = |piece: &&Piece| piece.offset <= at && at - piece.offset < piece.size;
@@ -277,12 +277,12 @@ impl<'v> Variable<'v> {
     /// Its value as a number of single precision.
     ///
     /// # Errors
-    /// As for [`Self::bits`].
+    /// Those of [`Self::bits`].
     pub fn real<B: Bus>(&self, bus: &mut B, now: u64) -> Result<f32, VariableError> {
         Ok(f32::from_bits(self.bits(bus, now)? as u32))
     }
 
-    /// Which variant of an enumeration it is, and the variant's content where it can have one.
+    /// Variant of an enumeration, and the variant's content where it can have one.
     ///
     /// # Errors
     /// It is no enumeration, or has a value that is none of its variants.
@@ -322,7 +322,7 @@ fn kind(unit: &Unit<'_>, entry: &Entry<'_, '_>) -> Result<Option<UnitSectionOffs
     })
 }
 
-/// Where a variable lies; none where it is no static.
+/// Location of a variable; none where it is no static.
 fn pieces(unit: &Unit<'_>, entry: &Entry<'_, '_>) -> Result<Option<Vec<Piece>>, VariableError> {
     let Some(AttributeValue::Exprloc(expression)) = entry.attr_value(gimli::DW_AT_location)? else { return Ok(None) };
     let (mut pieces, mut offset, mut last) = (Vec::new(), 0, None);
@@ -345,7 +345,7 @@ fn pieces(unit: &Unit<'_>, entry: &Entry<'_, '_>) -> Result<Option<Vec<Piece>>, 
     Ok(Some(pieces).filter(|pieces| pieces.iter().any(|piece| piece.address.is_some())))
 }
 
-/// What a type is made of; none for what is no type.
+/// Composition of a type; none for what is no type.
 fn shape<'a>(
     dwarf: &gimli::Dwarf<Source<'a>>,
     unit: &Unit<'a>,

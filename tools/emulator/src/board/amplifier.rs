@@ -1,4 +1,4 @@
-//! How a current amplifier follows the current through the shunt of a low side that begins to conduct: a dead time,
+//! Response of a current amplifier to the current through the shunt of a low side that begins to conduct: a dead time,
 //! then one pole.
 //!
 //! While its low side does not conduct, no current flows through a shunt, and the amplifier shows that. What is sampled

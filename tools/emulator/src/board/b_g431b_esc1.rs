@@ -183,7 +183,7 @@ impl Lines {
         Self { encoder, angle: None, count: 0 }
     }
 
-    /// Nothing changes, whatever the rotor does.
+    /// Unchanged reading, whatever the rotor does.
     const fn still(&self) -> Quadrature {
         Quadrature { count: self.count, index: None }
     }

@@ -21,7 +21,7 @@ const EARLY: f64 = 0.05;
 /// Shortest period that the plant is given, ps; what is less goes with the next one.
 const SHORTEST: u64 = 1_000_000;
 
-/// How far an amplifier had followed its phase's current when a sample of it was held.
+/// Settling of an amplifier to its phase's current by the time when a sample of it was held.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settling {
     /// Time for which the low side had conducted, s.
@@ -43,7 +43,7 @@ pub struct Drivetrain {
     encoder: Encoder,
     /// Up to here the actuator has moved.
     moved: Instant,
-    /// What the sensors show of that.
+    /// Sample that the sensors show of that.
     sample: DriveSample,
     pwm: Option<(Instant, Pwm)>,
     /// Since when the timer has asked for each low side; none where it asks for the high side.
@@ -54,11 +54,11 @@ pub struct Drivetrain {
     on: [f64; 3],
     /// The bridge follows its inputs.
     enabled: bool,
-    /// What the actuator has been given, s; none before it was given any.
+    /// Dead time that the actuator has been given, s; none before it was given any.
     dead_time: Option<f64>,
     /// It switched since `moved`, if only for a part of it.
     switched: bool,
-    /// When it last ceased to switch.
+    /// Instant at which it last ceased to switch.
     off_since: Option<Instant>,
     /// Outputs of the holding brake and of the brake chopper.
     outputs: (bool, bool),
@@ -72,7 +72,7 @@ impl Drivetrain {
     /// [`sample`](Self::sample) shows of it is the rotor's own angle.
     ///
     /// # Errors
-    /// What the plant refuses.
+    /// Refusals of the plant.
     pub fn new(mut parameters: ActuatorParameters, temperature: f64, seed: u64) -> Result<Self, plant::ParameterError> {
         parameters.validate()?;
         let encoder = Encoder::take(&mut parameters);
@@ -136,12 +136,12 @@ impl Drivetrain {
         self.encoder
     }
 
-    /// Whether the bridge switches: the timer drives the gates of all legs, and they reach the transistors.
+    /// Returns `true` if the bridge switches: the timer drives the gates of all legs, and they reach the transistors.
     pub fn is_switching(&self) -> bool {
         self.enabled && self.pwm.is_some_and(|(_, pwm)| pwm.running && is_switching(&pwm))
     }
 
-    /// When the bridge last ceased to switch; none where it does, or never did.
+    /// Instant at which the bridge last ceased to switch; none where it does, or never did.
     pub fn off_since(&self) -> Option<Instant> {
         self.off_since.filter(|_| !self.is_switching())
     }
@@ -155,7 +155,7 @@ impl Drivetrain {
         }
     }
 
-    /// Whether the bridge follows its inputs from now on: an enable line, a gate driver.
+    /// Sets whether the bridge follows its inputs from now on: an enable line, a gate driver.
     pub fn enable(&mut self, at: Instant, enabled: bool) {
         self.change(at, |drivetrain| drivetrain.enabled = enabled);
     }
@@ -179,7 +179,7 @@ impl Drivetrain {
         }
     }
 
-    /// What the sensors show at an instant.
+    /// Sample that the sensors show at an instant.
     pub fn sample(&mut self, at: Instant) -> &DriveSample {
         match self.pwm {
             Some((since, pwm)) if pwm.running => {
@@ -195,8 +195,8 @@ impl Drivetrain {
         &self.sample
     }
 
-    /// What an amplifier at a phase's low-side shunt shows at an instant, A. Where the bridge does not switch, that is
-    /// whatever current there is.
+    /// Current that an amplifier at a phase's low-side shunt shows at an instant, A. Where the bridge does not switch,
+    /// that is whatever current there is.
     pub fn phase_current(&mut self, at: Instant, phase: usize, amplifier: &Amplifier) -> f64 {
         let current = self.sample(at).phase_currents[phase];
         if !self.is_switching() {
@@ -228,8 +228,8 @@ impl Drivetrain {
         self.least_settled.take()
     }
 
-    /// Which low sides the timer asks for at an instant, to which it has counted; where one was asked for since `from`,
-    /// from when on.
+    /// Follows the low sides that the timer asks for at an instant, to which it has counted; where one was asked for
+    /// since `from`, from when on.
     fn follow_low_sides(&mut self, from: Instant, until: Instant) {
         let Some((_, pwm)) = self.pwm else { return };
         for phase in 0..self.low_since.len() {
@@ -300,13 +300,13 @@ fn ticks(pwm: &Pwm, counts: f64) -> f64 {
 /// A cycle of the core while PWM runs, ps: both boards' programs run it at 170 MHz.
 pub(super) const CYCLE: f64 = 1e12 / 170e6;
 
-/// Whether a leg's reference is active at a count: the high side is asked for.
+/// Returns `true` if a leg's reference is active at a count: the high side is asked for.
 fn is_active(pwm: &Pwm, phase: usize, count: f64) -> bool {
     let leg = &pwm.legs[phase];
     (count < f64::from(leg.compare)) == leg.active_below
 }
 
-/// Whether the timer drives the gates of all legs.
+/// Returns `true` if the timer drives the gates of all legs.
 fn is_switching(pwm: &Pwm) -> bool {
     pwm.legs.iter().all(|leg| matches!(leg.high, Gate::Switching { .. }))
 }

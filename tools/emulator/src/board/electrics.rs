@@ -1,5 +1,5 @@
-//! What parts between motor, supply and pins make of currents, voltages and temperatures; pure functions of the
-//! schematics.
+//! Parts between motor, supply and pins, and what they make of currents, voltages and temperatures; pure functions of
+//! the schematics.
 
 /// Resistance of a divider's lower part over both.
 pub fn divided(volts: f64, upper: f64, lower: f64) -> f64 {

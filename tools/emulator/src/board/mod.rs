@@ -25,7 +25,7 @@ use crate::cpu::Cpu;
 use crate::parts::drv8353::Drv8353;
 use plant::ParameterError;
 
-/// What a person or a broken part does to a board.
+/// Actions of a person or of a broken part on a board.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Inputs {
     /// The button is pressed.
@@ -43,13 +43,13 @@ pub struct Inputs {
 pub trait Wired: Wiring {
     /// The chip on it.
     const VARIANT: &'static Variant;
-    /// As the firmware's feature for it is called.
+    /// Name of the firmware's feature for it.
     const NAME: &'static str;
 
-    /// Whether it has a button.
+    /// `true` if it has a button.
     const BUTTON: bool;
 
-    /// What the program does against the manual, knowingly.
+    /// Deviations of the program from the manual, made knowingly.
     const DEVIATIONS: &'static [Deviation];
 
     /// A core for its chip. A board says this itself, so that a core's thousand operations are compiled with the board,
@@ -72,7 +72,7 @@ pub trait Wired: Wiring {
     fn inputs(&mut self) -> &mut Inputs;
     /// The CAN bus.
     fn line(&mut self) -> &mut Line;
-    /// Whether the LED is lit.
+    /// Returns `true` if the LED is lit.
     fn led(&self) -> bool;
     /// The gate driver, where it has registers and a fault line.
     fn gate_driver(&mut self) -> Option<&mut Drv8353>;

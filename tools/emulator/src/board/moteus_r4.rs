@@ -66,7 +66,7 @@ pub struct MoteusR4 {
     switched_on: bool,
     led: bool,
     revision: u8,
-    /// What pulls the pins of the family.
+    /// Levels to which the pins of the family are pulled.
     family: [Option<bool>; 2],
 }
 

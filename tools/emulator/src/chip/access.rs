@@ -220,8 +220,8 @@ impl<W: Wiring> Chip<W> {
         Ok(())
     }
 
-    /// Whether a device takes a write of this width. A timer's prescaler is written as half a word by embassy; the
-    /// bridge repeats it in the upper half, which is reserved.
+    /// Returns `true` if a device takes a write of this width. A timer's prescaler is written as half a word by
+    /// embassy; the bridge repeats it in the upper half, which is reserved.
     const fn takes(device: Device, offset: u32, width: Width) -> bool {
         match (device, width) {
             (_, Width::Word) => offset.is_multiple_of(4),

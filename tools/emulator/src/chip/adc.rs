@@ -71,7 +71,7 @@ const TWICE_SAMPLING: [u64; 8] = [5, 13, 25, 49, 95, 185, 495, 1281];
 const CAPACITOR: f64 = 5e-12;
 const SWITCH: f64 = 1e3;
 
-/// What a converter samples.
+/// Source that a converter samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Source {
     /// Its voltage without load, V.
@@ -92,7 +92,7 @@ pub enum Trigger {
     Tim1Second = 8,
 }
 
-/// What is due in a converter.
+/// Work that is due in a converter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Due {
     /// The sample of this channel is held: tell the converter with [`Converter::hold`].
@@ -104,7 +104,7 @@ pub enum Due {
 #[derive(Clone, Copy, Debug)]
 struct Conversion {
     rank: u32,
-    /// When its sample is held; none once it is.
+    /// Cycle at which its sample is held; none once it is.
     sample: Option<u64>,
     /// For how long it is sampled, in cycles of the core.
     sampling: u64,
@@ -119,7 +119,7 @@ pub struct Converter {
     block: Block,
     regulator: Instant,
     calibrated: u64,
-    /// When ADRDY is set; none where it will not be.
+    /// Cycle at which ADRDY is set; none where it will not be.
     ready: Option<u64>,
     conversion: Option<Conversion>,
     /// Voltage of the sampling capacitor.
@@ -127,7 +127,7 @@ pub struct Converter {
 }
 
 impl Converter {
-    /// As after reset.
+    /// State after reset.
     pub fn new(description: &'static ConverterDescription) -> Self {
         let block = Block::new(description.text, "21.6", REGISTERS);
         Self { description, block, regulator: Instant::NEVER, calibrated: 0, ready: None, conversion: None, held: 0.0 }
@@ -143,14 +143,14 @@ impl Converter {
         self.description
     }
 
-    /// When something next happens.
+    /// Cycle at which something next happens.
     #[inline]
     pub fn next(&self) -> u64 {
         let conversion = self.conversion.map_or(u64::MAX, |conversion| conversion.sample.unwrap_or(conversion.end));
         self.ready.unwrap_or(u64::MAX).min(conversion)
     }
 
-    /// What is due at a cycle, once; none where nothing is.
+    /// Work that is due at a cycle, once; none where nothing is.
     pub fn advance(&mut self, cycle: u64, divider: u64) -> Option<Due> {
         if self.ready.is_some_and(|ready| ready <= cycle) {
             self.ready = None;
@@ -188,7 +188,7 @@ impl Converter {
         self.block.get(JSQR) >> (9 + 6 * rank) & 0x1f
     }
 
-    /// What a rank measures. `start` has refused channels that are not there.
+    /// Input that a rank measures. `start` has refused channels that are not there.
     fn input(&self, rank: u32) -> Input {
         let channel = self.channel(rank);
         let found = self.description.channels.iter().find(|(number, _)| u32::from(*number) == channel);
@@ -224,7 +224,7 @@ impl Converter {
         self.block.get(ISR) & self.block.get(IER) != 0
     }
 
-    /// Whether the common clock may change: everything is off (21.7.2).
+    /// Returns `true` if the common clock may change: everything is off (21.7.2).
     pub fn is_off(&self, cycle: u64) -> bool {
         self.block.get(CR) & ADEN == 0 && cycle >= self.calibrated
     }
@@ -336,14 +336,14 @@ impl Converter {
     }
 }
 
-/// What a group of converters shares.
+/// State that a group of converters shares.
 #[derive(Clone, Debug)]
 pub struct Common {
     block: Block,
 }
 
 impl Common {
-    /// As after reset.
+    /// State after reset.
     pub fn new(name: &'static str) -> Self {
         Self { block: Block::new(name, "21.7", COMMON) }
     }

@@ -1,17 +1,17 @@
-//! When each peripheral that counts cycles next does something, and which interrupts it asks for: computed anew for
-//! those only that may have changed.
+//! Next cycle at which each peripheral that counts cycles does something, and the interrupts that it asks for: computed
+//! anew for those only that may have changed.
 
 /// Peripherals that have a place: timers, converters and SPIs.
 pub const PLACES: usize = 16;
 
-/// What is known of each.
+/// State of each peripheral as last known.
 #[derive(Clone, Debug)]
 pub struct Agenda {
     next: [u64; PLACES],
     lines: [u128; PLACES],
     /// Bit of each that may have changed since.
     changed: u32,
-    /// How many places are used, counted from the first.
+    /// Number of places that are used, counted from the first.
     used: usize,
     /// The earliest cycle of all, and bits of the places that have it.
     earliest: u64,
@@ -23,7 +23,7 @@ pub struct Agenda {
 }
 
 impl Agenda {
-    /// Nothing is known yet of so many peripherals.
+    /// Initial agenda: nothing is known yet of so many peripherals.
     pub const fn new(used: usize) -> Self {
         let (next, lines) = ([u64::MAX; PLACES], [0; PLACES]);
         Self { next, lines, changed: u32::MAX, used, earliest: u64::MAX, first: 0, ordered: false, all_lines: 0 }
@@ -53,8 +53,8 @@ impl Agenda {
         self.first_of(self.changed)
     }
 
-    /// What is true of a peripheral now: its next cycle, and the levels of its lines. [`order`](Self::order) follows
-    /// the last.
+    /// Notes the present state of a peripheral: its next cycle, and the levels of its lines. [`order`](Self::order)
+    /// follows the last.
     #[inline]
     pub fn note(&mut self, place: usize, next: u64, lines: u128) {
         self.ordered &= std::mem::replace(&mut self.next[place % PLACES], next) == next;

@@ -23,7 +23,7 @@ pub struct Crc {
 }
 
 impl Crc {
-    /// As after reset.
+    /// State after reset.
     pub fn new() -> Self {
         Self { block: Block::new("CRC", "16.4", REGISTERS) }
     }

@@ -1,4 +1,4 @@
-//! What happens by itself, in the order of time, and what peripherals tell each other.
+//! Events that happen by themselves, in the order of time, and what peripherals tell each other.
 
 use super::adc::{Due, Source, Trigger};
 use super::gpio::Mode;
@@ -55,7 +55,7 @@ impl<W: Wiring> Chip<W> {
         }
     }
 
-    /// What counts time, not cycles.
+    /// Advances what counts time, not cycles.
     fn step_slow(&mut self, cycle: u64) {
         let at = self.clock.instant(cycle);
         if self.flash.fails(at) {
@@ -70,7 +70,7 @@ impl<W: Wiring> Chip<W> {
         self.refresh_slow();
     }
 
-    /// What ended on the bus, and what the controller does next.
+    /// Advances the line: what ended on the bus, and what the controller does next.
     fn step_line(&mut self, at: Instant) {
         let clock = self.fdcan_clock();
         while let Some(event) = self.wiring.can().and_then(|line| line.take(at)) {
@@ -173,7 +173,7 @@ impl<W: Wiring> Chip<W> {
         }
     }
 
-    /// What counts time has changed, or the clock.
+    /// Refreshes what counts time after a change of it, or of the clock.
     pub(super) fn refresh_slow(&mut self) {
         self.next_slow = match self.powered {
             true => {
@@ -192,13 +192,13 @@ impl<W: Wiring> Chip<W> {
         self.refresh();
     }
 
-    /// Where a converter stands in the agenda: behind the timers.
+    /// Place of a converter in the agenda: behind the timers.
     #[inline]
     pub(super) fn converter_place(&self, index: usize) -> usize {
         self.timers.len() + index
     }
 
-    /// Where an SPI stands in the agenda: behind the converters.
+    /// Place of an SPI in the agenda: behind the converters.
     #[inline]
     pub(super) fn spi_place(&self, index: usize) -> usize {
         self.timers.len() + self.converters.len() + index

@@ -40,12 +40,12 @@ static OTHERS: [Register; 11] = table(u32::MAX, 0, 0);
 pub const PORTS: u8 = 7;
 const NAMES: [&str; PORTS as usize] = ["GPIOA", "GPIOB", "GPIOC", "GPIOD", "GPIOE", "GPIOF", "GPIOG"];
 
-/// Whether a register decides which peripheral a pin belongs to.
+/// Returns `true` if a register decides which peripheral a pin belongs to.
 pub const fn changes_functions(offset: u32) -> bool {
     matches!(offset, MODER | AFRL | 0x24)
 }
 
-/// What a pin is (MODER).
+/// Mode of a pin (MODER).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
     /// Read by the program.
@@ -58,7 +58,7 @@ pub enum Mode {
     Analog,
 }
 
-/// Which general-purpose outputs a port drives, and to what levels.
+/// General-purpose outputs that a port drives, and their levels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Driven {
     /// Bits of the pins that are driven.
@@ -74,7 +74,7 @@ pub struct Gpio {
 }
 
 impl Gpio {
-    /// As after reset.
+    /// State after reset.
     pub fn new() -> Self {
         let block = |(port, name): (usize, &'static str)| {
             let table: &'static [Register] = match port {
@@ -92,7 +92,7 @@ impl Gpio {
         self.ports[usize::from(port)].reset();
     }
 
-    /// What a pin is.
+    /// Mode of a pin.
     pub fn mode(&self, pin: Pin) -> Mode {
         let port = &self.ports[usize::from(pin.port)];
         match port.get(MODER) >> (2 * pin.number) & 3 {
@@ -106,7 +106,7 @@ impl Gpio {
         }
     }
 
-    /// What a port's general-purpose outputs drive: open drains drive low only (9.3.10).
+    /// Levels that a port's general-purpose outputs drive: open drains drive low only (9.3.10).
     pub fn driven(&self, port: u8) -> Driven {
         let block = &self.ports[usize::from(port)];
         let (modes, levels) = (block.get(MODER), block.get(ODR));

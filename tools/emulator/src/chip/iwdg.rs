@@ -22,10 +22,10 @@ const REGISTERS: &[Register] = &[
 /// A new prescaler or reload value takes up to five periods of the oscillator to arrive (42.4.4).
 const UPDATE_PERIODS: u64 = 5;
 
-/// What a store asks the rest of the chip for.
+/// Effect of a store that the rest of the chip is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effect {
-    /// Nothing.
+    /// No effect.
     None,
     /// The low-speed oscillator is started (42.3.1).
     StartOscillator,
@@ -36,13 +36,13 @@ pub enum Effect {
 pub struct Iwdg {
     block: Block,
     unlocked: bool,
-    /// When it bites; none while it does not run.
+    /// Instant at which it bites; none while it does not run.
     bites: Option<Instant>,
     updating: [Instant; 2],
 }
 
 impl Iwdg {
-    /// As after reset: stopped, as the option byte IWDG_SW says.
+    /// State after reset: stopped, as the option byte IWDG_SW says.
     pub fn new() -> Self {
         let block = Block::new("IWDG", "42.4", REGISTERS);
         Self { block, unlocked: false, bites: None, updating: [Instant(0); 2] }
@@ -53,12 +53,12 @@ impl Iwdg {
         *self = Self::new();
     }
 
-    /// Whether it runs.
+    /// Returns `true` if it runs.
     pub const fn is_running(&self) -> bool {
         self.bites.is_some()
     }
 
-    /// When it resets the chip.
+    /// Instant at which it resets the chip.
     #[inline]
     pub fn next(&self) -> Instant {
         self.bites.unwrap_or(Instant::NEVER)

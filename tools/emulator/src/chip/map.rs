@@ -1,4 +1,4 @@
-//! What lies where: RM0440, 2.2 "Memory organization".
+//! Memory map: RM0440, 2.2 "Memory organization".
 
 use super::variant::{
     self, CONVERTER_GATES, CRC_GATE, ClockGate, FDCAN_GATE, FLASH_GATE, PWR_GATE, RNG_GATE, SYSCFG_GATE, Variant,
@@ -41,7 +41,7 @@ pub enum Device {
     Debug,
 }
 
-/// What the clock gate of a device is; none where it always runs.
+/// Clock gate of a device; none where it always runs.
 pub fn gate(device: Device, variant: &Variant) -> Option<ClockGate> {
     match device {
         Device::Timer(index) => Some(variant.timers[index].gate),
@@ -81,7 +81,7 @@ impl Places {
         Self([None; 128])
     }
 
-    /// What is at an address; none where there is nothing that is modelled.
+    /// Device or memory at an address; none where there is nothing that is modelled.
     pub fn find(&mut self, address: u32, variant: &Variant) -> Option<Place> {
         // Peripherals' pages differ from bit 10 on.
         let lately = &mut self.0[((address >> 2 ^ address >> 8) % 128) as usize];

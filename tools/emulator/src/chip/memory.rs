@@ -21,7 +21,7 @@ pub const FLASH_SIZE: u32 = 0x1fff_75e0;
 pub struct Memory {
     bytes: Vec<u8>,
     size: usize,
-    /// Where CCM SRAM begins in `bytes`.
+    /// Offset of CCM SRAM in `bytes`.
     ccm: u32,
     uid: [u8; 12],
     flash_kib: u16,
@@ -64,7 +64,7 @@ impl Memory {
         memory
     }
 
-    /// Nothing answers any more.
+    /// Powers the memory down: nothing answers any more.
     pub fn power_down(&mut self) {
         self.bytes.clear();
     }
@@ -97,13 +97,14 @@ impl Memory {
         &mut self.bytes
     }
 
-    /// Where in `bytes` a word lies; none where it does not.
+    /// Offset of a word in `bytes`; none where it does not lie there.
     pub fn place_of(&self, address: u32) -> Option<usize> {
         let place = self.place(address);
         self.block(address, 4).map(|_| place)
     }
 
-    /// Where an address would be in `bytes`, and far behind their end where it is neither's: below CCM SRAM it wraps.
+    /// Offset that an address would have in `bytes`, and far behind their end where it is neither's: below CCM SRAM it
+    /// wraps.
     #[inline(always)]
     fn place(&self, address: u32) -> usize {
         let offset = if address < SRAM { address.wrapping_sub(CCM).saturating_add(self.ccm) } else { address - SRAM };

@@ -56,8 +56,8 @@ use timer::Timer;
 use variant::Variant;
 use wiring::{Pin, Wiring};
 
-/// What a program does against the manual, and may go on all the same: each of them known, and named by whoever runs
-/// the program.
+/// Deviation of a program from the manual with which it may go on all the same: each of them known, and named by
+/// whoever runs the program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Deviation {
     /// A register of a peripheral without its clock is accessed: it reads 0 and ignores what is written.
@@ -73,7 +73,7 @@ pub enum Deviation {
 /// and 5.3.1).
 const FLASH_WIDTH: u32 = 8;
 
-/// Where the flash's wait states (ACR.LATENCY) are counted.
+/// Place in which the flash's wait states (ACR.LATENCY) are counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Waiting {
     /// Nowhere: as if all code and data lay in SRAM.
@@ -166,7 +166,7 @@ impl<W: Wiring> Chip<W> {
         chip
     }
 
-    /// Which chip it is.
+    /// Variant of the chip.
     pub const fn variant(&self) -> &'static Variant {
         self.variant
     }
@@ -249,7 +249,7 @@ impl<W: Wiring> Chip<W> {
         self.clock.frequency()
     }
 
-    /// When a cycle begins, by the frequency of now.
+    /// Instant at which a cycle begins, by the frequency of now.
     pub fn instant(&self, cycle: u64) -> Instant {
         self.clock.instant(cycle)
     }
@@ -258,7 +258,7 @@ impl<W: Wiring> Chip<W> {
         Moment { cycle, clock: self.clock }
     }
 
-    /// Whether there is power. Without it every access is refused.
+    /// Returns `true` if there is power. Without it every access is refused.
     pub const fn is_powered(&self) -> bool {
         self.powered
     }
@@ -355,8 +355,8 @@ impl<W: Wiring> Chip<W> {
         }
     }
 
-    /// Whether the flash is read slowly enough for the core's frequency, and the regulator gives what it takes (3.3.3,
-    /// 5.3.3, 6.1.5).
+    /// Checks that the flash is read slowly enough for the core's frequency, and the regulator gives what it takes
+    /// (3.3.3, 5.3.3, 6.1.5).
     fn check_speed(&self) -> Result<(), Refusal> {
         let allowed = self.deviations.contains(&Deviation::WithoutBoost);
         let range = match self.pwr.range() {

@@ -25,7 +25,7 @@ const INPUTS: [([Option<Pin>; 4], Pin); 3] = [
     ([Some(Pin::new('B', 0)), Some(Pin::new('B', 13)), Some(Pin::new('A', 1)), None], Pin::new('B', 2)),
 ];
 
-/// What an amplifier does: its output is `gain` times the positive input less `gain - 1` times the bias.
+/// Amplification by an amplifier: its output is `gain` times the positive input less `gain - 1` times the bias.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Amplification {
     /// The positive input.
@@ -53,8 +53,8 @@ impl Amplifiers {
         self.block.reset();
     }
 
-    /// What an amplifier, counted from 1, gives its converter; none where it is off, or where its output is not
-    /// connected inside.
+    /// Amplification that an amplifier, counted from 1, gives its converter; none where it is off, or where its output
+    /// is not connected inside.
     pub fn amplification(&self, number: u8) -> Option<Amplification> {
         let index = usize::from(number.checked_sub(1)?);
         let &(inputs, bias) = INPUTS.get(index)?;

@@ -49,7 +49,7 @@ pub struct Pwr {
 }
 
 impl Pwr {
-    /// As after reset.
+    /// State after reset.
     pub fn new() -> Self {
         Self { block: Block::new("PWR", "6.4", REGISTERS) }
     }
@@ -59,7 +59,7 @@ impl Pwr {
         self.block.reset();
     }
 
-    /// Whether the backup domain may be written: CR1.DBP.
+    /// Returns `true` if the backup domain may be written: CR1.DBP.
     pub fn backup_is_writable(&self) -> bool {
         self.block.get(CR1) >> 8 & 1 != 0
     }

@@ -76,7 +76,7 @@ const REGISTERS: &[Register] = &[
     register(0x9c, "CCIPR2", 0, 0x0030_0003, 0),
 ];
 
-/// Why the chip was reset: flags of RCC_CSR (7.4.28).
+/// Cause of the chip's reset: flags of RCC_CSR (7.4.28).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
     /// The power came, or came back.
@@ -105,10 +105,10 @@ impl Cause {
     }
 }
 
-/// What a write to RCC did outside RCC.
+/// Effect of a write to RCC outside RCC.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effect {
-    /// Nothing.
+    /// No effect.
     None,
     /// The core runs at another frequency, Hz.
     Frequency(u64),
@@ -150,7 +150,7 @@ impl Rcc {
         (self.hsi, self.hsi48, self.lsi, self.pll) = (at, Instant::NEVER, Instant::NEVER, Instant::NEVER);
     }
 
-    /// Whether a peripheral's clock is enabled.
+    /// Returns `true` if a peripheral's clock is enabled.
     #[inline]
     pub fn is_enabled(&self, gate: ClockGate) -> bool {
         self.block.get(gate.register) >> gate.bit & 1 != 0
@@ -163,7 +163,7 @@ impl Rcc {
         }
     }
 
-    /// Whether the 48 MHz clock of the random number generator runs: HSI48, as CCIPR.CLK48SEL says (7.4.26).
+    /// Returns `true` if the 48 MHz clock of the random number generator runs: HSI48, as CCIPR.CLK48SEL says (7.4.26).
     pub fn has_hsi48(&self, at: Instant) -> bool {
         self.block.get(CCIPR) >> 26 & 3 == 0 && at >= self.hsi48
     }

@@ -8,7 +8,7 @@ use crate::bus::Refusal;
 pub struct Register {
     /// Bytes from the peripheral's address.
     pub offset: u32,
-    /// As in the reference manual, without the peripheral.
+    /// Name as in the reference manual, without the peripheral.
     pub name: &'static str,
     /// Value after reset.
     pub reset: u32,
@@ -38,7 +38,7 @@ pub struct Block {
 const NONE: u8 = u8::MAX;
 
 impl Block {
-    /// As after reset. `chapter` of RM0440 describes them.
+    /// State after reset. `chapter` of RM0440 describes them.
     pub fn new(name: &'static str, chapter: &'static str, table: &'static [Register]) -> Self {
         let words = table.iter().map(|register| register.offset / 4 + 1).max().unwrap_or(0);
         let mut places = vec![NONE; words as usize];
@@ -68,7 +68,7 @@ impl Block {
         })
     }
 
-    /// What a register of the table holds.
+    /// Content of a register of the table.
     ///
     /// # Panics
     /// Behind the last register.
@@ -77,7 +77,7 @@ impl Block {
         self.values[(offset / 4) as usize]
     }
 
-    /// What a register holds; 0 where the peripheral does not have it.
+    /// Content of a register; 0 where the peripheral does not have it.
     #[inline]
     pub fn get_or_zero(&self, offset: u32) -> u32 {
         self.values.get((offset / 4) as usize).copied().unwrap_or(0)
@@ -86,7 +86,7 @@ impl Block {
     /// Lets a register hold a value, whatever bits exist.
     ///
     /// # Panics
-    /// As [`get`](Self::get).
+    /// Those of [`get`](Self::get).
     #[inline]
     pub fn set(&mut self, offset: u32, value: u32) {
         self.values[(offset / 4) as usize] = value;
@@ -111,14 +111,14 @@ impl Block {
         Ok(before)
     }
 
-    /// What is not modelled of a register.
+    /// Refusal of what is not modelled of a register.
     pub fn refuse(&self, offset: u32, what: &str) -> Refusal {
         let name = self.place(offset).map_or("?", |place| self.table[place].name);
         let (peripheral, chapter) = (self.name, self.chapter);
         Refusal::Unmodelled(format!("{peripheral}_{name}: {what} (RM0440, {chapter}) is not modelled"))
     }
 
-    /// What a program must not do with a register, because the reference manual leaves open what happens.
+    /// Refusal of what a program must not do with a register, because the reference manual leaves open what happens.
     pub fn forbid(&self, offset: u32, what: &str) -> Refusal {
         let name = self.place(offset).map_or("?", |place| self.table[place].name);
         let (peripheral, chapter) = (self.name, self.chapter);

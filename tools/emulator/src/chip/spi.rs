@@ -57,7 +57,7 @@ pub struct Spi {
 }
 
 impl Spi {
-    /// As after reset.
+    /// State after reset.
     pub fn new(description: &'static SpiDescription) -> Self {
         Self {
             description,
@@ -80,7 +80,7 @@ impl Spi {
         self.description
     }
 
-    /// When a frame ends.
+    /// Cycle at which a frame ends.
     #[inline]
     pub fn next(&self) -> u64 {
         self.frame.map_or(u64::MAX, |frame| frame.ends)
@@ -108,7 +108,7 @@ impl Spi {
         Some((described, frame.began))
     }
 
-    /// What came back; the next frame begins where one waits.
+    /// Takes what came back; the next frame begins where one waits.
     pub fn answer(&mut self, received: u16, cycle: u64) {
         if self.receive.len() + self.bytes() > FIFO {
             self.flags |= OVR;

@@ -23,7 +23,7 @@ const DEBUG: &[Register] = &[
     register(0x10, "APB2FZR", 0, u32::MAX, 0),
 ];
 
-/// What the chip itself tells the break input of TIM1 where SYSCFG_CFGR2 connects it (10.2.10).
+/// Alarm that the chip itself tells the break input of TIM1 where SYSCFG_CFGR2 connects it (10.2.10).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Alarm {
     /// The core has locked up: a fault within a fault.
@@ -43,7 +43,7 @@ pub struct Syscfg {
 }
 
 impl Syscfg {
-    /// As after reset; `identity` is DBGMCU_IDCODE.
+    /// State after reset; `identity` is DBGMCU_IDCODE.
     pub fn new(identity: u32) -> Self {
         let debug = Block::new("DBGMCU", "47.16", DEBUG);
         Self { block: Block::new("SYSCFG", "10.2", REGISTERS), debug, identity }
@@ -59,7 +59,7 @@ impl Syscfg {
         *self = Self::new(self.identity);
     }
 
-    /// Whether an alarm breaks TIM1. CFGR2's bits stay set until a reset: see `write`.
+    /// Returns `true` if an alarm breaks TIM1. CFGR2's bits stay set until a reset: see `write`.
     pub fn breaks(&self, alarm: Alarm) -> bool {
         self.block.get(CFGR2) >> alarm as u32 & 1 != 0
     }

@@ -27,7 +27,7 @@ impl Instant {
     }
 }
 
-/// How the core's cycles count time: since when at which frequency.
+/// Conversion of the core's cycles into time: since when at which frequency.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Clock {
     cycle: u64,
@@ -53,7 +53,7 @@ impl Clock {
         }
     }
 
-    /// When a cycle begins.
+    /// Instant at which a cycle begins.
     pub fn instant(&self, cycle: u64) -> Instant {
         self.instant.after(cycle.saturating_sub(self.cycle), self.frequency)
     }
@@ -81,7 +81,7 @@ pub struct Moment {
 }
 
 impl Moment {
-    /// As an instant.
+    /// Value as an instant.
     pub fn instant(&self) -> Instant {
         self.clock.instant(self.cycle)
     }

@@ -28,7 +28,7 @@ pub const APB1: u32 = 0x58;
 /// RCC_APB2ENR.
 pub const APB2: u32 = 0x60;
 
-/// What a timer can do.
+/// Capabilities of a timer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TimerKind {
     /// TIM1: complementary outputs, break, repetition counter.
@@ -46,9 +46,9 @@ pub enum TimerKind {
 pub struct TimerDescription {
     /// Its name.
     pub name: TimerName,
-    /// As in the reference manual.
+    /// Name as in the reference manual.
     pub text: &'static str,
-    /// What it can do.
+    /// Capabilities.
     pub kind: TimerKind,
     /// Its address.
     pub address: u32,
@@ -125,7 +125,7 @@ pub const OUTPUTS: &[TimerOutput] = &[
     output(TimerName::Tim2, 3, false, Pin::new('B', 10), 1),
 ];
 
-/// What a converter's channel measures.
+/// Input that a converter's channel measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Input {
     /// A pin.
@@ -137,13 +137,13 @@ pub enum Input {
 /// A converter.
 #[derive(Clone, Copy, Debug)]
 pub struct ConverterDescription {
-    /// As in the reference manual.
+    /// Name as in the reference manual.
     pub text: &'static str,
     /// Its address.
     pub address: u32,
     /// Its interrupt.
     pub line: u8,
-    /// Which group of converters it shares clock and common registers with.
+    /// Group of converters with which it shares clock and common registers.
     pub group: usize,
     /// Number and input of its channels, single-ended.
     pub channels: &'static [(u8, Input)],
@@ -209,7 +209,7 @@ pub const CONVERTER_GATES: [ClockGate; 2] = [gate(AHB2, 13), gate(AHB2, 14)];
 pub struct SpiDescription {
     /// Number, from 1.
     pub number: u8,
-    /// As in the reference manual.
+    /// Name as in the reference manual.
     pub text: &'static str,
     /// Its address.
     pub address: u32,
@@ -232,7 +232,8 @@ pub struct Variant {
     pub name: &'static str,
     /// Bytes of flash.
     pub flash: u32,
-    /// Whether the flash is two banks of half the size, of which one can be read while the other is erased or written.
+    /// `true` if the flash is two banks of half the size, of which one can be read while the other is erased or
+    /// written.
     pub two_banks: bool,
     /// Bytes of SRAM1 and SRAM2 together.
     pub sram: u32,

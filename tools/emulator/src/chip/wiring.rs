@@ -48,7 +48,7 @@ pub enum TimerName {
     Tim15,
 }
 
-/// What a pin for a transistor's gate does until told otherwise.
+/// State of a pin for a transistor's gate until told otherwise.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Gate {
     /// High while the leg's reference is active, and low otherwise; the other way round where inverted.
@@ -84,13 +84,13 @@ pub struct Leg {
 /// A PWM timer's outputs from now on, until told otherwise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Pwm {
-    /// Which timer.
+    /// Name of the timer.
     pub timer: TimerName,
-    /// Whether it counts.
+    /// `true` if it counts.
     pub running: bool,
-    /// Where the counter is.
+    /// Value of the counter.
     pub count: u32,
-    /// Whether it counts up.
+    /// `true` if it counts up.
     pub up: bool,
     /// The top of the count in force.
     pub top: u32,
@@ -102,7 +102,7 @@ pub struct Pwm {
     pub legs: [Leg; 3],
 }
 
-/// What an incremental encoder has done.
+/// Count and index of an incremental encoder.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Quadrature {
     /// Edges of A and B so far, four a line, signed.
@@ -120,15 +120,15 @@ pub struct SpiFrame {
     pub mode: u8,
     /// Bits in the frame.
     pub bits: u8,
-    /// What is sent, the first bit highest.
+    /// Bits that are sent, the first bit highest.
     pub sent: u16,
     /// Frequency of the clock, Hz.
     pub frequency: u64,
-    /// When its first bit began.
+    /// Instant at which its first bit began.
     pub began: Instant,
 }
 
-/// What a board connects to the chip.
+/// Connections of a board to the chip.
 pub trait Wiring {
     /// Volts between a pin and ground, as a high-impedance input sees them.
     fn volts(&mut self, at: Instant, pin: Pin) -> f64;
@@ -149,7 +149,7 @@ pub trait Wiring {
     /// The chip drives a general-purpose output, or no longer does.
     fn driven(&mut self, at: Instant, pin: Pin, level: Option<bool>);
 
-    /// What the encoder at a timer's channels 1 to 3 has done. The count may begin anywhere.
+    /// Count and index of the encoder at a timer's channels 1 to 3. The count may begin anywhere.
     fn quadrature(&mut self, at: Instant, timer: TimerName) -> Quadrature;
 
     /// A PWM timer's outputs from now on. At every turn of the counter, and when anything changes between two.
@@ -165,7 +165,7 @@ pub trait Wiring {
     }
 }
 
-/// Nothing is connected: every pin floats at 0 V, every frame comes back as ones.
+/// Chip to which nothing is connected: every pin floats at 0 V, every frame comes back as ones.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Unconnected;
 

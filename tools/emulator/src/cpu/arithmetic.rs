@@ -25,7 +25,7 @@ pub(super) fn subtract(a: u32, b: u32) -> (u32, bool, bool) {
     (difference, !borrow, (a as i32).overflowing_sub(b as i32).1)
 }
 
-/// How a register operand is shifted. As in the encodings, and one more for a rotation through the carry.
+/// Shift of a register operand. As in the encodings, and one more for a rotation through the carry.
 pub(super) const LEFT: u8 = 0;
 pub(super) const RIGHT: u8 = 1;
 pub(super) const ARITHMETIC: u8 = 2;
@@ -61,7 +61,7 @@ pub(super) fn shift(kind: u8, value: u32, amount: u32, carry: bool) -> (u32, boo
     }
 }
 
-/// What an immediate shift of five bits means (DecodeImmShift): its kind and amount.
+/// Meaning of an immediate shift of five bits (DecodeImmShift): its kind and amount.
 pub(super) fn immediate_shift(kind: u32, amount: u32) -> (u8, u32) {
     match (kind, amount) {
         (0, _) => (LEFT, amount),
@@ -74,7 +74,7 @@ pub(super) fn immediate_shift(kind: u32, amount: u32) -> (u8, u32) {
     }
 }
 
-/// What a constant does to the carry of a logical operation.
+/// Effect of a constant on the carry of a logical operation.
 pub(super) const CARRY_KEPT: u32 = 0;
 pub(super) const CARRY_CLEARED: u32 = 1;
 pub(super) const CARRY_SET: u32 = 2;

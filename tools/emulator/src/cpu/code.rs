@@ -13,7 +13,7 @@ pub(super) struct Code<B: Bus> {
     pub(super) stretches: Stretches<B>,
     pub(super) translations: Translations,
     regions: Vec<Region>,
-    /// As [`Bus::line`].
+    /// Length of a line of code, as of [`Bus::line`].
     line: Option<u32>,
     /// The region that the program is in.
     current: Region,
@@ -29,7 +29,7 @@ struct Region {
     start: u32,
     /// Bytes.
     length: u32,
-    /// Where its operations begin.
+    /// Offset at which its operations begin.
     offset: usize,
     wait_states: u64,
 }
@@ -77,15 +77,15 @@ impl<B: Bus> Code<B> {
         Self::kept(&self.operations, self.place(address)?)
     }
 
-    /// Where the operation for an address of the current region is kept. That of the next instruction is kept behind
-    /// it, by its half-words.
+    /// Place in which the operation for an address of the current region is kept. That of the next instruction is kept
+    /// behind it, by its half-words.
     #[inline(always)]
     pub fn place(&self, address: u32) -> Option<usize> {
         let offset = address.wrapping_sub(self.current.start);
         (offset < self.current.length).then(|| self.current.offset.wrapping_add((offset / 2) as usize))
     }
 
-    /// What is kept at a place; None where nothing is decoded yet, and behind the region's end.
+    /// Operation that is kept at a place; None where nothing is decoded yet, and behind the region's end.
     #[inline(always)]
     pub fn kept(operations: &[Operation<B>], place: usize) -> Option<Operation<B>> {
         let operation = *operations.get(place)?;
@@ -97,7 +97,7 @@ impl<B: Bus> Code<B> {
         Self::kept(&self.operations, self.place_anywhere(address)?)
     }
 
-    /// Whether what begins at an address of any region is translated.
+    /// Returns `true` if what begins at an address of any region is translated.
     pub fn is_translated(&self, address: u32) -> bool {
         self.place_anywhere(address).is_some_and(|place| self.stretches.is_translated(place))
     }
@@ -128,7 +128,8 @@ impl<B: Bus> Code<B> {
         self.place(address).is_some_and(|place| self.stretches.form(place, |place| Self::kept(operations, place)))
     }
 
-    /// Whether a store to an address may change what is decoded; always outside of SRAM, where programs seldom store.
+    /// Returns `true` if a store to an address may change what is decoded; always outside of SRAM, where programs
+    /// seldom store.
     #[inline(always)]
     pub fn changes(&self, address: u32) -> bool {
         address < SRAM.start || address.wrapping_sub(self.changeable.start) < self.changeable_length
@@ -140,7 +141,7 @@ impl<B: Bus> Code<B> {
         self.changes(address) || self.changeable.start.wrapping_sub(address) < bytes && self.changeable_length != 0
     }
 
-    /// Whether an address lies in the current region.
+    /// Returns `true` if an address lies in the current region.
     #[inline(always)]
     pub fn holds(&self, address: u32) -> bool {
         address.wrapping_sub(self.current.start) < self.current.length
@@ -159,7 +160,7 @@ impl<B: Bus> Code<B> {
         self.current = self.region(address).copied().unwrap_or(nowhere);
     }
 
-    /// Whether lines of code cost something in sequence too.
+    /// Returns `true` if lines of code cost something in sequence too.
     #[inline(always)]
     pub const fn waits_for_lines(&self) -> bool {
         self.line.is_some()
@@ -190,7 +191,7 @@ impl<B: Bus> Code<B> {
         }
     }
 
-    /// What lies there has changed.
+    /// Forgets a range whose content has changed.
     pub fn forget(&mut self, range: Range<u32>) {
         // An instruction that begins up to two bytes before may reach into it.
         let range = range.start.saturating_sub(2)..range.end;

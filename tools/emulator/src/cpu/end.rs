@@ -1,9 +1,9 @@
-//! Why a run ended.
+//! Reasons for the end of a run.
 
 use super::Refused;
 use std::fmt;
 
-/// Why a run ended. Where it says an address, that is the instruction's, which has not taken effect.
+/// Reason for the end of a run. Where it says an address, that is the instruction's, which has not taken effect.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum End {
     /// The cycle that was asked for is reached.
@@ -28,14 +28,14 @@ pub enum End {
         address: u32,
         /// The encoding, the first half-word in the upper half where there are two.
         encoding: u32,
-        /// What is wrong with it.
+        /// Defect of it.
         why: Refused,
     },
     /// Something was used that is not modelled.
     Unmodelled {
         /// Address of the instruction.
         address: u32,
-        /// What, in words.
+        /// Name of it, in words.
         what: String,
     },
     /// A fault that no handler could take: the core would stand still until reset.
@@ -59,7 +59,7 @@ pub struct Lockup {
     pub bus_fault_address: u32,
 }
 
-/// Who asked for a reset.
+/// Origin of a request for a reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Origin {
     /// The program, by AIRCR.SYSRESETREQ.

@@ -14,11 +14,11 @@ use crate::bus::Bus;
 const BASIC_FRAME: u32 = 0x20;
 const FLOATING_FRAME: u32 = 0x48;
 
-/// What the handler of an exception has taken. Everything from the first cycle of entry to the last of return counts;
-/// what preempted it counts for it only in `cycles` and `instructions`.
+/// Times that the handler of an exception has taken. Everything from the first cycle of entry to the last of return
+/// counts; what preempted it counts for it only in `cycles` and `instructions`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ExceptionTimes {
-    /// How often it has returned.
+    /// Number of times that it has returned.
     pub count: u64,
     /// Instructions in all, those of what preempted it included.
     pub instructions: u64,
@@ -40,7 +40,7 @@ pub(super) struct Activation {
     number: u16,
     cycles: u64,
     instructions: u64,
-    /// What preempted it.
+    /// Cycles of what preempted it.
     nested_cycles: u64,
     nested_instructions: u64,
 }
@@ -122,8 +122,8 @@ impl<B: Bus> Cpu<B> {
         self.store_aligned::<4>(place.wrapping_add(0x40), self.floating.bits())
     }
 
-    /// What a floating-point instruction needs before it can run (ExecuteFPCheck): the unit switched on, registers of
-    /// what was interrupted stored, and the context marked as used.
+    /// Preparation of a floating-point instruction before it can run (ExecuteFPCheck): the unit switched on, registers
+    /// of what was interrupted stored, and the context marked as used.
     #[cold]
     pub(super) fn check_floating_point(&mut self) -> Result<(), Trap> {
         self.settle();

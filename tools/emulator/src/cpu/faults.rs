@@ -82,7 +82,7 @@ impl<B: Bus> Cpu<B> {
         self.interrupts.pend(HARD_FAULT);
     }
 
-    /// Nothing answered where a frame is stored or loaded.
+    /// Takes the fault that nothing answered where a frame is stored or loaded.
     pub(super) fn stacking_failed(&mut self, trap: Trap, loading: bool) {
         if trap == Trap::End {
             return;
@@ -94,7 +94,7 @@ impl<B: Bus> Cpu<B> {
         self.raise(bits, BUS_FAULT);
     }
 
-    /// Nothing answered where the vector of exception `number` lies.
+    /// Takes the fault that nothing answered where the vector of exception `number` lies.
     pub(super) fn vector_failed(&mut self, trap: Trap, number: u16) {
         if trap == Trap::End {
             return;

@@ -1,4 +1,4 @@
-//! Which exceptions are pending, enabled and active, and which of them comes next: the NVIC and what the system
+//! State of the exceptions, pending, enabled and active, and the one that comes next: the NVIC and what the system
 //! exceptions share with it.
 //!
 //! ARM DDI 0403, B1.5.2 to B1.5.4 (priorities), B3.4 (NVIC). Priorities have the four bits of an STM32G4 (RM0440,
@@ -132,12 +132,12 @@ impl Interrupts {
         (priority < self.current).then_some(number)
     }
 
-    /// Whether something wakes the core from WFI: what could be taken if PRIMASK were clear (B1.5.19).
+    /// Returns `true` if something wakes the core from WFI: what could be taken if PRIMASK were clear (B1.5.19).
     pub fn would_wake(&self) -> bool {
         self.best.is_some_and(|(priority, _)| priority < self.priority_of_execution(false))
     }
 
-    /// Whether an exception of this number could be taken now.
+    /// Returns `true` if an exception of this number could be taken now.
     pub fn would_take(&self, number: u16) -> bool {
         self.preemption(self.priority(number)) < self.current
     }
@@ -173,7 +173,7 @@ impl Interrupts {
         changed
     }
 
-    /// Whether a line that is high is to pend its interrupt again.
+    /// Returns `true` if a line that is high is to pend its interrupt again.
     fn refresh_pending(&self) -> bool {
         (0..4).any(|word| self.lines[word] & !self.active[word] & !self.pending[word] != 0)
     }
@@ -220,7 +220,7 @@ impl Interrupts {
         }
     }
 
-    /// How many handlers have begun and not returned.
+    /// Number of handlers that have begun and not returned.
     pub fn active_count(&self) -> u32 {
         self.system_active.count_ones() + self.active.iter().map(|word| word.count_ones()).sum::<u32>()
     }

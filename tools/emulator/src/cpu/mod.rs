@@ -66,7 +66,7 @@ pub struct Cpu<B: Bus> {
     pub bus: B,
     /// r0 to r12, the stack pointer in use, the link register; the last is never read.
     r: [u32; 16],
-    /// Where the next instruction lies.
+    /// Address of the next instruction.
     pc: u32,
     /// The stack pointer that is not in use.
     other_stack: u32,
@@ -91,7 +91,7 @@ pub struct Cpu<B: Bus> {
     unprivileged: bool,
     process_stack: bool,
     floating_used: bool,
-    /// Whether a floating-point instruction may go ahead without further preparation.
+    /// `true` if a floating-point instruction may go ahead without further preparation.
     floating_ready: bool,
     /// The event register of WFE, and the exclusive monitor.
     event: bool,
@@ -101,9 +101,9 @@ pub struct Cpu<B: Bus> {
     now: u64,
     slept: u64,
     instructions: u64,
-    /// Whether the last instruction loaded or stored one register.
+    /// `true` if the last instruction loaded or stored one register.
     single: bool,
-    /// Where the last instruction ends that waited for its lines of code.
+    /// End of the last instruction that waited for its lines of code.
     fetched: u32,
     /// The cycle at which `attend` has to look, and the one at which the run is to end.
     attention: u64,
@@ -126,7 +126,7 @@ pub struct Cpu<B: Bus> {
     watch: Option<Box<Watch>>,
 }
 
-/// What the core waits for.
+/// Event that the core waits for.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Sleep {
     Interrupt,
@@ -134,7 +134,7 @@ enum Sleep {
 }
 
 impl<B: Bus> Cpu<B> {
-    /// Everything that is not the next instruction: time that makes things happen, sleep, exceptions, the run's end.
+    /// Work that is not the next instruction: time that makes things happen, sleep, exceptions, the run's end.
     #[cold]
     fn attend(&mut self) -> Option<End> {
         loop {
@@ -180,7 +180,7 @@ impl<B: Bus> Cpu<B> {
         }
     }
 
-    /// When something next happens by itself.
+    /// Cycle at which something next happens by itself.
     fn due(&self) -> u64 {
         self.bus.next_event().min(self.timer.next())
     }

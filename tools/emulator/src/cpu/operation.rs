@@ -3,7 +3,7 @@
 use super::Cpu;
 use crate::bus::Bus;
 
-/// Why an instruction did not complete.
+/// Reason for which an instruction did not complete.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Trap {
     /// The instruction is undefined by definition.
@@ -18,9 +18,9 @@ pub(super) enum Trap {
     Unaligned,
     /// A division by zero, with the trap switched on.
     DivisionByZero,
-    /// Nothing answered a load or a store; the address is in `Cpu::trapped_address`.
+    /// No answer to a load or a store; the address is in `Cpu::trapped_address`.
     Data,
-    /// Nothing answered the fetch.
+    /// No answer to the fetch.
     Fetch,
     /// Code must not lie there.
     ExecuteNever,
@@ -30,7 +30,7 @@ pub(super) enum Trap {
     End,
 }
 
-/// What comes after an instruction if not the one behind it.
+/// Continuation after an instruction if not the one behind it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Leave {
     /// It has gone elsewhere, or begun an IT block: `Cpu::pc` and `Cpu::it` are to be looked at.
@@ -45,7 +45,7 @@ impl From<Trap> for Leave {
     }
 }
 
-/// How an instruction ends; nearly always with the one behind it as the next.
+/// End of an instruction; nearly always with the one behind it as the next.
 pub(super) type Done = Result<(), Leave>;
 
 /// Fields of an encoding, or what decoding made of them.
@@ -59,7 +59,7 @@ pub(super) struct Operands {
     pub n: u8,
     /// Second operand.
     pub m: u8,
-    /// What else there is: a fourth register, a condition, a position.
+    /// Another operand: a fourth register, a condition, a position.
     pub x: u8,
 }
 
@@ -82,7 +82,7 @@ impl Operands {
 /// Executes an instruction, and what follows it in its stretch.
 pub(super) type Execute<B> = fn(&mut Cpu<B>, Operands, Rest<B>) -> Done;
 
-/// What follows an instruction in its stretch (see `stretch`); nothing where it is executed by itself.
+/// Steps that follow an instruction in its stretch (see `stretch`); nothing where it is executed by itself.
 pub(super) type Rest<'a, B> = &'a [Step<B>];
 
 /// An instruction of a stretch.
@@ -111,21 +111,21 @@ pub(super) struct Operation<B: Bus> {
     pub action: Action,
 }
 
-/// How long an instruction is, and how long it takes.
+/// Length of an instruction, and its time.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) struct Timing {
     /// Bytes; 0 for what is not decoded yet.
     pub length: u8,
     /// Cycles without wait states, branch and pipelining.
     pub cycles: u8,
-    /// Whether it loads or stores one register, and the cycles that it saves behind another that does (see `timing`).
+    /// `true` if it loads or stores one register, and the cycles that it saves behind another that does (see `timing`).
     pub single: bool,
     pub overlaps: u8,
     pub flow: Flow,
     pub part: Part,
 }
 
-/// What an instruction can be in a pair that is executed at once (see `execute::pairs`).
+/// Role that an instruction can have in a pair that is executed at once (see `execute::pairs`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Part {
     None,
@@ -160,7 +160,7 @@ pub(super) enum Part {
     Nothing,
 }
 
-/// What an instruction does, as far as it can be translated (see `translation`); the fields are those that its function
+/// Action of an instruction, as far as it can be translated (see `translation`); the fields are those that its function
 /// is chosen by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Action {
@@ -246,7 +246,7 @@ pub(super) enum Action {
     FromFixed,
 }
 
-/// What comes behind an instruction.
+/// Flow behind an instruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Flow {
     /// The one behind it.
@@ -315,7 +315,7 @@ impl<B: Bus> Operation<B> {
         self
     }
 
-    /// What it does, which it is called for otherwise.
+    /// Sets its action, which it is called for otherwise.
     pub fn does(mut self, action: Action) -> Self {
         self.action = action;
         self

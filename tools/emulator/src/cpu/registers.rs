@@ -105,7 +105,7 @@ impl<B: Bus> Cpu<B> {
         self.exception
     }
 
-    /// What the handlers have taken so far, by the number of their exception.
+    /// Times that the handlers have taken so far, by the number of their exception.
     pub fn exception_times(&self) -> &BTreeMap<u16, ExceptionTimes> {
         &self.times
     }
@@ -125,12 +125,12 @@ impl<B: Bus> Cpu<B> {
         self.watch = watch.map(Box::new);
     }
 
-    /// What watches functions and stack.
+    /// Watch of functions and stack.
     pub fn watch(&self) -> Option<&Watch> {
         self.watch.as_deref()
     }
 
-    /// What watches functions and stack, to change it or take what it has collected.
+    /// Watch of functions and stack, to change it or take what it has collected.
     pub fn watch_mut(&mut self) -> Option<&mut Watch> {
         self.watch.as_deref_mut()
     }

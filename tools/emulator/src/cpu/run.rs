@@ -110,7 +110,7 @@ impl<B: Bus> Cpu<B> {
         done
     }
 
-    /// Whether a condition holds (ConditionPassed).
+    /// Returns `true` if a condition holds (ConditionPassed).
     #[inline(always)]
     pub(super) fn holds(&self, condition: u8) -> bool {
         let plain = match condition >> 1 {

@@ -1,8 +1,8 @@
 //! Stretches: instructions that are decoded one behind the other, as a list of calls with nothing to look up or to
 //! count in between.
 //!
-//! What an instruction takes without wait states is known beforehand, so a stretch is counted where it is left: at its
-//! end, by a branch, or by an instruction that needs the core as it is, which settles the count first
+//! Time that an instruction takes without wait states is known beforehand, so a stretch is counted where it is left: at
+//! its end, by a branch, or by an instruction that needs the core as it is, which settles the count first
 //! (`Cpu::settle_at`) and leaves the stretch. What takes longer than was known beforehand (wait states, refilled
 //! pipelines) is added to the time as it happens.
 //!
@@ -24,23 +24,23 @@ use crate::bus::Bus;
 const LONGEST: usize = 32;
 /// Half-words that those take, at most.
 pub(super) const SPAN: usize = 2 * LONGEST;
-/// So many steps are kept, 6 MB; behind them all stretches are formed anew.
+/// Number of steps that are kept, 6 MB; behind them all stretches are formed anew.
 const KEPT: usize = 1 << 18;
 
-/// What counts if a stretch is left behind a step.
+/// Counts if a stretch is left behind a step.
 #[derive(Clone, Copy, Default)]
 struct Mark {
     /// Since the stretch began.
     cycles: u16,
     bytes: u8,
     instructions: u8,
-    /// As in `Timing`.
+    /// Flag as in `Timing`.
     single: bool,
-    /// As in `Cpu`.
+    /// State as in `Cpu`.
     it: u8,
 }
 
-/// Where a stretch is kept.
+/// Place of a stretch.
 #[derive(Clone, Copy)]
 struct Stretch {
     /// Its steps: the first, and the one behind the last.
@@ -52,7 +52,7 @@ struct Stretch {
     bytes: u8,
     /// Cycles that the first instruction saves behind a single load or store.
     overlaps: u8,
-    /// How often it has begun, or, from `TRANSLATED` on, which function begins there.
+    /// Number of times that it has begun, or, from `TRANSLATED` on, the function that begins there.
     runs: u32,
 }
 
@@ -62,7 +62,7 @@ pub(super) struct Stretches<B: Bus> {
     steps: Vec<Step<B>>,
     /// Of the steps.
     marks: Vec<Mark>,
-    /// What begins at each place of the code; `NONE` where nothing does.
+    /// Stretch that begins at each place of the code; `NONE` where nothing does.
     begins: Vec<Stretch>,
 }
 
@@ -108,7 +108,7 @@ impl<B: Bus> Stretches<B> {
         }
     }
 
-    /// Whether a function begins at a place.
+    /// Returns `true` if a function begins at a place.
     pub fn is_translated(&self, place: usize) -> bool {
         self.begins.get(place).is_some_and(|stretch| stretch.runs >= TRANSLATED)
     }
@@ -204,7 +204,7 @@ impl<B: Bus> Stretches<B> {
     }
 }
 
-/// Why no stretch follows.
+/// Reason for which no stretch follows.
 enum Stopped {
     /// Something is due, or the core is in an IT block.
     Due,
@@ -214,7 +214,7 @@ enum Stopped {
     Often(usize),
 }
 
-/// Where the core is in a stretch.
+/// Position of the core in a stretch.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Within {
     /// The step behind the last; 0 where the core is in no stretch, or has left it.
@@ -384,7 +384,7 @@ impl<B: Bus> Cpu<B> {
         }
     }
 
-    /// What a branch out of a stretch leaves to be settled.
+    /// Counts that a branch out of a stretch leaves to be settled.
     #[inline(always)]
     fn count(&mut self) -> Option<Mark> {
         if self.within.end == 0 {

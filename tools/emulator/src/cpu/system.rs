@@ -88,7 +88,7 @@ impl System {
         self.sleep & EVENT_ON_PENDING != 0
     }
 
-    /// Whether a fault has a handler of its own.
+    /// Returns `true` if a fault has a handler of its own.
     pub fn handles(&self, fault: u16) -> bool {
         let bit = match fault {
             MEMORY_FAULT => 16,
@@ -130,7 +130,7 @@ impl System {
             kept | hard_fault_ready | u32::from(!handler) << 3 | u32::from(unprivileged) << 1 | DEFERRED;
     }
 
-    /// Where deferred registers belong, once.
+    /// Place to which deferred registers belong, once.
     pub fn take_deferred(&mut self) -> Option<u32> {
         let place = self.is_deferred().then_some(self.floating_place);
         self.floating_context &= !DEFERRED;
@@ -347,7 +347,7 @@ impl<B: Bus> Cpu<B> {
     }
 }
 
-/// What a register of the core is called.
+/// Name of a register of the core.
 fn name(address: u32) -> String {
     let name = match address {
         0xe000_0000..0xe000_1000 => "ITM",

@@ -71,7 +71,7 @@ impl SystemTimer {
         }
     }
 
-    /// Whether it has reached zero since it was last asked, with its exception enabled.
+    /// Returns `true` if it has reached zero since it was last asked, with its exception enabled.
     pub fn expire(&mut self, now: u64) -> bool {
         if self.interrupts {
             self.catch_up(now);

@@ -1,4 +1,4 @@
-//! How long things take, in cycles of the core: the published timings, and what this model assumes beyond them.
+//! Durations, in cycles of the core: the published timings, and what this model assumes beyond them.
 //!
 //! Sources: Cortex-M4 Technical Reference Manual (Arm 100166), 3.3.1 (instructions), 3.3.2 (loads and stores), 7.2.3
 //! (floating point) and 5 (exceptions). Assumed:

@@ -1,4 +1,4 @@
-//! What test equipment wants to know of a run: when functions are entered and left, what they took, how deep the stack
+//! Observation of a run by test equipment: when functions are entered and left, what they took, how deep the stack
 //! went.
 //!
 //! A run without a watch takes another loop and pays nothing for it.

@@ -21,7 +21,7 @@ const FRAMING: u16 = 1 << 0;
 const INVALID: u16 = 1 << 1;
 const PARITY: u16 = 1 << 2;
 
-/// What the sensor sees.
+/// Field that the sensor sees.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Field {
     /// Angle, 2^14 a turn.
@@ -48,7 +48,7 @@ impl Field {
 pub struct As5047p {
     selected: bool,
     frames: u32,
-    /// What the next frame brings, without parity and error flag.
+    /// Content of the next frame, without parity and error flag.
     answer: u16,
     errors: u16,
 }

@@ -100,7 +100,7 @@ impl Drv8353 {
         }
     }
 
-    /// Whether it has woken up.
+    /// Returns `true` if it has woken up.
     pub fn is_awake(&self, at: Instant) -> bool {
         self.awake.is_some_and(|since| at >= since.after_ns(WAKE_NS))
     }
@@ -115,7 +115,7 @@ impl Drv8353 {
         self.registers.get(number).copied()
     }
 
-    /// How often faults were cleared by a frame.
+    /// Number of times that faults were cleared by a frame.
     pub const fn clears(&self) -> u32 {
         self.clears
     }
@@ -130,7 +130,7 @@ impl Drv8353 {
         self.silent = silent;
     }
 
-    /// Whether its outputs follow its inputs: awake, no fault, not told to coast.
+    /// Returns `true` if its outputs follow its inputs: awake, no fault, not told to coast.
     pub fn drives(&self, at: Instant) -> bool {
         self.is_awake(at) && !self.has_fault() && self.registers[2] & COAST == 0
     }
@@ -155,7 +155,7 @@ impl Drv8353 {
         self.fail(status);
     }
 
-    /// Whether nFAULT is pulled low.
+    /// Returns `true` if nFAULT is pulled low.
     pub const fn has_fault(&self) -> bool {
         self.registers[0] & FAULT != 0
     }

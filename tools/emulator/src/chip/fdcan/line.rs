@@ -94,7 +94,7 @@ impl Bits {
     }
 }
 
-/// How the controller takes part.
+/// Participation of the controller in the bus.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Part {
     /// Not at all: it is initialised, or bus-off.
@@ -109,7 +109,7 @@ pub enum Part {
     Sending {
         /// Duration of a bit, ps.
         bit: u64,
-        /// What it wants to send.
+        /// Frame that it wants to send.
         frame: CanFrame,
     },
 }
@@ -123,7 +123,7 @@ impl Part {
     }
 }
 
-/// What ended on the bus.
+/// Event that ended on the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
     /// A frame of somebody else's.
@@ -141,11 +141,11 @@ pub enum Event {
 
 /// The bus as one controller meets it.
 pub trait CanLine {
-    /// How the controller takes part from now on. A frame under way is not affected.
+    /// Sets how the controller takes part from now on. A frame under way is not affected.
     fn take_part(&mut self, at: Instant, part: Part);
-    /// When something next ends.
+    /// Instant at which something next ends.
     fn next(&self) -> Instant;
-    /// What ended up to now; none where nothing did.
+    /// Event that ended up to now; none where nothing did.
     fn take(&mut self, at: Instant) -> Option<Event>;
 }
 
@@ -168,7 +168,7 @@ pub struct Line {
     idle: Instant,
     acknowledged: bool,
     disturbed: Option<Instant>,
-    /// What the controller has sent, with the end of each frame.
+    /// Frames that the controller has sent, with the end of each.
     sent: VecDeque<(Instant, CanFrame)>,
 }
 
@@ -187,7 +187,7 @@ impl Line {
         }
     }
 
-    /// Whether anybody acknowledges the controller.
+    /// Sets whether anybody acknowledges the controller.
     pub fn set_acknowledged(&mut self, acknowledged: bool) {
         self.acknowledged = acknowledged;
     }
@@ -332,7 +332,7 @@ mod tests {
         ];
         assert!(order.windows(2).all(|pair| pair[0].priority() < pair[1].priority()));
     }
-    /// What ended up to when nothing happens any more.
+    /// Events that ended up to when nothing happens any more.
     fn events(line: &mut Line) -> Vec<Event> {
         std::iter::from_fn(|| line.take(line.next())).collect()
     }

@@ -17,7 +17,7 @@ const ELEMENT: usize = 18;
 const EXTENDED: u32 = 1 << 30;
 const REMOTE: u32 = 1 << 29;
 
-/// Where an accepted frame goes, and which filter took it; none where no filter matched.
+/// Destination of an accepted frame, and the filter that took it; none where no filter matched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Accepted {
     /// FIFO 0 or 1.
@@ -50,7 +50,7 @@ impl MessageRam {
         }
     }
 
-    /// What the filters and the global configuration RXGFC make of a frame; none where it is rejected (44.3.5
+    /// Decision of the filters and of the global configuration RXGFC on a frame; none where it is rejected (44.3.5
     /// "Acceptance filter"). `extended_mask` is XIDAM.
     pub fn accept(&self, frame: &CanFrame, global: u32, extended_mask: u32) -> Option<Accepted> {
         let (reject_remote, unmatched, filters) = match frame.extended {
@@ -77,7 +77,7 @@ impl MessageRam {
         (unmatched < 2).then_some(Accepted { fifo: unmatched as usize, filter: None })
     }
 
-    /// What a standard filter does with an identifier; none where it does not match (44.3.9).
+    /// Decision of a standard filter on an identifier; none where it does not match (44.3.9).
     fn standard(&self, filter: u32, id: u32) -> Option<u32> {
         let element = self.get(STANDARD_FILTERS + filter as usize);
         let (first, second) = (element >> 16 & 0x7ff, element & 0x7ff);
@@ -103,7 +103,7 @@ impl MessageRam {
         matches.then_some(low >> 29)
     }
 
-    /// Whether a filter in use marks priorities (SFEC, EFEC 4 to 7), which are not modelled.
+    /// Returns `true` if a filter in use marks priorities (SFEC, EFEC 4 to 7), which are not modelled.
     pub fn has_priorities(&self, global: u32) -> bool {
         let standard = (0..global >> 16 & 0x1f).map(|filter| {
             let element = self.get(STANDARD_FILTERS + filter as usize);

@@ -51,15 +51,15 @@ pub struct Fdcan {
     receive_errors: u32,
     last_error: u32,
     bus_off: bool,
-    /// When it takes part: after eleven recessive bits, and from bus-off after 129 times as many.
+    /// Instant at which it takes part: after eleven recessive bits, and from bus-off after 129 times as many.
     joins: Instant,
     counting_since: Instant,
-    /// What the line was told.
+    /// Part that the line was told.
     part: Part,
 }
 
 impl Fdcan {
-    /// As after power-up.
+    /// State after power-up.
     pub fn new() -> Self {
         Self {
             block: Block::new("FDCAN1", "44.4", REGISTERS),
@@ -83,7 +83,7 @@ impl Fdcan {
         *self = Self { ram, ..Self::new() };
     }
 
-    /// When it begins to take part.
+    /// Instant at which it begins to take part.
     pub fn next(&self) -> Instant {
         if self.part == Part::None && !self.is_initialised() { self.joins } else { Instant::NEVER }
     }
@@ -99,7 +99,7 @@ impl Fdcan {
         self.block.get(CCCR) & INIT != 0
     }
 
-    /// How it takes part from now on; none where that is what the line was told before.
+    /// Participation from now on; none where that is what the line was told before.
     pub fn part(&mut self, at: Instant, clock: u64) -> Option<Part> {
         if self.bus_off && at >= self.joins {
             // Recovered (44.3.2 "Bus-off recovery sequence").
@@ -134,7 +134,7 @@ impl Fdcan {
         self.block.set(IR, self.block.get(IR) | flags);
     }
 
-    /// What ended on the line.
+    /// Takes an event that ended on the line.
     pub fn happened(&mut self, event: Event, at: Instant, clock: u64) {
         if self.part == Part::None {
             return;

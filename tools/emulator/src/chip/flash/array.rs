@@ -14,7 +14,7 @@ pub const DOUBLE_WORD: u32 = 8;
 /// Bytes of a page, in one bank and in two (3.3.1 and 5.3.1).
 pub const PAGE: u32 = 2048;
 
-/// What reading a double word gives whose programming or erasing the power did not last for.
+/// Reading of a double word whose programming or erasing the power did not last for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Torn {
     /// Junk, and the error correction finds two wrong bits.
@@ -45,7 +45,7 @@ pub struct Part {
 }
 
 impl Part {
-    /// Where they lie.
+    /// Range in which they lie.
     pub fn offsets(&self) -> Range<u32> {
         self.first * DOUBLE_WORD..(self.first + self.cells.len() as u32) * DOUBLE_WORD
     }
@@ -95,7 +95,7 @@ impl Array {
         &self.torn
     }
 
-    /// What a programmer writes beforehand, over whatever is there. False where it does not fit.
+    /// Writes what a programmer writes beforehand, over whatever is there. False where it does not fit.
     pub fn flash(&mut self, offset: u32, bytes: &[u8]) -> bool {
         let end = offset as usize + bytes.len();
         if end > self.bytes.len() {
@@ -156,8 +156,8 @@ impl Array {
         Some((memory::load(&self.bytes, offset as usize, width)?, wrong))
     }
 
-    /// Whether a double word may be programmed: erased, or overwritten by zeros (3.3.7 "Main memory programming
-    /// sequences").
+    /// Returns `true` if a double word may be programmed: erased, or overwritten by zeros (3.3.7 "Main memory
+    /// programming sequences").
     pub fn accepts(&self, word: u32, value: u64) -> bool {
         value == 0 || !self.written[word as usize]
     }

@@ -15,7 +15,7 @@ const ERASED: u8 = 0;
 const WRITTEN: u8 = 1;
 const TORN: u8 = 2;
 
-/// Why bytes are no kept pages.
+/// Reason for which bytes are no kept pages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum KeptError {
     /// They are something else.
@@ -49,7 +49,7 @@ impl fmt::Display for KeptError {
 impl std::error::Error for KeptError {}
 
 impl Flash {
-    /// Whether an operation is under way, and how many have begun: kept pages change with it.
+    /// Number of operations that have begun, and whether one is under way: kept pages change with it.
     pub const fn progress(&self) -> (u64, bool) {
         (self.operations, self.busy.is_some())
     }

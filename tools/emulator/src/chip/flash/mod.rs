@@ -80,7 +80,7 @@ const REGISTERS: &[Register] = &[
     register(OPTR, "OPTR", 0, 0, 0),
 ];
 
-/// How far the keys have come.
+/// Progress of the keys.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Keys {
     None,
@@ -89,13 +89,13 @@ enum Keys {
     Wrong,
 }
 
-/// What is under way.
+/// Operation that is under way.
 #[derive(Clone, Debug)]
 struct Busy {
     until: Instant,
     /// Offsets that cannot be read meanwhile.
     bank: Range<u32>,
-    /// What it changes, as it was; none where that is the options.
+    /// Part that it changes, as it was; none where that is the options.
     before: Option<Part>,
 }
 
@@ -126,7 +126,7 @@ pub struct Flash {
     busy: Option<Busy>,
     operations: u64,
     cut: Option<Cut>,
-    /// When the power goes, and what it leaves.
+    /// Instant at which the power goes, and what it leaves.
     fails: Option<(Instant, Torn)>,
     rewritten: Option<Range<u32>>,
 }
@@ -224,7 +224,8 @@ impl Flash {
         self.busy.as_ref().map(|busy| (busy.bank.clone(), busy.until))
     }
 
-    /// Whether the options are to be loaded (OBL_LAUNCH, 3.4.3), once: they are, and the caller resets the chip.
+    /// Returns `true` if the options are to be loaded (OBL_LAUNCH, 3.4.3), once: they are, and the caller resets the
+    /// chip.
     pub fn take_launch(&mut self) -> bool {
         if !std::mem::take(&mut self.launched) {
             return false;
@@ -233,13 +234,13 @@ impl Flash {
         true
     }
 
-    /// When something happens by itself.
+    /// Instant at which something happens by itself.
     pub fn next(&self) -> Instant {
         let end = self.busy.as_ref().map_or(Instant::NEVER, |busy| busy.until);
         self.fails.map_or(end, |(fails, _)| fails.min(end))
     }
 
-    /// Whether the power goes now.
+    /// Returns `true` if the power goes now.
     pub fn fails(&self, at: Instant) -> bool {
         self.fails.is_some_and(|(fails, _)| fails <= at)
     }

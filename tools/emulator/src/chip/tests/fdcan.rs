@@ -16,8 +16,8 @@ fn frame(id: u32, data: &[u8]) -> CanFrame {
     CanFrame::standard(id, data).unwrap()
 }
 
-/// As the firmware has it: 1 Mbit/s from 170 MHz, frames that match no filter into FIFO 0, a transmit FIFO, interrupts
-/// on line 0.
+/// Controller as the firmware has it: 1 Mbit/s from 170 MHz, frames that match no filter into FIFO 0, a transmit FIFO,
+/// interrupts on line 0.
 fn bench() -> Bench {
     let mut bench = stopped();
     configure(&mut bench);

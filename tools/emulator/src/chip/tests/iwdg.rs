@@ -4,7 +4,7 @@ use super::*;
 
 const IWDG: u32 = 0x4000_3000;
 
-/// As embassy sets it up for 100 ms: prescaler 4, reload 799.
+/// Watchdog as embassy sets it up for 100 ms: prescaler 4, reload 799.
 fn bench() -> Bench {
     let mut bench = Bench::fast();
     bench.set(IWDG, 0x5555);

@@ -154,7 +154,7 @@ impl Bench {
         result
     }
 
-    /// What the chip tells the core; one-time signals are kept until a test takes them.
+    /// Takes the signals of the chip to the core; one-time signals are kept until a test takes them.
     fn look(&mut self) {
         let Signals { reset, rewritten, .. } = self.signals.clone();
         let mut now = self.chip.signals();

@@ -18,7 +18,7 @@ fn step() -> impl Strategy<Value = Step> {
     prop_oneof![4 => (0u32..512).prop_map(Step::Program), 1 => (0u32..2).prop_map(Step::Erase)]
 }
 
-/// What a double word may hold.
+/// Content that a double word may hold.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Word {
     Erased,

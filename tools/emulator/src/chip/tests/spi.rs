@@ -4,7 +4,7 @@ use super::*;
 
 const SPI2: u32 = 0x4000_3800;
 
-/// As embassy sets it up: master, mode 1, a 32nd of the clock.
+/// Controller as embassy sets it up: master, mode 1, a 32nd of the clock.
 fn bench(bits: u32) -> Bench {
     let mut bench = Bench::fast();
     bench.set(RCC + 0x58, 1 << 28 | 1 << 14);

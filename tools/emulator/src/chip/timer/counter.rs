@@ -9,7 +9,7 @@
 pub struct Counter {
     /// The count at `since`.
     pub count: u32,
-    /// Whether it counts up.
+    /// `true` if it counts up.
     pub up: bool,
     /// The cycle at which `count` was reached.
     pub since: u64,

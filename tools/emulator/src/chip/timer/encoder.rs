@@ -10,12 +10,12 @@ use super::super::wiring::Quadrature;
 pub struct Encoder {
     /// The timer's count.
     count: u32,
-    /// What the encoder had counted then; none before it was asked.
+    /// Count of the encoder then; none before it was asked.
     seen: Option<i64>,
     up: bool,
 }
 
-/// What the edges did.
+/// Effect of the edges.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Followed {
     /// The count.

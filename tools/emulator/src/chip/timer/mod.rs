@@ -27,7 +27,8 @@ use output::Outputs;
 mod registers;
 use registers::*;
 
-/// What a timer tells other peripherals: rising edges of its trigger outputs (28.3.28 "ADC synchronization", 29.3.19).
+/// Events of a timer for other peripherals: rising edges of its trigger outputs (28.3.28 "ADC synchronization",
+/// 29.3.19).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Events {
     /// On TRGO.
@@ -64,7 +65,7 @@ pub struct Timer {
 }
 
 impl Timer {
-    /// As after reset.
+    /// State after reset.
     pub fn new(description: &'static TimerDescription) -> Self {
         let (table, chapter) = registers::of(description.kind);
         let block = Block::new(description.text, chapter, table);
@@ -86,13 +87,13 @@ impl Timer {
         self.description
     }
 
-    /// Whether its encoder mode is on: then [`follow`](Self::follow) it before every access.
+    /// Returns `true` if its encoder mode is on: then [`follow`](Self::follow) it before every access.
     #[inline]
     pub const fn follows_encoder(&self) -> bool {
         self.encoder.is_some()
     }
 
-    /// What the encoder has done.
+    /// Takes what the encoder has done.
     pub fn follow(&mut self, quadrature: Quadrature) {
         let Some(encoder) = &mut self.encoder else { return };
         let followed = encoder.follow(quadrature, self.counter.top);
@@ -107,7 +108,7 @@ impl Timer {
         self.block.set(SR, self.block.get(SR) | flags);
     }
 
-    /// When something next happens that somebody else sees.
+    /// Cycle at which something next happens that somebody else sees.
     pub fn next(&self) -> u64 {
         if self.encoder.is_some() {
             return u64::MAX;
@@ -129,7 +130,7 @@ impl Timer {
         self.events.outputs |= self.has_outputs();
     }
 
-    /// What happened since the last call, for others.
+    /// Events since the last call, for others.
     pub fn take_events(&mut self) -> Events {
         std::mem::take(&mut self.events)
     }
@@ -255,13 +256,13 @@ impl Timer {
         self.events.outputs |= before & MOE != 0;
     }
 
-    /// Whether a register shows what the counter has done since it last turned.
+    /// Returns `true` if a register shows what the counter has done since it last turned.
     #[inline]
     pub const fn shows_count(&self, offset: u32) -> bool {
         matches!(offset, CNT | SR) || self.encoder.is_some()
     }
 
-    /// Whether a load changes what others see: that of a captured index clears its flag.
+    /// Returns `true` if a load changes what others see: that of a captured index clears its flag.
     #[inline]
     pub fn changes_when_read(&self, offset: u32) -> bool {
         offset == CCR3 && registers::captures_index(&self.block)
@@ -329,7 +330,7 @@ impl Timer {
         Ok(())
     }
 
-    /// What a register that was written does at once.
+    /// Carries out what a register that was written does at once.
     fn written(&mut self, offset: u32, cycle: u64) -> Result<(), Refusal> {
         let value = self.block.get(offset);
         match offset {

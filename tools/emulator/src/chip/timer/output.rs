@@ -9,19 +9,19 @@ use super::{Refusal, Timer, TimerKind};
 /// Registers that choose what the outputs do, the compare values apart; of the first only the clock of the dead time.
 const CHOOSE_OUTPUTS: [u32; 6] = [CR1, CR2, CCMR1, CCMR2, CCER, BDTR];
 
-/// What the outputs were found to do: it is the same in most periods.
+/// Outputs as they were found: they are the same in most periods.
 #[derive(Clone, Debug, Default)]
 pub struct Outputs {
-    /// Whether a pin carries each channel's output, and its complementary one.
+    /// `true` for each channel's output, and its complementary one, that a pin carries.
     pub carried: [[bool; 2]; 3],
-    /// What the registers held when the rest was found; none where it was not yet.
+    /// Contents of the registers when the rest was found; none where it was not yet.
     chosen: Option<[u32; CHOOSE_OUTPUTS.len()]>,
     legs: [Leg; 3],
     dead_time: u64,
 }
 
 impl Timer {
-    /// Whether a channel from 1 to 3 is enabled as an output.
+    /// Returns `true` if a channel from 1 to 3 is enabled as an output.
     pub(super) fn has_outputs(&self) -> bool {
         self.description.kind != TimerKind::TwoChannels && self.encoder.is_none() && self.block.get(CCER) & 0x555 != 0
     }
@@ -43,7 +43,7 @@ impl Timer {
         }
     }
 
-    /// Which of its outputs a pin carries; the others are released.
+    /// Connects those of its outputs that a pin carries; the others are released.
     pub fn connect<'a>(&mut self, carried: impl Iterator<Item = &'a TimerOutput>) {
         self.outputs = Outputs::default();
         for output in carried {
@@ -53,7 +53,7 @@ impl Timer {
         }
     }
 
-    /// What the outputs do from now on.
+    /// Action of the outputs from now on.
     pub fn pwm(&mut self) -> Pwm {
         let mut chosen = CHOOSE_OUTPUTS.map(|register| self.block.get_or_zero(register));
         chosen[0] &= CKD;

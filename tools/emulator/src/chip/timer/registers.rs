@@ -149,7 +149,7 @@ pub fn of(kind: TimerKind) -> (&'static [Register], &'static str) {
     }
 }
 
-/// Whether channel 3 captures the rising edge of its own input: the index of an encoder.
+/// Returns `true` if channel 3 captures the rising edge of its own input: the index of an encoder.
 pub fn captures_index(block: &Block) -> bool {
     block.get_or_zero(CCMR2) & 3 == 1 && block.get(CCER) >> 8 & 0xb == 1
 }

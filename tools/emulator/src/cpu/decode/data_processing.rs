@@ -10,9 +10,9 @@ use crate::cpu::execute::data_processing::{
 use crate::cpu::execute::simd::{saturate_halves, ssat, usat};
 use crate::cpu::operation::{Action, Operation, Part};
 
-/// What an operation of the table A5-10 or A5-22 is, with registers that mean something else: operation, flags, whether
-/// its outcome is open. `second` is the second operand's register, None for a constant; `plain` says that it is not
-/// shifted, or by at most 3 to the left.
+/// Meaning of an operation of the table A5-10 or A5-22, with registers that mean something else: operation, flags,
+/// whether its outcome is open. `second` is the second operand's register, None for a constant; `plain` says that it is
+/// not shifted, or by at most 3 to the left.
 fn choose(first: u32, d: u32, second: Option<u32>, plain: bool, unshifted: bool) -> Result<(u8, u8, bool), Refused> {
     let n = bits(first, 3, 0);
     let sets = bits(first, 4, 4) == 1;

@@ -115,7 +115,7 @@ pub(super) fn pair<B: Bus>(address: u32, first: u32, second: u32) -> Decoded<B> 
     }
 }
 
-/// What a wide access moves: size and sign as encoded.
+/// Size and sign of what a wide access moves, as encoded.
 fn what(first: u32) -> Result<u8, Refused> {
     let (signed, size, load) = (bits(first, 8, 8), bits(first, 6, 5), bits(first, 4, 4));
     Ok(match (load, signed, size) {

@@ -13,7 +13,7 @@ use super::operation::Operation;
 use crate::bus::Bus;
 use std::fmt;
 
-/// Why an encoding is not executed.
+/// Reason for which an encoding is not executed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refused {
     /// There is no such instruction on a Cortex-M4F, or it is not implemented here.
@@ -33,7 +33,7 @@ impl fmt::Display for Refused {
 
 pub(super) type Decoded<B> = Result<Operation<B>, Refused>;
 
-/// Whether an instruction that begins so has a second half-word.
+/// Returns `true` if an instruction that begins so has a second half-word.
 pub(super) fn wide(first: u16) -> bool {
     first >> 11 >= 0b11101
 }

@@ -25,15 +25,15 @@ pub(in crate::cpu) const MOV: u8 = 5;
 pub(in crate::cpu) const MVN: u8 = 6;
 pub(in crate::cpu) const MUL: u8 = 7;
 
-/// Whether flags are set.
+/// Condition on which flags are set.
 pub(in crate::cpu) const NEVER: u8 = 0;
 pub(in crate::cpu) const ALWAYS: u8 = 1;
 pub(in crate::cpu) const OUTSIDE_IT: u8 = 2;
 /// Flags alone, no result.
 pub(in crate::cpu) const TEST: u8 = 3;
 
-/// Where the second operand comes from: `immediate` with `x` for the carry; register m; register m shifted by
-/// `immediate`, with kind `x`.
+/// Source of the second operand: `immediate` with `x` for the carry; register m; register m shifted by `immediate`,
+/// with kind `x`.
 pub(in crate::cpu) const CONSTANT: u8 = 0;
 pub(in crate::cpu) const REGISTER: u8 = 1;
 pub(in crate::cpu) const SHIFTED: u8 = 2;
@@ -166,7 +166,7 @@ pub(in crate::cpu) fn sbfx<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>)
     cpu.next(rest)
 }
 
-/// What is extended: the numbers of the wide encodings.
+/// Part that is extended: the numbers of the wide encodings.
 pub(in crate::cpu) const HALF_SIGNED: u8 = 0;
 pub(in crate::cpu) const HALF_UNSIGNED: u8 = 1;
 pub(in crate::cpu) const BYTES_SIGNED: u8 = 2;

@@ -4,7 +4,7 @@ use crate::bus::Bus;
 use crate::cpu::Cpu;
 use crate::cpu::operation::{Done, Execute, Operands, Part, Rest, Trap};
 
-/// What is moved: the numbers of the narrow encodings with a register offset.
+/// Transfer of an access: the numbers of the narrow encodings with a register offset.
 pub(in crate::cpu) const STR: u8 = 0;
 pub(in crate::cpu) const STRH: u8 = 1;
 pub(in crate::cpu) const STRB: u8 = 2;
@@ -18,8 +18,8 @@ pub(in crate::cpu) const fn loads(what: u8) -> bool {
     what >= LDRSB
 }
 
-/// How the address is formed: register n and constant; n and register m shifted left; a constant alone; n changed
-/// before or after.
+/// Formation of the address: register n and constant; n and register m shifted left; a constant alone; n changed before
+/// or after.
 pub(in crate::cpu) const OFFSET: u8 = 0;
 pub(in crate::cpu) const INDEXED: u8 = 1;
 pub(in crate::cpu) const ABSOLUTE: u8 = 2;
@@ -142,7 +142,7 @@ pub(in crate::cpu) fn load_branch_of<B: Bus>(address: u8) -> Execute<B> {
     }
 }
 
-/// What an access can be in a pair.
+/// Part that an access can be in a pair.
 pub(in crate::cpu) const fn access_part(what: u8, address: u8) -> Part {
     match (what, address) {
         (LDR, OFFSET) => Part::Load,

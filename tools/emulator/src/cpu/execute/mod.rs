@@ -1,5 +1,5 @@
-//! What instructions do, by group. Operands were checked by `decode`; the names are the architecture's (ARM DDI 0403,
-//! A7.7).
+//! Execution of instructions, by group. Operands were checked by `decode`; the names are the architecture's (ARM DDI
+//! 0403, A7.7).
 
 /// The function of a condition that only decoding knows; 14 and more always hold. What else it is generic over comes
 /// before.
@@ -38,7 +38,7 @@ pub(super) mod system;
 use super::Cpu;
 use crate::bus::Bus;
 
-/// What general registers keep of what is written.
+/// Bits that general registers keep of what is written.
 const KEPT: [u32; 16] = {
     let mut kept = [u32::MAX; 16];
     kept[13] = !3;

@@ -4,7 +4,7 @@ use crate::bus::Bus;
 use crate::cpu::Cpu;
 use crate::cpu::operation::{Done, Operands, Rest, Trap};
 
-/// What is added: register x, or 0 where that is 15.
+/// Addend: register x, or 0 where that is 15.
 fn addend<B: Bus>(cpu: &Cpu<B>, o: Operands) -> u32 {
     if o.x == 15 { 0 } else { cpu.get(o.x) }
 }

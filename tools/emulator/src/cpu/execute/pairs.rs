@@ -19,8 +19,8 @@ use crate::bus::Bus;
 use crate::cpu::Cpu;
 use crate::cpu::operation::{Done, Execute, Operands, Part, Rest};
 
-/// What executes two instructions one behind the other; none where they are no pair. `second` are the operands of the
-/// second.
+/// Function that executes two instructions one behind the other; none where they are no pair. `second` are the operands
+/// of the second.
 pub(in crate::cpu) fn pair_of<B: Bus>(parts: (Part, Part), second: Operands) -> Option<Execute<B>> {
     Some(match parts {
         (Part::CompareConstant, Part::Branch) => by_condition!(compare_constant_and_branch, second.x),
@@ -44,7 +44,7 @@ pub(in crate::cpu) fn pair_of<B: Bus>(parts: (Part, Part), second: Operands) -> 
     })
 }
 
-/// What executes a move of an IT block if a condition holds, beginning with the step before it; none where the
+/// Function that executes a move of an IT block if a condition holds, beginning with the step before it; none where the
 /// instruction is no move.
 pub(in crate::cpu) fn conditional_of<B: Bus>(condition: u8, part: Part) -> Option<Execute<B>> {
     Some(match part {
@@ -55,8 +55,8 @@ pub(in crate::cpu) fn conditional_of<B: Bus>(condition: u8, part: Part) -> Optio
     })
 }
 
-/// What sets the flags before such a move and executes it as well; none where `parts` are none of both. Of VCMP, VMRS
-/// lies between.
+/// Function that sets the flags before such a move and executes it as well; none where `parts` are none of both. Of
+/// VCMP, VMRS lies between.
 pub(in crate::cpu) fn compared_of<B: Bus>(parts: (Part, Part), condition: u8) -> Option<Execute<B>> {
     macro_rules! what {
         ($flags:ident) => {
@@ -209,12 +209,12 @@ twice! {
     move_floats, vmov_at_once, |cpu, o, rest| ready_first(cpu, o, rest, vmov)
 }
 
-/// What is moved if a condition holds: a constant, a register, a floating-point register.
+/// Operand that is moved if a condition holds: a constant, a register, a floating-point register.
 const MOVE_CONSTANT: u8 = 0;
 const MOVE_REGISTER: u8 = 1;
 const MOVE_FLOAT: u8 = 2;
 
-/// What sets the flags before: CMP with a constant, CMP of registers, VMRS, VCMP and VMRS.
+/// Instruction that sets the flags before: CMP with a constant, CMP of registers, VMRS, VCMP and VMRS.
 const COMPARE_CONSTANT: u8 = 0;
 const COMPARE_REGISTER: u8 = 1;
 const TAKE_FLAGS: u8 = 2;
@@ -234,7 +234,7 @@ fn move_if<B: Bus, const WHAT: u8, const CONDITION: u8>(cpu: &mut Cpu<B>, _: Ope
     cpu.next(behind)
 }
 
-/// What sets the flags, and such a move behind it.
+/// Execution of what sets the flags, and of such a move behind it.
 fn compare_and_move_if<B: Bus, const FLAGS: u8, const WHAT: u8, const CONDITION: u8>(
     cpu: &mut Cpu<B>,
     o: Operands,

@@ -12,7 +12,7 @@ const ASX: u8 = 2;
 const SUB8: u8 = 4;
 const SUB16: u8 = 5;
 const SAX: u8 = 6;
-/// What becomes of each result: kept modulo its width with the greater-or-equal flags set, saturated, halved; 4 more
+/// Treatment of each result: kept modulo its width with the greater-or-equal flags set, saturated, halved; 4 more
 /// without sign.
 const MODULO: u8 = 0;
 const SATURATING: u8 = 1;

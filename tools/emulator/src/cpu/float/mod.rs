@@ -22,13 +22,13 @@ const OVERFLOW: u32 = 1 << 2;
 const UNDERFLOW: u32 = 1 << 3;
 const INEXACT: u32 = 1 << 4;
 const INPUT_DENORMAL: u32 = 1 << 7;
-/// What the register has.
+/// Bits that the register has.
 const IMPLEMENTED: u32 = 0xf000_0000 | MODES | 0x9f;
 
 /// The NaN that operations without a NaN among their operands give.
 const DEFAULT_NAN: u32 = 0x7fc0_0000;
 
-/// Where a result between two numbers goes.
+/// Direction of rounding of a result between two numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rounding {
     /// To the nearer, to the even one from the middle.
@@ -79,8 +79,8 @@ impl Status {
         self.0 |= flags;
     }
 
-    /// Whether the host's result is the unit's: nothing could be flagged that is not, and nothing be rounded otherwise.
-    /// A result of the smallest exponent may have been rounded up to it, which is an underflow.
+    /// Returns `true` if the host's result is the unit's: nothing could be flagged that is not, and nothing be rounded
+    /// otherwise. A result of the smallest exponent may have been rounded up to it, which is an underflow.
     #[inline(always)]
     fn trusts(self, result: u32) -> bool {
         self.is_usual() && (result & 0x7f80_0000).wrapping_sub(0x0100_0000) < 0x7e80_0000

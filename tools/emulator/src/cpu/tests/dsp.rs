@@ -3,7 +3,7 @@
 use super::{complete, halves, machine};
 use proptest::prelude::*;
 
-/// What one instruction makes of r0 (d), r1 (n), r2 (m), r3 (a or the upper result): r0, r3, and whether Q was set.
+/// Result of one instruction on r0 (d), r1 (n), r2 (m), r3 (a or the upper result): r0, r3, and whether Q was set.
 fn run(encoding: u32, r: [u32; 4]) -> (u32, u32, bool) {
     let mut cpu = machine(&halves(encoding));
     for (register, value) in r.into_iter().enumerate() {

@@ -1,4 +1,4 @@
-//! What the core does, by group of instructions, and with exceptions and faults. Values are from the architecture's
+//! Behaviour of the core, by group of instructions, and with exceptions and faults. Values are from the architecture's
 //! pseudo-code.
 
 mod data_processing;
@@ -15,14 +15,14 @@ mod watching;
 use super::{Cpu, End};
 use crate::memory::Memory;
 
-/// Where the code under test begins, and the stack; the vector table lies at the flash's beginning.
+/// Begin of the code under test, and of the stack; the vector table lies at the flash's beginning.
 pub(super) const VECTORS: u32 = 0x0800_0000;
 pub(super) const START: u32 = 0x0800_0400;
 pub(super) const STACK: u32 = 0x2000_8000;
 /// Memory for loads and stores.
 pub(super) const DATA: u32 = 0x2000_1000;
 
-/// Where the handler of an exception lies; all of them return at once, unless a test says otherwise.
+/// Address of the handler of an exception; all of them return at once, unless a test says otherwise.
 pub(super) fn handler(number: u16) -> u32 {
     0x0800_1000 + 0x40 * u32::from(number)
 }

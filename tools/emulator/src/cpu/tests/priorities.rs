@@ -1,4 +1,4 @@
-//! Which exception comes first, which waits, and what masks them.
+//! Order of exceptions: which comes first, which waits, and what masks them.
 
 use super::{AIRCR, complete, enable, finish, handler, machine, pend, place, read};
 use crate::cpu::{Cpu, End};

@@ -1,5 +1,5 @@
-//! What is translated against single steps, with random instructions of those that are: registers, flags, memory,
-//! cycles and counts.
+//! Translated code against single steps, with random instructions of those that are translated: registers, flags,
+//! memory, cycles and counts.
 
 use super::{DATA, START, machine, steps_to, with_floating_point};
 use crate::cpu::{Cpu, End};
@@ -121,7 +121,7 @@ fn prepare(cpu: &mut Cpu<Memory>, registers: &[u32; 7], floats: &[u32; 8], usual
     cpu.set_fpscr(if usual { 0x10 } else { 0 });
 }
 
-/// Whether an instruction is defined and leaves r7 and the stack pointer as they are: tried by itself.
+/// Returns `true` if an instruction is defined and leaves r7 and the stack pointer as they are: tried by itself.
 fn executes(halves: &[u16]) -> bool {
     // IT, and branches over one instruction.
     let first = halves.first().copied().unwrap_or(0);

@@ -1,4 +1,4 @@
-//! What test equipment sees: calls, stops, the stack's depth; and that watching changes nothing.
+//! Observations of test equipment: calls, stops, the stack's depth; and that watching changes nothing.
 
 use super::{STACK, START, complete, finish, machine};
 use crate::cpu::{Call, End, Watch};

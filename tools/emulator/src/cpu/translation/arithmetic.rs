@@ -13,7 +13,7 @@ use cranelift_codegen::ir::condcodes::IntCC;
 use cranelift_codegen::ir::{InstBuilder, Value, types};
 
 impl Emitter<'_, '_> {
-    /// What an instruction does that goes on with the one behind it; none where it cannot be translated.
+    /// Translation of an instruction that goes on with the one behind it; none where it cannot be translated.
     pub fn plain(&mut self, instruction: Instruction) -> Option<()> {
         let o = instruction.operands;
         match instruction.action {

@@ -37,29 +37,29 @@ pub(super) struct Emitter<'a, 'b> {
     pub memory: Value,
     /// Cycles up to which blocks may begin.
     pub room: Variable,
-    /// How fields of the core, and memory, are accessed.
+    /// Access to fields of the core, and to memory.
     pub core: MemFlagsData,
     pub data: MemFlagsData,
-    /// Of what calls an instruction.
+    /// Signature of what calls an instruction.
     pub signature: SigRef,
     pub registers: [Variable; 15],
     pub floats: [Variable; 32],
     pub flags: [Variable; 4],
     pub spent: Variable,
-    /// What is not part of `spent` yet.
+    /// Cycles that are not part of `spent` yet.
     pub pending: u64,
-    /// Where the instruction is that is translated.
+    /// Place of the instruction that is translated.
     pub place: Place,
     /// The condition of an instruction that is executed either way, but changes nothing if that does not hold.
     pub guard: Option<Value>,
-    /// Where the function is left: with where the core goes on, `spent`, how it is left, and flags.
+    /// Block in which the function is left: with where the core goes on, `spent`, how it is left, and flags.
     pub out: Block,
-    /// Where the instruction that is translated is called instead, if it is.
+    /// Block in which the instruction that is translated is called instead, if it is.
     pub aside: Option<Block>,
     /// Variables that it has set, and where they are written to.
     pub written: Vec<(Variable, Type, i32)>,
     pub compared: Option<Compared>,
-    /// What the last comparison of floats left, which is not taken over yet.
+    /// Values that the last comparison of floats left, which are not taken over yet.
     pub compared_floats: Option<(Value, Value)>,
     /// In this block the floating-point unit was found ready; in the usual mode.
     pub ready: bool,
@@ -258,7 +258,7 @@ impl Emitter<'_, '_> {
         Some(())
     }
 
-    /// What an instruction counts.
+    /// Cycles that an instruction counts.
     fn cost(&self, instruction: &Instruction, single: bool) -> u64 {
         let timing = instruction.timing;
         let overlaps = if single { timing.overlaps } else { 0 };
@@ -335,7 +335,7 @@ impl Emitter<'_, '_> {
         Some(false)
     }
 
-    /// What an instruction does; true where nothing follows it.
+    /// Translates what an instruction does; true where nothing follows it.
     pub fn translate(&mut self, instruction: Instruction, cost: u64, follows: Place) -> Option<bool> {
         let o = instruction.operands;
         match instruction.action {
@@ -404,7 +404,8 @@ impl Emitter<'_, '_> {
     }
 }
 
-/// Whether an instruction changes nothing but registers and flags, and never leaves the function for what they are.
+/// Returns `true` if an instruction changes nothing but registers and flags, and never leaves the function for what
+/// they are.
 fn is_pure(action: Action) -> bool {
     matches!(
         action,

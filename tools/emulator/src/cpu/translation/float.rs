@@ -11,7 +11,7 @@ use cranelift_codegen::ir::condcodes::{FloatCC, IntCC};
 use cranelift_codegen::ir::{InstBuilder, MemFlagsData, Value, types};
 
 impl Emitter<'_, '_> {
-    /// What an instruction of the unit does; none where it cannot be translated.
+    /// Translation of an instruction of the unit; none where it cannot be translated.
     pub fn floating_point(&mut self, instruction: Instruction) -> Option<()> {
         let o = instruction.operands;
         self.check_ready(instruction.action == Action::CompareFloats);
@@ -202,7 +202,7 @@ impl Emitter<'_, '_> {
         self.b.ins().band(bits, mask)
     }
 
-    /// As `Status::trusts`.
+    /// Counterpart of `Status::trusts`.
     fn is_normal(&mut self, value: Value) -> Value {
         let (exponent, least, range) = (self.exponent(value), self.constant(0x0100_0000), self.constant(0x7e80_0000));
         let above = self.b.ins().isub(exponent, least);
@@ -300,7 +300,7 @@ impl Emitter<'_, '_> {
         self.set_bits(o.d, result);
     }
 
-    /// Where VLDR and VSTR go.
+    /// Address that VLDR and VSTR access.
     fn checked_float(&mut self, o: Operands, stores: bool) -> Value {
         let offset = self.constant(o.immediate);
         let address = match o.n {

@@ -20,10 +20,10 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 const LINE: usize = 64;
 const PAGE: usize = 4096;
 
-/// So many functions are kept for other cores, 40 MB.
+/// Number of functions that are kept for other cores, 40 MB.
 const KEPT: usize = 4096;
 
-/// What compiles.
+/// Compiler of functions.
 pub(in crate::cpu) struct Compiler {
     pub isa: OwnedTargetIsa,
     compiled: Mutex<HashMap<(Fields, Region), Option<Function>>>,
@@ -48,7 +48,7 @@ impl Compiler {
         signature
     }
 
-    /// Of what calls an instruction: see `call_one`.
+    /// Signature of what calls an instruction: see `call_one`.
     pub fn signature_of_call(&self) -> Signature {
         let mut signature = Signature::new(CallConv::triple_default(self.isa.triple()));
         let kinds = [types::I64, types::I64, types::I32, types::I32, types::I32, types::I32];
@@ -57,7 +57,7 @@ impl Compiler {
         signature
     }
 
-    /// That of this host, once for all cores.
+    /// Compiler of this host, once for all cores.
     pub fn of_host() -> Option<&'static Self> {
         static COMPILER: OnceLock<Option<Compiler>> = OnceLock::new();
         COMPILER.get_or_init(Self::new).as_ref()
@@ -128,7 +128,7 @@ pub(super) extern "C" fn call_one<B: Bus>(
 /// A function that the host can call.
 #[derive(Clone)]
 pub(in crate::cpu) struct Function {
-    /// Where it begins, in what is kept for it.
+    /// Begin of the function, in what is kept for it.
     begin: *const u8,
     _code: Arc<Mmap>,
     /// Bytes of memory that it was compiled for.

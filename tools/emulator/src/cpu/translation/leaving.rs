@@ -1,4 +1,4 @@
-//! How a function is left, and how it calls for an instruction that it does not execute itself.
+//! Ways in which a function is left, and in which it calls for an instruction that it does not execute itself.
 
 use super::emit::Emitter;
 use super::region::Place;
@@ -17,7 +17,7 @@ impl Emitter<'_, '_> {
         self.b.ins().jump(self.out, &arguments);
     }
 
-    /// Where the function is left.
+    /// Block in which the function is left.
     pub fn end(&mut self) {
         let out = self.out;
         let kinds = [types::I32, types::I64, types::I32, types::I8, types::I8, types::I8, types::I8];

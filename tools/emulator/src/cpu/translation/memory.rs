@@ -9,7 +9,7 @@ use crate::cpu::operation::Operands;
 use cranelift_codegen::ir::condcodes::IntCC;
 use cranelift_codegen::ir::{InstBuilder, Type, Value, types};
 
-/// Where it begins.
+/// Address at which it begins.
 const SRAM: u32 = 0x2000_0000;
 
 impl Emitter<'_, '_> {
@@ -21,7 +21,7 @@ impl Emitter<'_, '_> {
         }
     }
 
-    /// What an instruction does that loads, stores or concerns floating point.
+    /// Translation of an instruction that loads, stores or concerns floating point.
     pub fn memory_or_float(&mut self, instruction: Instruction) -> Option<()> {
         let o = instruction.operands;
         match instruction.action {
@@ -119,14 +119,14 @@ impl Emitter<'_, '_> {
         }
     }
 
-    /// Where in memory a word is loaded from, if that is known.
+    /// Address in memory from which a word is loaded, if that is known.
     pub fn fixed(&mut self, instruction: &Instruction) -> Option<Value> {
         let Word::Memory(place) = instruction.word else { return None };
         let (memory, place) = (self.memory, self.b.ins().iconst(types::I64, place as i64));
         Some(self.b.ins().iadd(memory, place))
     }
 
-    /// Where in the host's memory values of `bytes` bytes lie, so many of them, which have to be a multiple of those.
+    /// Address in the host's memory of values of `bytes` bytes, so many of them, which have to be a multiple of those.
     /// The function is left if they do not, or lie elsewhere, or are code that is stored to.
     pub fn checked(&mut self, address: Value, bytes: u32, values: u32, stores: bool) -> Value {
         let start = self.constant(SRAM);

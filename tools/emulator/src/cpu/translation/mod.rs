@@ -33,7 +33,7 @@ use std::time::Instant;
 /// Numbers of functions begin here; no stretch begins so often.
 pub(super) const TRANSLATED: u32 = 1 << 31;
 
-/// So often a stretch begins before what begins with it is translated.
+/// Number of times that a stretch begins before what begins with it is translated.
 const OFTEN: u32 = 4096;
 
 /// Bytes of a line, by which it is seen that nothing translated has changed.
@@ -61,11 +61,11 @@ enum Word {
     Constant { address: u32, value: u32, waits: u8 },
 }
 
-/// What a region is translated from.
+/// Source that a region is translated from.
 trait Source {
     /// The instruction at an address; none where nothing is decoded.
     fn instruction(&self, address: u32) -> Option<Instruction>;
-    /// Whether a function begins at an address.
+    /// Returns `true` if a function begins at an address.
     fn is_translated(&self, address: u32) -> bool;
     /// Bytes of memory that answers at once.
     fn memory(&self) -> u32;
@@ -73,7 +73,7 @@ trait Source {
     fn changeable(&self) -> Range<u32>;
 }
 
-/// Why a translated function was left.
+/// Reason for which a translated function was left.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Left {
     /// For an address that is not part of it.
@@ -84,7 +84,7 @@ pub(super) enum Left {
     Call = 2,
 }
 
-/// Where the parts of a core lie in it, in bytes: one kind of core from the other.
+/// Offsets of the parts of a core in it, in bytes: one kind of core from the other.
 #[derive(Clone, PartialEq, Eq, Hash)]
 struct Fields {
     registers: i32,
@@ -100,7 +100,7 @@ struct Fields {
     now: i32,
     instructions: i32,
     attention: i32,
-    /// Where `call_one` lies.
+    /// Offset of `call_one`.
     call: usize,
 }
 
@@ -129,16 +129,16 @@ impl Fields {
     }
 }
 
-/// What is translated of a core's code. Clones share it.
+/// Translations of a core's code. Clones share it.
 #[derive(Clone)]
 pub(super) struct Translations {
     pub functions: Vec<Translation>,
     /// Lines of memory that they were made of.
     lines: HashSet<u32>,
-    /// What has changed since, each from where to where; everything where that is said.
+    /// Ranges that have changed since; everything where that is said.
     changed: Vec<Range<u32>>,
     changed_all: bool,
-    /// So often a stretch begins before what begins with it is translated.
+    /// Number of times that a stretch begins before what begins with it is translated.
     after: u32,
     /// Rest behind a translation, as a multiple of what it took; none where no clock has to be kept up with.
     rest: Option<u32>,
@@ -152,12 +152,12 @@ pub(super) struct Translation {
     /// None where there is nothing to translate.
     function: Option<Function>,
     covers: Arc<[Range<u32>]>,
-    /// What it was made of has not changed.
+    /// `true` while what it was made of has not changed.
     holds: bool,
 }
 
 impl Translation {
-    /// Whether what it was made of is still there.
+    /// Returns `true` if what it was made of is still there.
     #[inline(always)]
     pub fn holds(&self) -> bool {
         self.holds
@@ -192,7 +192,7 @@ impl Default for Translations {
 }
 
 impl Translations {
-    /// So often a stretch begins before what begins with it is translated.
+    /// Number of times that a stretch begins before what begins with it is translated.
     pub fn after(&self) -> u32 {
         self.after
     }
@@ -203,7 +203,7 @@ impl Translations {
         self.after > 0 && self.rests.is_some_and(|until| Instant::now() < until)
     }
 
-    /// Nothing holds any more. It is forgotten by `settle`: functions may be in use.
+    /// Marks all as not holding any more. It is forgotten by `settle`: functions may be in use.
     pub fn forget_all(&mut self) {
         self.changed_all = true;
     }
@@ -215,7 +215,7 @@ impl Translations {
         }
     }
 
-    /// Whether something does not hold any more.
+    /// Returns `true` if something does not hold any more.
     pub fn is_unsettled(&self) -> bool {
         self.changed_all || !self.changed.is_empty()
     }
@@ -236,7 +236,7 @@ impl Translations {
     }
 }
 
-/// What a core's code is translated from.
+/// Source that a core's code is translated from.
 struct Core<'a, B: Bus> {
     cpu: &'a Cpu<B>,
     memory: u32,
@@ -277,8 +277,8 @@ impl<B: Bus> Source for Core<'_, B> {
 }
 
 impl<B: Bus> Cpu<B> {
-    /// So often code is come across before it is translated, 4096 times if nothing else is said; none for never. What
-    /// is translated already stays so. No result depends on it.
+    /// Sets the number of times that code is come across before it is translated, 4096 if nothing else is said; none
+    /// for never. What is translated already stays so. No result depends on it.
     pub fn set_translation(&mut self, after: Option<u32>) {
         self.code.translations.after = after.unwrap_or(TRANSLATED);
     }

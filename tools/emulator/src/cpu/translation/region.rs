@@ -1,5 +1,5 @@
-//! Which instructions are translated together: those that are reached from an address by branches whose targets are
-//! known.
+//! Region of instructions that are translated together: those that are reached from an address by branches whose
+//! targets are known.
 
 use super::{Action, Instruction, Source, Word};
 use crate::cpu::operation::{Flow, behind};
@@ -12,11 +12,11 @@ pub(super) const LEAST: u32 = 1024;
 /// Instructions of a region, at most.
 const LARGEST: usize = 256;
 
-/// So many are translated again where another function begins.
+/// Number of instructions that are translated again where another function begins.
 const SMALL: usize = 48;
 
-/// What is known of the core before an instruction: where it is, whether the instruction before loaded or stored one
-/// register, IT state.
+/// State of the core that is known before an instruction: where it is, whether the instruction before loaded or stored
+/// one register, IT state.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub(super) struct Place {
     pub address: u32,
@@ -25,7 +25,7 @@ pub(super) struct Place {
 }
 
 impl Place {
-    /// Where a branch leads to.
+    /// Destination of a branch.
     pub fn at(address: u32) -> Self {
         Self { address, single: false, it: 0 }
     }
@@ -98,7 +98,7 @@ impl Region {
         region
     }
 
-    /// Whether an address is part of it.
+    /// Returns `true` if an address is part of it.
     pub fn holds(&self, address: u32) -> bool {
         self.instructions.contains_key(&address)
     }

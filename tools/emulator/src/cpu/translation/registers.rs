@@ -93,7 +93,7 @@ impl Emitter<'_, '_> {
         self.set_flag(ZERO, zero);
     }
 
-    /// Whether an instruction sets flags.
+    /// Returns `true` if an instruction sets flags.
     pub fn sets(&self, flags: u8) -> bool {
         flags == ALWAYS || flags == TEST || flags == OUTSIDE_IT && self.place.it == 0
     }
@@ -118,7 +118,7 @@ impl Emitter<'_, '_> {
         self.b.ins().store(core, value, cpu, offset);
     }
 
-    /// Whether a condition holds (ConditionPassed).
+    /// Value that is true if a condition holds (ConditionPassed).
     pub fn holds(&mut self, condition: u8) -> Value {
         let of_words = [
             IntCC::Equal,
