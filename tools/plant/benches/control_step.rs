@@ -1,5 +1,5 @@
-//! What a control step costs on the host, whole and by its parts, and how many times faster than real time the closed
-//! loop runs.
+//! Cost of a control step on the host, whole and by its parts, and how many times faster than real time the closed loop
+//! runs.
 
 use divan::{Bencher, black_box};
 use friction_compensation::compensation::{Acting, Request};

@@ -22,7 +22,7 @@ use rigid_body::{JointKind, Tree};
 /// Periods of the bridges between two looks at where the links are.
 pub const EVERY: u64 = 4;
 
-/// Why an arm cannot be made.
+/// Reason for which an arm cannot be made.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ArmError {
     /// Joints of the tree, and virtual joints.

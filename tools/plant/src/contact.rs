@@ -1,4 +1,4 @@
-//! What the link runs into: a wall on one side, or a grip that holds it where it is.
+//! Contact that the link runs into: a wall on one side, or a grip that holds it where it is.
 //!
 //! A spring and a damper between the link and the ground. The torque is taken at the velocity at the end of the step
 //! (backward Euler), so even a stop of steel leaves the joint stable.
@@ -6,7 +6,7 @@
 use crate::error::{ParameterError, within};
 use serde::{Deserialize, Serialize};
 
-/// Which motions a contact resists.
+/// Motions that a contact resists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Side {
@@ -22,13 +22,13 @@ pub enum Side {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Contact {
-    /// Where the spring is unstressed, -1000 to 1000 rad.
+    /// Position at which the spring is unstressed, -1000 to 1000 rad.
     pub position: f64,
     /// Stiffness, 0.1 to 1e9 Nm/rad.
     pub stiffness: f64,
     /// Damping, 0 to 1e7 Nm s/rad.
     pub damping: f64,
-    /// Which motions it resists.
+    /// Motions that it resists.
     pub side: Side,
 }
 
@@ -60,7 +60,7 @@ impl Contact {
         (self.stiffness * (position - self.position), self.stiffness * step + self.damping)
     }
 
-    /// Whether a contact of this side can give `torque` (Nm, positive against a forward motion).
+    /// Returns `true` if a contact of this side can give `torque` (Nm, positive against a forward motion).
     pub(crate) fn gives(&self, torque: f64) -> bool {
         match self.side {
             Side::Above => torque > 0.0,

@@ -1,8 +1,8 @@
-//! What this crate refuses, and the range that it would have accepted.
+//! Refusals of this crate, with the range that it would have accepted.
 
 use std::fmt;
 
-/// Why a parameter was refused.
+/// Reason for which a parameter was refused.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ParameterError {
     /// The value is not a number or lies outside the permitted range. Where a limit follows from another parameter

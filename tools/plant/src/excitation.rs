@@ -30,7 +30,7 @@ pub enum Segment {
     },
     /// A move at constant speed with constant acceleration at both ends.
     Move {
-        /// Where to, -100 to 100 rad.
+        /// Destination, -100 to 100 rad.
         to: f64,
         /// Speed, 1e-4 to 100 rad/s; not reached where the way is too short.
         speed: f64,
@@ -97,7 +97,7 @@ impl Trajectory {
         self.end
     }
 
-    /// Where the joint should be at `time` (s); at rest before the start and after the end.
+    /// Reference of the joint at `time` (s); at rest before the start and after the end.
     #[must_use]
     pub fn at(&self, time: f64) -> Reference {
         let time = time.clamp(0.0, self.end);
@@ -156,9 +156,9 @@ impl Trapezoid {
 /// One recording session: the joint starts hanging at rest, at some temperature.
 #[derive(Clone, Debug)]
 pub struct Run {
-    /// How much warmer than the ambient the joint is when the run starts, 0 to 60 K.
+    /// Temperature of the joint above the ambient when the run starts, 0 to 60 K.
     pub warmth: f64,
-    /// What it then does.
+    /// Trajectory that follows.
     pub trajectory: Trajectory,
 }
 
@@ -170,9 +170,10 @@ pub struct Excitation {
 }
 
 impl Excitation {
-    /// What a careful user would record on this joint: [`DEFAULT_RUNS`] runs of 20 to 30 s with a Fourier series,
-    /// three constant speeds back and forth, slow reversals and rests; the first run cold, the last one 25 K warm.
-    /// Speeds cover 2 to 90 % of the speed limit over all runs. `seed` draws the series and the order of the warmth.
+    /// Excitation that a careful user would record on this joint: [`DEFAULT_RUNS`] runs of 20 to 30 s with a Fourier
+    /// series, three constant speeds back and forth, slow reversals and rests; the first run cold, the last one 25 K
+    /// warm. Speeds cover 2 to 90 % of the speed limit over all runs. `seed` draws the series and the order of the
+    /// warmth.
     ///
     /// # Errors
     /// The first of the joint's parameters that is outside its range.

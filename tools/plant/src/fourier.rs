@@ -11,7 +11,7 @@
 use crate::noise::Noise;
 use std::f64::consts::TAU;
 
-/// Where the joint should be.
+/// Reference motion of the joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reference {
     /// Position, rad.

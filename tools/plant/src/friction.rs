@@ -129,7 +129,7 @@ impl FrictionParameters {
     }
 }
 
-/// What else the friction depends on.
+/// Other variables that the friction depends on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surroundings {
     /// Position of the link, rad.

@@ -40,8 +40,8 @@ pub struct State {
     pub heat: Heat,
 }
 
-/// What answers to a torque on the link in the next step, before its velocity is known: the torque that is there
-/// already, and inertia and slope of the friction that stand against a change.
+/// Answer to a torque on the link in the next step, before its velocity is known: the torque that is there already, and
+/// inertia and slope of the friction that stand against a change.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Answer {
     /// Motor torque less friction and gravity at the velocity before, Nm.
@@ -92,13 +92,13 @@ impl Joint {
         self
     }
 
-    /// What this joint is.
+    /// Parameters of this joint.
     #[must_use]
     pub fn parameters(&self) -> &JointParameters {
         &self.parameters
     }
 
-    /// Where it is now.
+    /// State of the joint now.
     #[must_use]
     pub fn state(&self) -> &State {
         &self.state
@@ -114,12 +114,12 @@ impl Joint {
         Ok(())
     }
 
-    /// As [`Self::set_contact`], for a contact that is known to be valid.
+    /// Counterpart of [`Self::set_contact`] for a contact that is known to be valid.
     pub(crate) fn hold(&mut self, contact: Option<Contact>) {
         self.contact = contact;
     }
 
-    /// What is in the link's way.
+    /// Contact in the link's way.
     #[must_use]
     pub fn contact(&self) -> Option<&Contact> {
         self.contact.as_ref()
@@ -157,8 +157,8 @@ impl Joint {
         }
     }
 
-    /// What answers to a torque on the link over the next `step` (s, at most [`MAXIMUM_STEP`]) under `motor_torque` (Nm
-    /// at the link); contacts aside.
+    /// Answer to a torque on the link over the next `step` (s, at most [`MAXIMUM_STEP`]) under `motor_torque` (Nm at
+    /// the link); contacts aside.
     #[must_use]
     pub fn answer(&self, motor_torque: f64, step: f64) -> Answer {
         let friction = self.next_friction(step);

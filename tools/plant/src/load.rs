@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// Standard gravity, m/s².
 pub const GRAVITY: f64 = 9.80665;
 
-/// What hangs on the gear's output.
+/// Load on the gear's output.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct LoadParameters {

@@ -1,4 +1,4 @@
-//! Everything that describes one joint, and a reference joint whose numbers a reader can hold in mind.
+//! Parameters of one joint, and a reference joint whose numbers a reader can hold in mind.
 
 use crate::error::{ParameterError, within};
 use crate::friction::{Directional, FrictionParameters, Ripple};
@@ -7,7 +7,7 @@ use crate::motor::MotorParameters;
 use crate::thermal::ThermalParameters;
 use serde::{Deserialize, Serialize};
 
-/// How far and how fast the joint may be moved when it is recorded.
+/// Range and speed in which the joint may be moved when it is recorded.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Limits {
@@ -102,7 +102,7 @@ impl JointParameters {
         within("limits.speed", self.limits.speed, 0.05, 50.0)
     }
 
-    /// Everything that accelerates with the link, kg m².
+    /// Inertia of everything that accelerates with the link, kg m².
     #[must_use]
     pub fn inertia(&self) -> f64 {
         self.motor.reflected_inertia() + self.load.total_inertia()

@@ -1,4 +1,4 @@
-//! What the control step sees differs from the truth exactly as described.
+//! Measurements of the control step differ from the truth exactly as described.
 
 mod support;
 

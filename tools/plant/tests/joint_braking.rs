@@ -34,7 +34,7 @@ fn narrow(setup: &Setup) -> Setup {
     narrow
 }
 
-/// What a braking move did.
+/// Results of a braking move.
 struct Braked {
     faults: Vec<Fault>,
     highest: f64,
@@ -47,7 +47,7 @@ struct Braked {
     speed_left: f64,
 }
 
-/// How a joint is stopped.
+/// Way in which a joint is stopped.
 #[derive(Clone, Copy, Debug)]
 enum Stop {
     /// Along the quick stop's ramp.
@@ -107,7 +107,7 @@ fn braked_with(parameters: &ActuatorParameters, setup: &Setup, stop: Stop, time:
     }
 }
 
-/// Whether the supply was what ended it.
+/// Returns `true` if the supply was what ended it.
 fn tripped(braked: &Braked) -> bool {
     assert!(braked.faults.is_empty() || braked.faults == [Fault::OverVoltage], "{:?}", braked.faults);
     !braked.faults.is_empty()

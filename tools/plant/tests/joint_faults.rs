@@ -12,8 +12,8 @@ use plant::virtual_joint::Setup;
 use rig::table::{Reset, documented, documented_faults};
 use rig::{Rig, break_down, mend, position, reference, reset, torque, velocity};
 
-/// What the motor's torque may exceed its limit by: gain errors of the current sensors and overshoot of the current
-/// loop.
+/// Factor by which the motor's torque may exceed its limit: gain errors of the current sensors and overshoot of the
+/// current loop.
 const TORQUE_TOLERANCE: f64 = 1.05;
 
 fn moving() -> Rig {

@@ -1,5 +1,5 @@
-//! Whatever bits the measurements and the network's words are made of, the control step keeps its promises, and the
-//! joint can be brought back into service once they make sense again.
+//! Promises of the control step, kept whatever bits the measurements and the network's words are made of; and the joint
+//! can be brought back into service once they make sense again.
 
 mod rig;
 

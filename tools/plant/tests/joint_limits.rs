@@ -117,10 +117,10 @@ fn at_limit(side: f32, stiffness: f32, damping: f32, usual: &Gains) -> Rig {
 /// Unannounced a stiffness holds it as its spring gives (a tenth more where friction stops its swing), and without one
 /// the law does where the load pushes outwards: 95 % of the margin behind the limit, less what friction bears.
 ///
-/// What pulls inwards, announced by nobody and held by no stiffness, the joint follows, as it is to: with a damping
-/// slowly, and the law holds it at the other limit; without one a fault ends it, because beyond the velocity limit its
-/// current is at the end of the supply's voltage (OverCurrent), or because a tenth of the torque is what is left to
-/// stop it at the other limit, less than the quick stop's deceleration takes (PositionLimit).
+/// A load that pulls inwards, announced by nobody and held by no stiffness, the joint follows, as it is to: with a
+/// damping slowly, and the law holds it at the other limit; without one a fault ends it, because beyond the velocity
+/// limit its current is at the end of the supply's voltage (OverCurrent), or because a tenth of the torque is what is
+/// left to stop it at the other limit, less than the quick stop's deceleration takes (PositionLimit).
 #[test]
 fn a_load_of_nine_tenths_is_held_at_each_position_limit_with_any_gains_in_every_mode() {
     let usual = Setup::of(&weightless(reference())).configuration.gains;
@@ -275,8 +275,8 @@ fn joints_with_a_coarse_encoder_behind_a_low_gear_reverse_at_any_damping_without
     }
 }
 
-/// What stands in `limit_law` on stability: how much of the torque limit the torque ripples by (RMS) at the velocity
-/// limit.
+/// Ripple of the torque (RMS) at the velocity limit, as a part of the torque limit: what stands in `limit_law` on
+/// stability.
 #[test]
 fn an_inertia_over_damping_of_a_millisecond_is_enough_for_the_loops_delays() {
     let parameters = weightless(reference());

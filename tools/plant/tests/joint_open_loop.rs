@@ -187,7 +187,8 @@ fn at_its_limit(seed: u64, limit: Option<f32>, frame: Frame) -> (Rig, f32) {
     (rig, largest as f32)
 }
 
-/// What passes it is nearer to a current than to a part of the limit: of a limit far below the motor's own it is more.
+/// Excess over the limit is nearer to a current than to a part of the limit: of a limit far below the motor's own it is
+/// more.
 #[test]
 fn a_current_passes_its_limit_by_no_more_than_the_documentation_says() {
     let frames = [(0, 0), (300, 0), (0, 20_000), (300, 20_000)].map(|(speed, along)| Frame {

@@ -17,8 +17,8 @@ fn just_below_a_limit_nothing_shows_and_just_above_it_the_fault_does_within_its_
     assert!(failed.is_empty(), "{}", failed.join("\n"));
 }
 
-/// Whether a fault begins where a number passes its limit. Exhaustive: a new fault has to be told here, and then has to
-/// have a probe.
+/// Returns `true` if a fault begins where a number passes its limit. Exhaustive: a new fault has to be told here, and
+/// then has to have a probe.
 fn has_a_limit(fault: Fault) -> bool {
     match fault {
         Fault::Overrun | Fault::BridgeDriver => false,

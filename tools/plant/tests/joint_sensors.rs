@@ -15,7 +15,7 @@ use rig::{Rig, break_down, position, reference, velocity};
 /// Time for which a joint whose failure does not show is watched, s.
 const WATCHED: f64 = 0.4;
 
-/// What a row's failure is: for good, or an offset in every other step.
+/// Failure of a row: for good, or an offset in every other step.
 enum Breakage {
     Lasting(Failure),
     Jumping(f64),

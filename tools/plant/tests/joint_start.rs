@@ -1,4 +1,4 @@
-//! What is wrong before the joint has moved: it is not switched on, or refused before it gives torque.
+//! Defects before the joint has moved: it is not switched on, or refused before it gives torque.
 
 mod rig;
 

@@ -16,7 +16,7 @@ use std::fmt::Write;
 
 /// Times in which the holding brake opens and closes, s.
 const BRAKE: (f32, f32) = (0.15, 0.1);
-/// Where the arm is when it is stopped, about, rad: nearly level. And how fast it goes, rad/s.
+/// Position of the arm when it is stopped, about, rad: nearly level. And how fast it goes, rad/s.
 const LEVEL: f32 = 1.3;
 const SPEED: f32 = 0.5;
 /// An arm that moves less, rad, holds.
@@ -34,7 +34,7 @@ const MODES: [Operation; 7] = [
 const TORQUE_GAIN: f32 = 60.0;
 /// Of profiles, rad/s².
 const ACCELERATION: f32 = 8.0;
-/// From where a profile begins to where it ends, rad.
+/// Distance from where a profile begins to where it ends, rad.
 const FAR: f32 = 0.6;
 /// The same of homing: the next index is less than a turn of the rotor away.
 const INDEX: f32 = 0.12;
@@ -174,10 +174,10 @@ fn rising(mode: Operation, stops: StopConfiguration, brake: bool) -> Rig {
     rig
 }
 
-/// What the arm did.
+/// Motion of the arm.
 #[derive(Clone, Copy, Debug)]
 struct Stopped {
-    /// How far it went on upwards, rad, and how far it then sank, within two seconds.
+    /// Distance that it went on upwards, rad, and that it then sank, within two seconds.
     way: f64,
     sank: f64,
     /// It still moves.
@@ -225,12 +225,12 @@ fn stopped(mode: Operation, way: Way, stops: StopConfiguration, brake: bool) -> 
     Stopped { way: highest - start, sank: highest - lowest, falls, state: rig.state() }
 }
 
-/// Whether a mode's set-point has to be renewed; a profile position and homing end by themselves.
+/// Returns `true` if a mode's set-point has to be renewed; a profile position and homing end by themselves.
 fn is_renewed(mode: Operation) -> bool {
     !matches!(mode, Operation::ProfilePosition | Operation::Homing)
 }
 
-/// What it did in each mode in which the way is one.
+/// Motion in each mode in which the way is one.
 fn in_each_mode(way: Way, stops: StopConfiguration, brake: bool) -> Vec<(Operation, Stopped)> {
     let modes = MODES.into_iter().filter(|mode| way != Way::LateCommand || is_renewed(*mode));
     modes.map(|mode| (mode, stopped(mode, way, stops, brake))).collect()

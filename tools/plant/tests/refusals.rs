@@ -1,4 +1,4 @@
-//! What is out of range is refused by name, with the range.
+//! Refusals of values that are out of range, by name, with the range.
 
 use plant::excitation::{Segment, Trajectory};
 use plant::{JointParameters, ParameterError};

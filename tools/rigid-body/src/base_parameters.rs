@@ -12,7 +12,7 @@ use rand_chacha::rand_core::SeedableRng;
 /// A column counts as independent where more than this part of the largest is its own.
 const TOLERANCE: f64 = 1e-8;
 
-/// Which columns of a regressor span it, and how the others depend on them.
+/// Columns of a regressor that span it, and how the others depend on them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BaseParameters {
     /// Columns that span, ascending.

@@ -6,7 +6,7 @@ use crate::tree::{Joint, JointKind, Tree};
 use nalgebra::UnitQuaternion;
 use std::fmt::Write;
 
-/// What MJCF has for the friction of a joint.
+/// Friction of a joint as MJCF has it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct JointFriction {
     /// Viscous friction, Nm s/rad or N s/m.

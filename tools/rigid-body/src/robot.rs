@@ -29,13 +29,13 @@ pub enum Defect {
     /// No XML, or no robot.
     #[error("no URDF: {reason}")]
     Xml {
-        /// Why.
+        /// Reason.
         reason: String,
     },
     /// No TOML, or unknown keys.
     #[error("{reason}")]
     Toml {
-        /// Why.
+        /// Reason.
         reason: String,
     },
     /// An element or attribute is not there.
@@ -156,7 +156,7 @@ pub enum Defect {
     DoesNotMove {
         /// The joint.
         joint: String,
-        /// Why it does not move.
+        /// Reason for which it does not move.
         why: &'static str,
     },
     /// A number beyond its range.
@@ -168,7 +168,7 @@ pub enum Defect {
         key: &'static str,
         /// Its value.
         value: f64,
-        /// What it may be.
+        /// Values that it may have.
         expected: &'static str,
     },
     /// Two files with two ratios.
@@ -186,10 +186,10 @@ pub enum Defect {
     Coupling {
         /// Its joints.
         joints: Vec<String>,
-        /// Why it cannot be used.
+        /// Reason for which it cannot be used.
         reason: String,
     },
-    /// Nothing moves.
+    /// No joint moves.
     #[error("no joint moves; describe at least one drive")]
     NothingMoves,
 }

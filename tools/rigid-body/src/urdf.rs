@@ -22,10 +22,10 @@ pub struct Link {
     pub inertia: Option<LinkInertia>,
 }
 
-/// What a joint allows.
+/// Motions that a joint allows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Allowed {
-    /// Nothing.
+    /// No motion.
     Fixed,
     /// Rotation; `continuous` as well.
     Rotation,
@@ -38,7 +38,7 @@ pub enum Allowed {
 pub struct UrdfJoint {
     /// Name.
     pub name: String,
-    /// What it allows.
+    /// Motions that it allows.
     pub allowed: Allowed,
     /// Name of the link before it.
     pub parent: String,
@@ -264,7 +264,7 @@ pub struct LinkValues {
 /// their own inertia: it is part of that one's.
 ///
 /// # Errors
-/// As [`parse`].
+/// Those of [`parse`].
 pub fn with_values(text: &str, file: &str, values: &[LinkValues]) -> Result<String, RobotError> {
     let urdf = parse(text, file)?;
     let error = |e: roxmltree::Error| RobotError {

@@ -1,10 +1,10 @@
-//! What hangs at the board's outputs: a holding brake on the rotor and a resistor that a brake chopper connects.
+//! Devices at the board's outputs: a holding brake on the rotor and a resistor that a brake chopper connects.
 //!
 //! The brake is a grip that holds the link where it closed; it closes and opens some time after its output says so.
 
 use crate::contact::Contact;
 
-/// What is fitted; nothing by itself.
+/// Fitted devices; none by itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Accessories {
     /// Times in which the brake opens and closes, s; none: no brake.
@@ -23,7 +23,7 @@ pub struct Fitted {
     /// Since the brake's output changed, s.
     since: f64,
     grip: Option<Contact>,
-    /// What the resistor has burnt, J.
+    /// Energy that the resistor has burnt, J.
     burnt: f64,
 }
 
@@ -34,7 +34,7 @@ impl Fitted {
         Self { accessories, grip, ..Self::default() }
     }
 
-    /// What the outputs say from now on.
+    /// Sets what the outputs say from now on.
     pub fn set(&mut self, open: bool, conducts: bool) {
         if open != self.open {
             self.since = 0.0;
@@ -59,7 +59,7 @@ impl Fitted {
         }
     }
 
-    /// What holds the link.
+    /// Contact that holds the link.
     pub fn grip(&self) -> Option<Contact> {
         self.grip
     }

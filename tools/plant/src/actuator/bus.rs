@@ -16,7 +16,7 @@ pub struct BusParameters {
     pub source_resistance: f64,
     /// Capacitance of the board, 1e-6 to 0.1 F.
     pub capacitance: f64,
-    /// Whether the source takes current back: a battery does, a laboratory supply does not.
+    /// `true` if the source takes current back: a battery does, a laboratory supply does not.
     pub takes_back: bool,
 }
 

@@ -1,4 +1,4 @@
-//! What can break, as data: sensors, leads, transistors, supply, load.
+//! Faults that can occur, as data: sensors, leads, transistors, supply, load.
 
 use super::legs::Phase;
 use crate::error::{ParameterError, within};
@@ -47,7 +47,7 @@ impl Channel {
     }
 }
 
-/// How a sensor fails.
+/// Failure of a sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Failure {
@@ -102,7 +102,7 @@ impl Fault {
     }
 }
 
-/// Everything that is wrong at one time.
+/// Faults that are active at one time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ActiveFaults {
     /// Failure of each channel, in the order of [`Channel::ALL`]; of several the last injected counts.
@@ -155,7 +155,7 @@ impl Schedule {
         self.next_change = Some(f64::MIN);
     }
 
-    /// What is wrong at `time` (s), where that has changed since the last call.
+    /// Faults that are active at `time` (s), where that has changed since the last call.
     pub(crate) fn changed(&mut self, time: f64) -> Option<ActiveFaults> {
         if self.next_change.is_none_or(|change| time < change) {
             return None;

@@ -25,12 +25,12 @@ pub struct ImplicitStep {
     pub directions: [[f64; 2]; 3],
     /// Size w of the voltage against the current for each phase, V; zero for a driven phase.
     pub against: [f64; 3],
-    /// Which phases cannot carry current.
+    /// `true` for each phase that cannot carry current.
     pub open: [bool; 3],
 }
 
 impl ImplicitStep {
-    /// Whether no current starts to flow from none: the voltages stay within the rails.
+    /// Returns `true` if no current starts to flow from none: the voltages stay within the rails.
     #[must_use]
     pub fn rests(&self) -> bool {
         match self.open.iter().filter(|open| **open).count() {

@@ -123,7 +123,7 @@ impl Inverter {
         self.duties.late()
     }
 
-    /// What the dead time does in a PWM of `period` (s) between `rails`, to windings of `inductance` (H) that are
+    /// Effect of the dead time in a PWM of `period` (s) between `rails`, to windings of `inductance` (H) that are
     /// stepped by `step` (s).
     #[must_use]
     pub fn dead_time(&self, rails: &Rails, period: f64, inductance: f64, step: f64) -> DeadTime {

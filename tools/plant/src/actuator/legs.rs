@@ -1,4 +1,4 @@
-//! What each motor phase is connected to.
+//! Connection of each motor phase.
 
 use serde::{Deserialize, Serialize};
 

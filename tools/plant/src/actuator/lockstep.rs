@@ -42,7 +42,7 @@ pub struct Powers {
     pub mechanical: f64,
 }
 
-/// What is really going on; none of it is measured.
+/// Ground truth of the actuator; none of it is measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ActuatorState {
     /// Time since the start, s.
@@ -73,7 +73,7 @@ pub struct ActuatorState {
     pub powers: Powers,
 }
 
-/// What the electrical half of a period leaves for the mechanical one.
+/// Result of the electrical half of a period for the mechanical one.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Driven {
     /// Torque of the motor at the link, before friction, Nm.
@@ -151,13 +151,13 @@ impl Actuator {
         self
     }
 
-    /// What this actuator is.
+    /// Parameters of this actuator.
     #[must_use]
     pub fn parameters(&self) -> &ActuatorParameters {
         &self.parameters
     }
 
-    /// What is really going on.
+    /// Ground truth of the actuator.
     #[must_use]
     pub fn state(&self) -> &ActuatorState {
         &self.state
@@ -169,7 +169,7 @@ impl Actuator {
         &self.joint
     }
 
-    /// What is wrong in the present period.
+    /// Faults in the present period.
     #[must_use]
     pub fn faults(&self) -> &ActiveFaults {
         &self.faults
@@ -192,18 +192,18 @@ impl Actuator {
         self.grip_again();
     }
 
-    /// What the board's outputs say from now on: the brake is to open, the chopper conducts.
+    /// Sets the board's outputs from now on: the brake is to open, the chopper conducts.
     pub fn set_outputs(&mut self, brake_open: bool, chopper: bool) {
         self.fitted.set(brake_open, chopper);
     }
 
-    /// What is fitted, in operation.
+    /// Fitted devices, in operation.
     #[must_use]
     pub fn fitted(&self) -> &Fitted {
         &self.fitted
     }
 
-    /// What holds the link: a broken gear, a brake, or what is in its way.
+    /// Sets what holds the link: a broken gear, a brake, or what is in its way.
     fn grip_again(&mut self) {
         if !self.faults.blocked {
             self.joint.hold(self.fitted.grip().or(self.contact));
@@ -245,7 +245,7 @@ impl Actuator {
         self.meet_faults();
     }
 
-    /// What the drive's electronics measure now. Every call draws new noise.
+    /// Measurements of the drive's electronics now. Every call draws new noise.
     pub fn measure(&mut self) -> DriveSample {
         self.sensors.sample(&self.faults)
     }
@@ -284,7 +284,7 @@ impl Actuator {
         Driven { torque: (torque + cogging) * self.parameters.joint.motor.gear_ratio, powers }
     }
 
-    /// What answers to a torque on the link in the mechanical half.
+    /// Answer to a torque on the link in the mechanical half.
     pub(crate) fn answer(&self, driven: &Driven, period: f64) -> Answer {
         let answer = self.joint.answer(driven.torque, period);
         Answer { torque: answer.torque + self.faults.external_torque, ..answer }

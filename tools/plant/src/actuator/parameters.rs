@@ -1,4 +1,4 @@
-//! Everything that describes one actuator, and the reference joint's electrical side.
+//! Parameters of one actuator, and the reference joint's electrical side.
 
 use super::bus::BusParameters;
 use super::current_sensors::CurrentSensorParameters;

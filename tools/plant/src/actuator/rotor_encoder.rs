@@ -13,7 +13,7 @@ pub struct EncoderParameters {
     pub counts_per_turn: usize,
     /// Reading at rotor angle zero, 0 to 1 turn.
     pub zero: f64,
-    /// Whether it counts down while the rotor turns forward.
+    /// `true` if it counts down while the rotor turns forward.
     pub reversed: bool,
     /// Standard deviation before quantisation, 0 to 0.1 turn.
     pub noise: f64,
@@ -39,7 +39,7 @@ impl EncoderParameters {
         count_within("encoder.delay", self.delay, 0, MAXIMUM_DELAY)
     }
 
-    /// What the encoder's disc shows at the rotor's true `angle` (rad), turns, not wrapped.
+    /// Reading of the encoder's disc at the rotor's true `angle` (rad), turns, not wrapped.
     #[must_use]
     pub fn shown(&self, angle: f64) -> f64 {
         let eccentric = match self.eccentricity {

@@ -1,4 +1,4 @@
-//! What the drive's electronics measure in a control period: [`DriveSample`] is all that a control step may see.
+//! Measurements of the drive's electronics in a control period: [`DriveSample`] is all that a control step may see.
 
 use super::current_sensors::CurrentSensorParameters;
 use super::delay::Delay;
@@ -75,7 +75,7 @@ pub struct DriveSample {
     pub bus_voltage: f64,
     /// Rotor angle in the encoder's own direction and zero, 2^32 a turn.
     pub encoder: u32,
-    /// Whether the encoder answered properly.
+    /// `true` if the encoder answered properly.
     pub encoder_valid: bool,
     /// Temperature of the winding, °C; not a number where there is no sensor.
     pub winding_temperature: f64,

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct ThermistorParameters {
-    /// Whether the board has this sensor; without, the reading is not a number.
+    /// `true` if the board has this sensor; without, the reading is not a number.
     pub fitted: bool,
     /// Time constant, 0 to 300 s.
     pub lag: f64,

@@ -56,7 +56,7 @@ impl Cogging {
     }
 }
 
-/// What the windings are beyond [`MotorParameters`]. Torque constant and resistance are there: the flux linkage is
+/// Parameters of the windings beyond [`MotorParameters`]. Torque constant and resistance are there: the flux linkage is
 /// K_t / (3/2 p), and the resistance of a phase is two thirds of the one that turns i_q into copper loss.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
@@ -117,7 +117,7 @@ pub struct Rotation {
     pub velocity: f64,
 }
 
-/// What flowed during one step.
+/// Flow of current during one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Flow {
     /// Phase currents as the bridge sees them, A, positive into the motor.
@@ -129,7 +129,7 @@ pub struct Flow {
 }
 
 impl Flow {
-    /// Nothing flowed.
+    /// No flow.
     pub const NONE: Self = Self { phase_currents: [0.0; 3], torque: 0.0, copper_loss: 0.0 };
 }
 
@@ -206,7 +206,7 @@ impl Windings {
         }
     }
 
-    /// Whether there is no current and, with the phases at `legs`, none starts to flow.
+    /// Returns `true` if there is no current and, with the phases at `legs`, none starts to flow.
     #[must_use]
     pub fn rests(&self, legs: &[Leg; 3], rails: &Rails, rotation: &Rotation, step: f64) -> bool {
         let legs = self.ordered(*legs);

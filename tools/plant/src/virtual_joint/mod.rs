@@ -22,7 +22,7 @@ use joint_firmware::joint::{Active, Bridge, BridgeState, Demand, Joint, Measurem
 use joint_firmware::motor::thermal::WindingTemperature;
 pub use setup::Setup;
 
-/// Why a virtual joint cannot be made.
+/// Reason for which a virtual joint cannot be made.
 #[derive(Clone, Debug, PartialEq)]
 pub enum VirtualJointError {
     /// The plant refuses its parameters.
@@ -57,10 +57,10 @@ impl From<ConfigurationError> for VirtualJointError {
     }
 }
 
-/// Which control step runs: the firmware's, or the one that was built without compensation.
+/// Control step that runs: the firmware's, or the one that was built without compensation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Build {
-    /// As flashed.
+    /// Firmware as flashed.
     #[default]
     Whole,
     /// Without compensation.
@@ -77,7 +77,7 @@ pub struct VirtualJoint {
     slow: Slow,
     adaptation: Adaptation,
     load: LoadFeedforward,
-    /// What the feedforward of the load adds, Nm.
+    /// Torque that the feedforward of the load adds, Nm.
     load_torque: f32,
     /// Observer of the external torque.
     external: ExternalTorque,
@@ -95,7 +95,7 @@ impl VirtualJoint {
     /// A joint at rest at `temperature` (°C), switched off; the noise of its sensors follows from `seed`.
     ///
     /// # Errors
-    /// What plant or firmware refuse.
+    /// Refusals of plant or firmware.
     pub fn new(
         parameters: ActuatorParameters,
         setup: &Setup,
@@ -146,7 +146,7 @@ impl VirtualJoint {
         self.active = active.with_friction(self.active.friction.take());
     }
 
-    /// What the control step reads.
+    /// Configuration that the control step reads.
     #[must_use]
     pub fn active(&self) -> &Active {
         &self.active
@@ -190,7 +190,7 @@ impl VirtualJoint {
         self.actuator.drive(switching, duties, self.period)
     }
 
-    /// What answers to a torque on the link in the mechanical half.
+    /// Answer to a torque on the link in the mechanical half.
     pub(crate) fn answer(&self, driven: &Driven) -> Answer {
         self.actuator.answer(driven, self.period)
     }
@@ -271,13 +271,13 @@ impl VirtualJoint {
         &mut self.actuator
     }
 
-    /// What the last control step was told.
+    /// Measurements that the last control step was told.
     #[must_use]
     pub fn measured(&self) -> &Measurements {
         &self.measured
     }
 
-    /// What it told the bridge.
+    /// Command of the step to the bridge.
     #[must_use]
     pub fn bridge(&self) -> &Bridge {
         &self.bridge
@@ -288,19 +288,19 @@ impl VirtualJoint {
         self.adaptation = adaptation;
     }
 
-    /// All that it has learned.
+    /// State of everything that it has learned.
     #[must_use]
     pub fn learned(&self) -> &Adaptation {
         &self.adaptation
     }
 
-    /// What of it acts.
+    /// State of what of it acts.
     #[must_use]
     pub fn adaptation(&self) -> adaptation::Report {
         self.adaptation.report(&adaptation::Settings::of(&self.active))
     }
 
-    /// What the slow task knows.
+    /// Values that the slow task knows.
     #[must_use]
     pub fn slow(&self) -> &Slow {
         &self.slow

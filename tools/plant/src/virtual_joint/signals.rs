@@ -1,4 +1,4 @@
-//! What the plant measures, as the control step reads it.
+//! Measurements of the plant, as the control step reads them.
 
 use crate::actuator::DriveSample;
 use joint_firmware::joint::Measurements;

@@ -16,7 +16,7 @@ const LONG: u32 = 2_000;
 /// Distance of a probe from its limit, as a part of it.
 const NEAR: f64 = 1e-3;
 
-/// What the current loop does in a step.
+/// Values of the current loop in a step.
 #[derive(Clone, Copy)]
 struct Step {
     reference: Dq,

@@ -37,16 +37,16 @@ pub struct Probe {
 /// Holds a value for a control step, or for as many steps as the value says, from one call to the next.
 pub type Subject = Box<dyn FnMut(f64) -> Found>;
 
-/// How a value beyond its limit shows.
+/// Sign by which a value beyond its limit shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shows {
-    /// As a fault.
+    /// Fault.
     Fault(Fault),
-    /// As a torque that is less than asked for, or as an end of braking.
+    /// Torque that is less than asked for, or an end of braking.
     Less,
 }
 
-/// What a subject shows.
+/// Signs that a subject shows.
 #[derive(Clone, Copy, Debug)]
 pub struct Found {
     pub faults: Faults,
@@ -86,7 +86,7 @@ impl Probe {
         Self { beside, ..self }
     }
 
-    /// Nothing shows just below the limit; just above, the fault does in its time.
+    /// Checks that nothing shows just below the limit; just above, the fault does in its time.
     pub fn run(&self) -> Result<(), String> {
         let (name, below, above) = (&self.name, self.below, self.above);
         let mut subject = (self.subject)();

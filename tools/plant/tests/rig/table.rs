@@ -5,7 +5,7 @@ use joint_firmware::joint::fault::{Fault, Reaction};
 
 const DOCUMENT: &str = include_str!("../../../../docs/faults.md");
 
-/// When a fault can be acknowledged.
+/// Condition on which a fault can be acknowledged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reset {
     /// Once its cause is gone.
@@ -45,7 +45,7 @@ pub fn documented_faults() -> Vec<String> {
     rows("Faults").iter().map(|row| row[0].to_owned()).collect()
 }
 
-/// What is documented of a fault.
+/// Documented row of a fault.
 pub fn documented(fault: Fault) -> FaultRow {
     let name = format!("{fault:?}");
     let rows = rows("Faults");
@@ -75,7 +75,7 @@ pub struct SensorRow {
     pub sensor: &'static str,
     pub failure: &'static str,
     pub motion: &'static str,
-    /// Which fault, and after how many control steps at most; none where nothing shows.
+    /// Name of the fault, and the control steps after which it comes at most; none where nothing shows.
     pub fault: Option<(&'static str, u32)>,
 }
 
