@@ -1,4 +1,4 @@
-//! What is wrong with a joint, from the parameters of its days; host.
+//! Finding about a joint, from the parameters of its days; host.
 //!
 //! The reference is the sums of the first days, the present those of the last ones. Between them, over the motion of
 //! the present: the factor of the rigid torque (inertia and gravity), of friction, of dry and of viscous friction, and
@@ -41,7 +41,7 @@ pub const LEAST_RESIDUAL: f64 = 0.01;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
-    /// What is left unexplained has grown.
+    /// Growth of what is left unexplained.
     Broken,
     /// The sign of the torque, or a factor of all of it.
     WrongConfiguration,
@@ -51,7 +51,7 @@ pub enum Kind {
     FrictionFell,
     /// No parameters in the reference or in the present.
     NotEnoughMotion,
-    /// Nothing.
+    /// No finding.
     Healthy,
 }
 
@@ -86,7 +86,7 @@ pub struct Day {
     pub errors: Option<[f64; 6]>,
     /// Mean temperature, °C.
     pub temperature_c: Option<f64>,
-    /// Why the day is not used; empty where it is.
+    /// Reason for which the day is not used; empty where it is.
     pub defect: String,
 }
 
@@ -114,7 +114,7 @@ pub struct Change {
 pub struct Finding {
     /// Name of the joint.
     pub joint: String,
-    /// What is wrong.
+    /// Kind of what is wrong.
     pub kind: Kind,
     /// The same as a sentence.
     pub reason: String,

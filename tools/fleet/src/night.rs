@@ -28,7 +28,7 @@ pub struct Night {
     pub kept: usize,
 }
 
-/// Why a night's work ended.
+/// Reason for the end of a night's work.
 #[derive(Debug, thiserror::Error)]
 pub enum NightError {
     /// The folder.
@@ -45,7 +45,7 @@ pub enum NightError {
     /// Threads.
     #[error("{threads} threads cannot be started: {reason}")]
     Threads {
-        /// How many.
+        /// Number of threads.
         threads: usize,
         /// The system's answer.
         reason: String,

@@ -21,9 +21,9 @@ pub struct Partition {
 /// A folder or file whose place or name is not that of a partition.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Misplaced {
-    /// Where.
+    /// Path of it.
     pub path: PathBuf,
-    /// What is wrong.
+    /// Defect of it.
     pub reason: String,
 }
 

@@ -23,7 +23,7 @@ pub struct Entry {
     pub day: String,
     /// Files with size and SHA-256.
     pub source: String,
-    /// Why the partition is not used; empty where it is.
+    /// Reason for which the partition is not used; empty where it is.
     pub defect: String,
     /// The sums; zeros with a defect.
     pub sums: Sums,

@@ -52,7 +52,7 @@ pub struct Recorded {
     pub temperature: f64,
 }
 
-/// Why a file is not used.
+/// Reason for which a file is not used.
 #[derive(Debug, thiserror::Error)]
 pub enum BadFile {
     /// The file, a column, or a value.
@@ -69,7 +69,7 @@ pub enum BadFile {
         from: f64,
         /// Time of the row, s.
         to: f64,
-        /// What is expected.
+        /// Limit that is expected.
         limit: &'static str,
     },
 }

@@ -3,7 +3,7 @@
 use crate::format::Format;
 use std::path::PathBuf;
 
-/// Why a log is not read or not written. Rows count from 1.
+/// Reason for which a log is not read or not written. Rows count from 1.
 #[derive(Debug, thiserror::Error)]
 pub enum LogError {
     /// A name that says no format.
@@ -27,7 +27,7 @@ pub enum LogError {
         file: PathBuf,
         /// The format that its name says.
         format: Format,
-        /// What the reader said.
+        /// Error of the reader.
         reason: String,
     },
     /// A file that ends early, or whose bytes were changed.
@@ -37,7 +37,7 @@ pub enum LogError {
         file: PathBuf,
         /// Rows that were read before.
         row: usize,
-        /// What the reader said.
+        /// Error of the reader.
         reason: String,
     },
     /// No row.
@@ -114,7 +114,7 @@ pub enum LogError {
     Shape {
         /// The column.
         column: String,
-        /// What is wrong with it.
+        /// Defect of it.
         reason: String,
     },
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 /// Column with the time of a row since the first one, s, in tables that this crate writes as MCAP.
 pub const TIME: &str = "time_s";
 
-/// How a table is stored.
+/// Storage format of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     /// MCAP, <https://mcap.dev/spec>.

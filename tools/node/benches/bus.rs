@@ -25,7 +25,7 @@ struct Round {
     noise: u32,
 }
 
-/// What one setting led to.
+/// Results of one setting.
 #[derive(Default)]
 struct Measured {
     /// Share of the time for which the wire was taken.

@@ -60,7 +60,7 @@ fn main() -> ExitCode {
     ExitCode::SUCCESS
 }
 
-/// Whether an overflow is a panic in this build.
+/// Returns `true` if an overflow is a panic in this build.
 fn overflow_is_checked() -> bool {
     std::panic::set_hook(Box::new(|_| {}));
     let checked = std::panic::catch_unwind(|| black_box(u8::MAX) + black_box(1)).is_err();

@@ -19,7 +19,7 @@ pub struct SlotImages {
 }
 
 impl SlotImages {
-    /// What a flash holds, as found at a start.
+    /// Content of a flash, as found at a start.
     ///
     /// # Errors
     /// A flash that cannot be written.
@@ -30,7 +30,7 @@ impl SlotImages {
         Ok(Self { flash, slots })
     }
 
-    /// Whether a slot was whole once and is not any more.
+    /// Returns `true` if a slot was whole once and is not any more.
     #[must_use]
     pub fn is_damaged(&self) -> bool {
         self.slots.is_damaged()
@@ -50,7 +50,7 @@ impl SlotImages {
         &self.flash
     }
 
-    /// What stands in the slots.
+    /// Content of the slots.
     pub fn stored(&mut self) -> StoredImages {
         let (active, previous) = (self.slots.active(), self.slots.previous());
         StoredImages { active: self.summary(active), previous: self.summary(previous) }
@@ -77,7 +77,7 @@ impl SlotImages {
     /// Stores an image.
     ///
     /// # Errors
-    /// What the slots refuse; the content in use is then untouched.
+    /// Refusals of the slots; the content in use is then untouched.
     pub fn store(&mut self, image: &[u8]) -> Result<(), SlotError> {
         self.slots.store(&mut self.flash, image)
     }

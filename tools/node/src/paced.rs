@@ -1,7 +1,7 @@
 //! Several nodes on one modelled wire, in simulated time: bits, arbitration and control steps to the nanosecond, as
 //! fast as the machine can.
 //!
-//! What is assumed about the board, because no board has been measured: the receive interrupt has done its work
+//! Assumptions about the board, because no board has been measured: the receive interrupt has done its work
 //! [`REACTION`] after a frame's last bit, the task gets to a request [`TASK`] later, and the controller has three
 //! transmit buffers that it empties by identifier (the STM32G4's FDCAN).
 
@@ -19,7 +19,7 @@ pub const TASK: Duration = Duration::from_micros(50);
 /// Transmit buffers of a controller.
 const BUFFERS: usize = 3;
 
-/// What has just happened.
+/// Event that has just happened.
 #[derive(Clone, Debug)]
 pub enum PacedEvent {
     /// A frame was received by all but its senders; the nodes see it after [`REACTION`].
@@ -170,7 +170,7 @@ impl PacedNodes {
         }
     }
 
-    /// What is due at a node now; whether it was a control step.
+    /// Runs what is due at a node now; returns whether it was a control step.
     fn run(&mut self, number: usize) -> bool {
         let now = self.now;
         let Some(member) = self.members.get_mut(number) else { return false };

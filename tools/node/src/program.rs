@@ -1,4 +1,4 @@
-//! What a board's program does for the objects, done for the simulated joint: swaps wait for the next control step.
+//! Services of a board's program for the objects, done for the simulated joint: swaps wait for the next control step.
 
 use crate::storage::Storage;
 use canopen_node::{Event, Reset};
@@ -28,7 +28,7 @@ pub struct VirtualProgram {
     pub history: Option<History>,
     /// The network asked for a reset of the node.
     pub reset: bool,
-    /// Why it started.
+    /// Reason for its start.
     pub last_reset: LastReset,
 }
 

@@ -10,14 +10,14 @@ use friction_compensation::friction::{FrictionModel, FrictionParameters, Paramet
 use friction_compensation::parameters::certificate::Limits;
 use friction_compensation::parameters::image::{Effort, GoldenVector, Image, MAX_GOLDEN, MAX_LENGTH, Target};
 
-/// What varies.
+/// Properties that vary.
 #[derive(Clone, Copy, Debug)]
 pub struct SampleImage<'a> {
     /// Image version.
     pub version: u32,
     /// Friction of each parameter set, Nm, -2 to 2.
     pub levels: &'a [f64],
-    /// Which set applies.
+    /// Selector of the set that applies.
     pub selector: Selector,
     /// Each set has a network, which says nothing.
     pub network: bool,
@@ -36,7 +36,7 @@ impl SampleImage<'_> {
     /// The image's bytes.
     ///
     /// # Panics
-    /// Where what varies is out of its range.
+    /// Panics if a property that varies is out of its range.
     #[must_use]
     pub fn bytes(&self) -> Vec<u8> {
         let neuron = Neuron { weights: [0; _], fraction: MIN_FRACTION };

@@ -17,7 +17,7 @@ const MOST: u32 = 42;
 /// A machine that is so much behind gives the time up.
 const LOST: Duration = Duration::from_millis(100);
 
-/// What can be on a bus: simulated, with a time of its own.
+/// Participant of a bus: simulated, with a time of its own.
 pub trait Served {
     /// Its time.
     fn now(&self) -> Duration;
@@ -25,7 +25,7 @@ pub trait Served {
     /// Lives up to an instant of its time.
     ///
     /// # Errors
-    /// What ended its life.
+    /// Reason for the end of its life.
     fn live_until(&mut self, instant: Duration) -> Result<(), String>;
 
     /// A frame of somebody else's has come.
@@ -56,7 +56,7 @@ impl Served for VirtualNode {
     }
 }
 
-/// Why a node left the bus.
+/// Reason for which a node left the bus.
 #[derive(Debug, thiserror::Error)]
 pub enum ServeError {
     /// The bus.

@@ -1,5 +1,5 @@
-//! Everything that outlasts a loss of power: images, the record of object 1010h, what guards the joint. Each lies in
-//! two slots of its own, as on a board, so that a loss of power in any store leaves the old content or the new one.
+//! Storage that outlasts a loss of power: images, the record of object 1010h, what guards the joint. Each lies in two
+//! slots of its own, as on a board, so that a loss of power in any store leaves the old content or the new one.
 
 use crate::flash::Flash;
 use crate::images::SlotImages;
@@ -12,7 +12,7 @@ use std::path::Path;
 const CONFIGURATION: u32 = 2;
 const GUARD: u32 = 3;
 
-/// Why there is no storage.
+/// Reason for which there is no storage.
 #[derive(Debug, thiserror::Error)]
 pub enum StorageError {
     /// A file.
@@ -68,7 +68,7 @@ impl Record {
     }
 }
 
-/// What a joint keeps. A clone is what a loss of power at that moment leaves.
+/// Storage of a joint. A clone is what a loss of power at that moment leaves.
 #[derive(Clone, Debug)]
 pub struct Storage {
     pub(crate) images: SlotImages,
@@ -79,7 +79,7 @@ pub struct Storage {
 }
 
 impl Storage {
-    /// Nothing stored, in memory.
+    /// Empty storage, in memory.
     ///
     /// # Errors
     /// None in practice: an erased flash can be written.
@@ -87,7 +87,7 @@ impl Storage {
         Self::with(SlotImages::empty()?)
     }
 
-    /// Nothing but images stored.
+    /// Storage of nothing but images.
     ///
     /// # Errors
     /// None in practice: an erased flash can be written.
@@ -96,7 +96,7 @@ impl Storage {
         Ok(Self { images, configuration: configuration?, guard: guard?, log: Flash::erased(2) })
     }
 
-    /// What a folder holds, one file for each content; all that is stored is in the files at once. The folder is made
+    /// Storage in a folder, one file for each content; all that is stored is in the files at once. The folder is made
     /// where there is none.
     ///
     /// # Errors
@@ -144,7 +144,7 @@ impl Storage {
         &mut self.log
     }
 
-    /// What guards the joint. Where it is damaged the joint is locked, and that is kept, as a board does.
+    /// Guard of the joint. Where it is damaged the joint is locked, and that is kept, as a board does.
     pub(crate) fn guard(&mut self) -> Guard {
         let damaged = self.guard.is_damaged();
         let mut guard = Guard::decode(self.guard.load().as_deref());
@@ -159,7 +159,7 @@ impl Storage {
         self.guard.store(&guard.encode())
     }
 
-    /// Which of images and guard is damaged: bits as of EMCY 6310h.
+    /// Damaged ones of images and guard: bits as of EMCY 6310h.
     pub(crate) fn damaged(&self) -> u8 {
         let locked = Guard::decode(self.guard.clone().load().as_deref()).locked;
         u8::from(self.images.is_damaged()) | u8::from(self.guard.is_damaged() || locked) << 2

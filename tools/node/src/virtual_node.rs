@@ -44,7 +44,7 @@ const TRANSMIT: usize = 16;
 /// Places that the task leaves to what the receive interrupt sends: the TPDOs.
 const RESERVED: usize = PDOS;
 
-/// Which node.
+/// Options of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Options {
     /// 1 to 127, or 255: silent until LSS gives it one. One that LSS has stored comes first.
@@ -55,7 +55,7 @@ pub struct Options {
     pub seed: u64,
 }
 
-/// Why there is no node.
+/// Reason for which there is no node.
 #[derive(Debug, thiserror::Error)]
 pub enum NodeError {
     /// Plant or firmware refuse.
@@ -108,7 +108,7 @@ impl VirtualNode {
     /// long as the program runs.
     ///
     /// # Errors
-    /// What plant or firmware refuse.
+    /// Refusals of plant or firmware.
     pub fn new(
         parameters: ActuatorParameters,
         setup: &Setup,
@@ -122,7 +122,7 @@ impl VirtualNode {
     /// acts instead of `setup`'s.
     ///
     /// # Errors
-    /// What plant or firmware refuse.
+    /// Refusals of plant or firmware.
     pub fn with_storage(
         parameters: ActuatorParameters,
         setup: &Setup,
@@ -206,12 +206,12 @@ impl VirtualNode {
         self.bus.state()
     }
 
-    /// What a loss of power leaves of the images: the slots' flash.
+    /// Flash of the slots, which is what a loss of power leaves of the images.
     pub fn flash(&mut self) -> Flash {
         self.objects.program().storage.images.flash().clone()
     }
 
-    /// What a loss of power leaves.
+    /// Storage that a loss of power leaves.
     pub fn storage(&mut self) -> Storage {
         self.objects.program().storage.clone()
     }
@@ -408,7 +408,7 @@ impl VirtualNode {
         }
     }
 
-    /// What the task knows of the joint.
+    /// Takes what the task knows of the joint.
     fn observe(&mut self, telemetry: &Telemetry, feedforward_torque: f32) {
         let mut seen = *telemetry;
         if let Some(shadow) = &mut self.shadow {

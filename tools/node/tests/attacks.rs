@@ -106,7 +106,7 @@ struct Moving {
     speed: i32,
 }
 
-/// Where it turns round, rad.
+/// Position at which it turns round, rad.
 const TURNS: f64 = 0.5;
 
 impl Moving {

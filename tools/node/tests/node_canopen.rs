@@ -68,7 +68,7 @@ fn modules() -> Result<PathBuf, String> {
     Err(format!("node-canopen could not be installed: {said}"))
 }
 
-/// Where Node's own headers are installed beside it, so that none have to be downloaded.
+/// Folder in which Node's own headers are installed beside it, so that none have to be downloaded.
 fn headers() -> Option<PathBuf> {
     let node = Command::new("node").args(["-p", "process.execPath"]).output().ok()?;
     let prefix = Path::new(std::str::from_utf8(&node.stdout).ok()?.trim()).parent()?.parent()?.to_owned();

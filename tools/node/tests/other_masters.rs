@@ -17,7 +17,7 @@ const VELOCITY: i8 = 9;
 const TORQUE: i8 = 10;
 /// Before its first target a joint may move by this, rad.
 const STILL: f64 = 1e-3;
-/// Where the joint is brought before, µrad.
+/// Position to which the joint is brought before, µrad.
 const SOMEWHERE: i32 = 361_000;
 
 /// RPDO 1 as ros2_canopen maps it: controlword, mode, target position. Its 22 SDO writes follow the procedure of CiA

@@ -1,4 +1,5 @@
-//! What a board still misses on its way from unboxing to a joint that moves and learns: docs/on-a-board.md; host.
+//! Checklist of what a board still misses on its way from unboxing to a joint that moves and learns:
+//! docs/on-a-board.md; host.
 
 use crate::absent::is_absent;
 use joint_firmware::default_configuration::B_G431B_ESC1;
@@ -13,11 +14,11 @@ use serde::Serialize;
 pub struct Item {
     /// Name.
     pub name: &'static str,
-    /// Whether it is as it should be.
+    /// `true` if it is as it should be.
     pub done: bool,
     /// The value that says so.
     pub found: String,
-    /// What to do where it is not done; empty where it is.
+    /// Remedy where it is not done; empty where it is.
     pub remedy: &'static str,
 }
 

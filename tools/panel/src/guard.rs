@@ -17,7 +17,7 @@ const RANDOM: usize = 16;
 /// Name of the cookie.
 const NAME: &str = "panel";
 
-/// Why a request is refused.
+/// Reason for which a request is refused.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Refusal {
     /// Host.
@@ -37,7 +37,7 @@ pub enum Refusal {
     Token,
 }
 
-/// Why an address is not listened on.
+/// Reason for which an address is not listened on.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum AddressError {
     /// All addresses at once.

@@ -54,7 +54,7 @@ impl Hold {
         });
     }
 
-    /// Whether hold `number` lasts.
+    /// Returns `true` if hold `number` lasts.
     pub fn is_held(&self, number: u64, now: Instant) -> bool {
         self.with(|inner| {
             inner.held.is_some_and(|(held, at)| held == number && now.saturating_duration_since(at) < LIMIT)

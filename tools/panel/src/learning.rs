@@ -41,7 +41,7 @@ fn told(joint: &RemoteJoint, status: &ImageStatus) -> Result<Value, RemoteError>
     }))
 }
 
-/// Where images stand.
+/// State of the images.
 ///
 /// # Errors
 /// The bus, or no answer.

@@ -25,7 +25,7 @@ pub const STATE: [Actual; 3] = [Actual::Statusword, Actual::LatchedFaults, Actua
 
 /// Width of what a page draws as one stroke, s: several of them to a pixel of a plot over some seconds.
 pub const STROKE: f64 = 0.004;
-/// What is kept, s.
+/// Time that is kept, s.
 pub const KEPT: f64 = 60.0;
 
 /// Minima and maxima of the samples that share a stroke.

@@ -16,7 +16,7 @@ pub struct Message {
     pub ask: Ask,
 }
 
-/// What becomes of an image, as [`jointctl::remote::image::Use`].
+/// Use of an image, as [`jointctl::remote::image::Use`].
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Usage {
@@ -30,7 +30,7 @@ pub enum Usage {
     Commit,
 }
 
-/// What a page may ask.
+/// Request of a page.
 #[derive(Clone, Debug, Deserialize, PartialEq)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Ask {
@@ -47,7 +47,7 @@ pub enum Ask {
     Move {
         /// Number of the hold.
         hold: u64,
-        /// Which motion.
+        /// Motion that is asked for.
         motion: Motion,
         /// A fault whose cause is gone is acknowledged first.
         #[serde(default)]
@@ -55,7 +55,7 @@ pub enum Ask {
     },
     /// Joints on the bus.
     Scan,
-    /// What the board still misses.
+    /// Checklist of what the board still misses.
     Checklist,
     /// Live values anew, after somebody else has put the joint out of OPERATIONAL.
     Look,
@@ -83,12 +83,12 @@ pub enum Ask {
     Upload {
         /// The file's content.
         image: Vec<u8>,
-        /// How far.
+        /// Use that is asked for.
         usage: Usage,
     },
     /// The image that this page uploaded, a step further.
     Use {
-        /// How far.
+        /// Use that is asked for.
         usage: Usage,
     },
     /// The image before.
@@ -98,7 +98,7 @@ pub enum Ask {
 }
 
 impl Ask {
-    /// Whether it changes something: for one page at a time.
+    /// Returns `true` if it changes something: for one page at a time.
     pub const fn changes(&self) -> bool {
         match self {
             Self::Held { .. }

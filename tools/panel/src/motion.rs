@@ -1,4 +1,4 @@
-//! What a page moves a joint with, as a function of time since it began: jog, sine, steps, impedance; no I/O.
+//! Motion with which a page moves a joint, as a function of time since it began: jog, sine, steps, impedance; no I/O.
 
 use joint_firmware::joint::{Command, Mode};
 use jointctl::remote::motion::Motion as Limited;

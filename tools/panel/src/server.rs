@@ -31,7 +31,7 @@ const UNSUPPORTED: u16 = 1003;
 const INVALID: u16 = 1007;
 const POLICY: u16 = 1008;
 
-/// What is served.
+/// State that is served.
 #[derive(Debug)]
 pub struct Panel {
     network: Network,

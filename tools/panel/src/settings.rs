@@ -16,7 +16,7 @@ use std::path::Path;
 /// Ends what takes long, with a word about it.
 const STOPPED: &str = "stopped before it was complete";
 
-/// Whether an object is a number that a person may look at.
+/// Returns `true` if an object is a number that a person may look at.
 fn is_shown(entry: &Entry) -> bool {
     entry.is_content() && !matches!(entry.object.data_type, DataType::Domain)
 }

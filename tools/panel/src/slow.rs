@@ -8,7 +8,7 @@ use jointctl::remote::refusal::image_state;
 use jointctl::remote::{Entry, RemoteError, RemoteJoint};
 use serde_json::{Value, json};
 
-/// What is read in turn, and its title.
+/// Values that are read in turn, each with its title.
 const FIELDS: [(&str, Field); 15] = [
     ("winding", Field::Actual(Actual::WindingTemperature)),
     ("bridge", Field::Actual(Actual::BridgeTemperature)),

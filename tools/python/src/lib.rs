@@ -10,9 +10,9 @@ use std::process::Command;
 pub struct Packages {
     /// Folder of their environment.
     pub folder: &'static str,
-    /// What pip installs, with versions.
+    /// Packages that pip installs, with versions.
     pub install: &'static [&'static str],
-    /// What must then be found, separated by commas.
+    /// Modules that must then be found, separated by commas.
     pub import: &'static str,
 }
 

@@ -1,13 +1,13 @@
-//! What somebody at the bench does to an emulated board, as a line of text.
+//! Command of somebody at the bench to an emulated board, as a line of text.
 
 use std::str::FromStr;
 
 /// A command.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Command {
-    /// What there is.
+    /// List of the commands.
     Help,
-    /// How the board is.
+    /// State of the board.
     Status,
     /// The next command comes after so much time of the board's, s.
     Wait(f64),
@@ -86,18 +86,18 @@ pub const HELP: [(&str, &str, &str); 11] = [
     ("power", "on|off", "the power comes or goes"),
 ];
 
-/// Why a line is no command.
+/// Reason for which a line is no command.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CommandError {
     /// Nobody knows it.
     #[error("unknown command \"{0}\"; help lists them")]
     Unknown(String),
-    /// What follows the command is missing, or there is too much of it.
+    /// Missing arguments of the command, or too many.
     #[error("{name} takes {takes}")]
     Arguments {
         /// The command.
         name: &'static str,
-        /// What follows it.
+        /// Arguments that follow it.
         takes: &'static str,
     },
     /// A number that is none, or out of range.
@@ -105,7 +105,7 @@ pub enum CommandError {
     Number {
         /// The command.
         name: &'static str,
-        /// What was given.
+        /// Value that was given.
         value: String,
         /// Least value.
         least: f64,

@@ -13,7 +13,7 @@ use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// Why a flash is not kept.
+/// Reason for which a flash is not kept.
 #[derive(Debug, thiserror::Error)]
 pub enum FlashFileError {
     /// The program has no parameter pages.
@@ -22,27 +22,27 @@ pub enum FlashFileError {
     /// The file or its folder.
     #[error("{}: {source}", path.display())]
     File {
-        /// Which.
+        /// Path of it.
         path: PathBuf,
-        /// What went wrong.
+        /// Error.
         source: io::Error,
     },
     /// The file holds something else. It stays as it is.
     #[error("{}: {source}", path.display())]
     Foreign {
-        /// Which.
+        /// Path of it.
         path: PathBuf,
-        /// What it is.
+        /// Error.
         source: KeptError,
     },
 }
 
-/// Where the pages are kept.
+/// File in which the pages are kept.
 #[derive(Debug)]
 pub struct FlashFile {
     path: PathBuf,
     addresses: Range<u32>,
-    /// How far the flash had come when it was last looked at.
+    /// Progress of the flash when it was last looked at.
     progress: (u64, bool),
 }
 

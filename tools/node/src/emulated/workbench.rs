@@ -12,7 +12,7 @@ use std::collections::VecDeque;
 
 /// A hand looks and pushes anew after so long, ps.
 const HAND: u64 = 1_000_000_000;
-/// How fast it turns the link, rad/s.
+/// Speed at which it turns the link, rad/s.
 const SPEED: f64 = 0.25;
 /// It reaches that speed within this time, s, with at most so many times the joint's largest torque.
 const PUSH: f64 = 0.005;
@@ -23,10 +23,10 @@ const PRESSED: u64 = 100_000_000_000;
 /// A hand that turns the link.
 #[derive(Clone, Copy, Debug)]
 struct Hand {
-    /// Where it began, and how far it goes, rad.
+    /// Position at which it began, and the distance that it goes, rad.
     from: f64,
     by: f64,
-    /// What it pushes with besides what the speed asks for, Nm.
+    /// Torque with which it pushes besides what the speed asks for, Nm.
     sustained: f64,
 }
 
@@ -95,7 +95,7 @@ impl Workbench {
         }
     }
 
-    /// What is due.
+    /// Carries out what is due.
     fn obey<W: Wired>(&mut self, emulation: &mut Emulation<W>, now: u64) {
         if self.pressed.is_some_and(|until| until <= now) {
             self.pressed = None;

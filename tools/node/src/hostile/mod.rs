@@ -53,7 +53,7 @@ const IDENTITY: Identity<'static> = Identity {
     serial: 4,
 };
 
-/// What the protocol does not allow, and what led to it.
+/// Violation of the protocol, and what led to it.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct Violation(String);
@@ -67,7 +67,7 @@ macro_rules! hold {
     };
 }
 
-/// What has happened, so that a run can show that it went deep.
+/// Counts of what has happened, so that a run can show that it went deep.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// Frames that the node sent.
@@ -105,7 +105,7 @@ impl Counts {
     }
 }
 
-/// What the firmware keeps in statics.
+/// State that the firmware keeps in statics.
 #[derive(Debug)]
 pub struct Statics {
     bus: canopen_node::Shared,
@@ -114,7 +114,7 @@ pub struct Statics {
 }
 
 impl Statics {
-    /// As at power-on.
+    /// State at power-on.
     #[allow(clippy::new_without_default, reason = "as its parts")]
     #[must_use]
     pub const fn new() -> Self {
@@ -191,7 +191,7 @@ impl<'a> HostileNode<'a> {
         self.bus.node_id()
     }
 
-    /// What has happened.
+    /// Counts of what has happened.
     #[must_use]
     pub fn counts(&self) -> &Counts {
         &self.counts
@@ -215,7 +215,7 @@ impl<'a> HostileNode<'a> {
     /// The receive interrupt.
     ///
     /// # Errors
-    /// What the protocol does not allow.
+    /// Violations of the protocol.
     pub fn receive(&mut self, frame: &Frame) -> Result<(), Violation> {
         let (before, asked, id) = (self.bus.state(), self.image.demand(), self.bus.node_id());
         self.counts.operational += u64::from(before == NmtState::Operational);
@@ -239,7 +239,7 @@ impl<'a> HostileNode<'a> {
     /// The task's work.
     ///
     /// # Errors
-    /// What the protocol does not allow.
+    /// Violations of the protocol.
     pub fn work(&mut self) -> Result<(), Violation> {
         let now = self.now as u32;
         let mut before = self.bus.state();
@@ -363,7 +363,7 @@ impl<'a> HostileNode<'a> {
         }
     }
 
-    /// What may be run or stored.
+    /// Judges whether an image may be run or stored.
     fn judge_image(&mut self, length: usize) -> Result<Summary, Violation> {
         let (key, floor) = (self.key.clone(), self.floor);
         let staging = self.objects.staging();

@@ -42,7 +42,7 @@ impl Noise {
     /// One frame, and what the node does about it.
     ///
     /// # Errors
-    /// What the protocol does not allow.
+    /// Violations of the protocol.
     pub fn attack(&mut self, node: &mut HostileNode) -> Result<(), Violation> {
         let frame = self.frame(node.id());
         node.receive(&frame)?;

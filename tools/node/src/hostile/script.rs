@@ -61,7 +61,7 @@ fn initiate(command: u8, index: u16, sub_index: u8, data: [u8; 4]) -> [u8; 8] {
     [command, low, high, sub_index, a, b, c, d]
 }
 
-/// What a client sends to write `data`; up to four bytes go expedited, whatever the way.
+/// Frames that a client sends to write `data`; up to four bytes go expedited, whatever the way.
 pub(super) fn download(way: Transfer, index: u16, sub_index: u8, data: &[u8]) -> Vec<[u8; 8]> {
     let size = (data.len() as u32).to_le_bytes();
     let padded = |piece: &[u8], first: u8| {
@@ -100,7 +100,7 @@ pub(super) fn download(way: Transfer, index: u16, sub_index: u8, data: &[u8]) ->
     }
 }
 
-/// What a client sends to read a short object.
+/// Frames that a client sends to read a short object.
 pub(super) fn upload(way: Transfer, index: u16, sub_index: u8) -> Vec<[u8; 8]> {
     match way {
         Transfer::Segmented => {
@@ -138,7 +138,7 @@ fn crc(data: &[u8]) -> u16 {
 /// | `111w xxxx` | | the object of two following bytes is read |
 ///
 /// # Errors
-/// What the protocol does not allow.
+/// Violations of the protocol.
 pub fn interpret(bytes: &[u8], node: &mut HostileNode, images: &[Vec<u8>]) -> Result<(), Violation> {
     let mut rest = bytes.iter().copied();
     let mut byte = move || rest.next();

@@ -22,7 +22,7 @@ pub struct Watched {
     pub configured: u32,
     /// Wrong tags since somebody looked.
     pub forged: u32,
-    /// What must not have happened.
+    /// Event that must not have happened.
     pub problem: Option<&'static str>,
 }
 

@@ -17,7 +17,7 @@ pub const MILLISECOND: u64 = 20;
 /// A master with one node on its bus.
 pub struct Master {
     pub node: VirtualNode,
-    /// What the node sent beside SDO answers.
+    /// Frames that the node sent beside SDO answers.
     pub heard: Vec<Frame>,
 }
 

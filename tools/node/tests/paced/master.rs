@@ -21,7 +21,7 @@ pub const FIRST: u8 = 1;
 pub struct Line {
     pub nodes: PacedNodes,
     pub master: Station,
-    /// What went over the wire, oldest first.
+    /// Frames that went over the wire, oldest first.
     pub heard: Vec<Delivery>,
     /// The master's set-points: controlword and velocity, mrad/s, of each joint.
     pub driven: Vec<Option<(u16, i32)>>,

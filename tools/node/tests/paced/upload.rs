@@ -9,8 +9,8 @@ use joint_firmware::joint::state_machine::State;
 use node::{PacedEvent, SampleImage};
 use std::time::Duration;
 
-/// What a Cortex-M4 at 170 MHz needs to verify the most expensive image: at most 21 million instructions (docs/cost.md,
-/// `host-tests/tests/on_the_core/library.rs`), one a cycle.
+/// Time that a Cortex-M4 at 170 MHz needs to verify the most expensive image: at most 21 million instructions
+/// (docs/cost.md, `host-tests/tests/on_the_core/library.rs`), one a cycle.
 const VERIFICATION: Duration = Duration::from_millis(124);
 
 /// Two parameter sets with networks: 1,036 bytes.

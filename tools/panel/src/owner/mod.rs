@@ -51,7 +51,7 @@ impl Syncs {
     }
 }
 
-/// Which joint, and by which means.
+/// Joint that is meant, and the means to reach it.
 #[derive(Clone, Debug)]
 pub struct Setup {
     /// The bus.

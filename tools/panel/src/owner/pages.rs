@@ -47,7 +47,7 @@ impl Pages {
         }
     }
 
-    /// Whether nobody looks.
+    /// Returns `true` if nobody looks.
     pub fn is_empty(&self) -> bool {
         self.pages.is_empty()
     }

@@ -31,7 +31,7 @@ pub struct Watch {
     foreign_syncs: Subscription,
     /// SDO requests of other clients.
     foreign_requests: Subscription,
-    /// When the last one came.
+    /// Time at which the last one came.
     requested: Option<Instant>,
     emergencies: Subscription,
     node: u8,
@@ -55,7 +55,8 @@ fn unit(signal: &Signal) -> &'static str {
     if signal.unit == OF_CURRENT { "A" } else { signal.unit }
 }
 
-/// Whether a frame of another client begins to write an object of the TPDOs: an SDO download (CiA 301, 7.2.4.3.3).
+/// Returns `true` if a frame of another client begins to write an object of the TPDOs: an SDO download (CiA 301,
+/// 7.2.4.3.3).
 fn changes_tpdos(data: &[u8]) -> bool {
     matches!(data, [command, low, high, ..] if command >> 5 == 1
         && TPDOS.iter().any(|range| range.contains(&u16::from_le_bytes([*low, *high]))))
@@ -119,7 +120,7 @@ impl Watch {
         self.kept.csv(&self.drawn().map(name).collect::<Vec<_>>())
     }
 
-    /// What has come since the last time, as messages.
+    /// Tells what has come since the last time, as messages.
     pub fn look(&mut self, tell: &mut dyn FnMut(Value)) -> Result<(), RemoteError> {
         if self.is_changed()? {
             let problem = "another client changes the TPDOs; live values ended, Look begins anew".into();
@@ -165,7 +166,7 @@ impl Watch {
         Ok(())
     }
 
-    /// Whether another client has written to the TPDOs.
+    /// Returns `true` if another client has written to the TPDOs.
     fn is_changed(&mut self) -> Result<bool, RemoteError> {
         while let Some(received) = self.foreign_requests.try_next()? {
             self.requested = Some(received.at);
@@ -176,7 +177,7 @@ impl Watch {
         Ok(false)
     }
 
-    /// Whether another client asks the joint something: a question in between would end its transfer.
+    /// Returns `true` if another client asks the joint something: a question in between would end its transfer.
     pub fn is_shared(&self) -> bool {
         self.requested.is_some_and(|at| at.elapsed() < SHARED)
     }

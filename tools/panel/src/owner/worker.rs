@@ -51,7 +51,7 @@ pub struct Worker {
     moving: Option<Moving>,
     /// The image that a page uploaded last, for its next steps.
     uploaded: Vec<u8>,
-    /// When a joint that did not answer is asked again, and when the next slow value is read.
+    /// Time at which a joint that did not answer is asked again, and at which the next slow value is read.
     due: Instant,
 }
 

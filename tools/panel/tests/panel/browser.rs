@@ -8,7 +8,7 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::Instant;
 
-/// Whether this machine has a browser and its driver.
+/// Returns `true` if this machine has a browser and its driver.
 pub fn is_there() -> bool {
     let answers = |program: &str| Command::new(program).arg("--version").stdout(Stdio::null()).status().is_ok();
     answers("chromedriver") && answers("chromium")

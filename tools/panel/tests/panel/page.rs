@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use tungstenite::client::IntoClientRequest;
 use tungstenite::{Error, Message, WebSocket};
 
-/// How often a page looks for messages, and says that its button is held.
+/// Interval at which a page looks for messages, and says that its button is held.
 const LOOK: Duration = Duration::from_millis(20);
 /// A machine that is busy misses held-messages: the button is pressed again.
 const PRESSES: u64 = 20;
@@ -218,7 +218,7 @@ impl Page {
         });
     }
 
-    /// What is said before the connection ends.
+    /// Message that is said before the connection ends.
     pub fn closed(&mut self) -> Option<String> {
         let began = Instant::now();
         let mut said = None;

@@ -1,4 +1,4 @@
-//! Whatever happens to a page, the joint is left disabled. A second page sees it.
+//! Safety of the joint: whatever happens to a page, the joint is left disabled. A second page sees it.
 
 use crate::page::Page;
 use crate::served::{Joints, NODE, PATIENCE, Served};

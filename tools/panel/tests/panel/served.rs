@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// How long anything may take: these joints run in real time, and the machine may have much else to do.
+/// Longest time that anything may take: these joints run in real time, and the machine may have much else to do.
 pub const PATIENCE: Duration = Duration::from_secs(60);
 /// Node id of the first joint.
 pub const NODE: u8 = 5;
