@@ -101,7 +101,7 @@ pub const MOTEUS_R4: BoardConfiguration = BoardConfiguration {
         BridgeConfiguration {
             rate: MOTEUS_R4_RATE,
             duty: (0.0, 1.0),
-            // As the gate driver is configured.
+            // Dead time that the gate driver is configured for.
             dead_time: 50e-9,
             dead_time_band: 1.0,
             has_bridge_sensor: true,

@@ -302,7 +302,7 @@ fn receive() -> Option<Frame> {
 fn transmit(sending: &mut TransmitQueue<TO_BUS>, now: u32) {
     let can = pac::FDCAN1;
     let all = usize::from(FIFO);
-    // As many as there are buffers: each turn takes one of them.
+    // One turn for each buffer: each turn takes one of them.
     for _ in 0..all {
         let occupied = can.txbrp().read().0.count_ones() as usize;
         let Some(frame) = sending.pop(now, Buffers { all, occupied }).filter(|_| occupied < all) else { break };
@@ -323,7 +323,7 @@ fn transmit(sending: &mut TransmitQueue<TO_BUS>, now: u32) {
 
 impl Bus {
     fn take(&mut self, frame: &Frame) {
-        // What is known of the joint is much to copy, and TPDOs alone need it.
+        // An observation of the joint is much to copy, and TPDOs alone need it.
         let now = now();
         self.image.at(now);
         if self.receiver.is_sync(frame, now)

@@ -200,7 +200,7 @@ pub fn hold_off() -> bool {
         return false;
     }
     WORDS.held_off.store(true, Ordering::Release);
-    // Where the joint was enabled in the last step, the next one disables it. Without control steps the watchdog ends
+    // If the joint was enabled in the last step, the next one disables it. Without control steps the watchdog ends
     // this.
     let (runs, before) = (is_enabled(), WORDS.steps.load(Ordering::Relaxed));
     while runs && WORDS.steps.load(Ordering::Acquire) == before {

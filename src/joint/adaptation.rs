@@ -367,7 +367,7 @@ impl Adaptation {
             self.quiet += 1;
         }
         if self.touched > PATIENCE_ROWS {
-            // What was learned counts as a second's rows do.
+            // Learned sums count as a second's rows do.
             self.torques = self.torques.map(|sum| FADED * sum);
             self.products = self.products.map(|sums| sums.map(|sum| FADED * sum));
             (self.rows, self.touched) = (0, 0);

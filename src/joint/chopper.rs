@@ -65,8 +65,8 @@ impl Chopper {
     /// One control step at a supply, V; what is not a number is none.
     #[inline(always)]
     pub fn step(&mut self, gains: &ChopperGains, supply: f32) {
-        // As integers, see `motor::number`: negative numbers and what is none come after all others, and are looked at
-        // more closely.
+        // Comparison as integers, see `motor::number`: negative numbers and what is none come after all others, and are
+        // looked at more closely.
         if supply.to_bits() > gains.off.to_bits() || self.mean.to_bits() != 0 {
             self.decide(gains, supply);
         }

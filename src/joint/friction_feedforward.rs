@@ -176,7 +176,7 @@ impl FrictionFeedforward {
             None => self.guard(gains, velocity, wanted),
         };
         let permitted = or_zero(standstill * guarded);
-        // Where nothing is added, not even the sign of a zero changes.
+        // If nothing is added, not even the sign of a zero changes.
         let image = output.torque.to_bits() as f32 * (1.0 / 65536.0);
         let torque = match ADAPTS {
             true => (image + self.adapted) * permitted,
@@ -321,7 +321,7 @@ mod tests {
             feedforward.physical_model(active);
             feedforward.compensate(active, &motion, &wanted)
         };
-        // As if the round before had been like this one.
+        // Last output as if the round before had been like this one.
         let last = stages(&mut feedforward.clone(), &Output::NOTHING).output;
         stages(feedforward, &last)
     }

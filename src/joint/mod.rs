@@ -204,8 +204,8 @@ impl Joint {
 
         let mut brake_open = false;
         let (bridge, reference, current) = if state.makes_torque() {
-            // What is hot bears the current of braking for as long as braking may take; a joint that coasts into
-            // somebody is worse.
+            // Hot parts bear the current of braking for as long as braking may take; a joint that coasts into somebody
+            // is worse.
             let limit = match state {
                 State::OperationEnabled => active.current_limit * derating,
                 _ if self.stopping.bears() => active.current_limit * derating,
@@ -411,7 +411,7 @@ impl Joint {
             return faults;
         }
         let mut faults = self.monitor.measurements(active, measured, currents, observation);
-        // What an encoder that is lost or jumps says of the motion counts for nothing.
+        // The motion by an encoder that is lost or jumps counts for nothing.
         if !faults.contains(Fault::EncoderLost) && !faults.contains(Fault::EncoderJump) {
             let open_loop = demand.command.mode == Mode::OpenLoop;
             let moving = self.monitor.motion(active, motion, self.stale_steps, winding);

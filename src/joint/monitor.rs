@@ -174,7 +174,7 @@ impl Monitor {
         faults.set(Fault::CurrentSensor, self.current_sum.step(unbalanced, CURRENT_SUM_STEPS));
 
         let (lowest, highest) = limits.bus_voltage;
-        // As integers, see `motor::number`: negative numbers and what is none come after all others.
+        // Comparison as integers, see `motor::number`: negative numbers and what is none come after all others.
         let supply = measured.bus_voltage.to_bits();
         faults.set(Fault::OverVoltage, supply > highest.to_bits());
         faults.set(Fault::UnderVoltage, !(lowest.to_bits()..=f32::INFINITY.to_bits()).contains(&supply));

@@ -112,7 +112,7 @@ impl MotionLaw {
         let error = self.velocity - motion.velocity;
         let damped = limited(active.limits.damping * error, limit);
         let torque = limited(damped + self.integral + gains.braking_integral * error, limit);
-        // What the limit has cut off is not integrated: it would drive the joint back after its stop.
+        // Torque that the limit has cut off is not integrated: it would drive the joint back after its stop.
         self.integral = torque - damped;
         if PROFILES {
             self.position = motion.position;

@@ -125,7 +125,7 @@ impl MotionLoop {
         self.held = self.release > 0 || demand.controlword.ends_operation();
         if self.held {
             self.release = self.release.saturating_sub(1);
-            // What of the torque pushes nowhere goes on bearing a load.
+            // The part of the torque that pushes nowhere goes on bearing a load.
             hold = Command { mode: Mode::Hold, torque: command.torque - command.push, ..Command::NOTHING };
             command = &hold;
         }

@@ -101,7 +101,7 @@ impl Joint {
         if !self.offsets.are_known() {
             return self.offsets.add(measured, active.largest_offset);
         }
-        // What happens in "fault" is not trusted.
+        // Measurements in "fault" are not trusted.
         let is_off = matches!(self.machine.state(), State::SwitchOnDisabled | State::ReadyToSwitchOn);
         self.offsets.follow(measured, is_off, self.found.motion.velocity, &active.limits, active.largest_offset);
     }

@@ -224,7 +224,7 @@ impl<'a, P: Program> Objects<'a, P> {
         if self.damaged() != 0 {
             emergency.register |= LOST_BIT;
         }
-        // What does not fit is in the objects all the same.
+        // An EMCY that does not fit is in the objects all the same.
         let _ = self.emergencies.push_back(emergency);
     }
 

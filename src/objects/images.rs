@@ -58,7 +58,7 @@ impl<'a> Images<'a> {
     }
 
     pub(super) fn state(&self) -> u8 {
-        // Nothing staged beside an image in use is what a joint starts with, too.
+        // A joint that starts with an image in use has nothing staged, too.
         match self.life.state() {
             State::Empty if self.stored.active.is_some() => State::Active as u8,
             state => state as u8,

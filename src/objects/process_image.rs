@@ -188,7 +188,7 @@ impl<'a> JointImage<'a> {
         match set_point {
             SetPoint::CoupledVelocity => self.arrived.coupled = true,
             SetPoint::Counter => self.arrived.counter = Some(value as u8),
-            // Nothing that is asked of the joint.
+            // Choices are not asked of the joint.
             choice if choice.is_choice() => {}
             SetPoint::TargetPosition => (self.arrived.asked, self.arrived.position) = (true, true),
             _ => self.arrived.asked = true,

@@ -53,7 +53,7 @@ impl Positions {
         if !rises || !at_once && self.waiting.is_some() {
             return;
         }
-        // Nothing was asked for yet: from where the joint is.
+        // Without a target so far: from where the joint is.
         let from = if self.goes { self.waiting.filter(|_| !at_once).unwrap_or(self.current) } else { actual };
         let target = if word.is_relative() { from.saturating_add(position) } else { position };
         self.acknowledged = true;

@@ -236,7 +236,7 @@ impl SetPoints {
         };
         let target = torque(self.targets.torque, self.torque);
         let offset = torque(self.targets.torque_offset, self.torque_offset);
-        // Who does not say what holds the joint may mean gravity by the target.
+        // A master that does not say what holds the joint may mean gravity by the target.
         let push = if self.targets.torque_offset { target } else { 0.0 };
         let plain = Command { mode: self.mode.of_the_joint(), torque: target + offset, push, ..Command::NOTHING };
         let halts = Controlword(self.controlword).halts();
@@ -250,7 +250,7 @@ impl SetPoints {
                 Some((position, ..)) if !halts => Command { mode: Mode::Profile, position, ..plain },
                 _ => plain,
             },
-            // What bears a load goes on bearing it.
+            // A torque that bears a load goes on bearing it.
             Operation::Velocity | Operation::Position | Operation::ProfileVelocity | Operation::ProfilePosition
                 if !self.follows() =>
             {

@@ -284,7 +284,7 @@ impl Shared {
         let begins =
             Controlword(self.set_point(SetPoint::Controlword) as u16).is_new_set_point() && told & STARTED == 0;
         match mode {
-            // What is told is of the homing before.
+            // The word told is still of the homing before.
             Some(Operation::Homing) if begins => 0,
             _ => told & !STARTED | u16::from(reached) << 10,
         }

@@ -63,7 +63,7 @@ mod tests {
     #[test]
     fn a_bit_of_1_mbit_a_second_has_170_quanta_at_170_mhz() {
         assert_eq!((BUS.bit(), BUS.before_sample() + 1), (170, 126));
-        // What the register holds, and a resynchronisation lies within the phase segments.
+        // Range of the register, and a resynchronisation within the phase segments.
         assert!(BUS.phase2 <= 128 && BUS.jump_width <= BUS.phase1.min(BUS.phase2));
     }
 

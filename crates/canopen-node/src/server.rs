@@ -71,7 +71,7 @@ impl<'a> Server<'a> {
         if frame.id() == LSS_MASTER {
             let outcome = self.lss.receive(request, node_id, self.identity, dictionary);
             if outcome.start {
-                // Nothing but LSS reaches a node without a node id, so it has been initialising since the task looked.
+                // Only LSS reaches a node without a node id, so it has been initialising since the task looked.
                 self.initialise(self.known, dictionary);
             }
             return Some(Frame::full(LSS_SLAVE, outcome.answer?));

@@ -40,7 +40,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     sets[0] = ParameterSet { physical, network: None };
     let parameters = FrictionParameters { domain, selector: Selector::default(), common: CommonTerms::default(), sets };
 
-    // What this friction is at most, in every state, roundings included: it fits the motor, or it is refused.
+    // Bound of this friction in every state, roundings included: it fits the motor, or it is refused.
     let certificate = prove(&parameters).map_err(|refusal| format!("{refusal:?}"))?;
     println!("friction is at most {:.2} Nm", certificate.output_torque().to_f64());
 

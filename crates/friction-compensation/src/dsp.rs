@@ -240,7 +240,7 @@ fn between_knots(knots: &[i16; HALF_TABLE_LEN], step: u32, fraction: i32, sign: 
 pub fn interpolate_product<const SHIFT: u32>(table: &[i32; TABLE_LEN], product: i64) -> i32 {
     let step = (product >> 32) as i32 >> (SHIFT - 12);
     let fraction = (product >> (SHIFT + 8)) as i32 & 0xfff;
-    // Where holding would have changed something, the ends' slopes are zero, and any fraction will do.
+    // If holding would have changed something, the ends' slopes are zero, and any fraction will do.
     let word = at_step(table, step);
     word.wrapping_add((word as i16 as i32) * fraction)
 }

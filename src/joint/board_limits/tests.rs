@@ -208,7 +208,7 @@ fn protects(joint: &Joint, board: &BoardConfiguration, active: &Active, accepted
     assert!(!heated(configured.bridge_temperature - 0.01).0.contains(Fault::BridgeTemperature));
 
     assert!(active.deadline_steps as f32 <= bears.command_deadline * board.bridge.rate);
-    // What a converter reads at either end, whatever the limits are.
+    // Readings of a converter at either end, whatever the limits are.
     for code in [0, 4_095] {
         for phase in 0..3 {
             let mut codes = [board.analog.current_zero as u16; 3];
@@ -283,7 +283,7 @@ fn a_value_above_the_boards_is_refused_with_its_name_and_the_boards_range() {
         let mut names = BTreeSet::new();
         for (setting, _) in attacks(&board) {
             let Some(high) = highest(bears, setting) else { continue };
-            // As far up as the others let it go.
+            // Highest value that the others let it have.
             let mut configuration = board.joint;
             configuration.limits.bus_voltage.1 = bears.supply;
             (configuration.limits.over_current, configuration.limits.regeneration_band) = (bears.over_current, 0.5);

@@ -90,7 +90,7 @@ impl<P: Program> Objects<'_, P> {
             return Err(Abort::VALUE);
         }
         self.configure(&configuration)?;
-        // What else is staged stays so.
+        // Other staged settings stay staged.
         let _ = setting.set(&mut self.staged, number);
         Ok(())
     }

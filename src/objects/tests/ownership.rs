@@ -101,7 +101,7 @@ fn every_setting_of_the_table_is_protected() {
         if matches!(object.field, Field::Setting(_) | Field::AtOnce(_))
             && object.access != canopen_node::Access::ReadOnly
         {
-            // Nothing that the owner set is above all bits of a number.
+            // With all bits set, no number is within what the owner set.
             let value = vec![0xff; object.data_type.bytes().unwrap().into()];
             let mut node = owned();
             let answer = node.download(object.index, object.sub_index, &value);
@@ -212,7 +212,7 @@ fn a_whole_session_that_was_recorded_and_is_sent_again_changes_nothing() {
 #[test]
 fn of_two_rotations_that_race_one_comes_through_whole_or_none() {
     let challenge = owned().challenge();
-    // What each of both sends, who have the same challenge.
+    // Frames of each of both, who have the same challenge.
     let sent = |new: &Key| {
         let mut node = owned();
         node.challenge();
@@ -228,7 +228,7 @@ fn of_two_rotations_that_race_one_comes_through_whole_or_none() {
         let owner = node.owner();
         let kept = node.objects.program().kept.iter().filter_map(|guard| guard.key.as_ref().map(Key::id)).next_back();
         assert_eq!(kept.unwrap_or(key(1).id()), owner, "what is kept is what counts");
-        // What did not come through can be sent again.
+        // A rotation that did not come through can be sent again.
         if owner == key(1).id() {
             node.replay(&first);
             assert_eq!(node.owner(), key(2).id());

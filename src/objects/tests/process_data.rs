@@ -122,7 +122,7 @@ fn a_position_counts_once_it_is_another_one_by_sdo_or_with_the_release_of_halt()
         // And back.
         node.receive(0x205, &rpdo1(0x0F, 0, position));
         assert_eq!(at(&node), Some(position));
-        // Nothing of it is left once operation was disabled, or another mode was chosen meanwhile.
+        // No position is left once operation was disabled, or another mode was chosen meanwhile.
         node.receive(0x205, &rpdo1(0x07, 0, position + 2));
         node.receive(0x205, &rpdo1(0x0F, 0, position + 3));
         node.receive(0x205, &rpdo1(0x0F, 0, position + 3));
@@ -184,7 +184,7 @@ fn what_holds_is_added_in_every_mode_but_the_open_loop_once_it_came_and_through_
                 node.receive(0x205, &rpdo1(controlword, 100, n as i32));
                 node.receive(0x405, &[1, 2, 3, 4, 5, 6, 7, 8]);
             }
-            // What came before operation was enabled is nothing to go by.
+            // A set-point from before operation was enabled is nothing to go by.
             let held = if n == 0 || mode == -2 { 0.0 } else { -0.25 * node.shared.rated_torque() };
             let (with, without) = (node.image.demand().command, without.image.demand().command);
             assert!((with.torque - without.torque - held).abs() < 1e-6, "mode {mode}, {n}: {with:?}");
@@ -246,7 +246,7 @@ fn every_transition_ends_every_set_point_and_keeps_the_mode() {
         let after = node.image.demand();
         assert_eq!((after.controlword, after.command), (Controlword::QUICK_STOP, Command::default()));
         assert_ne!(after.sequence, before.sequence);
-        // What comes now changes nothing, now and after the next start.
+        // Set-points that come now change nothing, now and after the next start.
         node.receive(0x205, &rpdo1(0x0F, 100, 1_000_000));
         node.receive(0x80, &[]);
         assert_eq!(node.image.demand(), after);

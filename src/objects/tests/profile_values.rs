@@ -127,7 +127,7 @@ fn a_position_limit_of_the_profile_is_the_joint_s_own_taken_at_once_with_the_mot
     assert_eq!(taken.limits.position, (-1.25, 0.4));
     assert_eq!((read(&mut node), node.real(0x2103, 3), node.real(0x2103, 4)), ([-1_250_000, 400_000], -1.25, 0.4));
     assert_eq!(node.number(0x2100, 7), 0, "nothing is staged");
-    // What is staged besides stays staged.
+    // Other staged settings stay staged.
     node.set_real(0x2103, 4, 0.7).unwrap();
     write(&mut node, 1, -1_000_000).unwrap();
     assert_eq!((node.real(0x2103, 4), node.number(0x607D, 2)), (0.7, 400_000));

@@ -254,7 +254,7 @@ fn what_an_update_keeps_of_a_record_are_the_same_bytes_but_for_objects_that_nobo
 
     let unknown = [&before[..], &[0xFF, 0x2F, 1, 1, 2, 3, 4]].concat();
     assert_eq!(update(None, Part::Kept, Part::Kept, &unknown), before);
-    // Nothing of a record in another format is kept.
+    // A record in another format is not kept.
     assert_eq!(update(None, Part::Kept, Part::Kept, &[2, 17, 9]), [1, 255, 0]);
 }
 

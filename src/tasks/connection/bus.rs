@@ -40,7 +40,7 @@ pub async fn serve(node: &'static mut Node) {
     loop {
         let frame = with_timeout(TICK, can::next()).await.ok();
         node.work(frame);
-        // Whatever it has written to flash is written.
+        // By now its writes to flash are done.
         control::release();
         // The transition stopped the joint; a start in the middle of that would let it fall.
         let (restart, set_options) = (node.objects.program().restart, node.objects.program().set_options);

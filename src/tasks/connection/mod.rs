@@ -41,7 +41,7 @@ pub fn start(commands: Commands, parts: Parts) -> Result<(Connection, Started), 
     let start = program.start();
     oscillator::trim(start.configuration.oscillator_trim);
     let thermal = program.begin(&start.configuration)?;
-    // What a loss of power left undecided in flash is decided.
+    // By now what a loss of power left undecided in flash is decided.
     control::release();
     let node = node::start(program, &start, commands.demand, parts.can);
     Ok((Connection { node }, Started { thermal, encoder_counts: start.configuration.motor.encoder_counts }))

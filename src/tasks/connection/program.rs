@@ -63,7 +63,7 @@ impl BoardProgram {
     #[inline(never)]
     pub fn begin(&mut self, configuration: &Configuration) -> Result<ThermalSettings, ConfigurationError> {
         let image = self.store.image().unwrap_or_default();
-        // Nothing has been offered, so there is a place.
+        // The place is free: nothing has been offered.
         let prepared = defmt::unwrap!(prepare(&mut self.active, configuration, image))?;
         let thermal = prepared.value().thermal;
         put_to_use(prepared, true);

@@ -99,7 +99,7 @@ impl Store {
 
     /// For the start: a record that is damaged gives way to what was stored before.
     pub fn find_record(&mut self) {
-        // Where the flash refuses the mark that it is damaged, it is found so again.
+        // If the flash refuses the mark that the record is damaged, it is found so again.
         let _ = self.records.usable(&mut self.flash);
     }
 
@@ -123,7 +123,7 @@ impl Store {
         };
         if self.guards.is_damaged() && !guard.locked {
             guard.locked = true;
-            // Where it cannot be written it is found damaged again.
+            // If it cannot be written it is found damaged again.
             let _ = self.keep(&guard);
         }
         guard
@@ -144,7 +144,7 @@ impl Store {
     pub fn count_power_up(&mut self) {
         let Self { flash, log, .. } = self;
         for log in log {
-            // Where the flash refuses it the next fault tries again.
+            // If the flash refuses it the next fault tries again.
             let _ = log.keep_power_up(flash);
         }
     }

@@ -103,7 +103,7 @@ impl BlockUpload {
             let [low, high] = self.crc.map_or(0, BlockCrc::value).to_le_bytes();
             return Ok(Some([0xC1 | unused << 2, low, high, 0, 0, 0, 0, 0]));
         }
-        // What was not acknowledged begins the next block.
+        // Unacknowledged segments begin the next block.
         self.block_size = checked(block_size)?;
         self.base = self.base.saturating_add(u32::from(acknowledged).saturating_mul(7));
         self.sent = 0;

@@ -72,7 +72,7 @@ impl Noise {
 /// Asserts what must hold after each frame: `before` is the state that the frame met.
 fn check(node: &Node, frame: &Frame, before: NmtState, set_points: &BTreeMap<u32, u64>) {
     let after = node.shared.state();
-    // Nothing but NMT changes the state in the interrupt, as it does at once.
+    // Only NMT changes the state in the interrupt, as it does at once.
     if frame.id() != 0 {
         assert_eq!(before, after);
     }

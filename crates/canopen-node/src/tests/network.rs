@@ -152,7 +152,7 @@ fn a_node_is_monitored_once_and_other_nodes_are_nothing_to_it() {
         node.bus(0x70A, &[5]);
     }
     assert_eq!(node.read(0x1003, 0), Ok(1));
-    // What is not monitored any more is no error.
+    // A node that is not monitored any more is no error.
     node.write(0x1016, 1, &[0; 4]).unwrap();
     assert_eq!(node.read(0x1001, 0), Ok(0));
 }

@@ -210,7 +210,7 @@ fn a_sync_with_a_counter_is_as_long_as_1019h_says_and_another_one_counts_and_is_
     assert_eq!((sync(&[1]), sync(&[2])), (vec![], vec![]));
     assert_eq!(sync(&[]), [[0x40, 0x82, 0x11]]);
     assert_eq!((sync(&[]), sync(&[3, 0]), sync(&[4])), (vec![], vec![], vec![]), "once");
-    // Whoever says what SYNC has has seen to it.
+    // A client that writes what SYNC has has seen to it.
     let told = |frames: Vec<Frame>| frames.iter().map(|frame| (frame.id(), frame.data()[0])).collect::<Vec<_>>();
     assert_eq!(told(node.bus(0x605, &[0x2F, 0x19, 0x10, 0, 0, 0, 0, 0])), [(0x585, 0x60), (0x85, 0)]);
     assert_eq!(node.read(0x1001, 0), Ok(0));

@@ -204,7 +204,7 @@ impl FaultLog {
         flash.erase_page(first / PAGE_WORDS)?;
         flash.program(first, encode((HEAD, number, 0)))?;
         (self.page, self.number, self.next) = (page, number, OWN);
-        // Where this power-up is to follow, the one before it is the number that is carried over.
+        // If this power-up is to follow, the one before it is the number that is carried over.
         let carried = self.power_ups.saturating_sub(self.new.into());
         flash.program(first + 1, encode((POWER_UP, carried, 0)))
     }

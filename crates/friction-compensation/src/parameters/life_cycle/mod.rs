@@ -560,7 +560,7 @@ impl LifeCycle {
         match before {
             State::Shadow | State::Trial => self.revert(State::Empty),
             State::Active => {
-                // Nothing is staged to be forgotten.
+                // No image is staged that could be forgotten.
                 self.state = State::Active;
                 Action::Nothing
             }

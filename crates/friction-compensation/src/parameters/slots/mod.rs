@@ -334,7 +334,7 @@ impl Slots {
         let (slot, sequence) = match self.active() {
             Some(active) => (active.other(), self.sequence(active).wrapping_add(1)),
             None => {
-                // What is damaged in the other slot may read right one day: it must not be the newest then.
+                // A damaged payload in the other slot may read right one day: it must not be the newest then.
                 if self.second != SlotState::Empty {
                     retire(flash, &self.layout, Slot::Second)?;
                 }
