@@ -177,7 +177,7 @@ pub fn run(
     };
     let wrong = parameters.joint.friction.scaled(&factors).map_err(|error| error.to_string())?;
     let compensates = variant.is_some();
-    // Where a way leads there, it ends in the same state with compensation and without.
+    // If a way leads there, it ends in the same state with compensation and without.
     let acts = if matches!(knowledge, Knowledge::Image(_)) { Request::PhysicalAndNetwork } else { Request::Physical };
     let request = if compensates || alone.gravity().is_some() { acts } else { Request::Off };
     let mut setup = Setup::of(&parameters).compensating(request);
@@ -269,7 +269,7 @@ pub fn run(
             _ if alone.held() || alone == Alone::Sprung => {
                 0.5 * f64::from(gains.stiffness) * (position - spring).powi(2)
             }
-            // What the command bears is no energy of the joint's.
+            // Work of a load that the command bears is no energy of the joint's.
             Alone::Borne => -parameters.joint.load.gravity_amplitude() * (1.0 - position.cos()),
             _ => 0.0,
         } - bears * parameters.joint.load.gravity_amplitude() * (1.0 - position.cos());
@@ -288,7 +288,7 @@ pub fn run(
             seen.pushed = seen.pushed.max(energy - rest);
         }
         if alone.gravity().is_some() {
-            // What a weight that is borne wrong puts into motion counts as a push does.
+            // Motion that a wrongly borne weight causes counts as a push does.
             begin = if begin.is_nan() { energy } else { begin };
             seen.pushed = seen.pushed.max(begin - energy);
         }

@@ -58,7 +58,7 @@ pub const ALL: [Variant; 9] = [
     },
     Variant {
         name: "no energy guard",
-        // Nothing counts as speeding up.
+        // No motion counts as speeding up.
         prepare: |active| active.compensation.standstill = f32::INFINITY,
         ..DEFAULT
     },

@@ -186,7 +186,7 @@ fn beyond_the_trained_box_the_network_then_the_physical_model_fade_to_nothing_wi
         let settings = unlimited(Request::PhysicalAndNetwork);
         let range = parameters.domain.ranges[signal as usize];
         let width = (range.half_width() as f64 * parameters.domain.margin as f64 / 65536.0).floor();
-        // Nothing fades towards the cold.
+        // No fade towards the cold.
         let outwards = if random.random() || signal == Signal::Temperature { 1.0 } else { -1.0 };
         let edge = if outwards > 0.0 { range.high } else { range.low };
         let inside = parameters.domain.ranges.map(|range| within(&mut random, range));

@@ -1,4 +1,4 @@
-// What a program for the emulated Cortex-M4F needs around its work: start, output and end. Included by both programs.
+// Surroundings of a program for the emulated Cortex-M4F: start, output and end. Included by both programs.
 
 use core::arch::asm;
 

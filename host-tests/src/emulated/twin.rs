@@ -158,7 +158,7 @@ impl<'v> Twin<'v> {
         }
         given.measured.bus_voltage = supply;
         let encoder = W::encoder_taken(memory, &self.variables.encoder, given.encoder)?;
-        // Where the encoder did not answer, its last good angle stands in.
+        // If the encoder did not answer, its last good angle stands in.
         self.angle = encoder.angle.unwrap_or(self.angle);
         given.measured.encoder = self.angle;
         given.measured.encoder_valid = encoder.angle.is_some();

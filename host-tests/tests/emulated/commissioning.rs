@@ -214,7 +214,7 @@ fn is_commissioned<W: Wired>(board: &'static str, wired: fn(Drivetrain) -> W, se
     if !condition.faults.is_empty() {
         return Err(format!("a fault is left: {}\n{told}", condition.faults).into());
     }
-    // What was found outlasts a loss of power.
+    // The results outlast a loss of power.
     joint.objects().bench.restart(NODE)?;
     for (setting, wanted) in &found.settings {
         let kept = joint.setting(*setting).map_err(|stopped| stopped.to_string())?;
@@ -236,8 +236,7 @@ fn turns_again(seed: u64) -> Result<(), Failed> {
     commission(&mut joint, &motor.plan, &mut telling)
         .map_err(|failure| format!("{failure}\n{}", telling.told.join("\n")))?;
     let gear = joint.setting(Setting::GearRatio).map_err(stopped)?;
-    // Where the link is, and where the joint says that it is: what is between both stays, but for whole turns of the
-    // rotor.
+    // Difference of the link's position and the one that the joint tells: it stays, but for whole turns of the rotor.
     let between = |joint: &mut Joint<OnBoard<'_, BG431BEsc1>>| -> Result<f64, String> {
         let [position, ..] = joint.motion().map_err(stopped)?;
         let link = joint.objects().bench.board().drivetrain().actuator().state().joint.position;

@@ -182,7 +182,7 @@ fn stop<W: Wired>(mut bench: Bench<W>, stage: Stage, cause: Cause, rate: f64, br
     let drive = |controlword: u16, mode: i8| {
         let mut frame = controlword.to_le_bytes().to_vec();
         frame.push(mode as u8);
-        // Where it is a target, the joint goes on as it does.
+        // If it is a target, the joint goes on as it does.
         frame.extend(((1e3 * fastest) as i32).to_le_bytes());
         frame
     };

@@ -184,7 +184,7 @@ fn under<W: Observed>(bench: &mut Bench<W>, frames: fn(u32) -> Vec<Heard>) -> Re
         }
     }
     let microseconds = (bench.emulation.now().0 - from.0) as f64 * 1e-6;
-    // What is still waiting goes before the next load.
+    // Frames that still wait go before the next load.
     for _ in LASTS..LASTS + 50 {
         send(&mut bench.emulation, 0x300 + u16::from(NODE), &set_point(0x0F, 0.0))?;
         bench.run(SET_POINT)?;

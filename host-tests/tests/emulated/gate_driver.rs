@@ -289,7 +289,7 @@ fn other_boards() -> Result<(), Failed> {
         expect("2302h", told(&mut bench)?, ([0; 2], 0, WRONG_BOARD))?;
         expect("2302h:5", bench.number(NODE, 0x2302, 5)?, u32::from(code))?;
         bench.expect("nothing is driven")?;
-        // Whatever is asked for.
+        // Any frame that is asked for.
         send(&mut bench.emulation, 0x000, &[0x01, NODE])?;
         for word in [SHUTDOWN, 0x07, 0x0F] {
             send(&mut bench.emulation, 0x300 + u16::from(NODE), &[word as u8, 0, 9, 0, 0, 0, 0])?;

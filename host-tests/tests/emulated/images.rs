@@ -99,11 +99,11 @@ fn takes_an_image<W: Observed>(name: &str, board: impl FnOnce(Drivetrain) -> W) 
     }
     expect("state", bench.number(NODE, 0x2212, 2)?, ACTIVE)?;
     expect("version", bench.number(NODE, 0x2213, 1)?, VERSION)?;
-    // Everything that is stored beside images takes the same way through the SDO server.
+    // Other stored contents take the same way through the SDO server.
     bench.download(NODE, 0x1010, 1, b"save")?;
 
     let (used, region) = stack.used(&mut bench.emulation)?;
-    // Whatever it learned before, it has from flash now.
+    // If it learned something before, it has it from flash now.
     let booted = bench.exchange(cob_id::NMT, &[0x81, NODE], 0.5)?;
     bench.has_booted(NODE, &booted)?;
     match bench.emulation.resets() {

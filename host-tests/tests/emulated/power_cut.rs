@@ -135,7 +135,7 @@ impl Content {
                 let value = first + step * number as f32;
                 bench.download(NODE, index, sub_index, &value.to_le_bytes())?;
             }
-            // What is staged comes into use, and is stored.
+            // Staged settings come into use, and are stored.
             bench.download(NODE, 0x2100, 1, &[1])?;
             match bench.upload(NODE, 0x2100, 2)?.as_slice() {
                 [0] => {}
@@ -282,7 +282,7 @@ impl Case<'_> {
             let found = self.find(permitted)?;
             let request = (self.content.request)(&mut self.bench, 20)?;
             self.bench.exchange(request.0, &request.1, 0.0)?;
-            // As far as one knows before it is stored, it changes what is there.
+            // By all that is known before it is stored, it changes what is there.
             let mut whole = self.bench.clone();
             let operations = whole.written()?;
             let next = (self.content.read)(&mut whole)?;

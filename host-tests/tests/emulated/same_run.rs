@@ -86,7 +86,7 @@ fn same_every_time<W: Wired + Clone>(board: fn(Drivetrain) -> W) -> Result<(), F
             return Err(format!("{what}, the run is another one").into());
         }
     }
-    // What is compared does tell runs apart: one bit of noise is enough.
+    // The comparison does tell runs apart: one bit of noise is enough.
     match run(board, &program, How { seed: 2, ..once })? == first {
         true => Err("other noise makes no difference".into()),
         false => Ok(()),

@@ -248,7 +248,7 @@ fn storage<W: Wired>(board: fn(Drivetrain) -> W) -> Result<(), Failed> {
     let new = 0.25f32.to_le_bytes();
     kept.keep(&bench.emulation)?;
     bench.download(NODE, DEADLINE.0, DEADLINE.1, &new)?;
-    // What is staged comes into use, and can be stored.
+    // Staged settings come into use, and can be stored.
     bench.download(NODE, 0x2100, 1, &[1])?;
     bench.run(0.001)?;
 

@@ -92,7 +92,7 @@ fn seldom_or_operating(name: &str) -> bool {
         "5joint12regeneration",
         "5motor15field_weakening",
         "19FrictionFeedforward5reset",
-        // Of what clears the current loop's memory in them.
+        // Veneer of what clears the current loop's memory in them.
         "LongThunk___aeabi_memclr",
     ]
     .iter()

@@ -96,7 +96,7 @@ impl Batch {
                 && calm
                 && random.random_range(0..64) > 0
             {
-                // What criteria look at stays.
+                // Signals that criteria look at stay.
                 for place in [Signal::Velocity as usize, Signal::Acceleration as usize, INPUTS - 2] {
                     state[place] = last[place];
                 }

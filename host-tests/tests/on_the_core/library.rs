@@ -83,7 +83,7 @@ fn build_probe() -> Result<PathBuf, Failed> {
 }
 
 fn links_little() -> Result<(), Failed> {
-    // That it links at all shows that no panic can be reached: see the probe's panic handler.
+    // A program that links at all shows that no panic can be reached: see the probe's panic handler.
     let bytes = std::fs::read(build()?)?;
     let program = object::File::parse(&*bytes)?;
     let names: Vec<String> = program.symbols().filter_map(|symbol| symbol.name().ok().map(str::to_owned)).collect();

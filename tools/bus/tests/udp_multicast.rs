@@ -63,7 +63,7 @@ fn members() -> Result<(), Failed> {
     assert_eq!(received(&*a, wait), [100]);
     assert_eq!(received(&*b, wait), (1..=50).collect::<Vec<_>>());
     assert_eq!(received(&*c, wait), (1..=50).chain([100]).collect::<Vec<_>>());
-    // What is no frame is counted.
+    // Datagrams that are no frame are counted.
     let stranger = std::net::UdpSocket::bind("0.0.0.0:0")?;
     stranger.send_to(b"hello", (GROUP, port))?;
     assert_eq!((received(&*a, wait), a.lost()), (vec![], 1));

@@ -180,8 +180,8 @@ mod tests {
     fn offsets_that_cannot_be_are_told() {
         let (mut memory, rtt) = channel(9, 0);
         assert_eq!(rtt.read(&mut memory, 0), Err(RttError::Damaged { size: 8, write: 9, read: 0 }));
-        // As memory comes up: a buffer that ends beyond the address space, one that ends with it, and one as large as
-        // it.
+        // Contents of memory as it comes up: a buffer that ends beyond the address space, one that ends with it, and
+        // one as large as it.
         for (buffer, size, write, read) in [
             (u32::MAX - 6, 8, 5, 2),
             (u32::MAX - 8, 8, 5, 2),

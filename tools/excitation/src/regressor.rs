@@ -53,7 +53,7 @@ impl Regressor {
         gram.fill_lower_triangle_with_upper_triangle();
         let values = gram.symmetric_eigenvalues();
         let (least, greatest) = (values.min(), values.max());
-        // What is left of zero after rounding.
+        // Remainder of zero after rounding.
         if least > 1e-14 * greatest { (greatest / least).sqrt() } else { f64::INFINITY }
     }
 }

@@ -188,7 +188,7 @@ fn day(entry: &Entry, own: Option<&Estimate>, reference: Option<&Side>) -> Day {
     let unexplained = own.zip(reference).map(|(own, reference)| {
         let mut left = *own;
         left.values.iter_mut().zip(reference.found.values).for_each(|(value, before)| *value -= before);
-        // What the day's own parameters leave is orthogonal to what they explain.
+        // The residual of the day's own parameters is orthogonal to what they explain.
         let all: Vec<usize> = (0..left.values.len()).collect();
         rms(&entry.sums, &all, &left).hypot(own.residual) / own.torque
     });

@@ -99,7 +99,7 @@ fn every_joint_that_changed_is_found_with_kind_and_day_and_no_other() {
     assert!((change.friction - 1.4).abs() < 0.1 && (change.rigid - 1.0).abs() < 0.05, "{change:?}");
     let change = of(&findings, 35).change.unwrap();
     assert!((change.rigid - 0.8).abs() < 0.02 && (change.friction - 0.8).abs() < 0.05, "{change:?}");
-    // What is worst comes first.
+    // The worst comes first.
     assert!(findings.windows(2).all(|pair| pair[0].kind <= pair[1].kind));
 }
 

@@ -97,7 +97,7 @@ fn every_command_says_by_2_that_its_arguments_are_wrong_and_leaves_nothing_behin
         if command.get_arguments().any(|argument| argument.get_long() == Some("timeout")) {
             for (value, is_refused) in [("9", true), ("10", false), ("600000", false), ("600001", true)] {
                 let words = ["jointctl"].into_iter().chain(name.split(' ')).chain(["--timeout", value]);
-                // What else is missing is told only once every value is valid.
+                // Other missing arguments are told only once every value is valid.
                 let error = arguments().try_get_matches_from(words).err();
                 let refused = error.as_ref().is_some_and(|error| error.kind() == ErrorKind::ValueValidation);
                 assert_eq!(refused, is_refused, "{name} --timeout {value}: {error:?}");

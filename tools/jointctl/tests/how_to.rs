@@ -143,7 +143,7 @@ fn ros2_canopen(python: Option<&Path>) -> Result<(), Failed> {
     }
     let joints = folder.path().join("joints");
     let read = |name: &str| std::fs::read_to_string(joints.join(name));
-    // What the table of the page says of the file.
+    // Facts of the file by the table of the page.
     let bus_yml = read("bus.yml")?;
     let told = scales_of_the_table(ROS2_CANOPEN);
     for (key, value) in &told {

@@ -241,7 +241,7 @@ impl Scan<'_> {
         }
         topic.rows += 1;
         self.rows += 1;
-        // What this message lacks is missing in this row.
+        // Columns that this message lacks are missing in this row.
         topic.numbers.values_mut().for_each(|values| values.resize(topic.rows, f64::NAN));
         topic.texts.values_mut().for_each(|texts| {
             (texts.codes.len()..topic.rows).for_each(|_| texts.push(""));

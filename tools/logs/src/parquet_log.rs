@@ -49,7 +49,7 @@ pub fn read(path: &Path, wanted: &Wanted) -> Result<Table, LogError> {
 
 /// Runs a reader. The crate `parquet` panics at lengths and places in a damaged file that it does not check.
 fn guarded<T>(path: &Path, read: impl FnOnce() -> Result<T, LogError>) -> Result<T, LogError> {
-    // Nothing outlives a panic but the path.
+    // Only the path outlives a panic.
     let read = std::panic::catch_unwind(std::panic::AssertUnwindSafe(read));
     read.unwrap_or_else(|_| {
         let reason = "its lengths contradict each other".into();

@@ -116,7 +116,7 @@ impl Program for VirtualProgram {
     }
 
     fn count_power_up(&mut self) {
-        // Where it is refused the next fault tries again.
+        // If it is refused the next fault tries again.
         let _ = self.log.keep_power_up(self.storage.log());
     }
 

@@ -85,7 +85,7 @@ fn serve_by(
 ) -> Result<f64, ServeError> {
     let origin = node.now();
     let (start, mut lost) = (clock(), Duration::ZERO);
-    // Where the node would be if it were as fast as the clock.
+    // Time of the node if it were as fast as the clock.
     let target = |lost| origin + clock().saturating_sub(start + lost);
     while !stop.load(Ordering::Relaxed) {
         // Frames do not wait for a machine that is behind to catch up, and it does not wait for them.
@@ -144,7 +144,7 @@ mod tests {
         }
 
         fn live_until(&mut self, instant: Duration) -> Result<(), String> {
-            // Whatever is simulated, looking at the clock takes time as well.
+            // Looking at the clock takes time as well, whatever is simulated.
             self.clock.set(self.clock.get() + 2 * (instant - self.now) + Duration::from_micros(100));
             self.now = instant;
             (self.others)(self.received, self.now)

@@ -77,7 +77,7 @@ fn the_version_floor_stays_on_every_path_of_an_image_but_a_commit_which_raises_i
     master.image(TRIAL).unwrap();
     master.image(DISCARD).unwrap();
     assert_eq!((floor(&mut master), in_use(&mut master)), (7, 7));
-    // What is refused raises nothing either.
+    // A refused command raises nothing either.
     let mut forged = signed(u32::MAX);
     forged[40] ^= 1;
     assert!(!verifies(&mut master, &forged) && !verifies(&mut master, &SampleImage::constant(u32::MAX, 0.25)));

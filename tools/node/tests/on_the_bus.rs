@@ -98,7 +98,7 @@ fn an_image_goes_from_upload_by_way_of_a_trial_to_flash_and_back() {
     master.image(3).unwrap();
     assert_eq!((master.number(0x2213, 1), master.number(0x2214, 1)), (2, 1));
 
-    // What a loss of power leaves.
+    // Images that a loss of power leaves.
     let images = SlotImages::open(master.node.flash()).unwrap();
     let mut master = Master::with(images);
     assert_eq!((master.number(0x2213, 1), master.number(0x2214, 1)), (2, 1));

@@ -105,7 +105,7 @@ fn a_set_point_is_taken_followed_along_its_profile_and_reached_without_being_ren
         assert_eq!(master.state(), State::OperationEnabled, "nobody renewed anything");
         // Way, speed and ramps of a trapezoid.
         let [v, a, d] = [velocity, acceleration, deceleration].map(|milli| 1e-3 * f64::from(milli));
-        // Which ends where it is within the window.
+        // The trapezoid ends where it is within the window.
         let trapezoid = 1.0 / v + 0.5 * v / a + 0.5 * v / d - (2.0 * WINDOW / d).sqrt();
         let took = 1e-3 * time as f64;
         assert!((0.97 * trapezoid..1.03 * trapezoid + 0.1).contains(&took), "{took} s, not {trapezoid} s");
@@ -523,7 +523,7 @@ fn a_value_that_would_never_let_the_joint_stop_is_refused() {
 fn a_start_of_homing_takes_back_at_once_what_was_said_of_the_one_before() {
     let mut master = enabled(HOMING);
     assert_eq!(home(&mut master, 37, 0), REACHED | TAKEN);
-    // What TPDO 1 says, with no time for the task between: it knows of the homing before alone.
+    // Word of TPDO 1, with no time for the task between: it knows of the homing before alone.
     let told = |master: &mut Master, word: u16| {
         master.listen();
         master.heard.clear();

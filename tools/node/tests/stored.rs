@@ -70,7 +70,7 @@ fn a_joint_whose_configuration_is_damaged_says_so_at_every_start_and_is_not_enab
             let mut master = start(folder.path());
             assert!(master.emergencies().contains(&0x6310), "{:04x?}", master.emergencies());
             assert_eq!((master.number(0x1001, 0), master.number(DAMAGED.0, DAMAGED.1)), (0x81, 2));
-            // What was stored before, or the defaults.
+            // Settings stored before, or the defaults.
             assert_eq!(staged(&mut master), if stores == 2 { 50.0 } else { defaults });
             assert_eq!(tries_to_enable(&mut master), State::SwitchOnDisabled);
         }

@@ -59,7 +59,7 @@ mod tests {
         }
         for asset in ASSETS {
             assert!(!asset.text.contains("http:") && !asset.text.contains("https:"), "{}", asset.path);
-            // What comes from a joint is text, never markup.
+            // Content from a joint is text, never markup.
             assert!(!asset.text.contains("innerHTML") && !asset.text.contains("eval("), "{}", asset.path);
         }
     }

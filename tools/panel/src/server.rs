@@ -105,7 +105,7 @@ impl Drop for Server {
     fn drop(&mut self) {
         self.stop.take();
         if let Some(thread) = self.thread.take() {
-            // What it says of its end interests nobody any more.
+            // The outcome of the thread interests nobody any more.
             let _ = thread.join();
         }
     }

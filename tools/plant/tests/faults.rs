@@ -129,7 +129,7 @@ fn an_open_phase_carries_no_current_driven_or_not() {
             actuator.advance(true, duties, 0.0, PERIOD);
             let currents = actuator.state().phase_currents;
             let largest = currents.iter().fold(0.0_f64, |most, i| i.abs().max(most));
-            // What is left is the rotor's change of speed within a period.
+            // The remaining current is the rotor's change of speed within a period.
             assert!(currents[phase.index()].abs() < 3e-4 * largest + 1e-9, "{currents:?}");
             assert!(currents.iter().sum::<f64>().abs() < 1e-9);
             others = others.max(largest);

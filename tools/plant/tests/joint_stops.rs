@@ -191,7 +191,7 @@ fn stopped(mode: Operation, way: Way, stops: StopConfiguration, brake: bool) -> 
     match way {
         Way::QuickStop => rig.demand.controlword = Controlword::QUICK_STOP,
         Way::Nmt => {
-            // As `objects::process_image` asks: once, and then no set-point comes.
+            // Request of `objects::process_image`: once, and then no set-point comes.
             (rig.demand.controlword, rig.demand.command) = (Controlword::QUICK_STOP, Command::default());
             rig.step();
             rig.silent = true;
@@ -199,7 +199,7 @@ fn stopped(mode: Operation, way: Way, stops: StopConfiguration, brake: bool) -> 
         Way::Shutdown => rig.demand.controlword = Controlword::SHUTDOWN,
         Way::DisableOperation => rig.demand.controlword = Controlword::SWITCH_ON,
         Way::Halt => {
-            // As `objects::set_points` asks.
+            // Request of `objects::set_points`.
             rig.demand.controlword = Controlword(Controlword::ENABLE_OPERATION.0 | Controlword::HALT.0);
             rig.demand.command = Command { mode: Mode::Hold, limits: limits(mode), ..Command::NOTHING };
         }
@@ -413,7 +413,7 @@ fn a_joint_that_stopped_for_a_late_command_goes_on_only_when_it_is_asked_anew() 
     rig.step();
     assert_eq!(rig.state(), State::OperationEnabled);
     rig.run(1.0);
-    // What bore the load goes on bearing it.
+    // The torque that bore the load goes on bearing it.
     assert!((rig.position() - held).abs() < 5e-3, "{held}: {}", rig.position());
 }
 

@@ -193,7 +193,7 @@ impl Staging {
 
 impl Drop for Staging {
     fn drop(&mut self) {
-        // What is left here is of no use to anyone, and the output is already decided.
+        // Files left here are of no use to anyone, and the output is already decided.
         let _ = fs::remove_dir_all(&self.root);
     }
 }

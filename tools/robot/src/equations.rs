@@ -172,7 +172,7 @@ impl Rows {
             .into_par_iter()
             .map(|group| {
                 let used: Vec<usize> = samples.iter().copied().filter(|&i| self.group[i] == Some(group)).collect();
-                // As matrices: a product of blocks is faster than sums of rows.
+                // Matrices: a product of blocks is faster than sums of rows.
                 let active: Vec<usize> = self.active(j);
                 let mut matrix = self.columns(j, &used, &active);
                 let mut effort = DVector::zeros(used.len());

@@ -18,7 +18,7 @@ impl Network {
     pub fn fastscan(&self, wait: Duration) -> Result<Option<Address>, ClientError> {
         let answers = self.subscribe(|frame| frame.id() == cob_id::LSS_SLAVE);
         for attempt in 1..=ATTEMPTS {
-            // Whoever is half way through another scan or configuration forgets it.
+            // Nodes half way through another scan or configuration forget it.
             self.lss(&request::switch_global(false))?;
             let mut scan = Fastscan::new();
             loop {

@@ -90,7 +90,7 @@ impl Shared {
                 Ok(None) => {}
                 Err(error) => {
                     *lock(&self.failure) = Some(error);
-                    // Whoever waits for a frame sees the channel closed.
+                    // Subscribers that wait for a frame see the channel closed.
                     lock(&self.subscribers).clear();
                     return;
                 }

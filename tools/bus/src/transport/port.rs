@@ -57,7 +57,7 @@ mod tests {
     fn no_port_is_given_twice_nor_where_somebody_has_it() {
         let _alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
         let first = free_port().unwrap();
-        // Whoever takes the next one is not asked.
+        // Sockets of somebody who does not ask take the next ports.
         let sockets: Vec<_> =
             (first + 1..first + 4).filter_map(|port| UdpSocket::bind(("0.0.0.0", port)).ok()).collect();
         let buses: Vec<_> =

@@ -39,7 +39,7 @@ impl Hasher for Words {
         }
     }
 
-    // As `write` would, without going through bytes: what is hashed are mostly small numbers and enumerations.
+    // Same as `write` without going through bytes: what is hashed are mostly small numbers and enumerations.
     fn write_u8(&mut self, word: u8) {
         self.write_u64(u64::from(word));
     }

@@ -37,7 +37,7 @@ impl<W: Wiring> Chip<W> {
                 self.timers[place].advance(cycle);
                 self.tell(place, cycle);
             }
-            // What it has started may be due as well.
+            // Timers that it has started may be due as well.
             left = (left | self.agenda.changed()) & !((2 << place) - 1);
         }
         if self.next_slow <= cycle {

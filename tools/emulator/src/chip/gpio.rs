@@ -142,7 +142,7 @@ impl Gpio {
     pub fn write(&mut self, port: u8, offset: u32, value: u32) -> Result<(), Refusal> {
         let block = &mut self.ports[usize::from(port)];
         match offset {
-            // Where both are asked for, setting wins (9.4.7).
+            // If both are asked for, setting wins (9.4.7).
             BSRR => block.set(ODR, block.get(ODR) & !(value >> 16) | value & 0xffff),
             BRR => block.set(ODR, block.get(ODR) & !(value & 0xffff)),
             _ => {

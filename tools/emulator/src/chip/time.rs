@@ -65,7 +65,7 @@ impl Clock {
         }
         let elapsed = u128::from(instant.0.saturating_sub(self.instant.0));
         let cycles = (elapsed * u128::from(self.frequency)).div_ceil(SECOND) as u64;
-        // What `instant` rounds down makes the cycle before the first one whose beginning is not earlier.
+        // Rounding down in `instant` makes this the cycle before the first one whose beginning is not earlier.
         let cycle = self.cycle.saturating_add(cycles);
         if cycle > self.cycle && self.instant(cycle - 1) >= instant { cycle - 1 } else { cycle }
     }

@@ -61,7 +61,7 @@ impl<B: Bus> Cpu<B> {
         };
         self.r[14] = if floating { return_value & !0x10 } else { return_value };
         self.now += timing::ENTRY;
-        // What has arrived meanwhile, or what stacking has caused, may be more urgent.
+        // An exception that has arrived meanwhile, or that stacking has caused, may be more urgent.
         if self.now >= self.due() {
             self.catch_up();
         }

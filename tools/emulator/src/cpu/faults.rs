@@ -38,7 +38,7 @@ impl<B: Bus> Cpu<B> {
             self.pc = pc;
             return;
         }
-        // What the handler returns to is the instruction itself; a supervisor call has completed.
+        // Return address of the handler: the instruction itself; a supervisor call has completed.
         let back = if trap == Trap::Escalated { self.pc } else { pc };
         let current = self.interrupts.current();
         self.record(trap);

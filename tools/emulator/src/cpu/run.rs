@@ -12,7 +12,7 @@ impl<B: Bus> Cpu<B> {
     /// completes.
     pub fn run(&mut self, until: u64) -> End {
         self.until = until;
-        // Whoever runs the core may have changed what it is connected to.
+        // The caller may have changed what the core is connected to.
         self.read_signals();
         self.attention = 0;
         loop {
@@ -34,7 +34,7 @@ impl<B: Bus> Cpu<B> {
         self.until = u64::MAX;
         self.read_signals();
         let before = self.instructions;
-        // What was not decoded yet takes a turn by itself.
+        // An instruction that was not decoded yet takes a turn by itself.
         while self.instructions == before {
             if let Some(end) = self.attend() {
                 return Some(end);

@@ -121,7 +121,7 @@ impl<B: Bus> Stretches<B> {
         }
         let first = self.steps.len();
         let (mut next, mut before_last, mut mark) = (place, 0, Mark::default());
-        // What the last instruction can be in a pair, and the one before.
+        // Roles in a pair of the last instruction, and of the one before.
         let mut lately = [Part::None; 2];
         while let Some(operation) = kept(next)
             && usize::from(mark.instructions) < LONGEST

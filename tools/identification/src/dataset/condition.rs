@@ -6,7 +6,7 @@ use super::load::Table;
 /// For each row whether `condition` holds. The columns it names must have been loaded as the kinds that it compares
 /// with.
 pub fn holds(condition: &Condition, table: &Table) -> Vec<bool> {
-    // Nothing is one of no values.
+    // No value is one of an empty list.
     let mut mask = vec![condition.one_of.as_ref().is_none_or(|list| !list.is_empty()); table.len()];
     if let Some(values) = table.numbers.get(&condition.column) {
         for (holds, &x) in mask.iter_mut().zip(values) {

@@ -186,7 +186,7 @@ fn fold_error(
     let network = problem.task(seen, checks, input_box, SEEDS).run(trainer, true)?.network;
     let before = rmse(judged.iter().map(|&i| residual(i)));
     let after = rmse(judged.iter().map(|&i| residual(i) - network.evaluate(&network_inputs(samples, i))));
-    // As a ratio: the draw of the samples that are judged is not that of the physical model's error.
+    // Error as a ratio: the draw of the samples that are judged is not that of the physical model's error.
     Ok(model.rmse * after / before.max(f64::MIN_POSITIVE))
 }
 

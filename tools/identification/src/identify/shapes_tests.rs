@@ -52,7 +52,7 @@ fn neither_is_offered_to_a_joint_that_has_none() {
 #[test]
 fn a_ripple_has_a_part_whatever_the_direction_from_eight_periods_over_the_range_on() {
     assert!(!has_torque(7.99 * TAU / 3.0, 3.0) && has_torque(8.01 * TAU / 3.0, 3.0));
-    // What gravity leaves looks like a slow ripple whatever the direction.
+    // The rest of gravity looks like a slow ripple whatever the direction.
     let (mut samples, slow) = (motion(12_000), Ripple { frequency: 5.0, torque_sine: 0.4, ..Ripple::default() });
     let truth = FrictionModel {
         terms: Terms::of(&[Term::Viscous, Term::Coulomb, Term::Ripple]),

@@ -17,7 +17,7 @@ impl Completions {
     pub fn run(self) -> Result<(), CommandError> {
         let mut script = Vec::new();
         clap_complete::generate(self.shell, &mut arguments(), "jointctl", &mut script);
-        // Whoever closes the pipe, as `head` does, has seen enough.
+        // A reader that closes the pipe, as `head` does, has seen enough.
         let _ = std::io::stdout().write_all(&script);
         Ok(())
     }

@@ -56,7 +56,7 @@ impl Enable {
     /// Runs the command.
     pub fn run(&self) -> Result<(), CommandError> {
         let (complete, left) = self.held.run(Command::default(), self.duration)?;
-        // That somebody ends it is how it ends.
+        // An end by the user is the normal end.
         println!("node {}: {}{left}", self.held.on.node, if complete { "" } else { "ended early; " });
         Ok(())
     }

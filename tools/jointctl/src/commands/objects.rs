@@ -71,7 +71,7 @@ impl Get {
                 true => format!("{:#}\n", content.map(|entry| entry.json()).collect::<serde_json::Value>()),
                 false => content.map(|entry| format!("{}\n", entry.listed())).collect(),
             };
-            // Whoever closes the pipe, as `head` does, has seen enough.
+            // A reader that closes the pipe, as `head` does, has seen enough.
             let _ = std::io::stdout().write_all(text.as_bytes());
             return Ok(());
         };
@@ -149,7 +149,7 @@ impl Set {
         let joint = self.on.joint()?;
         configuration::set(&joint, &wanted)?;
         for (entry, _) in wanted {
-            // What cannot be read is a command.
+            // An object that cannot be read is a command.
             let shown = if entry.is_readable() { info::show_entry(&joint, entry)? } else { "done".into() };
             println!("{:<32} {shown}", entry.described());
         }

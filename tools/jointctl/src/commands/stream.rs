@@ -38,7 +38,7 @@ pub fn permits(force: Force, path: &Path) -> Result<(), CommandError> {
 /// [`CommandError`]; what was there before is still there.
 pub fn write(path: &Path, contents: &[u8], said: &str) -> Result<(), CommandError> {
     if is_stream(path) {
-        // Whoever closes the pipe, as `head` does, has seen enough.
+        // A reader that closes the pipe, as `head` does, has seen enough.
         let _ = io::stdout().write_all(contents).and_then(|()| io::stdout().flush());
         return Ok(());
     }

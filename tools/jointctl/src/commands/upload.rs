@@ -38,7 +38,7 @@ impl Upload {
     pub fn run(&self) -> Result<(), CommandError> {
         let upload = match self.image.extension() {
             Some(ending) if ending.eq_ignore_ascii_case("toml") => bytes(&read(&self.image)?, &self.image)?,
-            // As it is: what is wrong with it is the joint's to say.
+            // Bytes as they are: what is wrong with them is the joint's to say.
             _ => stream::read(&self.image)?,
         };
         let usage = match (self.shadow, self.trial, self.commit) {

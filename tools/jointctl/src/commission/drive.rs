@@ -26,7 +26,7 @@ pub(super) fn powered<B: Bench, T, E: From<Stopped>>(
     let begun = bench.enable().map_err(E::from);
     let mut drive = Drive { bench, frame: Frame::default(), window };
     let done = begun.and_then(|()| something(&mut drive));
-    // What went wrong first is what is told.
+    // The first error is the one that is told.
     match (done, drive.bench.off()) {
         (Ok(_), Err(stopped)) => Err(stopped.into()),
         (done, _) => done,

@@ -160,7 +160,7 @@ impl<O: Objects> Joint<O> {
     fn begin_or_off(&mut self, mode: i8, set_point: (SetPoint, u64), last: State) -> Result<(), Stopped> {
         let begun = self.begin(mode, set_point, last);
         if begun.is_err() {
-            // What went wrong first is what is told.
+            // The first error is the one that is told.
             let _ = self.off();
         }
         begun
@@ -270,7 +270,7 @@ impl<O: Objects> Bench for Joint<O> {
             if waited > BRAKING {
                 return Err(self.stopped(state));
             }
-            // Who has asked to stop is not kept waiting: it ends by itself.
+            // A user who has asked to stop is not kept waiting: it ends by itself.
             if self.objects.pass(LOOK).is_err() {
                 return Ok(());
             }
@@ -317,7 +317,7 @@ impl<O: Objects> Bench for Joint<O> {
     fn set(&mut self, settings: &[(Setting, f64)]) -> Result<(), Stopped> {
         let taken = self.offer(settings);
         if taken.is_err() {
-            // Where this fails too, the first error is the one that says why.
+            // If this fails too, the first error is the one that says why.
             let _ = self.write_raw(Field::Configuration(ConfigurationField::Command), FORGET);
         }
         taken

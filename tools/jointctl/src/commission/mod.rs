@@ -160,7 +160,7 @@ pub fn commission<B: Bench>(bench: &mut B, plan: &Plan, guide: &mut impl Guide) 
     let mut found = match found {
         Ok(found) => found,
         Err(failure) => {
-            // Where this fails too, the first failure is the one that says why.
+            // If this fails too, the first failure is the one that says why.
             let _ = bench.off();
             let _ = bench.set(&before);
             return Err(failure);

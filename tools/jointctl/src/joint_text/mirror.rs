@@ -269,7 +269,7 @@ mod turns {
         if !(0.0..1.0).contains(&turns) {
             return Err(D::Error::custom(format!("electrical_zero is {turns} turns, must lie in 0 to below 1")));
         }
-        // What lies within half a step of a whole turn is zero again.
+        // An angle within half a step of a whole turn is zero again.
         Ok(ElectricalAngle((turns * STEPS).round() as u64 as u32))
     }
 }

@@ -27,7 +27,7 @@ fn is_taken(network: &Network, id: u8) -> Result<bool, RemoteError> {
         Ok(_) => Ok(true),
         Err(ClientError::NoAnswer { .. }) => Ok(false),
         Err(error @ ClientError::Bus(_)) => Err(error.into()),
-        // Whoever refuses is there.
+        // A node that refuses is there.
         Err(_) => Ok(true),
     }
 }

@@ -74,7 +74,7 @@ impl Objects for RemoteObjects<'_> {
 
 impl Drop for RemoteObjects<'_> {
     fn drop(&mut self) {
-        // Whatever brought us here is what is reported.
+        // The error that brought us here is what is reported.
         let _ = self.network(Command::EnterPreOperational);
     }
 }

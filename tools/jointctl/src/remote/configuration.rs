@@ -20,7 +20,7 @@ const FORGET: u64 = 2;
 pub fn set(joint: &RemoteJoint, wanted: &[(Entry, Value)]) -> Result<(), RemoteError> {
     let refuse =
         |entry: &Entry, problem: &str| RemoteError::Value { object: entry.described(), problem: problem.into() };
-    // Everything that can be seen from here is refused before anything is sent.
+    // Values that can be refused from here are refused before anything is sent.
     for (entry, value) in wanted {
         match (entry.object.field, entry.object.access) {
             (Field::Image(ImageField::Staging), _) => return Err(refuse(entry, "`jointctl upload` writes it")),
@@ -42,7 +42,7 @@ pub fn set(joint: &RemoteJoint, wanted: &[(Entry, Value)]) -> Result<(), RemoteE
         let settings = wanted.iter().filter(|(entry, _)| is_setting(entry));
         let taken = stage(joint, settings);
         if taken.is_err() {
-            // Where this fails too, the first error is the one that says why.
+            // If this fails too, the first error is the one that says why.
             let _ = joint.write_raw(Field::Configuration(ConfigurationField::Command), FORGET);
         }
         taken?;

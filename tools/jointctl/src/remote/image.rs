@@ -131,7 +131,7 @@ impl RemoteJoint {
 
     /// Brings an image, and its tag where there is one, into the joint, and on as far as is asked for.
     pub fn upload_image(&self, upload: &[u8], usage: Use, progress: &dyn Progress) -> Result<ImageStatus, RemoteError> {
-        // What can be seen to fail fails before the first byte.
+        // Errors that can be foreseen are found before the first byte.
         self.check_use(usage)?;
         if upload.is_empty() || upload.len() > STAGING {
             let problem = format!("the image has {} bytes, must be 1 to {STAGING}", upload.len());

@@ -92,7 +92,7 @@ pub fn differences(configured: &Load, identified: &[Parameter]) -> Vec<LoadDiffe
 impl LoadDifference {
     fn counts(&self) -> bool {
         let permitted = TOLERANCE * self.configured + DEVIATIONS * self.standard_error;
-        // What was not identified is zero. A negative inertia is the sign of torque or position.
+        // A load that was not identified is zero. A negative inertia is the sign of torque or position.
         self.configured > 0.0 && self.measured != 0.0 && (self.measured - self.configured).abs() > permitted
     }
 }

@@ -40,7 +40,7 @@ impl RemoteJoint {
 
     /// Opens a session where that is what a refusal asks for; false where it is not.
     fn open_session(&self, refusal: &ClientError) -> Result<bool, RemoteError> {
-        // Where these cannot be read, the refusal says more.
+        // If these cannot be read, the refusal says more.
         let raw = |field| self.raw(Field::Owner(field)).map_err(|_| RemoteError::from(refusal.clone()));
         if raw(OwnerField::KeyPresent)? == 0 || raw(OwnerField::Session)? != 0 {
             return Ok(false);

@@ -98,7 +98,7 @@ impl Attempt<'_> {
             }
             Ok(Some(refusal @ Refusal::Image(ImageError::TooManySets { .. }))) => refusal.to_string(),
             Ok(Some(refusal)) if refusal.code() == code => refusal.to_string(),
-            // Whether its details can be read makes no difference to the refusal.
+            // The refusal stands whether or not its details can be read.
             _ => words(code).to_owned(),
         };
         let version = joint.raw(Field::Actual(joint_firmware::objects::field::Actual::ImageVersion)).ok();

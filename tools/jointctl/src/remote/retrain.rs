@@ -199,7 +199,7 @@ impl Tidy<'_> {
 
 impl Drop for Tidy<'_> {
     fn drop(&mut self) {
-        // Whatever brought us here is what is reported.
+        // The error that brought us here is what is reported.
         if self.staged {
             let _ = self.joint.discard_image();
         }
@@ -340,7 +340,7 @@ mod tests {
 
     #[test]
     fn friction_that_falls_by_itself_from_motion_to_motion_is_no_improvement() {
-        // As measured on the reference joint with a gain of 0: 4.30, 3.92 Nm, and still falling.
+        // Values measured on the reference joint with a gain of 0: 4.30, 3.92 Nm, and still falling.
         for [first, after, last] in [[4.30, 3.92, 3.70], [3.70, 3.92, 4.30], [4.0, 4.0, 4.0]] {
             assert!(!shown(after).is_better_than(&shown(first).lower(shown(last))), "{first} {after} {last}");
         }

@@ -21,7 +21,7 @@ impl Drop for Owner {
     fn drop(&mut self) {
         if self.opened.load(Ordering::Relaxed) {
             let Entry { object, .. } = Entry::of(Field::Owner(OwnerField::Session));
-            // Where it cannot be ended it ends by itself.
+            // If it cannot be ended it ends by itself.
             let _ = self.node.download(object.index, object.sub_index, &0u32.to_le_bytes());
         }
     }

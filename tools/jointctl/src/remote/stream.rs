@@ -316,7 +316,7 @@ impl Stream {
 impl Drop for Stream {
     fn drop(&mut self) {
         if !self.ended {
-            // Whatever brought us here is what is reported.
+            // The error that brought us here is what is reported.
             let _ = self.finish();
         }
     }

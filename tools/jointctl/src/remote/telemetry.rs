@@ -99,7 +99,7 @@ impl Telemetry {
             incomplete: 0,
             ended: false,
         };
-        // What has been changed is put back where one of them fails.
+        // The PDOs that have been changed are put back if one of them fails.
         for (pdo, places) in Pdo::all(Direction::Transmit).into_iter().zip(&telemetry.places) {
             let base = 0x180 + 0x100 * u16::from(pdo.number) + u16::from(joint.id());
             let mapping: Vec<_> = places.iter().filter_map(|at| telemetry.signals.get(*at)).map(mapped).collect();

@@ -131,7 +131,7 @@ pub fn new_joints_get_the_node_ids_that_are_free() {
 pub fn a_joint_that_was_left_with_an_id_that_it_does_not_use_yet_is_found_again() {
     let served = Served::joints(&[NO_NODE_ID]);
     let network = Network::new(bus::open(served.bus()).unwrap()).with_patience(Duration::from_secs(60));
-    // As a client that is killed leaves it: found, given 9, and not released.
+    // State that a killed client leaves: found, given 9, and not released.
     let address = loop {
         if let Ok(Some(address)) = network.fastscan(Duration::from_millis(50)) {
             break address;

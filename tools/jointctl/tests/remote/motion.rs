@@ -96,7 +96,7 @@ pub fn a_master_that_dies_leaves_a_fault_that_is_named_and_acknowledged_only_whe
     let served = Served::joints(&[NODE]);
     let joint = served.joint();
     let stream = Stream::begin(&joint, Mode::Torque, 100.0, false).unwrap();
-    // As if the program had been killed after a few set-points: nothing more is sent, nothing is said.
+    // State as if the program had been killed after a few set-points: nothing more is sent, nothing is said.
     let mut sent = 0;
     stream.play(move |_| {
         sent += 1;
@@ -121,7 +121,7 @@ pub fn a_master_that_dies_leaves_a_fault_that_is_named_and_acknowledged_only_whe
     );
     let acknowledged = Motion { acknowledge: true, ..motion(command, 0.1) };
     assert_eq!(run(&again, &acknowledged).unwrap().0.state, State::SwitchOnDisabled);
-    // What was acknowledged is in the log still.
+    // Acknowledged faults are in the log still.
     let page = info::page(&again).unwrap();
     assert!(page.contains("fault log       1 faults, 1 power-ups\n"), "{page}");
     assert!(

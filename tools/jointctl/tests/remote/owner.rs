@@ -58,7 +58,7 @@ pub fn what_the_owner_may_do_takes_a_session_that_ends_with_his_work() {
     drop(owner);
     assert_eq!(session(&stranger), 0, "the session outlives its owner's work");
     assert_eq!(stranger.number(Field::Setting(Setting::TorqueLimit)).unwrap(), before - 1.0);
-    // What needs no owner is refused for other reasons, and says so.
+    // Uploads that need no owner are refused for other reasons, and say so.
     let message = stranger.upload_image(&image(1, 0.25, 0), Use::Verify, &Silent).unwrap_err().to_string();
     assert!(message.contains("0301h"), "{message}");
     let mode = Entry::of(Field::SetPoint(SetPoint::Mode));

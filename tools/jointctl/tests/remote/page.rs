@@ -23,7 +23,7 @@ pub fn the_page_on_the_bus_runs_line_by_line() {
     let port = bus::free_port().unwrap();
     let bus = format!("udp:239.74.163.2:{port}");
     let folder = tempfile::tempdir().unwrap();
-    // What `demo` would have written.
+    // Files that `demo` would have written.
     std::fs::create_dir(folder.path().join("demo")).unwrap();
     std::fs::write(folder.path().join("demo/friction.img"), image(1, 0.25, 0)).unwrap();
     let command = |line: &str| {

@@ -244,7 +244,7 @@ pub fn two_masters_of_one_joint_end_in_a_joint_that_is_disabled() {
     let served = Served::joints(&[NODE]);
     let (joint, other) = (served.joint(), served.joint());
     let stream = Stream::begin(&joint, Mode::Torque, 100.0, false).unwrap();
-    // Where both ask the joint at the same time the second is told of another client, and tries again.
+    // If both ask the joint at the same time the second is told of another client, and tries again.
     let begin = || Stream::begin(&other, Mode::Torque, 100.0, false);
     let told = |outcome: &Result<_, _>| matches!(outcome, Err(RemoteError::Client(ClientError::OtherClient { .. })));
     let second = (0..20).map(|_| begin()).find(|outcome| !told(outcome)).unwrap_or_else(begin);

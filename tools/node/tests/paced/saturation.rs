@@ -153,7 +153,7 @@ fn a_flood_that_no_joint_can_help_stops_the_joints_and_afterwards_everything_is_
         assert!(line.telemetry(joint).motion.velocity.abs() < 0.05);
         assert!(heartbeats(&line, FIRST + joint as u8).len() <= 1, "they have the lowest priority of all");
     }
-    // What is more urgent than the flood goes through: the EMCYs say why.
+    // Frames more urgent than the flood go through: the EMCYs say why.
     assert_eq!(line.emergencies(), [0x8100, 0x8100]);
     // The flood ends: heartbeats are there at once, nothing old comes after them, and the joints can be enabled again.
     line.heard.clear();

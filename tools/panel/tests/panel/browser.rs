@@ -137,7 +137,7 @@ pub fn the_page_shows_values_that_move_and_the_joint_stands_once_the_button_is_l
     let browser = Browser::begin();
     browser.window(1280, 1000, "light");
     browser.call("POST", "/url", &json!({ "url": format!("http://{}/", served.address) }));
-    // What the page shows is what the joint sends.
+    // The page shows what the joint sends.
     browser.until("document.querySelector('#state').textContent.startsWith('disabled')");
     browser.until("Number.isFinite(panel.latest('velocity-actual-value'))");
     let strokes = "panel.plots.count()";
@@ -186,7 +186,7 @@ pub fn the_page_shows_values_that_move_and_the_joint_stands_once_the_button_is_l
         let drawn = browser.value("panel.plots.drawn()").as_u64().unwrap();
         browser.until(&format!("panel.plots.drawn() > {}", drawn + 2));
         browser.picture(&format!("panel-{width}-{scheme}.png"));
-        // Nothing hangs over the side.
+        // No element hangs over the side.
         browser.until("document.documentElement.scrollWidth <= window.innerWidth");
     }
     assert_eq!(browser.value("panel.problems"), json!([]));

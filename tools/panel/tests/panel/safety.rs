@@ -44,7 +44,7 @@ pub fn a_page_that_is_gone_leaves_the_joint_disabled_and_the_next_one_commands()
     let served = Served::joints(&[NODE]);
     let (page, mut witness) = moving(&served);
     assert!(witness.seen.contains(&json!({ "role": "looks" })));
-    // As a browser that is killed: no close frame.
+    // End of a browser that is killed: no close frame.
     drop(page);
     stands(&mut witness, &["the page is gone", "not held any more"]);
     witness.commands();
@@ -93,7 +93,7 @@ pub fn stop_stops_whoever_asks_for_it() {
     stop_in_motion(&mut page, &mut other, false);
     stop_in_motion(&mut page, &mut other, true);
     drop(page);
-    // Nothing moves for a page: whoever else commands the joint is cut off.
+    // No page moves the joint: whoever else commands it is cut off.
     let joint = served.joints.joint();
     let command = Command { mode: Mode::Velocity, velocity: 0.6, ..Command::default() };
     let motion = Motion { command, duration: 1e3, rate: 100.0, acknowledge: false };
@@ -134,7 +134,7 @@ pub fn a_second_page_looks_and_may_not_change_anything() {
         assert!(error.contains("another page commands this joint"), "{ask}: {error}");
     }
     second.let_go(true);
-    // What only looks waits for the joint to stand, whoever asks.
+    // Requests that only look wait for the joint to stand, whoever asks.
     let refused = (0..20).any(|_| {
         page.move_until(&jog(), VELOCITY, fast);
         let answer = page.answer(json!("objects"));

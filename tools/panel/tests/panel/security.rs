@@ -119,7 +119,7 @@ pub fn every_answer_forbids_other_sources_and_frames() {
 pub fn beyond_this_machine_a_token_is_wanted_once() {
     const HOST: &str = "192.0.2.7:8402";
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-    // As if it were reached by that address; the token is as old as it may just be.
+    // Guard as if it were reached by that address; the token is as old as it may just be.
     let made = Instant::now().checked_sub(TOKEN_LIFE - Duration::from_secs(300)).unwrap_or_else(Instant::now);
     let guard = Guard::new(HOST.parse().unwrap(), made).unwrap();
     let token = guard.address().split_once("?token=").unwrap().1.to_owned();

@@ -335,7 +335,7 @@ impl Actuator {
             let rotation = Rotation { frame, velocity };
             let flow = self.windings.advance(&legs, &rails, &rotation, resistance, outside, step);
             let rail = Inverter::rail_current(&legs, &flow.phase_currents);
-            // What the rails give and the motor's terminals do not get stays in transistors and diodes.
+            // Power that the rails give and the motor's terminals do not get stays in transistors and diodes.
             let terminals: f64 = legs.iter().zip(flow.phase_currents).map(|(leg, i)| leg.power(&rails, i)).sum();
             let dissipated = outside / resistance * flow.copper_loss + rails.voltage * rail - terminals;
             torque += share * flow.torque;

@@ -75,7 +75,7 @@ impl Setup {
             winding_temperature: 130.0,
             command_deadline: 0.1,
         };
-        // As little as permitted, and enough for the margin where the quick stop's deceleration takes half the torque.
+        // Least damping permitted, and enough for the margin where the quick stop's deceleration takes half the torque.
         let stopping = torque / (deceleration * f64::from(limits.position_margin)).sqrt();
         limits.damping = limits.least_damping().max(stopping as f32);
         let phase_resistance = motor.resistance / 1.5;

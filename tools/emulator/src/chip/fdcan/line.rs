@@ -297,7 +297,7 @@ impl CanLine for Line {
             (Sender::Host(frame), Event::Disturbed { .. }) => self.again(self.idle, frame),
             _ => {}
         }
-        // What the controller sends next it says itself; until then the host may begin.
+        // The controller itself says what it sends next; until then the host may begin.
         self.part = self.part.bit().map_or(Part::None, |bit| Part::Listening { bit });
         self.begin(end);
         Some(event)

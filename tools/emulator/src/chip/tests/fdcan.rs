@@ -122,7 +122,8 @@ fn a_frame_arrives_when_its_bits_have_passed() {
 #[test]
 fn filters_reject_by_mask_and_range_and_choose_the_fifo() {
     let mut bench = bench();
-    // As the firmware: classic masks that reject; then a range into FIFO 1, two identifiers into FIFO 1.
+    // Filters as the firmware has them: classic masks that reject; then a range into FIFO 1, two identifiers into FIFO
+    // 1.
     bench.set(RAM, 2 << 30 | 3 << 27 | 0x580 << 16 | 0x780);
     bench.set(RAM + 4, 2 << 27 | 0x100 << 16 | 0x10f);
     bench.set(RAM + 8, 1 << 30 | 2 << 27 | 0x200 << 16 | 0x300);

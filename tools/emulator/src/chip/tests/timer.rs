@@ -53,7 +53,7 @@ fn bridge() -> Bench {
 
 #[test]
 fn a_time_base_counts_microseconds_overflows_and_compares() {
-    // As embassy's time driver has TIM15.
+    // Timer as embassy's time driver has TIM15.
     let mut bench = bench();
     bench.try_write(TIM15 + 0x28, Width::Half, 169).unwrap();
     bench.set(TIM15, 1 << 2);
@@ -219,7 +219,7 @@ fn the_board_is_told_at_every_turn_and_in_order() {
 
 #[test]
 fn an_encoder_counts_every_edge_round_the_top_and_the_index_captures() {
-    // As embassy's counter driver and the firmware's index have TIM4.
+    // Timer as embassy's counter driver and the firmware's index have TIM4.
     let mut bench = bench();
     bench.board().quadrature.count = 1_000;
     bench.set(TIM4 + 0x18, 0x3131);

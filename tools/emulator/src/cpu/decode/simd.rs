@@ -15,7 +15,7 @@ pub(super) fn parallel<B: Bus>(first: u32, second: u32) -> Decoded<B> {
 pub(super) fn miscellaneous<B: Bus>(first: u32, second: u32) -> Decoded<B> {
     let (d, n, m) = (bits(second, 11, 8), bits(first, 3, 0), bits(second, 3, 0));
     let kind = bits(second, 5, 4);
-    // Where there is one operand, it is encoded twice.
+    // A single operand is encoded twice.
     let one = bad(d) || bad(m) || n != m;
     let op = Operation::<B>::new;
     match (bits(first, 5, 4), kind) {

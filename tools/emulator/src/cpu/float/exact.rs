@@ -167,7 +167,7 @@ fn sum(a: (bool, i32, u64), b: (bool, i32, u64), status: &mut Status) -> u32 {
         return sign(negative);
     }
     let distance = exponent(high) - exponent(low);
-    // As far as fits; what is below that only has to be told from nothing.
+    // Shift as far as fits; what is below that only has to be told from nothing.
     let up = distance.min(76);
     let rest = distance - up;
     let low_part = match rest {

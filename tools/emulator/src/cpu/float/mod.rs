@@ -162,7 +162,7 @@ pub fn negate(a: u32) -> u32 {
 /// FPCompare: the four flags as the register has them. A quiet NaN is invalid only if `signals`.
 #[inline]
 pub fn compare(a: u32, b: u32, signals: bool, status: &mut Status) {
-    // Where denormal operands count as zero.
+    // Denormal operands count as zero in this mode.
     let (x, y) = if status.flushes() { (exact::flushed(a, status), exact::flushed(b, status)) } else { (a, b) };
     let (first, second) = (f32::from_bits(x), f32::from_bits(y));
     let flags = match (first < second, first == second, first > second) {

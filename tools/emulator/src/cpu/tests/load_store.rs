@@ -156,7 +156,7 @@ fn lines_of_code_cost_wait_states_in_sequence_where_nothing_prefetches() {
         cpu.now()
     };
     let extra = |code: &[u16]| cycles(code, Some(8)) - cycles(code, None);
-    // Where the run begins costs nothing: nothing has led there.
+    // The first fetch costs nothing: nothing has led there.
     assert_eq!(super::START % 8, 0);
     assert_eq!(extra(&[0xbf00; 3]), 0, "a line with what ends the run");
     assert_eq!(extra(&[0xbf00; 4]), 4, "what ends the run lies in the next line");

@@ -308,7 +308,7 @@ impl Emitter<'_, '_> {
         let kept = (self.place, self.compared_floats, self.ready, self.usual);
         let ended = self.translate_or_call(instruction, cost, follows, remaining)?;
         if timing.single {
-            // What follows takes another time behind it.
+            // The following instruction takes another time behind it.
             self.pending += cost;
             self.go_to(follows);
             self.b.seal_block(otherwise);

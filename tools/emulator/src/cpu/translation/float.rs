@@ -143,7 +143,7 @@ impl Emitter<'_, '_> {
         if !self.ready {
             let (ready, no) = (self.field(types::I8, self.fields.floating_ready), self.flag(false));
             let unusual = self.compare(IntCC::Equal, ready, no);
-            // What follows a comparison has to know what was compared.
+            // Instructions behind a comparison have to know what was compared.
             if compares {
                 self.leave_if(unusual)
             } else {
@@ -160,7 +160,7 @@ impl Emitter<'_, '_> {
             let kept = self.b.ins().band(status, mask);
             let unusual = self.compare(IntCC::NotEqual, kept, usual);
             self.leave_if(unusual);
-            // What prepares the unit may change the mode.
+            // The unit's preparation may change the mode.
             self.usual = self.was_ready;
         }
     }
@@ -234,7 +234,7 @@ impl Emitter<'_, '_> {
 
     /// VCMP of what is no NaN.
     fn compare_floats(&mut self, o: Operands) {
-        // Where denormal operands count as zero it is another comparison.
+        // If denormal operands count as zero it is another comparison.
         self.check_usual();
         let a = self.float(o.d);
         let b = if o.immediate != 0 { self.b.ins().f32const(0.0) } else { self.float(o.m) };

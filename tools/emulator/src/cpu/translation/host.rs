@@ -83,7 +83,7 @@ impl Compiler {
         let conventions = Conventions { own, of_call, frontend: self.isa.frontend_config() };
         let mut context = Context::for_function(emit::function(conventions, fields, region)?);
         let compiled = context.compile(&*self.isa, &mut ControlPlane::default()).ok()?;
-        // Nothing is called, and constants lie with the code: it can lie anywhere.
+        // No calls, and constants lie with the code: it can lie anywhere.
         if !compiled.buffer.relocs().is_empty() {
             return None;
         }

@@ -111,7 +111,7 @@ impl Emitter<'_, '_> {
         let guard = self.guard.take();
         let pending = std::mem::replace(&mut self.pending, before);
         self.call(follows, remaining);
-        // What it has taken is counted: nothing is left of what is counted for it behind it.
+        // Cycles that it has taken are counted: nothing is left of what is counted for it behind it.
         let none = self.b.ins().iconst(types::I64, before.wrapping_add(cost).wrapping_neg() as i64);
         self.b.def_var(self.spent, none);
         for (variable, kind, offset) in std::mem::take(&mut self.written) {

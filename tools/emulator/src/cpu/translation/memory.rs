@@ -47,7 +47,7 @@ impl Emitter<'_, '_> {
             Action::StoreExclusive { bytes } => {
                 let address = self.address(o);
                 let at = self.checked(address, bytes.into(), 1, true);
-                // Where the mark is gone nothing is stored, which is seldom.
+                // If the mark is gone nothing is stored, which is seldom.
                 let own = self.field(types::I8, self.fields.exclusive);
                 let no = self.flag(false);
                 let lost = self.compare(IntCC::Equal, own, no);
@@ -131,7 +131,7 @@ impl Emitter<'_, '_> {
     pub fn checked(&mut self, address: Value, bytes: u32, values: u32, stores: bool) -> Value {
         let start = self.constant(SRAM);
         let offset = self.b.ins().isub(address, start);
-        // What is no multiple of a word is behind the end when its lowest bits are its highest.
+        // An offset that is no multiple of a word is behind the end when its lowest bits are its highest.
         let mut unusual = match bytes {
             4 => {
                 let two = self.constant(2);
@@ -150,7 +150,7 @@ impl Emitter<'_, '_> {
         };
         let code = self.region.changeable.clone();
         if stores && !code.is_empty() {
-            // From where something that is stored reaches into it.
+            // First address from which something that is stored reaches into it.
             let first = self.constant(code.start.wrapping_sub(4 * (values - 1)));
             let length = self.constant(code.end - code.start + 4 * (values - 1));
             let into = self.b.ins().isub(address, first);

@@ -59,13 +59,13 @@ impl Region {
             if region.instructions.contains_key(&address) || region.instructions.len() >= LARGEST {
                 continue;
             }
-            // What begins there is translated already; a jump to it costs as much as some instructions.
+            // The code that begins there is translated already; a jump to it costs as much as some instructions.
             if region.instructions.len() >= SMALL && source.is_translated(address) {
                 continue;
             }
             let Some(instruction) = source.instruction(address) else { continue };
             let Instruction { action, operands, timing, .. } = instruction;
-            // Where a branch leads that is not translated is not known.
+            // The target of a branch that is not translated is unknown.
             if action == Action::Other && timing.flow != Flow::On {
                 continue;
             }
@@ -82,7 +82,8 @@ impl Region {
             let ends = matches!(action, Action::Branch | Action::Call | Action::BranchToRegister { .. })
                 || matches!(action, Action::Several { load: true }) && operands.immediate >> 15 != 0;
             if !ends || it != 0 {
-                // What follows depends on whether it was executed; behind the next instruction it does not any more.
+                // The following instruction depends on whether it was executed; behind the next one it does not any
+                // more.
                 if it != 0 && timing.single {
                     region.leaders.insert(follows);
                     if let Some(second) = source.instruction(follows) {
