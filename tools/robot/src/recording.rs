@@ -130,7 +130,7 @@ pub enum RobotFitError {
         path: PathBuf,
         /// The joint.
         joint: String,
-        /// What is wrong.
+        /// Cause.
         source: identification::fit::FitError,
     },
 }
