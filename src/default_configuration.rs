@@ -128,8 +128,8 @@ pub const MOTEUS_R4: BoardConfiguration = BoardConfiguration {
 /// Control steps a second, Hz.
 const MOTEUS_R4_RATE: f32 = 40_000.0;
 
-/// From the edge of a low side until its current can be sampled, s: by the vendor's measurement at gain 20, which is
-/// the settling time of the gate driver's data sheet and 500 ns.
+/// Time from the edge of a low side until its current can be sampled, s: by the vendor's measurement at gain 20, which
+/// is the settling time of the gate driver's data sheet and 500 ns.
 const MOTEUS_R4_SETTLING: f32 = 1.5e-6;
 
 /// The same on the B-G431B-ESC1, *derived*: the gate driver's 110 ns, and 4.6 time constants (1 %) of an amplifier with

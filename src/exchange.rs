@@ -96,7 +96,7 @@ pub struct Handover {
 pub struct Preparer<'a> {
     shared: &'a Handover,
     own: u8,
-    /// Something has been offered.
+    /// `true` once something has been offered.
     any: bool,
 }
 

@@ -291,7 +291,7 @@ pub fn start_pwm() {
 }
 
 impl Sensors {
-    /// Before the control interrupt starts: the counts a turn of the encoder, which a checked configuration has.
+    /// Sets the counts a turn of the encoder, which a checked configuration has; before the control interrupt starts.
     pub fn set_encoder_counts(&mut self, counts: u32) {
         if let Some(encoder) = Incremental::new(counts as u16) {
             self.encoder = encoder;
@@ -327,7 +327,7 @@ impl Sensors {
         }
     }
 
-    /// At the end of a control interrupt: nothing of this board's sensors is under way.
+    /// Ends a control interrupt: nothing of this board's sensors is under way.
     #[inline(always)]
     pub fn complete(&mut self) {}
 }

@@ -92,11 +92,11 @@ static DROPS: Drops = Drops { controller: AtomicU32::new(0), task: AtomicU32::ne
 /// Frames that found no room, since the start; each wraps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
 pub struct Dropped {
-    /// In the controller: the interrupt came too late.
+    /// Frames dropped in the controller: the interrupt came too late.
     pub controller: u32,
-    /// On the way to the task.
+    /// Frames dropped on the way to the task.
     pub task: u32,
-    /// On the way to the bus.
+    /// Frames dropped on the way to the bus.
     pub bus: u32,
     /// TPDOs and heartbeats that newer ones replaced on the way to the bus.
     pub overwritten: u32,

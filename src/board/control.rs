@@ -61,7 +61,7 @@ struct Words {
     longest_cycles: AtomicU32,
     overruns: AtomicU32,
     switching: AtomicBool,
-    /// Somebody wants the bridge off until the next reset.
+    /// `true` if somebody wants the bridge off until the next reset.
     stopped: AtomicBool,
     bridge_temperature: Real,
     winding_temperature: Real,
@@ -142,7 +142,7 @@ pub struct Report {
 }
 
 impl Report {
-    /// Before the first step.
+    /// Report before the first step.
     const NOTHING: Self =
         Self { telemetry: Telemetry::NOTHING, latched: Faults::NONE, phase_currents: Phases::uniform(0.0) };
 }
@@ -186,9 +186,9 @@ pub fn stop() {
     WORDS.stopped.store(true, Ordering::Relaxed);
 }
 
-/// Before flash is written where it holds the program, too: the joint is off, and stays so until [`release`]. False
-/// where it is under current; then nothing may be written. For the task that writes, and before the control interrupt
-/// starts.
+/// Holds the joint off before flash is written where it holds the program, too: the joint is off, and stays so until
+/// [`release`]. False where it is under current; then nothing may be written. For the task that writes, and before the
+/// control interrupt starts.
 ///
 /// Code that the control interrupt runs only while operation is enabled may lie in flash on such a board: with this it
 /// never waits for a write.

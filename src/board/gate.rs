@@ -16,11 +16,11 @@ use joint_firmware::hardware::drv8353::name;
 use joint_firmware::hardware::moteus_revision::SUPPORTED;
 use joint_firmware::hardware::{GateDriver, Setup};
 
-/// Between two attempts to set the driver up, and from its enable to the first: twice the time that it needs (SLVSDY6,
-/// t_WAKE). Also how long the enable is low where the driver is to forget: longer than its reset pulse of 40 µs and
-/// than the 1 ms after which it sleeps.
+/// Time between two attempts to set the driver up, and from its enable to the first: twice the time that it needs
+/// (SLVSDY6, t_WAKE). Also how long the enable is low where the driver is to forget: longer than its reset pulse of 40
+/// µs and than the 1 ms after which it sleeps.
 const ATTEMPT: Duration = Duration::from_millis(2);
-/// Between two looks at the fault line.
+/// Time between two looks at the fault line.
 const LOOK: Duration = Duration::from_millis(1);
 /// Looks from one check of the registers to the next, while the bridge is off.
 const CHECK: u32 = 100;
@@ -29,7 +29,7 @@ const CHECK: u32 = 100;
 #[derive(Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 enum State {
-    /// It has not been set up since the start: no control step.
+    /// Initial state, not set up since the start: no control step.
     Starting = 0,
     /// The bridge may switch.
     Ready = 1,
@@ -166,7 +166,7 @@ impl Gate {
         }
     }
 
-    /// Until it answers, keeps what is written, and reports no fault.
+    /// Sets the driver up until it answers, keeps what is written, and reports no fault.
     async fn set_up(&mut self) {
         let mut before = Setup::Waking;
         loop {
@@ -215,7 +215,7 @@ impl Gate {
         }
     }
 
-    /// From a fault until it has been cleared: by a fault reset.
+    /// Handles a fault until it has been cleared: by a fault reset.
     async fn fault(&mut self) {
         RESET.store(false, Ordering::Relaxed);
         let status = self.driver.status();
@@ -259,7 +259,7 @@ impl Gate {
     }
 }
 
-/// For the log.
+/// Description for the log.
 fn describe(setup: Setup) -> &'static str {
     match setup {
         Setup::NoAnswer => "does not answer",

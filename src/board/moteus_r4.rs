@@ -195,7 +195,7 @@ pub fn start(mut p: Peripherals) -> Result<Parts, StartError> {
     Ok(parts)
 }
 
-/// There is no button.
+/// No state: there is no button.
 pub const fn button() -> Option<bool> {
     None
 }
@@ -308,7 +308,7 @@ fn end_frame() -> Option<u16> {
 }
 
 impl Sensors {
-    /// For boards that count an encoder.
+    /// Counterpart of boards that count an encoder.
     pub fn set_encoder_counts(&mut self, _counts: u32) {}
 
     /// Measurements known now; temperatures and overrun are filled in by the caller.
@@ -342,7 +342,7 @@ impl Sensors {
         measurements
     }
 
-    /// At the end of a control interrupt: takes the encoder's answer.
+    /// Takes the encoder's answer at the end of a control interrupt.
     #[inline(always)]
     pub fn complete(&mut self) {
         self.answer = end_frame();

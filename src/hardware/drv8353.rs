@@ -73,19 +73,19 @@ pub struct Settings {
     pub low_side: (u16, u16),
     /// Time for which the gates are driven with these, ns.
     pub drive_time: u16,
-    /// Between the switches of a half bridge, ns.
+    /// Dead time between the switches of a half bridge, ns.
     pub dead_time: u16,
     /// Voltage of a transistor that conducts at which it counts as over-current, mV.
     pub vds_level: u16,
-    /// For so long, µs.
+    /// Time for which the voltage has to last, µs.
     pub deglitch: u16,
-    /// Of the current amplifiers.
+    /// Gain of the current amplifiers.
     pub gain: u16,
     /// Voltage of a shunt at which it counts as over-current, mV.
     pub sense_level: u16,
 }
 
-/// Of the moteus r4.10 and r4.11, as in the vendor's firmware; the sense level is the vendor's default.
+/// Settings of the moteus r4.10 and r4.11, as in the vendor's firmware; the sense level is the vendor's default.
 pub const MOTEUS_R4_11: Settings = Settings {
     high_side: (100, 200),
     low_side: (100, 600),

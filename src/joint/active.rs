@@ -182,7 +182,7 @@ pub struct GuardGains {
 }
 
 impl GuardGains {
-    /// For a motion loop with rounds of `period` s, and a standstill velocity, rad/s.
+    /// Gains for a motion loop with rounds of `period` s, and a standstill velocity, rad/s.
     fn new(period: f32, standstill: f32) -> Self {
         Self {
             drift: within(period / DRIFT, 0.0, 1.0),
@@ -230,7 +230,7 @@ pub struct AdaptationGains {
     pub mean_share: f32,
 }
 
-/// Everything prepared that the control step reads. It is replaced as a whole between two steps.
+/// Prepared configuration, complete, as the control step reads it. It is replaced as a whole between two steps.
 ///
 /// In this order, the friction model and what follows it last: the core's floating-point loads reach no further than
 /// 1020 bytes.
@@ -296,7 +296,7 @@ pub struct Active {
     pub has_bridge_sensor: bool,
     /// The motor has a temperature sensor.
     pub has_winding_sensor: bool,
-    /// For the slow task.
+    /// Settings for the slow task.
     pub thermal: ThermalSettings,
     /// The verified friction model; none: no compensation.
     pub friction: Option<FrictionModel>,
@@ -304,9 +304,9 @@ pub struct Active {
     pub stops: StopGains,
     /// Brake chopper.
     pub chopper: ChopperGains,
-    /// For adaptation, where a program has it.
+    /// Gains of adaptation, where a program has it.
     pub adaptation: AdaptationGains,
-    /// For the feedforward of the load, where a program has it.
+    /// Gains of the feedforward of the load, where a program has it.
     load: [LoadGains; LOADS as usize],
 }
 
@@ -542,7 +542,7 @@ impl Active {
         self
     }
 
-    /// For the feedforward of the load.
+    /// Gains of the feedforward of the load.
     pub fn load(&self) -> &LoadGains {
         self.load.first().unwrap_or(&LoadGains::NONE)
     }

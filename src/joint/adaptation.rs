@@ -44,7 +44,8 @@ const LOOKS: u16 = 20;
 const ROW: f32 = LOOKS as f32 / LOOK_RATE;
 /// Place of a row's middle.
 const MIDDLE: f32 = 0.5 * (LOOKS as f32 - 1.0);
-/// From a slope's sum to the slope of the straight line through all looks, 1/s: they are n (n² - 1) / 12 in squares.
+/// Factor from a slope's sum to the slope of the straight line through all looks, 1/s: they are n (n² - 1) / 12 in
+/// squares.
 const SLOPE: f32 = LOOK_RATE * 12.0 / (LOOKS as f32 * (LOOKS as f32 * LOOKS as f32 - 1.0));
 /// Time in which the weight of a row falls to a third (1 / e), s of motion.
 pub const MEMORY: f32 = 8.0;
@@ -140,7 +141,7 @@ pub struct Report {
 }
 
 impl Default for Report {
-    /// Of a joint that does not adapt.
+    /// Report of a joint that does not adapt.
     fn default() -> Self {
         Self { factors: Factors::IMAGE, deviation: PRIOR, learning: Learning::Off }
     }
@@ -177,7 +178,7 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// Of a joint that does not adapt.
+    /// Settings of a joint that does not adapt.
     pub const OFF: Self = Self {
         request: AdaptationRequest::Off,
         gain: 0.0,
@@ -187,7 +188,7 @@ impl Settings {
         acceleration: 1.0,
     };
 
-    /// Of a joint as it is prepared.
+    /// Settings of a joint as it is prepared.
     pub fn of(active: &Active) -> Self {
         Self {
             request: active.adaptation.request,

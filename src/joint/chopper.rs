@@ -45,7 +45,7 @@ impl ChopperGains {
     /// Never.
     pub const NONE: Self = Self { on: f32::INFINITY, off: f32::INFINITY, share: 0.0, used: 0.0, rise: 0.0, part: 0.0 };
 
-    /// For `rate` control steps a second, Hz.
+    /// Gains for `rate` control steps a second, Hz.
     pub fn new(limits: &Limits, rate: f32) -> Self {
         let on = if limits.chopper_voltage > 0.0 { limits.chopper_voltage } else { f32::INFINITY };
         let share = limits.chopper_share;

@@ -148,7 +148,7 @@ impl Default for Command {
 /// Demand on the joint in a control step. The set-point is looked at once a round of the motion loop.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Demand {
-    /// For the state machine.
+    /// Controlword for the state machine.
     pub controlword: Controlword,
     /// The newest set-point.
     pub command: Command,

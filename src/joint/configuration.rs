@@ -146,9 +146,9 @@ pub enum AdaptationRequest {
     /// No adaptation.
     #[default]
     Off = 0,
-    /// It learns and reports, and does not act.
+    /// Adaptation that learns and reports, and does not act.
     Shadow = 1,
-    /// It learns and acts.
+    /// Adaptation that learns and acts.
     On = 2,
 }
 

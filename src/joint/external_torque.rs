@@ -104,7 +104,7 @@ pub struct Report {
 }
 
 impl Report {
-    /// Before the first look.
+    /// Report before the first look.
     pub const NOTHING: Self =
         Self { torque: 0.0, uncertainty: 0.0, collisions: 0, collided: 0.0, reaction: CollisionReaction::Off };
 }
@@ -128,7 +128,7 @@ pub struct ExternalTorque {
 }
 
 impl Settings {
-    /// Before anything is prepared.
+    /// Settings before anything is prepared.
     pub const NONE: Self = Self {
         load: Load { inertia: 0.0, gravity: 0.0, hanging: 0.0 },
         load_wrong: 0.0,
@@ -142,7 +142,7 @@ impl Settings {
         reaction: CollisionReaction::Off,
     };
 
-    /// Of a joint as it is prepared.
+    /// Settings of a joint as it is prepared.
     pub fn of(active: &Active) -> Self {
         let load = active.load();
         Self {

@@ -59,9 +59,9 @@ impl Default for Compensated {
 /// Variables that friction depends on besides this joint's motion and torque.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surroundings {
-    /// Of the gear, °C.
+    /// Temperature of the gear, °C.
     pub temperature: f32,
-    /// Of the joint that shares the drive, rad/s.
+    /// Velocity of the joint that shares the drive, rad/s.
     pub coupled_velocity: f32,
 }
 
@@ -92,7 +92,7 @@ fn reference(active: &Active, wanted: &Wanted) -> Option<f32> {
     }
 }
 
-/// To Q16.16; held at the ends of the range, zero for what is not a number.
+/// Conversion to Q16.16; held at the ends of the range, zero for what is not a number.
 fn q16(value: f32) -> i32 {
     (value * 65536.0) as i32
 }

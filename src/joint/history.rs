@@ -97,7 +97,7 @@ impl Default for History {
 }
 
 impl Packed {
-    /// Before the first step: not ready, no fault, all zeros.
+    /// Entry before the first step: not ready, no fault, all zeros.
     const NONE: Self = Self { state: 0, position: 0.0, pairs: [0; 3] };
 }
 

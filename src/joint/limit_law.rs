@@ -67,7 +67,7 @@ pub struct LimitGains {
 }
 
 impl LimitGains {
-    /// For a motion loop with rounds of `period` s.
+    /// Gains for a motion loop with rounds of `period` s.
     pub(super) fn new(limits: &Limits, gains: &Gains, period: f32) -> Self {
         let fade = limits.torque / limits.damping;
         // With it the loop's damping ratio is 0.5 for the largest inertia that the torque can brake so, and more for

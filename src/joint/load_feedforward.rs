@@ -87,7 +87,7 @@ pub struct LoadGains {
 }
 
 impl LoadGains {
-    /// Of a joint without.
+    /// Gains of a joint without load.
     pub const NONE: Self = Self {
         request: LoadFeedforwardRequest::Off,
         load: Load { inertia: 0.0, gravity: 0.0, hanging: 0.0 },
@@ -98,7 +98,7 @@ impl LoadGains {
         collision_reaction: CollisionReaction::Off,
     };
 
-    /// Of a configuration.
+    /// Gains of a configuration.
     pub fn of(configuration: &Configuration) -> Self {
         let Configuration { load, gains, limits, .. } = configuration;
         Self {
@@ -123,7 +123,7 @@ pub struct LoadFeedforward {
 }
 
 impl LoadFeedforward {
-    /// Before the first look.
+    /// State before the first look.
     pub const NOTHING: Self = Self { reference: None, gravity: 0.0 };
 
     /// A look at a control step, [`LOOK_RATE`] times a second: the torque to add from here on, Nm, within the torque

@@ -432,7 +432,7 @@ impl Joint {
         faults.union(self.monitor.found())
     }
 
-    /// Of the faults of motion those that count in the open loop, in which a shorter deadline holds.
+    /// Faults of motion that count in the open loop, in which a shorter deadline holds.
     #[inline(never)]
     fn open_loop_faults(&self, active: &Active, moving: Faults) -> Faults {
         let mut faults = moving.intersection(Faults::OPEN_LOOP);

@@ -102,7 +102,7 @@ struct Sums {
 /// Filtered signals of the current loop.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Voltage {
-    /// Since the last check.
+    /// Sums since the last check.
     sums: Sums,
     /// The last step's current, A.
     last: Dq,
@@ -118,7 +118,7 @@ struct Voltage {
     error: Dq,
     /// Too much is unexplained.
     rounds: Bucket,
-    /// Of these rounds, those in which the current missed its reference less the others.
+    /// Number of these rounds in which the current missed its reference, less the others.
     missed: i32,
     /// Faults that the last check found.
     found: Faults,

@@ -1,4 +1,4 @@
-//! From a command to a torque: ramps, stiffness and damping; control step, once a round of the motion loop.
+//! Conversion of a command into a torque: ramps, stiffness and damping; control step, once a round of the motion loop.
 //!
 //! Whatever a mode and its gains want, the torque stays within the [bounds](super::limit_law) of the limits.
 
@@ -28,7 +28,7 @@ pub struct MotionLaw {
     velocity: f32,
     /// Nm.
     integral: f32,
-    /// Of the torque.
+    /// Bounds of the torque.
     bounds: Bounds,
     /// The joint brakes: no mode.
     brakes: bool,

@@ -15,7 +15,7 @@ use super::state_machine::State;
 /// The stages of a round, in their order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Stage {
-    /// From the command to a torque.
+    /// Motion law: from the command to a torque.
     #[default]
     Law,
     /// The regime of friction; and what the current loop did since the round before is checked (see
@@ -40,7 +40,7 @@ pub struct MotionLoop {
     compensated: Compensated,
     /// Rounds for which an enabled joint still holds where it is, because its brake opens.
     release: u32,
-    /// It holds where it is instead of following the command.
+    /// `true` while it holds where it is instead of following the command.
     held: bool,
 }
 

@@ -120,7 +120,7 @@ mod tests {
     const LIMITS: Limits = crate::default_configuration::B_G431B_ESC1.joint.limits;
     const LARGEST: f32 = 5.0;
 
-    /// With offsets of nothing.
+    /// Known offsets of zero.
     fn known() -> Offsets {
         let mut offsets = Offsets::default();
         (0..OFFSET_STEPS).for_each(|_| offsets.add(Phases::uniform(0.0), LARGEST));

@@ -102,7 +102,8 @@ impl Controlword {
         Self(self.0 & Self::FAULT_RESET.0)
     }
 
-    /// Not a fault reset, with which nothing else counts: every command of the profile has bit 7 clear.
+    /// Returns `true` if this is not a fault reset, with which nothing else counts: every command of the profile has
+    /// bit 7 clear.
     const fn commands(self) -> bool {
         !self.has(1 << 7)
     }
@@ -166,8 +167,8 @@ pub struct StateMachine {
     reset: bool,
     /// Control steps for which a fault reset still waits for the gate driver.
     waits: u16,
-    /// Since the quick stop somebody has asked for something else than operation: a master that was silent must not go
-    /// on as if it had not been.
+    /// `true` if since the quick stop somebody has asked for something else than operation: a master that was silent
+    /// must not go on as if it had not been.
     heard: bool,
 }
 

@@ -102,7 +102,7 @@ pub struct Stopping {
     /// Control steps that it took so far; those of a joint that stands and holds do not count.
     steps: u32,
     standing: u32,
-    /// It has stood.
+    /// `true` once it has stood.
     stood: bool,
     /// Control steps since the ramp ended.
     applying: u32,

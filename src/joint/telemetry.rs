@@ -50,7 +50,7 @@ impl Default for Telemetry {
 }
 
 impl Telemetry {
-    /// Before the first step.
+    /// Telemetry before the first step.
     pub const NOTHING: Self = Self {
         state: State::NotReadyToSwitchOn,
         faults: Faults::NONE,

@@ -51,7 +51,7 @@ impl ElectricalAngle {
 /// Counting direction of the encoder while the field turns forward, from phase A to B to C.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Direction {
-    /// Up.
+    /// Counts up.
     #[default]
     Forward,
     /// Down.

@@ -71,7 +71,7 @@ pub struct WeakeningGains {
 }
 
 impl WeakeningGains {
-    /// For settings that the [configuration](crate::joint::configuration) has checked.
+    /// Gains for settings that the [configuration](crate::joint::configuration) has checked.
     pub fn new(settings: &WeakeningSettings) -> Self {
         let WeakeningSettings { current, bandwidth, rate, resistance, inductance_d, flux_linkage, .. } = *settings;
         let WeakeningSettings { highest_reach, highest_speed, .. } = *settings;

@@ -127,7 +127,7 @@ pub struct Observation {
 /// The observer, from one control step to the next. The first sample starts it, at rest and within half a turn of zero.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Observer {
-    /// At the instant of the last sample. Its acceleration is without what is fed forward.
+    /// Motion at the instant of the last sample. Its acceleration is without what is fed forward.
     motion: Motion,
     started: bool,
     held: u32,

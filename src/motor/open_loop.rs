@@ -47,7 +47,7 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// From object 2107h:1: voltage in the lowest 16 bits, then speed, along, across.
+    /// Decodes object 2107h:1: voltage in the lowest 16 bits, then speed, along, across.
     pub const fn from_bits(bits: u64) -> Self {
         Self {
             voltage: bits as u16,
@@ -89,7 +89,7 @@ pub struct Window {
 }
 
 impl Window {
-    /// Before the first window.
+    /// Window before the first one.
     pub const NOTHING: Self = Self {
         number: 0,
         current: Dq::ZERO,
@@ -116,7 +116,7 @@ pub struct OpenLoopGains {
 }
 
 impl OpenLoopGains {
-    /// For a control rate, Hz.
+    /// Gains for a control rate, Hz.
     pub fn new(rate: f32) -> Self {
         Self { slew: SLEW / rate, way: STEPS / rate, deadline_steps: (DEADLINE * rate) as u32 }
     }

@@ -101,7 +101,7 @@ impl Name {
         panic!("no such setting")
     }
 
-    /// In words; empty for none.
+    /// Text of the name; empty for none.
     pub fn text(self) -> &'static str {
         NAMES.get(usize::from(self.0)).map_or("", |(text, ..)| text)
     }

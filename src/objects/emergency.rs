@@ -35,7 +35,7 @@ const RESET: u16 = 0;
 /// A joint that wanders along the edge of the range reports it once in this time, ms.
 const ENVELOPE_QUIET: u64 = 1_000;
 
-/// For [`Server::emergency`](canopen_node::Server::emergency).
+/// Emergency for [`Server::emergency`](canopen_node::Server::emergency).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Emergency {
     /// Error code.

@@ -30,7 +30,7 @@ const BYTES: usize = 12;
 #[derive(Debug)]
 pub(super) struct FaultLogging {
     left: u8,
-    /// Since when time counts towards the next one, ms; wraps.
+    /// Time since which time counts towards the next one, ms; wraps.
     since: u32,
     /// Code, number of the fault, and when it came, s.
     waiting: Deque<(u16, u8, u32), WAITING>,
@@ -47,7 +47,7 @@ impl FaultLogging {
         Self { left: 0, since: 0, waiting: Deque::new(), missed: 0, seen: Faults::NONE, counted: true }
     }
 
-    /// After a start: `powered_up` where the supply came.
+    /// State after a start: `powered_up` where the supply came.
     pub(super) fn started(self, powered_up: bool) -> Self {
         Self { left: if powered_up { FIRST } else { 0 }, counted: !powered_up, ..self }
     }

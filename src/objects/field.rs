@@ -131,7 +131,7 @@ pub enum ResetField {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum SetPoint {
-    /// For the state machine.
+    /// Controlword of the state machine.
     Controlword = 0,
     /// Mode of operation.
     Mode = 1,
@@ -191,11 +191,11 @@ pub(super) const PROFILE_SET_POINTS: usize = 6 * PROFILES as usize;
 pub enum ProfileParameter {
     /// Following error from which on bit 13 is set, raw position.
     FollowingErrorWindow = 0,
-    /// For how long it has to be beyond, ms.
+    /// Time for which it has to be beyond, ms.
     FollowingErrorTime = 1,
     /// Distance to the target within which the joint has to be, raw position.
     PositionWindow = 2,
-    /// For how long, ms.
+    /// Time for which the position has to be within, ms.
     PositionTime = 3,
     /// Difference to the target velocity within which the velocity has to be, raw velocity.
     VelocityWindow = 4,
@@ -231,7 +231,7 @@ impl ProfileParameter {
         }
     }
 
-    /// At the start.
+    /// Values at the start.
     pub const DEFAULTS: [u32; 13] = [u32::MAX, 0, 10_000, 0, 50, 20, 0, 0, 100, u32::MAX, 100, 0, -3i8 as u8 as u32];
 }
 
@@ -414,7 +414,7 @@ pub enum ImageField {
     Result,
     /// Bytes staged.
     Length,
-    /// Of the bytes staged.
+    /// Checksum of the bytes staged.
     Checksum,
     /// Remaining time of a trial.
     TrialLeft,
@@ -454,7 +454,7 @@ pub enum OwnerField {
 /// One of the two stored images.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Which {
-    /// In use.
+    /// Image in use.
     Active,
     /// Image that a roll back would make active.
     Previous,

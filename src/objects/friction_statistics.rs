@@ -8,7 +8,7 @@ use friction_compensation::compensation::{Output, Reason};
 /// Looks over which the mean square is taken: about a second at 1 kHz.
 const MEMORY: f32 = 1_000.0;
 
-/// Of one joint, since it was switched on.
+/// Statistics of one joint, since it was switched on.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FrictionStatistics {
     violations: u16,

@@ -16,7 +16,7 @@ use friction_compensation::parameters::slots::{Slot, SlotError};
 /// Content of the slots.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StoredImages {
-    /// In use, with the slot that it lies in.
+    /// Image in use, with the slot that it lies in.
     pub active: Option<(Summary, Slot)>,
     /// Image that a roll back would make active.
     pub previous: Option<(Summary, Slot)>,
@@ -40,12 +40,12 @@ pub struct Images<'a> {
     stored: StoredImages,
     action: Action,
     uploads: bool,
-    /// Of the image that is being read.
+    /// Checksum of the image that is being read.
     reading: Option<u32>,
 }
 
 impl<'a> Images<'a> {
-    /// From what was found at start.
+    /// Images from what was found at start.
     pub fn new(staging: &'a mut [u8; STAGING], life: LifeCycle, owner: Ownership, stored: StoredImages) -> Self {
         Self { staging, life, owner, stored, action: Action::Nothing, uploads: false, reading: None }
     }
@@ -209,9 +209,9 @@ impl<'a> Images<'a> {
 /// Reason for which an upload is not taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Failure {
-    /// By the life cycle.
+    /// Refusal by the life cycle.
     Refused(Refusal),
-    /// For another reason.
+    /// Abort for another reason.
     Abort(Abort),
 }
 

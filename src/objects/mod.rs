@@ -1,4 +1,4 @@
-//! This joint's object dictionary: the only place where an index meets a field.
+//! Object dictionary of this joint: the only place where an index meets a field.
 //!
 //! # Two contexts, as in [`canopen`](canopen_node)
 //!

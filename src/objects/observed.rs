@@ -16,7 +16,7 @@ use friction_compensation::compensation::Reason;
 /// A copy of what the control step and the slow task know.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observed {
-    /// Of a control step.
+    /// Telemetry of a control step.
     pub telemetry: Telemetry,
     /// Faults since the last acknowledgement.
     pub latched: Faults,
@@ -26,16 +26,16 @@ pub struct Observed {
     pub winding_temperature: f32,
     /// °C; NaN where the board has no sensor.
     pub bridge_temperature: f32,
-    /// Of the compensation.
+    /// Statistics of the compensation.
     pub friction: FrictionStatistics,
-    /// Of adaptation.
+    /// Report of adaptation.
     pub adaptation: adaptation::Report,
-    /// Of the external torque; no byte of it where a program has no room.
+    /// Report of the external torque; no byte of it where a program has no room.
     pub external: [external_torque::Report; LOADS as usize],
 }
 
 impl Default for Observed {
-    /// Before the first control step.
+    /// Observation before the first control step.
     fn default() -> Self {
         Self {
             telemetry: Telemetry::default(),

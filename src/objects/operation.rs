@@ -66,8 +66,8 @@ impl Operation {
         supported & (1 << (Self::ProfilePosition as i8 - 1)) != 0
     }
 
-    /// Those that there are, object 6502h: a mode n from 1 on is bit n - 1; the manufacturer's are bits 16 (impedance)
-    /// and 17 (open loop).
+    /// Mask of the modes that there are, object 6502h: a mode n from 1 on is bit n - 1; the manufacturer's are bits 16
+    /// (impedance) and 17 (open loop).
     pub const SUPPORTED: u32 = Self::supported();
 
     const fn supported() -> u32 {

@@ -50,7 +50,7 @@ pub(super) struct Place {
     /// Joint whose challenge it is.
     pub(super) target: Target,
     pub(super) now: u64,
-    /// Somebody is at the joint.
+    /// `true` if somebody is at the joint.
     pub(super) present: bool,
     /// The flash can be written.
     pub(super) writable: bool,
@@ -71,7 +71,7 @@ pub struct Ownership {
 }
 
 impl Ownership {
-    /// From what was kept.
+    /// Ownership from what was kept.
     pub fn new(guard: &Guard) -> Self {
         Self {
             key: guard.key.clone(),
@@ -284,7 +284,7 @@ impl Ownership {
 /// Reason for which an upload is not taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Wrong {
-    /// Not the response to the challenge: to be counted.
+    /// Wrong response to the challenge: to be counted.
     Response,
     /// Another reason.
     Abort(Abort),

@@ -31,9 +31,9 @@ pub struct JointImage<'a> {
     shared: &'a Shared,
     observed: Observed,
     state: NmtState,
-    /// In force.
+    /// Set-points in force.
     points: SetPoints,
-    /// With what has arrived of an RPDO.
+    /// Set-points with what has arrived of an RPDO.
     arriving: SetPoints,
     arrived: Arrived,
     sequence: u32,
@@ -50,7 +50,7 @@ pub struct JointImage<'a> {
 /// Parts of an RPDO that have arrived.
 #[derive(Clone, Copy, Debug, Default)]
 struct Arrived {
-    /// Something that is asked of the joint.
+    /// `true` if something has arrived that is asked of the joint.
     asked: bool,
     /// A position is part of it.
     position: bool,

@@ -44,10 +44,10 @@ impl Since {
 /// State of homing.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 enum Homing {
-    /// Not begun, or interrupted.
+    /// No homing: not begun, or interrupted.
     #[default]
     Idle,
-    /// On its way to an index, rad.
+    /// Approach to an index, rad.
     Approaches(f32),
     /// Waits until the joint stands, to take its zero: the position, rad, that is to be called the home offset. None:
     /// the joint's own.
@@ -57,7 +57,7 @@ enum Homing {
     Taken(f32, f32),
     /// Done.
     Attained,
-    /// Not possible.
+    /// Impossible homing.
     Failed,
 }
 
@@ -66,7 +66,7 @@ enum Homing {
 pub(super) enum Wish {
     /// No action.
     Nothing,
-    /// This is to be the joint's zero, rad (2102h:2). How that went [`ProfileModes::answer`] is told.
+    /// Position that is to be the joint's zero, rad (2102h:2). How that went [`ProfileModes::answer`] is told.
     Zero(f32),
 }
 
@@ -83,7 +83,7 @@ pub(super) struct ProfileModes {
 }
 
 impl ProfileModes {
-    /// At the start.
+    /// State at the start.
     pub(super) const NOTHING: Self =
         Self { arrived: Since(None), astray: Since(None), homing: Homing::Idle, shift: (0.0, 0.0), started: false };
 

@@ -7,7 +7,7 @@ use crate::joint::state_machine::Controlword;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Positions {
     current: i32,
-    /// There is one.
+    /// `true` if there is one.
     goes: bool,
     waiting: Option<i32>,
     /// The set-point that the controlword holds up was taken.
@@ -21,7 +21,7 @@ impl Positions {
     /// None yet.
     pub(super) const NONE: Self = Self { current: 0, goes: false, waiting: None, acknowledged: false, number: 0 };
 
-    /// Without any; the numbers go on.
+    /// State without any; the numbers go on.
     pub(super) fn forgotten(&self) -> Self {
         Self { number: self.number, ..Self::NONE }
     }

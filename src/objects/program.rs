@@ -14,7 +14,7 @@ use friction_compensation::parameters::slots::SlotError;
 /// Reason for which a configuration is not in use.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum NotConfigured {
-    /// It is refused.
+    /// Refusal of it.
     Refused(ConfigurationError),
     /// The control step has not taken the one before.
     Busy,

@@ -1,4 +1,4 @@
-//! From the numbers of the bus to a command; the receive interrupt.
+//! Conversion of the numbers of the bus into a command; the receive interrupt.
 
 use super::field::{FIRST_OF_PROFILES, PROFILE_SET_POINTS, Range, SetPoint};
 use super::interpolation::Target;
@@ -20,7 +20,7 @@ pub(super) struct SetPoints {
     position: i32,
     velocity: i32,
     impedance: u64,
-    /// Those of the profile modes, where a program has them: [`SetPoint`]s from [`FIRST_OF_PROFILES`] on, raw.
+    /// Set-points of the profile modes, where a program has them: [`SetPoint`]s from [`FIRST_OF_PROFILES`] on, raw.
     more: [u32; PROFILE_SET_POINTS],
     positions: [Positions; PROFILES as usize],
     /// Targets that count: those that came since operation was enabled in this mode.
@@ -43,7 +43,7 @@ struct Targets {
 
 /// A raw limit that limits nothing: the joint's own counts.
 const UNLIMITED: u32 = u32::MAX;
-/// Those of the profile modes at first: no limits, no offsets.
+/// Initial set-points of the profile modes: no limits, no offsets.
 const MORE: [u32; 6] = [UNLIMITED, UNLIMITED, UNLIMITED, 1_000, 0, 0];
 /// Number of choices among them, which stay.
 const CHOICES: usize = 4;

@@ -44,7 +44,7 @@ struct ProfileModes {
     target_number: AtomicU16,
     /// Number of the target that was reached last. Task.
     reached: AtomicU16,
-    /// Of the joint, raw. Task.
+    /// Position of the joint, raw. Task.
     position: AtomicU32,
     /// Bits of the statusword. Task.
     status: AtomicU16,

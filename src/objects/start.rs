@@ -22,7 +22,7 @@ pub struct Start {
 }
 
 impl Start {
-    /// From the newest `record` that is whole. `lost`: the slots hold, or held, another one. `defaults` are the
+    /// Start from the newest `record` that is whole. `lost`: the slots hold, or held, another one. `defaults` are the
     /// board's.
     pub fn new(record: Option<&[u8]>, lost: bool, defaults: &Configuration, bridge: &BridgeConfiguration) -> Self {
         let found = record.map_or(Some(Stored::NOTHING), |record| Stored::decode(record, defaults));

@@ -14,12 +14,12 @@ pub const REFILL: u32 = 3_600_000;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StoreBudget {
     left: u8,
-    /// Since when time counts towards the next one, ms; wraps.
+    /// Time since which time counts towards the next one, ms; wraps.
     since: u32,
 }
 
 impl StoreBudget {
-    /// With so many left.
+    /// Budget with so many left.
     pub(super) const fn new(left: u8) -> Self {
         Self { left, since: 0 }
     }

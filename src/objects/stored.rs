@@ -51,7 +51,7 @@ pub enum Part<T> {
     Kept,
     /// Left out: defaults.
     Removed,
-    /// With these values.
+    /// New values.
     New(T),
 }
 

@@ -27,7 +27,7 @@ pub struct Bearing {
 }
 
 impl Bearing {
-    /// Before the first look.
+    /// State before the first look.
     pub const NOTHING: Self = Self { parts: [(LoadFeedforward::NOTHING, ExternalTorque::NOTHING); LOADS as usize] };
 
     /// Every millisecond: from a control step to what the next commands carry; `factors` of the image's friction act.

@@ -53,7 +53,7 @@ impl From<ConfigurationError> for NotStarted {
 
 /// Values of the first configuration that are needed besides the control step.
 pub struct Started {
-    /// For the thermal model.
+    /// Settings of the thermal model.
     thermal: ThermalSettings,
     /// Counts a turn of an incremental encoder.
     encoder_counts: u32,
@@ -107,7 +107,7 @@ fn winding(thermal: &ThermalSettings) -> Result<WindingTemperature, Configuratio
     Ok(WindingTemperature::new(thermal, if plausible { sensor } else { thermal.warning })?)
 }
 
-/// At the thermal model's rate: how much current the winding bears, and how warm the gear is.
+/// Computes, at the thermal model's rate, how much current the winding bears, and how warm the gear is.
 #[embassy_executor::task]
 async fn keep_cool(mut winding: WindingTemperature) {
     let mut ticker = Ticker::every(Duration::from_hz(SLOW_RATE as u64));

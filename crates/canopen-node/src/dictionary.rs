@@ -7,9 +7,9 @@ use super::parameters::CommunicationParameters;
 /// Access of an SDO client to an entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
-    /// Only read; constant or not.
+    /// Read access only; constant or not.
     ReadOnly,
-    /// Only write.
+    /// Write access only.
     WriteOnly,
     /// Both.
     ReadWrite,
@@ -32,9 +32,9 @@ pub enum Length {
 /// Permission to map an entry into a PDO, by direction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Mappable {
-    /// In an RPDO: the process image can take it in the receive interrupt.
+    /// RPDO: the process image can take it in the receive interrupt.
     pub receive: bool,
-    /// In a TPDO.
+    /// TPDO.
     pub transmit: bool,
 }
 
@@ -74,7 +74,7 @@ pub enum Event {
         /// Its node id.
         node: u8,
     },
-    /// It is heard again.
+    /// Return of a lost heartbeat.
     HeartbeatBack {
         /// Its node id.
         node: u8,
@@ -173,6 +173,6 @@ pub trait ObjectDictionary {
     /// Communication parameters at power-on for a node id of 1 to 127: the stored ones, or the defaults.
     fn communication_parameters(&self, node_id: u8) -> CommunicationParameters;
 
-    /// Something happened; see [`Event`].
+    /// Tells the application an event; see [`Event`].
     fn event(&mut self, event: Event);
 }

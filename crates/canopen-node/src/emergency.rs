@@ -62,7 +62,7 @@ pub(super) enum Lasting {
     Heartbeat(u8),
     /// Number of the RPDO, 0 to 3.
     Deadline(u8),
-    /// Of the controller.
+    /// Error passive state of the controller.
     ErrorPassive,
     /// SYNC of another length than object 1019h says.
     SyncLength,
@@ -153,7 +153,8 @@ impl Emergencies {
         self.dropped
     }
 
-    /// After a reset of communication: the server's errors are forgotten, the application's and the history stay.
+    /// Starts anew after a reset of communication: the server's errors are forgotten, the application's and the history
+    /// stay.
     pub(super) fn restart(&mut self, cob_id: u32, inhibit: u16) {
         self.lasting = 0;
         self.pending.clear();

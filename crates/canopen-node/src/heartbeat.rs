@@ -63,7 +63,7 @@ pub(super) enum Change {
         consumer: u8,
         node: u8,
     },
-    /// It is not monitored any more, although it was lost.
+    /// End of monitoring of a node that was lost.
     Dismissed {
         consumer: u8,
     },

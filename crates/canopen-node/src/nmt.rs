@@ -4,14 +4,14 @@
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum NmtState {
-    /// From reset until the boot-up message; also a node without a node id. Its number is the boot-up message's data
-    /// byte.
+    /// State from reset until the boot-up message; also that of a node without a node id. Its number is the boot-up
+    /// message's data byte.
     Initialising = 0x00,
     /// NMT, heartbeat and LSS alone.
     Stopped = 0x04,
-    /// Everything.
+    /// All services.
     Operational = 0x05,
-    /// Everything but PDOs and SYNC.
+    /// All services but PDOs and SYNC.
     PreOperational = 0x7F,
 }
 

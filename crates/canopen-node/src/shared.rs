@@ -61,7 +61,7 @@ impl Epoch {
 }
 
 impl Shared {
-    /// Without a node id, initialising.
+    /// State without a node id, initialising.
     #[allow(clippy::new_without_default, reason = "it belongs into a static")]
     pub const fn new() -> Self {
         Self {

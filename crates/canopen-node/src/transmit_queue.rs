@@ -16,7 +16,7 @@
 use super::time::{MILLISECOND, elapsed};
 use super::{Frame, HEARTBEAT};
 
-/// After this time a frame is not overtaken any more, us. Long against a frame (0.13 ms) and the usual distance of two
+/// Time after which a frame is not overtaken any more, us. Long against a frame (0.13 ms) and the usual distance of two
 /// SYNCs, short against heartbeats and the time-outs of SDO.
 pub const PATIENCE: u32 = 10 * MILLISECOND;
 

@@ -45,7 +45,7 @@ pub enum Reason {
     /// Switched off.
     #[default]
     Off,
-    /// There is no verified image.
+    /// No verified image.
     NoModel,
     /// Full compensation, as requested.
     AsRequested,

@@ -61,8 +61,8 @@ impl<P: Program> Objects<'_, P> {
         !(self.single_bank && self.needs_control())
     }
 
-    /// Somebody is at the joint: at its button, or at its supply while no master runs it. A reset over the bus is no
-    /// power-up.
+    /// Returns `true` if somebody is at the joint: at its button, or at its supply while no master runs it. A reset
+    /// over the bus is no power-up.
     pub(super) fn is_present(&self) -> bool {
         let new =
             || self.now < POWER_UP && !self.was_started && self.program.last_reset().causes & LastReset::POWER != 0;

@@ -118,7 +118,7 @@ pdo!(transmit_2, 0x1801, 0x1A01, "TPDO 2 communication parameter", "TPDO 2 mappi
 pdo!(transmit_3, 0x1802, 0x1A02, "TPDO 3 communication parameter", "TPDO 3 mapping parameter", 3, 6);
 pdo!(transmit_4, 0x1803, 0x1A03, "TPDO 4 communication parameter", "TPDO 4 mapping parameter", 3, 6);
 
-/// In the order of their indices.
+/// Rooms in the order of their indices.
 pub(super) const ROOMS: [Room; 17] = [
     general::ROOM,
     receive_1::COMMUNICATION,

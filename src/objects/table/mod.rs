@@ -199,7 +199,7 @@ macro_rules! room {
 }
 use room;
 
-/// In the order of their indices.
+/// Rooms in the order of their indices.
 const ROOMS: [Room; 7] =
     [motion::ROOM, configuration::ROOM, friction::ROOM, load::ROOM, image::ROOM, supervision::ROOM, profile::ROOM];
 

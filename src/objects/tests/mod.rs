@@ -216,7 +216,7 @@ pub struct Node {
 }
 
 impl Node {
-    /// In PRE-OPERATIONAL.
+    /// Node in PRE-OPERATIONAL.
     pub fn new() -> Self {
         Self::with(None, false)
     }
@@ -229,14 +229,14 @@ impl Node {
         Self::guarded(record, single_bank, reset, &Guard::default())
     }
 
-    /// With what guards the joint.
+    /// Node with what guards the joint.
     pub fn guarded(record: Option<Vec<u8>>, single_bank: bool, reset: LastReset, guard: &Guard) -> Self {
         let found = Start::new(record.as_deref(), false, &BOARD.joint, &BOARD.bridge);
         let start = Start { single_bank, stores_left: STORES, ..found };
         Self::starting(Memory { record, reset, ..Memory::default() }, &start, guard)
     }
 
-    /// With a program that starts so.
+    /// Node with a program that starts so.
     pub fn starting(program: Memory, start: &Start, guard: &Guard) -> Self {
         let bus: &canopen_node::Shared = Box::leak(Box::new(canopen_node::Shared::new()));
         let shared: &Shared = Box::leak(Box::new(Shared::new()));

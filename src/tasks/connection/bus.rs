@@ -60,7 +60,7 @@ const fn is_off(state: State) -> bool {
 }
 
 impl Node {
-    /// Before the receive interrupt is enabled.
+    /// Node, before the receive interrupt is enabled.
     pub fn new(
         shared: &'static canopen_node::Shared,
         server: Server<'static>,

@@ -64,7 +64,7 @@ impl Connection {
 /// State of the joint that the bus shows beside its control steps.
 pub struct Watching {
     statistics: FrictionStatistics,
-    /// Of the model in shadow.
+    /// Memory of the model in shadow.
     memory: Memory,
     adapting: Adapting,
     bearing: Bearing,

@@ -28,7 +28,7 @@ const _: () = assert!(
 
 /// The program around the objects.
 pub struct BoardProgram {
-    /// To the control step.
+    /// Configurations to the control step.
     pub active: Offering<Active>,
     window: RefCell<Subscriber<Window>>,
     /// The flash.
@@ -42,7 +42,7 @@ pub struct BoardProgram {
 }
 
 impl BoardProgram {
-    /// With what the flash holds.
+    /// Program with what the flash holds.
     pub fn new(active: Offering<Active>, window: Subscriber<Window>, mut store: Store) -> Self {
         let guard = store.guard();
         Self { active, window: RefCell::new(window), store, guard, restart: false, set_options: false }

@@ -97,7 +97,7 @@ impl Store {
         self.records.is_lost()
     }
 
-    /// For the start: a record that is damaged gives way to what was stored before.
+    /// Finds the record at the start: one that is damaged gives way to what was stored before.
     pub fn find_record(&mut self) {
         // If the flash refuses the mark that the record is damaged, it is found so again.
         let _ = self.records.usable(&mut self.flash);

@@ -1,7 +1,7 @@
 //! The CRC of block transfers: CiA 301 section 7.2.4.3.16, polynomial x^16 + x^12 + x^5 + 1 from 0, known as
 //! CRC-16/XMODEM.
 
-/// Without a table: a block of 889 bytes takes less time than its frames do, and flash is scarce.
+/// CRC without a table: a block of 889 bytes takes less time than its frames do, and flash is scarce.
 const CRC: crc::Crc<u16, crc::NoTable> = crc::Crc::<u16, crc::NoTable>::new(&crc::CRC_16_XMODEM);
 
 /// The CRC of what came so far.

@@ -151,7 +151,7 @@ fn disturbances() -> impl Strategy<Value = Vec<Disturbance>> {
     (losses_and_repetitions(), losses_and_swaps()).prop_map(|(some, others)| [some, others].concat()).prop_shuffle()
 }
 
-/// Does one of them to the block; where `keep_ends`, its first and last segment arrive.
+/// Applies one of them to the block; where `keep_ends`, its first and last segment arrive.
 fn apply(disturbance: Disturbance, segments: &mut Vec<[u8; 8]>, keep_ends: bool) {
     let (first, places) = match keep_ends {
         true => (1, segments.len().saturating_sub(2)),

@@ -164,7 +164,7 @@ pub struct BlockUpload {
     pub sub_index: u8,
     pub crc: bool,
     pub block_size: u8,
-    /// Up to so many bytes the plain protocol will do.
+    /// Bytes up to which the plain protocol will do.
     pub threshold: u8,
 }
 

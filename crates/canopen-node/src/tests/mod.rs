@@ -247,7 +247,7 @@ impl Node {
         }
     }
 
-    /// In PRE-OPERATIONAL, boot-up message sent.
+    /// Node in PRE-OPERATIONAL, boot-up message sent.
     pub fn booted() -> Self {
         let mut node = Self::powered(NODE);
         assert_eq!(node.task(), [frame(0x700 + u16::from(NODE), &[0])]);

@@ -41,7 +41,7 @@ pub struct CommonTorques {
 }
 
 impl Common {
-    /// Without any term.
+    /// No term.
     pub(super) const NONE: Self = Self { present: false, slip: MaxwellSlip::NONE, ripples: CommonTerms::NONE.ripples };
 
     /// Prepares `terms` for `rate` evaluations a second (at least 1).

@@ -165,7 +165,7 @@ pub struct Fade {
 }
 
 impl Fade {
-    /// Not prepared yet.
+    /// Fade that is not prepared yet.
     pub(super) const NONE: Self =
         Self { edges: [Edge { range: Range { low: 0, high: 0 }, margin: 0, factor: 0, per_step: 0 }; SIGNALS] };
 

@@ -47,7 +47,7 @@ pub struct MaxwellSlip {
 }
 
 impl MaxwellSlip {
-    /// Without any element.
+    /// No element.
     pub(super) const NONE: Self = Self { gains: [0; ELEMENTS], levels: [0; ELEMENTS] };
 
     /// Prepares elements for `rate` steps a second (at least 1, and [`LOWEST_RATE`] for stiff elements).

@@ -77,7 +77,7 @@ pub struct FrictionModel {
 }
 
 impl FrictionModel {
-    /// Without any friction.
+    /// No friction.
     const NONE: Self = Self {
         fade: Fade::NONE,
         selector: Selector { criteria: [None; MAX_CRITERIA], fade_time: 0 },

@@ -52,7 +52,8 @@ pub struct NetworkParameters {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InputScale {
     centre: i32,
-    /// From the upper end of the centred range to that of 32 bits: what saturates when it is added has left the range.
+    /// Distance from the upper end of the centred range to that of 32 bits: what saturates when it is added has left
+    /// the range.
     above: i32,
     /// A power of two.
     factor: i32,
@@ -64,7 +65,7 @@ pub struct InputScale {
 }
 
 impl InputScale {
-    /// Not prepared yet.
+    /// Scaling that is not prepared yet.
     const NONE: Self = Self { centre: 0, above: 0, below: 0, factor: 0, offset: 0, gain: 0 };
 
     /// Maps `range` to [-1, 1]; an empty range gives zero for every input.
@@ -175,7 +176,7 @@ fn layer([a, b, c, d, e]: &[PackedNeuron; NEURONS], before: [u32; 3]) -> [u32; 3
 }
 
 impl Inputs {
-    /// Not prepared yet.
+    /// Scalings that are not prepared yet.
     pub(super) const NONE: Self = Self([InputScale::NONE; INPUTS]);
 
     /// Prepares the scales for `domain`.

@@ -214,7 +214,7 @@ coefficients! {
 }
 
 impl Coefficients {
-    /// Those that an image of format 1 has, the first ones.
+    /// Number of coefficients of an image of format 1, the first ones.
     pub const FORMAT_1: usize = 31;
 }
 
@@ -347,7 +347,7 @@ pub(crate) fn times(coefficient: i32, factor: i32) -> i32 {
 }
 
 impl Scaling {
-    /// Not prepared yet.
+    /// Scaling that is not prepared yet.
     pub(super) const NONE: Self =
         Self { ranges: [Range { low: 0, high: 0 }; SIGNALS], factors: [0; SIGNALS], reference_temperature: 0 };
 
@@ -405,7 +405,7 @@ impl PreparedTerms {
             .saturating_add(self.hysteresis.saturating_abs())
     }
 
-    /// Without any term.
+    /// No term.
     pub(super) const NONE: Self = Self {
         terms: Terms(0),
         coefficients: Factors::NONE,

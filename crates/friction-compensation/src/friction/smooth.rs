@@ -66,7 +66,7 @@ pub fn atan(x: i32) -> i32 {
     if x < 0 { -quarter_turns } else { quarter_turns }
 }
 
-/// For x in [0, 1], Q16.16.
+/// Arc tangent for x in [0, 1], Q16.16.
 #[inline(always)]
 fn atan_up_to_one(x: u32) -> i32 {
     interpolate_odd(&ATAN, (x.min(0xffff) << 12) as i32)

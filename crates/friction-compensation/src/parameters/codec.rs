@@ -32,7 +32,7 @@ pub(super) struct Header {
     pub(super) golden: u8,
 }
 
-/// Everything between the length and the checksum.
+/// Decodes everything between the length and the checksum.
 pub(super) fn decode_content(mut reader: Reader) -> Result<Image, ImageError> {
     let header = decode_header(&mut reader);
     let mut parameters = [ParameterSet::default(); MAX_SETS];
@@ -213,7 +213,7 @@ fn decode_network(reader: &mut Reader, network: &mut NetworkParameters) {
     reader.reserved(2);
 }
 
-/// Everything before the checksum; the length stays open.
+/// Encodes everything before the checksum; the length stays open.
 pub(super) fn encode_content(image: &Image, writer: &mut Writer) {
     let Image { friction, limits, golden, .. } = image;
     let format = image.format();

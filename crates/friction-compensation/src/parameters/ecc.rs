@@ -40,7 +40,7 @@ pub enum Decision {
         /// Clears the flag of the double error and no other.
         clear: u32,
     },
-    /// Something else: the program cannot go on.
+    /// Another error: the program cannot go on.
     Fatal {
         /// Address that the register speaks of.
         address: u32,

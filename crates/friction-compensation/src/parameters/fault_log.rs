@@ -42,7 +42,7 @@ pub struct LoggedFault {
     pub fault: u8,
     /// Number of the power-up, from 1 on.
     pub power_up: u32,
-    /// Since the program started, s.
+    /// Time since the program started, s.
     pub time: u32,
 }
 
@@ -87,7 +87,7 @@ pub struct FaultLog {
     /// Its number; 0 where nothing was ever written.
     number: u32,
     power_ups: u32,
-    /// This power-up is not in flash yet.
+    /// `true` while this power-up is not in flash yet.
     new: bool,
     newest: Deque<LoggedFault, LOGGED>,
 }

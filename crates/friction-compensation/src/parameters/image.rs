@@ -361,12 +361,12 @@ pub struct GoldenSequence {
 }
 
 impl GoldenSequence {
-    /// Before the first vector.
+    /// Sequence before the first vector.
     pub fn new(terms: &CommonTerms) -> Self {
         Self { common: Common::new(terms, GOLDEN_RATE), bent: Bent::default() }
     }
 
-    /// At the next vector's state.
+    /// Torques at the next vector's state.
     pub fn next(&mut self, state: &JointState) -> CommonTorques {
         self.common.step(&mut self.bent, state)
     }

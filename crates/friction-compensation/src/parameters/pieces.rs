@@ -13,7 +13,7 @@ use crate::friction::{self, FrictionModel, ParameterSet};
 /// An image all of whose fields are right.
 pub(super) struct Pieces<'a> {
     pub(super) header: Header,
-    /// At the first set.
+    /// Reader at the first set.
     sets: Reader<'a>,
 }
 
@@ -56,7 +56,7 @@ impl<'a> Pieces<'a> {
         self.read_sets(index, set);
     }
 
-    /// Everything to the end, with each golden vector.
+    /// Walks over everything to the end, with each golden vector.
     #[inline(never)]
     fn walk(&self, last: usize, with: &mut dyn FnMut(&GoldenVector)) -> Reader<'a> {
         let mut set = ParameterSet::default();

@@ -73,7 +73,7 @@ fn torque_bounds(root: Cell, parameters: &NetworkParameters, depth: u32) -> Inte
     )
 }
 
-/// Of the three hidden layers.
+/// Slopes of the three hidden layers.
 #[inline(never)]
 fn tanh_slopes(root: &Cell, parameters: &NetworkParameters) -> [[Interval; NEURONS]; 3] {
     let [second, third] = &parameters.hidden;

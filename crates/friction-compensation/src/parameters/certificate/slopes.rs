@@ -74,7 +74,7 @@ struct Before<'a> {
     input: usize,
     /// Neurons that are at the upper end: a bit each.
     upper: usize,
-    /// Before the shift by a neuron's fraction. Below 2^44, so that nothing saturates.
+    /// Sums before the shift by a neuron's fraction. Below 2^44, so that nothing saturates.
     sums: [Interval; NEURONS],
 }
 

@@ -74,17 +74,17 @@ pub enum State {
     Empty = 0,
     /// Bytes have arrived.
     Staged = 1,
-    /// Everything holds of them.
+    /// Verified bytes: everything holds of them.
     Verified = 2,
     /// Computed without effect.
     Shadow = 3,
-    /// In use from RAM.
+    /// Trial from RAM.
     Trial = 4,
     /// Being written to flash, or the roll back is.
     Storing = 5,
-    /// In flash, not in use yet.
+    /// Stored in flash, not in use yet.
     Committed = 6,
-    /// In flash and in use; nothing is staged.
+    /// Stored in flash and in use; nothing is staged.
     Active = 7,
 }
 
@@ -180,7 +180,7 @@ pub struct Conditions<'a> {
 #[derive(Clone, Copy, Debug)]
 struct Checked {
     verified: Verified,
-    /// Of the upload's bytes.
+    /// Checksum of the upload's bytes.
     checksum: u32,
     /// Number of the key that the tag was checked with.
     key: Option<u32>,
@@ -208,7 +208,7 @@ pub struct LifeCycle {
 }
 
 impl LifeCycle {
-    /// At start: nothing is staged.
+    /// Life cycle at start: nothing is staged.
     ///
     /// `floor`: as it was kept. `newest`: the highest version of the stored images, whose tags nobody knows.
     /// `failures`: the kept count of wrong tags.
@@ -375,7 +375,7 @@ impl LifeCycle {
         }
     }
 
-    /// To be called often: ends a trial whose time is over or whose client is gone.
+    /// Ends a trial whose time is over or whose client is gone; to be called often.
     pub fn tick(&mut self, now: u64, heartbeat_lost: bool) -> Action {
         if self.pending.is_some() || !matches!(self.state, State::Shadow | State::Trial) {
             return Action::Nothing;

@@ -18,7 +18,7 @@ pub enum Refusal {
         /// Bytes of the staging buffer.
         room: usize,
     },
-    /// Not as many bytes arrived as were announced.
+    /// Number of bytes that is not the announced one.
     UploadLength {
         /// Bytes that arrived.
         length: usize,
@@ -43,44 +43,44 @@ pub enum Refusal {
         /// Lowest that is taken.
         floor: u32,
     },
-    /// For another product.
+    /// Image for another product.
     Product {
         /// Product that the image is for.
         image: u32,
-        /// This joint's.
+        /// Product of this joint.
         joint: u32,
     },
-    /// For another joint.
+    /// Image for another joint.
     Serial {
         /// Serial number that the image is for.
         image: u32,
-        /// This joint's.
+        /// Serial number of this joint.
         joint: u32,
     },
-    /// In another unit than the joint commands.
+    /// Effort in another unit than the joint commands.
     Effort {
         /// Unit of the image.
         image: Effort,
-        /// This joint's.
+        /// Effort of this joint.
         joint: Effort,
     },
     /// The certificate cannot be given, within the image's limits and the joint's.
     Certificate(certificate::Refusal),
-    /// This program's arithmetic is not the one that the image was judged with.
+    /// Mismatch of arithmetic: this program's is not the one that the image was judged with.
     Golden(GoldenMismatch),
     /// No such command.
     UnknownCommand {
         /// Number that was written.
         value: u8,
     },
-    /// Not in this state.
+    /// Command or upload that this state does not permit.
     State {
         /// The command; none for an upload.
         command: Option<Command>,
         /// State of the life cycle.
         state: State,
     },
-    /// Something that was begun has not come to its end.
+    /// Operation that was begun and has not come to its end.
     Busy,
     /// One bank of flash: the program stands still while it is written, and the motor must be off and nearly at rest.
     Armed {

@@ -157,7 +157,7 @@ pub enum SlotError {
         /// Bytes of the payload.
         needed: usize,
     },
-    /// There is no previous content to roll back to.
+    /// No previous content to roll back to.
     NoPrevious,
     /// The payload was whole when the slots were opened and is not now.
     Damaged {
