@@ -126,8 +126,8 @@ impl Core {
         Ok(calls.iter().map(|call| Cost { instructions: call.instructions, cycles: call.cycles }).collect())
     }
 
-    /// At a breakpoint that a trace has met: the word that the program prints there by semihosting, after which it goes
-    /// on; none where it ends.
+    /// Word that the program prints by semihosting at a breakpoint that a trace has met, after which it goes on; none
+    /// where it ends.
     ///
     /// # Errors
     /// Output that is no word.

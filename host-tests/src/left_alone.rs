@@ -53,7 +53,7 @@ pub enum Alone {
     Borne,
     /// Torque mode, no torque: the payload swings.
     Swinging,
-    /// With its payload, away from where that hangs, a spring and a damper hold the position; the joint's own
+    /// Joint with its payload, away from where that hangs, held in position by a spring and a damper; the joint's own
     /// feedforward bears a gravity that is configured wrong.
     HeldBearing(Gravity),
     /// The same without spring and damper: the payload floats.
@@ -86,7 +86,7 @@ impl Alone {
     /// All of them.
     pub const ALL: [Self; 5] = [Self::Free, Self::Held, Self::Sprung, Self::Borne, Self::Swinging];
 
-    /// Those with a feedforward of gravity.
+    /// Ways with a feedforward of gravity.
     pub const BEARING: [Self; 6] = [
         Self::HeldBearing(Gravity::Little),
         Self::HeldBearing(Gravity::Much),

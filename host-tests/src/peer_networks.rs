@@ -29,7 +29,7 @@ fn sums(layer: &Layer, x: &[f64; NEURONS]) -> Vec<f64> {
 }
 
 impl Exact {
-    /// From the integers of an image.
+    /// Networks from the integers of an image.
     pub fn new(parameters: &NetworkParameters) -> Self {
         let first = parameters.first.map(|[weights @ .., bias]| {
             (weights.map(|weight| f64::from(weight) * 2f64.powi(-26)), f64::from(bias) * 2f64.powi(-25))
@@ -58,7 +58,7 @@ impl Exact {
         self.evaluate(x).1
     }
 
-    /// In the memory layout of the probe's `Floats`.
+    /// Bytes in the memory layout of the probe's `Floats`.
     pub fn floats(&self) -> Vec<u8> {
         let layer = |layer: &Layer| {
             let weights = layer.iter().flat_map(|(weights, _)| *weights);
@@ -67,8 +67,8 @@ impl Exact {
         self.hidden.iter().chain([&self.output]).flat_map(layer as fn(&Layer) -> Vec<u8>).collect()
     }
 
-    /// In the memory layout of the probe's `Bytes`, quantized for what occurs over `samples`, and the value of a step
-    /// of its output. Sums beyond +-4, where tanh is flat in 8 bits, are cut.
+    /// Bytes in the memory layout of the probe's `Bytes`, quantized for what occurs over `samples`, and the value of a
+    /// step of its output. Sums beyond +-4, where tanh is flat in 8 bits, are cut.
     pub fn bytes(&self, samples: &[[f64; INPUTS]]) -> (Vec<u8>, f64) {
         let evaluated: Vec<_> = samples.iter().map(|x| self.evaluate(*x)).collect();
         let step = |largest: f64| largest / 127.0;

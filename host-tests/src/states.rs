@@ -82,7 +82,7 @@ pub fn within(random: &mut ChaCha8Rng, range: Range) -> i32 {
     random.random_range(range.low..=range.high)
 }
 
-/// At an end of a range or one step beside it.
+/// Value at an end of a range or one step beside it.
 fn beside(random: &mut ChaCha8Rng, range: Range) -> i32 {
     let end = if random.random() { range.low } else { range.high };
     end.saturating_add(random.random_range(-1..=1))

@@ -260,9 +260,9 @@ fn recorded() -> Result<String, String> {
 /// Place in which the controller around the computed torque closes its loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Loop {
-    /// In the joints, by impedance mode with low gains: they know the reference velocity.
+    /// Loop in the joints, by impedance mode with low gains: they know the reference velocity.
     Joints,
-    /// In the master, by torque mode at 1 kHz.
+    /// Loop in the master, by torque mode at 1 kHz.
     Master,
 }
 

@@ -61,7 +61,7 @@ fn factors() -> [(&'static str, FrictionFactors); 6] {
 
 /// Values of a joint that are asserted.
 struct Found {
-    /// Without compensation, and with it.
+    /// Motions without compensation, and with it.
     moved: [Moved; 2],
     torque_mode: InTorqueMode,
     /// The uncertainty that its fit states, and what moved by itself with it.
@@ -73,7 +73,7 @@ struct Found {
 
 /// A joint in service.
 struct Served {
-    /// By [`factors`], without adaptation and with it.
+    /// Motions by [`factors`], without adaptation and with it.
     by_factors: Vec<[Moved; 2]>,
     /// Pushed, and resisted.
     touched: [f64; 2],

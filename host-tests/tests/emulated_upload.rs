@@ -83,7 +83,7 @@ struct Seen {
 struct Watched<'b> {
     bench: &'b mut Bench<MoteusR4>,
     part: &'b AtomicUsize,
-    /// Before each of the parts, in them, and behind them.
+    /// Observations before each of the parts, in them, and behind them.
     seen: [Seen; PARTS.len() + 1],
     before: Option<(Instant, f64)>,
     sent: VecDeque<Heard>,

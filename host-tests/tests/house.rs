@@ -211,7 +211,7 @@ fn circle(arrows: &BTreeMap<Module, BTreeSet<Module>>) -> Option<Vec<Module>> {
     arrows.keys().find_map(|from| follow(from, arrows, &mut Vec::new(), &mut done))
 }
 
-/// Without those between a folder's own file and the files in it.
+/// Arrows without those between a folder's own file and the files in it.
 fn between_ideas(mut arrows: BTreeMap<Module, BTreeSet<Module>>) -> BTreeMap<Module, BTreeSet<Module>> {
     for (from, to) in &mut arrows {
         to.retain(|to| !from.starts_with(to) && !to.starts_with(from));

@@ -22,7 +22,7 @@ pub const WIDTH: usize = 5;
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub struct FloatLayer<const N: usize> {
-    /// By neuron.
+    /// Weights by neuron.
     pub weights: [[f32; WIDTH]; N],
     /// Biases.
     pub biases: [f32; N],
@@ -43,11 +43,11 @@ pub struct Floats {
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub struct ByteLayer<const N: usize> {
-    /// By neuron.
+    /// Weights by neuron.
     pub weights: [[i8; WIDTH]; N],
     /// One product in steps of the output.
     pub factor: f32,
-    /// In steps of the output.
+    /// Biases in steps of the output.
     pub biases: [f32; N],
 }
 

@@ -85,7 +85,7 @@ pub fn configuration(scenario: &Scenario) -> (Configuration, BridgeConfiguration
     (joint, bridge)
 }
 
-/// Everything prepared; none where an image or the configuration is refused.
+/// Prepared configuration; none where an image or the configuration is refused.
 pub fn prepare(scenario: &Scenario, image: &[u8]) -> Option<Active> {
     let (configuration, bridge) = configuration(scenario);
     let image = Image::decode(image).ok()?;

@@ -137,8 +137,8 @@ impl<W: Wired> Bench<W> {
         }
     }
 
-    /// Somebody turns the link by hand, slowly, until the rotor has turned once: an incremental encoder has met its
-    /// index. `reached` as in [`run_with`](Self::run_with).
+    /// Turns the link by hand, slowly, until the rotor has turned once: an incremental encoder has met its index.
+    /// `reached` as in [`run_with`](Self::run_with).
     ///
     /// # Errors
     /// Those of it; or the link is stuck.

@@ -17,19 +17,19 @@ use std::f64::consts::TAU;
 
 /// Its node id.
 pub const NODE: u8 = 5;
-/// Between two set-points, s.
+/// Period of set-points, s.
 pub const SET_POINT: f64 = 0.005;
 /// Usual amplitude of the velocity at the link, rad/s; its sine has 1 Hz.
 pub const AMPLITUDE: f64 = 2.0;
 /// Time for which the joint moves where the control interrupt is measured, s.
 pub const MOTION: f64 = 2.0;
-/// Between two heartbeats of the joint, ms.
+/// Period of the joint's heartbeat, ms.
 const HEARTBEAT: u16 = 10;
 /// Cyclic synchronous velocity, of object 6060h.
 const VELOCITY: u8 = 9;
 /// Controlwords of CiA 402: shutdown, switch on, enable operation.
 const ENABLING: [u16; 3] = [0x06, 0x07, 0x0F];
-/// Up to here the joint is enabled, s.
+/// Time up to which the joint is enabled, s.
 const ENABLED: f64 = 0.3;
 
 /// An image whose physical model and network act in all that [`Moving`] does: every term, a network in each of
@@ -47,7 +47,7 @@ pub struct Moving<W: Wired = MoteusR4> {
     period: u32,
     /// Amplitude of the velocity at the link, rad/s.
     pub amplitude: f64,
-    /// Nobody sends set-points.
+    /// `true` if nobody sends set-points.
     pub silent: bool,
     /// Controlword instead of those that enable the joint.
     pub controlword: Option<u16>,
@@ -58,7 +58,7 @@ pub struct Moving<W: Wired = MoteusR4> {
 }
 
 impl<W: Observed> Moving<W> {
-    /// From power-up until it moves.
+    /// Runs from power-up until it moves.
     ///
     /// # Errors
     /// It is not enabled.

@@ -147,7 +147,7 @@ pub struct Memory<'c, W> {
 }
 
 impl<'c, W: Observed> Memory<'c, W> {
-    /// At a time, in cycles.
+    /// Memory at a time, in cycles.
     pub const fn new(bus: &'c mut Chip<W>, now: u64) -> Self {
         Self { bus, now }
     }

@@ -7,9 +7,9 @@ use emulator::chip::flash::Torn;
 use emulator::chip::time::Instant;
 use libtest_mimic::Failed;
 
-/// Between two looks at the flash, s: less than its shortest operation takes.
+/// Time between two looks at the flash, s: less than its shortest operation takes.
 const LOOK: f64 = 20e-6;
-/// Without an operation for so long, a program has written what it was to, s: longer than its longest operation.
+/// Time without an operation after which a program has written what it was to, s: longer than its longest operation.
 const QUIET: f64 = 0.026;
 /// Longest time from power-up to the boot-up message, s.
 const START: f64 = 0.5;

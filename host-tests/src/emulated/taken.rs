@@ -25,7 +25,7 @@ pub struct Taken {
     pub rounds: u64,
     /// Rounds by what acted and why.
     pub acted: BTreeMap<String, u64>,
-    /// Of the control interrupt.
+    /// Times of the control interrupt.
     pub interrupt: ExceptionTimes,
     /// Cycles of the network from its inputs in Q31, and of clamping and scaling those: least, median, most.
     pub network: [[u64; 3]; 2],

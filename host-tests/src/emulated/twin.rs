@@ -41,11 +41,11 @@ struct Given {
 pub struct Seen {
     /// Steps that were compared.
     pub steps: u64,
-    /// Those in which the bridge switched.
+    /// Steps in which the bridge switched.
     pub switching: u64,
-    /// Those with a fault.
+    /// Steps with a fault.
     pub faults: u64,
-    /// Those in which the bridge switched, by which model acted and why.
+    /// Steps in which the bridge switched, by which model acted and why.
     pub compensation: BTreeMap<String, u64>,
 }
 
@@ -84,7 +84,8 @@ impl<'v> Twin<'v> {
         &self.seen
     }
 
-    /// Before the first instruction of a control interrupt: compares the step before, and reads what this one is given.
+    /// Compares, before the first instruction of a control interrupt, the step before, and reads what this one is
+    /// given.
     ///
     /// # Errors
     /// A difference.
@@ -223,7 +224,7 @@ impl<'v> Twin<'v> {
     }
 }
 
-/// Of [`Observed::GATE`].
+/// States of [`Observed::GATE`].
 const STARTING: u64 = 0;
 const READY: u64 = 1;
 

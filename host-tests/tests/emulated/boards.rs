@@ -36,7 +36,7 @@ fn esc1() -> Result<Bench<BG431BEsc1>, Failed> {
     Bench::with(BG431BEsc1::new, &actuator, &program(BG431BEsc1::NAME, env!("CARGO_TARGET_TMPDIR"))?)
 }
 
-/// It starts once, controls once a period and within it, and reports neither faults nor overruns.
+/// Checks that it starts once, controls once a period and within it, and reports neither faults nor overruns.
 fn starts<W: Wired>(bench: &mut Bench<W>, rate: u32, idle: &str) -> Result<(), Failed> {
     bench.run(0.1)?;
     bench.emulation.cpu.clear_exception_times();
@@ -71,7 +71,7 @@ fn moteus_starts() -> Result<(), Failed> {
     starts(&mut bench(MoteusR4::new)?, 40_000, "switch on disabled")
 }
 
-/// Somebody turns the link by hand, slowly: the rotor passes the index.
+/// Turns the link by hand, slowly: the rotor passes the index.
 fn esc1_index() -> Result<(), Failed> {
     let mut bench = esc1()?;
     bench.run(0.2)?;

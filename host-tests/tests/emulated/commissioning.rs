@@ -29,7 +29,7 @@ const RESTARTED: u64 = 3;
 const SPEED: f64 = 0.5;
 const TURNING: f64 = 0.5;
 const RIGHT: f64 = 0.3;
-/// Between two set-points, s.
+/// Period of set-points, s.
 const PERIOD: f64 = 0.01;
 /// Position that may be off after the index was met again, turns of the rotor.
 const OFF: f64 = 0.01;

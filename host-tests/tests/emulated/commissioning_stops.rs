@@ -44,7 +44,7 @@ enum Cause {
     Network(u8),
     /// A current sensor reads more than the over-current limit.
     Fault,
-    /// Nobody sends frames any more.
+    /// Lost client: nobody sends frames any more.
     LostClient,
     /// The button.
     Button,

@@ -43,7 +43,7 @@ const NETWORK: u64 = 330;
 const JOINTS: u64 = 12;
 /// The boards' programs.
 const PROGRAMS: [&str; 2] = ["moteus-r4", "b-g431b-esc1"];
-/// Between two set-points, s.
+/// Period of set-points, s.
 const SET_POINT: f64 = 0.005;
 const NODE: u8 = 5;
 
@@ -60,7 +60,7 @@ pub fn trials() -> Vec<Trial> {
     ]
 }
 
-/// With the network acting, the longest control interrupt takes what docs/budget.md says, and no more than the target
+/// Longest control interrupt with the network acting: it takes what docs/budget.md says, and no more than the target
 /// where that is called kept.
 fn published<W: Observed + Clone>(name: &str, board: fn(Drivetrain) -> W) -> Result<(), Failed> {
     let path = build(name, env!("CARGO_TARGET_TMPDIR"))?;

@@ -1,5 +1,5 @@
-//! Something breaks while the flashed program moves the joint on the emulated board: the bridge is off in time, and the
-//! reason can be read.
+//! Faults while the flashed program moves the joint on the emulated board: the bridge is off in time, and the reason
+//! can be read.
 //!
 //! Times run from the instant at which the part breaks to the one at which the plant sees the last gate off. How long
 //! that may take and what is to be read stands in the table of docs/emulated-board.md, which the tests read. Each fault
@@ -29,8 +29,8 @@ const INSTANTS: usize = 6;
 const MOVING: f64 = 0.8;
 /// Duration of the disturbance of the bus, s.
 const DISTURBED: f64 = 0.4;
-/// Of the supply: what it rises to, what it falls to, and what is left of it where it is lost; the chip's regulators
-/// need more.
+/// Factors of the supply: what it rises to, what it falls to, and what is left of it where it is lost; the chip's
+/// regulators need more.
 const SURGE: f64 = 2.2;
 const SAG: f64 = 0.3;
 const LOST: f64 = 0.1;
@@ -45,7 +45,7 @@ pub fn trials() -> Vec<Trial> {
 
 /// A row of the document's table.
 struct Documented {
-    /// From the fault until the bridge is off, s.
+    /// Time from the fault until the bridge is off, s.
     within: f64,
     /// Error codes, of which one is to be read over the bus.
     codes: Vec<u16>,
@@ -88,7 +88,7 @@ struct Broken<W: Wired> {
     bring: Bring<W>,
     /// Number of times that it is brought in.
     instants: usize,
-    /// From the fault to the last of what the joint has to say of it, s.
+    /// Time from the fault to the last of what the joint has to say of it, s.
     afterwards: f64,
 }
 
@@ -102,7 +102,7 @@ fn inject<W: Observed>(moving: &mut Moving<W>, fault: Fault) -> Result<Instant, 
     Ok(moving.now())
 }
 
-/// Something on the board: no sensor, no lead, no supply.
+/// Fault on the board: no sensor, no lead, no supply.
 fn on_the_board<W: Observed>(moving: &mut Moving<W>, breaks: fn(&mut Inputs)) -> Result<Instant, Failed> {
     breaks(moving.bench.board().inputs());
     Ok(moving.now())
@@ -131,7 +131,7 @@ fn lose_supply<W: Observed>(moving: &mut Moving<W>) -> Result<Instant, Failed> {
     Ok(lost)
 }
 
-/// Nobody's frame comes through.
+/// Disturbs the bus: nobody's frame comes through.
 fn disturb<W: Observed>(moving: &mut Moving<W>) -> Instant {
     let now = moving.now();
     moving.bench.board().line().disturb(Instant(now.0 + (DISTURBED * 1e12) as u64));
@@ -275,7 +275,7 @@ fn switches_off<W: Observed + Clone>(board: fn(Drivetrain) -> W, faults: &[Broke
 }
 
 impl<W: Observed> Broken<W> {
-    /// After how long the bridge was off, and what is to be read of it.
+    /// Time after which the bridge was off, and what is to be read of it.
     fn happens(&self, mut moving: Moving<W>, program: &Program, limits: &Documented) -> Result<(f64, String), Failed> {
         let said = moving.bench.log().len();
         let from = (self.bring)(&mut moving, program)?;

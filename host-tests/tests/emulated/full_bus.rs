@@ -19,7 +19,7 @@ use node::SampleImage;
 use std::f64::consts::TAU;
 
 const NODE: u8 = 5;
-/// Between two set-points, s.
+/// Period of set-points, s.
 const SET_POINT: f64 = 0.001;
 /// Reversals of the joint per second: it keeps up, and its current crosses zero often.
 const REVERSALS: f64 = 5.0;

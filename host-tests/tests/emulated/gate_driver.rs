@@ -106,7 +106,7 @@ fn reset(moving: &mut Moving) -> Result<(), Failed> {
     moving.run(LONG)
 }
 
-/// From "switch on disabled" until the joint moves.
+/// Enables the joint from "switch on disabled" until it moves.
 fn enable(moving: &mut Moving) -> Result<(), Failed> {
     for word in [SHUTDOWN, 0x07, 0x0F] {
         moving.controlword = Some(word);

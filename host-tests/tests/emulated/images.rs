@@ -145,7 +145,8 @@ fn refuses_an_image() -> Result<(), Failed> {
     expect("version", bench.number(NODE, 0x2213, 1)?, 0)
 }
 
-/// It has no regimes: an image that has is refused before its first byte where it is too long, and else by what it is.
+/// Checks that it has no regimes: an image that has is refused before its first byte where it is too long, and else by
+/// what it is.
 fn refuses_regimes() -> Result<(), Failed> {
     let mut bench = Bench::new(BG431BEsc1::new, &program(ESC1, env!("CARGO_TARGET_TMPDIR"))?)?;
     take_part(&mut bench)?;

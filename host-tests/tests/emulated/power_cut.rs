@@ -30,7 +30,8 @@ const NMI: u16 = 2;
 const FOLLOWED: u32 = 8;
 /// Operations at the start and at the end of a store that are all followed: the marks.
 const MARKS: u64 = 5;
-/// Of the operations between them one of so many is tried in the test command; all where all samples are asked for.
+/// Share of the operations between them, one of so many, that is tried in the test command; all where all samples are
+/// asked for.
 const PART: u64 = 4;
 /// Longest time from a request to its last operation, s.
 const LONGEST: f64 = 0.4;
@@ -49,7 +50,7 @@ type Board = Bench<MoteusR4>;
 /// Objects that are read back of a content, one by one.
 type Read = Vec<Vec<u8>>;
 
-/// Something that the program keeps.
+/// Content that the program keeps.
 struct Content {
     name: &'static str,
     /// Number of contents stored before the one that is cut short.

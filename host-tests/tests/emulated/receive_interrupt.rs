@@ -19,7 +19,7 @@ const RECEIVE: u16 = 16 + 21;
 /// Most cycles with one RPDO of three objects, entry and return included.
 const MOTEUS: u64 = 3_300;
 const ESC1: u64 = 4_700;
-/// Between two set-points, s, and their number.
+/// Period of set-points, s, and their number.
 const SET_POINT: f64 = 0.001;
 const SET_POINTS: i32 = 50;
 /// 60C2h, ms: set-points are interpolated.

@@ -30,7 +30,7 @@ struct How {
     /// Calls for a step.
     pieces: u64,
     watched: bool,
-    /// At each step a clone goes on instead.
+    /// `true` if at each step a clone goes on instead.
     cloned: bool,
     /// Number of times that code is come across before it is translated.
     translated: Option<u32>,

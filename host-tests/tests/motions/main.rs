@@ -20,7 +20,7 @@ use python::baselines::PACKAGES;
 use rayon::iter::{IndexedParallelIterator, IntoParallelRefIterator, ParallelIterator};
 use std::path::Path;
 
-/// Of so many motions one is judged in the test command.
+/// Share of the motions, one of so many, that is judged in the test command.
 const PART: usize = 3;
 
 fn main() {

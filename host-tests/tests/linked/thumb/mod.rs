@@ -24,7 +24,7 @@ pub struct Program {
 enum Flow {
     Next,
     To(u32),
-    /// To an address that only the running program knows.
+    /// Address that only the running program knows.
     Unknown,
     /// The permanently undefined instruction: where the compiler ends what must not go on.
     Trap,

@@ -42,7 +42,7 @@ struct Body {
 /// Frames of a program, with what is known of its calls through registers.
 pub struct Stack<'a> {
     program: &'a Program,
-    /// For a function's name: names of what it may call through registers; none where that is not known.
+    /// Names of what a function may call through registers, by its name; none where that is not known.
     targets: &'a dyn Fn(&str) -> Option<Vec<String>>,
     /// None while a function is being looked at: recursion comes back to it then.
     depths: BTreeMap<u32, Option<Depth>>,
