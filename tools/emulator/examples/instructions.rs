@@ -14,7 +14,7 @@ const DATA: u32 = 0x2000_1000;
 const CODE: std::ops::Range<u32> = 0x0800_0000..0x0808_0000;
 const CASE: usize = 2 + 2 + 15 + 2 + 32 + 64;
 
-/// Before each case: vmov.f32 s0, s0, so that no case is the first to use the unit, which sets its modes; clrex.
+/// Code before each case: vmov.f32 s0, s0, so that no case is the first to use the unit, which sets its modes; clrex.
 const BEFORE: [u8; 8] = [0xb0, 0xee, 0x40, 0x0a, 0xbf, 0xf3, 0x2f, 0x8f];
 
 /// Resets the core and switches the floating-point unit on, by the program's own instruction: str r1, [r0].

@@ -14,7 +14,7 @@ pub enum Width {
 }
 
 impl Width {
-    /// In bytes.
+    /// Width in bytes.
     #[inline(always)]
     pub const fn bytes(self) -> u32 {
         match self {

@@ -93,7 +93,7 @@ impl Rtt {
 pub struct Messages(Table);
 
 impl Messages {
-    /// From the table in a program; None where it logs without defmt, an error where it is of another version.
+    /// Table of a program; None where it logs without defmt, an error where it is of another version.
     pub fn of(program: &Program) -> Result<Option<Self>, String> {
         Table::parse(program.elf()).map(|table| table.map(Self)).map_err(|error| format!("{error:#}"))
     }

@@ -20,7 +20,7 @@ type Entry<'e, 'a> = gimli::DebuggingInformationEntry<'e, 'e, Source<'a>>;
 pub enum VariableError {
     /// The debug information is damaged, or there is none.
     Debug(String),
-    /// There is no such static, or several.
+    /// No such static, or several.
     Static {
         /// Name that was looked for.
         name: String,
@@ -94,16 +94,16 @@ struct Type {
 /// Consecutive bytes of a static.
 #[derive(Clone, Copy, Debug)]
 struct Piece {
-    /// In the static.
+    /// Offset in the static.
     offset: u32,
     size: u32,
-    /// In the program's memory; none where the optimiser has taken it out.
+    /// Address in the program's memory; none where the optimiser has taken it out.
     address: Option<u32>,
 }
 
 #[derive(Debug)]
 struct Static {
-    /// With its namespaces.
+    /// Path with its namespaces.
     path: String,
     pieces: Vec<Piece>,
     of: UnitSectionOffset,
@@ -122,13 +122,13 @@ pub struct Variable<'v> {
     variables: &'v Variables,
     path: String,
     pieces: &'v [Piece],
-    /// In the static.
+    /// Offset in the static.
     offset: u32,
     of: UnitSectionOffset,
 }
 
 impl Variables {
-    /// Those of a program.
+    /// Variables of a program.
     ///
     /// # Errors
     /// Debug information that cannot be read.

@@ -19,7 +19,7 @@ pub const CONDITION: f64 = 1e6;
 /// Parameters of one joint over some days.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
-    /// In the order of [`crate::windows::NAMES`]: kg m^2, Nm, Nm, Nm, Nm, Nm s/rad.
+    /// Values in the order of [`crate::windows::NAMES`]: kg m^2, Nm, Nm, Nm, Nm, Nm s/rad.
     pub values: [f64; UNKNOWNS],
     /// Standard errors of independent windows.
     pub errors: [f64; UNKNOWNS],

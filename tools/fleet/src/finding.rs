@@ -56,7 +56,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// In words.
+    /// Name in words.
     pub const fn words(self) -> &'static str {
         match self {
             Self::Broken => "broken",
@@ -93,17 +93,17 @@ pub struct Day {
 /// The factors between reference and present.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Change {
-    /// Of inertia and gravity.
+    /// Factor of inertia and gravity.
     pub rigid: f64,
-    /// Of the friction torque.
+    /// Factor of the friction torque.
     pub friction: f64,
-    /// Of dry friction.
+    /// Factor of dry friction.
     pub dry: f64,
-    /// Of viscous friction.
+    /// Factor of viscous friction.
     pub viscous: f64,
     /// Difference of the mean torque that does not depend on the velocity, without gravity's sine, Nm.
     pub offset_nm: f64,
-    /// Of the residual.
+    /// Factor of the residual.
     pub residual: f64,
     /// Difference of the temperature, K; NaN where it is not recorded.
     pub temperature_k: f64,

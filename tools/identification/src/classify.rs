@@ -19,8 +19,8 @@ pub struct Thresholds {
 }
 
 impl Thresholds {
-    /// Those of the description; where absent, a tenth of the 95th percentile of |acceleration| and the median of
-    /// |velocity| over the samples for training and validation.
+    /// Thresholds of the description; where absent, a tenth of the 95th percentile of |acceleration| and the median
+    /// of |velocity| over the samples for training and validation.
     pub fn of(samples: &Samples, description: &Classify) -> Thresholds {
         let magnitudes = |values: &[f64]| -> Vec<f64> {
             let known = |i: &usize| matches!(samples.part[*i], Part::Train | Part::Validation);

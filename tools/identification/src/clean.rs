@@ -31,7 +31,7 @@ pub struct Stretch {
     pub time: Vec<f64>,
     /// The signals, in the order of the raw run.
     pub signals: Vec<Vec<f64>>,
-    /// For each sample the nearest good row of the run.
+    /// Nearest good row of the run for each sample.
     pub row: Vec<usize>,
 }
 
@@ -85,8 +85,8 @@ pub fn steady(values: &mut [f64], missing: &[bool], limit: f64) -> usize {
     replaced
 }
 
-/// For each row whether it belongs to a frozen read-out: good rows that repeat one value before a step larger than
-/// `step` a row, with `margin` rows before them and `margin` rows after the first one behind the step.
+/// Flag of each row that belongs to a frozen read-out: good rows that repeat one value before a step larger than `step`
+/// a row, with `margin` rows before them and `margin` rows after the first one behind the step.
 pub fn frozen(values: &[f64], missing: &[bool], step: f64, margin: usize) -> Vec<bool> {
     let mut unused = vec![false; values.len()];
     let good: Vec<usize> = (0..values.len()).filter(|&i| !missing[i]).collect();

@@ -163,9 +163,9 @@ pub struct JointState {
 /// One value for each direction of the velocity.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Directional {
-    /// At v >= 0.
+    /// Value at v >= 0.
     pub positive: f64,
-    /// At v < 0.
+    /// Value at v < 0.
     pub negative: f64,
 }
 

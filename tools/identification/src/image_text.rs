@@ -102,7 +102,7 @@ struct ElementText {
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RippleText {
-    /// In a rad.
+    /// Periods in a rad.
     periods: f64,
     level_sine: f64,
     level_cosine: f64,

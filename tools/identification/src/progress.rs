@@ -4,7 +4,7 @@
 pub trait Progress: Sync {
     /// A new stage begins.
     fn stage(&self, name: &str);
-    /// Something worth knowing about the current stage.
+    /// Tells something worth knowing about the current stage.
     fn detail(&self, text: &str);
 }
 

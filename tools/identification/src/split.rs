@@ -108,7 +108,7 @@ fn share(of: f64) -> Fraction {
     Fraction { of, by: FractionBy::Blocks, length: None, seed: 0 }
 }
 
-/// For each sample whether it is one of the `candidates` and satisfies the rule.
+/// Flag of each sample that is one of the `candidates` and satisfies the rule.
 fn members(rule: &Rule, recorded: Recorded, candidates: &[bool], matches: &[bool]) -> Vec<bool> {
     let mut taken: Vec<bool> =
         candidates.iter().zip(matches).map(|(&candidate, &matches)| candidate && matches).collect();

@@ -13,7 +13,7 @@ pub enum KeyFileError {
     Io {
         /// Action that was tried.
         action: &'static str,
-        /// On which path.
+        /// Path of the action.
         path: PathBuf,
         /// The system's answer.
         source: io::Error,
@@ -21,7 +21,7 @@ pub enum KeyFileError {
     /// A key is never overwritten: joints that have it would take no image any more.
     #[error("{} exists; a key is never overwritten, choose another name or move it away", .0.display())]
     Exists(PathBuf),
-    /// Something else stands in the file.
+    /// File with something else in it.
     #[error("{} holds {found} characters beside blanks, a key is {} hexadecimal digits", path.display(), 2 * KEY)]
     Length {
         /// The file.

@@ -48,7 +48,7 @@ fn holds(is: bool, otherwise: impl FnOnce() -> String) -> Result<(), Failed> {
     if is { Ok(()) } else { Err(otherwise().into()) }
 }
 
-/// Somebody with a terminal, a folder, and a board on the bus.
+/// Desk of somebody with a terminal, a folder, and a board on the bus.
 struct Desk {
     folder: TempDir,
     /// Arguments of `jointctl` that put the board on the bus.

@@ -20,7 +20,7 @@ pub enum LogError {
         /// The system's answer.
         source: std::io::Error,
     },
-    /// Something else than the format that the name says.
+    /// Another format than the one that the name says.
     #[error("{}: is no {} file: {reason}", file.display(), format.name())]
     Foreign {
         /// The file.
@@ -53,7 +53,7 @@ pub enum LogError {
         file: PathBuf,
         /// The column.
         column: String,
-        /// Those that exist.
+        /// Columns that exist.
         available: Vec<String>,
     },
     /// Columns that no single topic has.

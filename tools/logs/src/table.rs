@@ -30,7 +30,7 @@ impl Wanted {
 pub struct Texts {
     /// The different words, in order of first appearance.
     pub words: Vec<String>,
-    /// For each row the index of its word.
+    /// Index of each row's word.
     pub codes: Vec<u32>,
     index: HashMap<String, u32>,
 }

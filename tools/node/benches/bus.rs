@@ -30,14 +30,14 @@ struct Round {
 struct Measured {
     /// Share of the time for which the wire was taken.
     load: f64,
-    /// From SYNC's last bit to a TPDO's, us, and the frames on the wire from then on, the TPDO included.
+    /// Time from SYNC's last bit to a TPDO's, us, and the frames on the wire from then on, the TPDO included.
     answers: Vec<(f64, usize)>,
-    /// From handing an RPDO to the master's controller to its last bit, us, and the frames on the wire in that time,
-    /// the RPDO included.
+    /// Time from handing an RPDO to the master's controller to its last bit, us, and the frames on the wire in that
+    /// time, the RPDO included.
     commands: Vec<(f64, usize)>,
-    /// From the RPDO's last bit to the control step whose set-point is the new one, us.
+    /// Time from the RPDO's last bit to the control step whose set-point is the new one, us.
     reactions: Vec<f64>,
-    /// From the beginning of the master's cycle to that control step, us.
+    /// Time from the beginning of the master's cycle to that control step, us.
     torques: Vec<f64>,
     /// TPDOs that were due, and those that were overwritten.
     due: u64,

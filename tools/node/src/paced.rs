@@ -12,9 +12,9 @@ use canopen_node::Buffers;
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// From the last bit of a frame until the receive interrupt is over; it waits for a control step at most.
+/// Time from the last bit of a frame until the receive interrupt is over; it waits for a control step at most.
 pub const REACTION: Duration = Duration::from_micros(20);
-/// From there until the task has answered a request.
+/// Time from there until the task has answered a request.
 pub const TASK: Duration = Duration::from_micros(50);
 /// Transmit buffers of a controller.
 const BUFFERS: usize = 3;
@@ -98,7 +98,7 @@ impl PacedNodes {
         self.members.len()
     }
 
-    /// There is no joint.
+    /// Returns `true` if there is no joint.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.members.is_empty()

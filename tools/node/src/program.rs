@@ -20,7 +20,7 @@ pub struct VirtualProgram {
     /// Prepared, for the next control step.
     pub next: Option<Active>,
     pub storage: Storage,
-    /// Of the pages in the storage.
+    /// Log of faults in the pages of the storage.
     log: FaultLog,
     /// The open loop's last window.
     pub window: Window,

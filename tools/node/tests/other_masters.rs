@@ -15,7 +15,7 @@ const ENABLE: u16 = 0x0F;
 const POSITION: i8 = 8;
 const VELOCITY: i8 = 9;
 const TORQUE: i8 = 10;
-/// Before its first target a joint may move by this, rad.
+/// Largest motion of a joint before its first target, rad.
 const STILL: f64 = 1e-3;
 /// Position to which the joint is brought before, µrad.
 const SOMEWHERE: i32 = 361_000;

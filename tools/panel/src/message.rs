@@ -24,7 +24,7 @@ pub enum Usage {
     Verify,
     /// Computed without effect for a time, s.
     Shadow(f64),
-    /// In use for a time, s.
+    /// Trial for a time, s.
     Trial(f64),
     /// Stored and in use.
     Commit,

@@ -46,8 +46,8 @@ pub enum Motion {
     },
 }
 
-/// From 0 to 1 with velocity and acceleration of zero at both ends: the minimum-jerk motion (Flash, Hogan, "The
-/// coordination of arm movements", 1985, eq. 4).
+/// Transition from 0 to 1 with velocity and acceleration of zero at both ends: the minimum-jerk motion (Flash, Hogan,
+/// "The coordination of arm movements", 1985, eq. 4).
 fn smooth(x: f64) -> f64 {
     let x = x.clamp(0.0, 1.0);
     x * x * x * (10.0 - 15.0 * x + 6.0 * x * x)
@@ -139,7 +139,7 @@ pub struct Steered {
 }
 
 impl Steered {
-    /// From the position `from`, rad.
+    /// Motion from the position `from`, rad.
     pub fn new(motion: Motion, from: f64) -> Self {
         Self { motion, from, last: motion.at(from, 0.0), frozen: false }
     }

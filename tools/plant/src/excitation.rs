@@ -213,7 +213,7 @@ impl Excitation {
     }
 }
 
-/// From zero to one side, to the other and back at `speed` (rad/s): one second of it to each side, or less where
+/// Motion from zero to one side, to the other and back at `speed` (rad/s): one second of it to each side, or less where
 /// `travel` (rad) ends first. `acceleration` in rad/s².
 #[must_use]
 pub fn back_and_forth(speed: f64, travel: f64, acceleration: f64) -> Vec<Segment> {

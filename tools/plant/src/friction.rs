@@ -24,9 +24,9 @@ pub const REFERENCE_TEMPERATURE: f64 = 25.0;
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Directional {
-    /// At velocity zero and above.
+    /// Value at velocity zero and above.
     pub forward: f64,
-    /// At negative velocity. A magnitude: not negative itself.
+    /// Value at negative velocity. A magnitude: not negative itself.
     pub backward: f64,
 }
 
@@ -141,7 +141,7 @@ pub struct Surroundings {
 }
 
 impl Default for Surroundings {
-    /// At position zero, unloaded, at [`REFERENCE_TEMPERATURE`].
+    /// State at position zero, unloaded, at [`REFERENCE_TEMPERATURE`].
     fn default() -> Self {
         Self { position: 0.0, gear_torque: 0.0, temperature: REFERENCE_TEMPERATURE }
     }

@@ -42,7 +42,7 @@ struct Braked {
     lost: f64,
     stored: f64,
     heat: f64,
-    /// By a chopper's resistor.
+    /// Energy burnt by a chopper's resistor.
     burnt: f64,
     speed_left: f64,
 }
@@ -56,8 +56,8 @@ enum Stop {
     Torque,
 }
 
-/// Up to nine tenths of the speed limit, then a quick stop, which brakes as hard as it may, for `time` s or until it
-/// ends.
+/// Acceleration to nine tenths of the speed limit, then a quick stop, which brakes as hard as it may, for `time` s or
+/// until it ends.
 fn braked(parameters: &ActuatorParameters, setup: &Setup, stop: Stop, time: f64) -> Braked {
     braked_with(parameters, setup, stop, time, 0.0)
 }

@@ -30,9 +30,9 @@ const MODES: [Operation; 7] = [
     Operation::Torque,
     Operation::Impedance,
 ];
-/// Of the master that commands torques, Nm s/rad.
+/// Gain of the master that commands torques, Nm s/rad.
 const TORQUE_GAIN: f32 = 60.0;
-/// Of profiles, rad/s².
+/// Acceleration of profiles, rad/s².
 const ACCELERATION: f32 = 8.0;
 /// Distance from where a profile begins to where it ends, rad.
 const FAR: f32 = 0.6;
@@ -180,7 +180,7 @@ struct Stopped {
     /// Distance that it went on upwards, rad, and that it then sank, within two seconds.
     way: f64,
     sank: f64,
-    /// It still moves.
+    /// `true` if it still moves.
     falls: bool,
     state: State,
 }
@@ -433,7 +433,7 @@ fn a_joint_that_cannot_hold_switches_off_and_closes_its_brake() {
     assert!(!rig.is_switching() && !rig.joint.joint().outputs().brake_open());
 }
 
-/// For as long as it holds, winding and bridge bear what they bear for long.
+/// Check that, for as long as it holds, winding and bridge bear what they bear for long.
 #[test]
 fn what_holds_gives_no_more_current_than_a_hot_winding_bears() {
     let stops = StopConfiguration { quick_stop: 6, ..StopConfiguration::DEFAULT };

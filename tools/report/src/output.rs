@@ -16,7 +16,7 @@ pub enum OutputError {
     Io {
         /// Action that was tried.
         action: &'static str,
-        /// On which path.
+        /// Path of the action.
         path: PathBuf,
         /// The system's answer.
         source: io::Error,

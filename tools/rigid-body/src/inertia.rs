@@ -33,7 +33,7 @@ impl LinkInertia {
         Self { mass, first_moment: mass * centre, inertia: about_centre - mass * lever * lever }
     }
 
-    /// From `[m, mx, my, mz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz]`.
+    /// Inertia from `[m, mx, my, mz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz]`.
     pub fn from_parameters(parameters: &[f64; PARAMETERS]) -> Self {
         let mut inertia = Matrix3::zeros();
         for ((row, column), value) in ENTRIES.into_iter().zip(&parameters[4..]) {

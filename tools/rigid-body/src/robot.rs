@@ -113,7 +113,7 @@ pub enum Defect {
         /// The other.
         second: String,
     },
-    /// Not one link without a parent.
+    /// Number of links without a parent that is not one.
     #[error("{} are no child of any joint: a tree has one base; join them by fixed joints", roots.join(", "))]
     Roots {
         /// Links without a parent.
@@ -359,7 +359,7 @@ fn consistent(description: &RobotDescription, urdf: &Urdf) -> Result<(), Defect>
     }
 }
 
-/// Everything of a robot that moves.
+/// Parts of a robot that move.
 struct Moving {
     tree: Tree,
     links: Vec<String>,

@@ -102,7 +102,7 @@ pub struct JointErrors {
 pub enum Judged {
     /// All samples that the description uses.
     All,
-    /// Those of its test sets.
+    /// Samples of its test sets.
     Test,
 }
 

@@ -17,7 +17,7 @@ use serde::Serialize;
 pub struct Options {
     /// Choices for each joint.
     pub joint: JointOptions,
-    /// Only the first seconds of the samples for training and validation; None: all.
+    /// Limit to the first seconds of the samples for training and validation; None: all.
     pub seconds: Option<f64>,
 }
 

@@ -33,9 +33,9 @@ const ROUNDS: usize = 8;
 pub enum Weighting {
     /// All alike.
     Ordinary,
-    /// By the noise of each joint.
+    /// Weights by the noise of each joint.
     ByJoint,
-    /// By the noise of each joint, and less for samples that depart from the model.
+    /// Weights by the noise of each joint, and less for samples that depart from the model.
     Reweighted,
 }
 
@@ -141,7 +141,7 @@ struct Combined {
     inverse: DMatrix<f64>,
     /// Condition number of the regressor.
     condition: f64,
-    /// Those of them that the motion leaves open.
+    /// Flag of those of them that the motion leaves open.
     open: Vec<bool>,
 }
 

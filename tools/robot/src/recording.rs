@@ -112,7 +112,7 @@ pub enum RobotFitError {
         joint: String,
         /// Its samples.
         found: usize,
-        /// Those of the first joint.
+        /// Number that the first joint has.
         expected: usize,
     },
     /// Too few samples, or a motion that determines nothing.

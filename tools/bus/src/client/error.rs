@@ -50,7 +50,7 @@ pub enum ClientError {
         /// Reason, as an abort code.
         abort: Abort,
     },
-    /// Somebody else uses the node's SDO server at the same time. It has one channel, and the transfers destroy each
+    /// Another client uses the node's SDO server at the same time. It has one channel, and the transfers destroy each
     /// other.
     #[error(
         "{object}: another client is talking to this node's SDO server; the transfer was given up. Stop the other client, or wait for it"
@@ -67,7 +67,7 @@ pub enum ClientError {
         /// Defect of it.
         problem: String,
     },
-    /// Something that was waited for did not come.
+    /// No answer to what was waited for.
     #[error("{what} did not come within {} ms", timeout.as_millis())]
     Silence {
         /// Name of what was waited for.

@@ -93,7 +93,7 @@ pub enum Step {
     Ask(Message),
     /// The node with this address is in configuration state.
     Found(Address),
-    /// There is no node without an id.
+    /// No node without an id.
     Nobody,
     /// A node answered, and then contradicted itself: an answer came late or was lost. Scan again, with a longer wait.
     Confused,
@@ -128,7 +128,7 @@ impl Default for Fastscan {
 }
 
 impl Fastscan {
-    /// From the beginning.
+    /// Scan from the beginning.
     pub fn new() -> Self {
         Self { address: Address::default(), phase: Phase::Begin }
     }

@@ -49,14 +49,14 @@ pub mod cob_id {
     pub const SYNC: u16 = 0x080;
     /// EMCY.
     pub const EMERGENCY: u16 = 0x080;
-    /// From a node's SDO server.
+    /// Identifier from a node's SDO server.
     pub const SDO_TRANSMIT: u16 = 0x580;
-    /// To a node's SDO server.
+    /// Identifier to a node's SDO server.
     pub const SDO_RECEIVE: u16 = 0x600;
     /// Heartbeat and boot-up.
     pub const HEARTBEAT: u16 = 0x700;
-    /// From LSS slaves (CiA 305).
+    /// Identifier from LSS slaves (CiA 305).
     pub const LSS_SLAVE: u16 = 0x7E4;
-    /// To LSS slaves (CiA 305).
+    /// Identifier to LSS slaves (CiA 305).
     pub const LSS_MASTER: u16 = 0x7E5;
 }

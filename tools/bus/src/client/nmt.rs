@@ -8,11 +8,11 @@ use crate::Frame;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Command {
-    /// To OPERATIONAL.
+    /// Transition to OPERATIONAL.
     Start = 0x01,
-    /// To STOPPED.
+    /// Transition to STOPPED.
     Stop = 0x02,
-    /// To PRE-OPERATIONAL.
+    /// Transition to PRE-OPERATIONAL.
     EnterPreOperational = 0x80,
     /// The application starts anew, and with it communication.
     ResetNode = 0x81,

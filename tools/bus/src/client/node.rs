@@ -32,7 +32,7 @@ impl Node {
         Self { network, id, settings }
     }
 
-    /// With other patience, say for storing into flash.
+    /// Node with other patience, say for storing into flash.
     pub fn with_settings(self, settings: Settings) -> Self {
         Self { settings, ..self }
     }

@@ -3,7 +3,7 @@
 use crate::Frame;
 use std::time::Duration;
 
-/// After the CRC sequence, not stuffed: CRC delimiter, acknowledge slot and delimiter, end of frame.
+/// Bits after the CRC sequence, not stuffed: CRC delimiter, acknowledge slot and delimiter, end of frame.
 const TRAILER: u32 = 1 + 2 + 7;
 /// Bits in which nobody may begin.
 pub(super) const INTERFRAME_SPACE: u32 = 3;
@@ -46,7 +46,7 @@ fn crc(bits: &[bool]) -> u16 {
     })
 }
 
-/// After five equal bits comes the opposite one, which counts towards the next five.
+/// Number of stuff bits: after five equal bits comes the opposite one, which counts towards the next five.
 fn stuff_bits(bits: &[bool]) -> u32 {
     let (mut stuffed, mut run, mut last) = (0, 0, None);
     for bit in bits {

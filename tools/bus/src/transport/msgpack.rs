@@ -5,7 +5,7 @@ use crate::Frame;
 use serde::{Deserialize, Serialize};
 use serde_bytes::Bytes;
 
-/// In the order in which python-can packs it.
+/// Message in the order in which python-can packs it.
 #[derive(Serialize)]
 struct Outgoing<'a> {
     timestamp: f64,

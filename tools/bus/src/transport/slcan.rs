@@ -1,4 +1,4 @@
-//! This program as the host of an slcan adapter: opens the channel at 1 Mbit/s, then frames in both directions; host.
+//! Host of an slcan adapter: opens the channel at 1 Mbit/s, then frames in both directions; host.
 //!
 //! TCP needs `TCP_NODELAY`: a short line otherwise waits for the acknowledgement of the one before, about 40 ms a
 //! frame.

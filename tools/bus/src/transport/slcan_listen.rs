@@ -1,5 +1,5 @@
-//! This program as an slcan adapter that listens on TCP, so that a virtual joint serves any slcan client (python-can's
-//! `slcan` with `socket://host:port`); host. One client at a time; a second one waits until the first hangs up.
+//! Slcan adapter that listens on TCP, so that a virtual joint serves any slcan client (python-can's `slcan` with
+//! `socket://host:port`); host. One client at a time; a second one waits until the first hangs up.
 //!
 //! A client that has not opened the channel (`O`), or no client at all, is a wire that nobody listens to: frames to it
 //! are gone, as on a bus.

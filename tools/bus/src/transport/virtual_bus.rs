@@ -50,7 +50,7 @@ impl Inbox {
 struct Pace {
     bus: Mutex<PacedBus>,
     began: Instant,
-    /// Something was sent, or got its turn.
+    /// Signal that something was sent, or got its turn.
     changed: Condvar,
 }
 

@@ -7,7 +7,7 @@
 /// A current amplifier's step response.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Amplifier {
-    /// From the edge at the gate driver's input until the output begins to follow, s.
+    /// Delay from the edge at the gate driver's input until the output begins to follow, s.
     pub delay: f64,
     /// Time constant of what follows, s.
     pub time_constant: f64,

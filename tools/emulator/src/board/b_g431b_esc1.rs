@@ -49,7 +49,7 @@ pub struct BG431BEsc1 {
 }
 
 impl BG431BEsc1 {
-    /// With a plant behind it, and an encoder of 1,000 lines with direction and zero of the plant's.
+    /// Board with a plant behind it, and an encoder of 1,000 lines with direction and zero of the plant's.
     pub fn new(drivetrain: Drivetrain) -> Self {
         Self {
             lines: Lines::of(Encoder { counts: COUNTS, ..drivetrain.encoder() }),

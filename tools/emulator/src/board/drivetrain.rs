@@ -16,7 +16,7 @@ use plant::actuator::{Actuator, ActuatorParameters, DriveSample};
 
 /// Period while no PWM runs, ps.
 const IDLE: u64 = 50_000_000;
-/// Before the top by less than this part of the way up, the period is over for whoever samples.
+/// Part of the way up, before the top, in which the period is over for whoever samples.
 const EARLY: f64 = 0.05;
 /// Shortest period that the plant is given, ps; what is less goes with the next one.
 const SHORTEST: u64 = 1_000_000;
@@ -41,12 +41,12 @@ impl Settling {
 pub struct Drivetrain {
     actuator: Actuator,
     encoder: Encoder,
-    /// Up to here the actuator has moved.
+    /// Instant up to which the actuator has moved.
     moved: Instant,
     /// Sample that the sensors show of that.
     sample: DriveSample,
     pwm: Option<(Instant, Pwm)>,
-    /// Since when the timer has asked for each low side; none where it asks for the high side.
+    /// Instant since which the timer has asked for each low side; none where it asks for the high side.
     low_since: [Option<Instant>; 3],
     /// The sample whose low side had conducted for the shortest time while the bridge switched.
     least_settled: Option<Settling>,
@@ -56,7 +56,7 @@ pub struct Drivetrain {
     enabled: bool,
     /// Dead time that the actuator has been given, s; none before it was given any.
     dead_time: Option<f64>,
-    /// It switched since `moved`, if only for a part of it.
+    /// `true` if it switched since `moved`, if only for a part of it.
     switched: bool,
     /// Instant at which it last ceased to switch.
     off_since: Option<Instant>,
@@ -209,7 +209,7 @@ impl Drivetrain {
         current * settling.followed(0.0)
     }
 
-    /// For how long a phase's low side has conducted, s; 0 where it does not, or both switches of the leg are off.
+    /// Time for which a phase's low side has conducted, s; 0 where it does not, or both switches of the leg are off.
     pub fn conducting(&self, at: Instant, phase: usize) -> f64 {
         let Some(since) = self.low_since[phase] else { return 0.0 };
         let is_high = self.pwm.is_some_and(|(from, pwm)| {

@@ -12,7 +12,7 @@ const COUNTS: (u32, u32) = (16, 1 << 20);
 pub struct Encoder {
     /// Counts a turn, 16 to 1,048,576: of an incremental encoder four a line. An AS5047P has 16,384.
     pub counts: u32,
-    /// It counts down while the rotor turns forward.
+    /// `true` if it counts down while the rotor turns forward.
     pub reversed: bool,
     /// Reading at rotor angle zero, 0 to 1 turn. An incremental encoder's index is where its reading is zero.
     pub offset: f64,

@@ -30,7 +30,7 @@ use plant::ParameterError;
 pub struct Inputs {
     /// The button is pressed.
     pub button: bool,
-    /// Something pulls the gate driver's fault line low.
+    /// `true` if something pulls the gate driver's fault line low.
     pub driver_fault: bool,
     /// The bridge's thermistor is not connected any more.
     pub thermistor_open: bool,

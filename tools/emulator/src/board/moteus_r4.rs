@@ -35,9 +35,9 @@ const ENCODER_SELECT: Pin = Pin::new('B', 11);
 const LED: Pin = Pin::new('F', 0);
 const BRAKE: Pin = Pin::new('C', 15);
 const CHOPPER: Pin = Pin::new('C', 14);
-/// They tell the family: floating on an r4.
+/// Pins that tell the family: floating on an r4.
 const FAMILY: [Pin; 2] = [Pin::new('B', 10), Pin::new('B', 11)];
-/// They tell the revision: those of its code's ones are pulled low.
+/// Pins that tell the revision: those of its code's ones are pulled low.
 const REVISION: [Pin; 3] = [Pin::new('C', 6), Pin::new('A', 15), Pin::new('A', 10)];
 /// Code of an r4.11.
 const R4_11: u8 = 4;
@@ -71,7 +71,7 @@ pub struct MoteusR4 {
 }
 
 impl MoteusR4 {
-    /// With a plant behind it, whose encoder's direction and zero are those of the magnet.
+    /// Board with a plant behind it, whose encoder's direction and zero are those of the magnet.
     pub fn new(drivetrain: Drivetrain) -> Self {
         Self {
             magnet: Encoder { counts: COUNTS, ..drivetrain.encoder() },

@@ -59,7 +59,7 @@ impl Hasher for Words {
 }
 
 impl<W> Witnessed<W> {
-    /// With a witness from now on.
+    /// Board with a witness from now on.
     pub fn new(board: W) -> Self {
         Self { board, passed: Words::default() }
     }

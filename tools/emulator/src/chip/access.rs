@@ -394,7 +394,8 @@ impl<W: Wiring> Chip<W> {
         }
     }
 
-    /// Without its clock a peripheral is not to be accessed (7.2.16 "Peripheral clock enable registers").
+    /// Returns `true` if a peripheral has its clock, without which it is not to be accessed (7.2.16 "Peripheral clock
+    /// enable registers").
     #[inline]
     fn is_clocked(&self, gate: Option<ClockGate>, device: Device, address: u32) -> Result<bool, Refusal> {
         match gate {

@@ -106,7 +106,7 @@ struct Conversion {
     rank: u32,
     /// Cycle at which its sample is held; none once it is.
     sample: Option<u64>,
-    /// For how long it is sampled, in cycles of the core.
+    /// Time for which it is sampled, in cycles of the core.
     sampling: u64,
     end: u64,
     code: u32,

@@ -16,7 +16,7 @@ pub struct Agenda {
     /// The earliest cycle of all, and bits of the places that have it.
     earliest: u64,
     first: u32,
-    /// Those two are right.
+    /// `true` if those two are right.
     ordered: bool,
     /// The levels of all lines.
     all_lines: u128,
@@ -29,7 +29,7 @@ impl Agenda {
         Self { next, lines, changed: u32::MAX, used, earliest: u64::MAX, first: 0, ordered: false, all_lines: 0 }
     }
 
-    /// Somebody may have changed a peripheral: to be called with every access that can.
+    /// Notes that somebody may have changed a peripheral: to be called with every access that can.
     #[inline]
     pub const fn touch(&mut self, place: usize) {
         self.changed |= 1 << (place % PLACES);

@@ -221,7 +221,7 @@ impl<W: Wiring> Chip<W> {
         }
     }
 
-    /// Something has changed: the earliest event, and the levels of the interrupts.
+    /// Refreshes, after a change, the earliest event, and the levels of the interrupts.
     pub(super) fn refresh(&mut self) {
         if self.agenda.first_touched().is_some() {
             while let Some(place) = self.agenda.first_touched() {

@@ -51,7 +51,7 @@ pub fn store(bytes: &mut [u8], offset: usize, width: Width, value: u32) -> Optio
 }
 
 impl Memory {
-    /// After power-up.
+    /// Memory after power-up.
     pub fn new(variant: &Variant) -> Self {
         let mut memory = Self {
             bytes: Vec::new(),

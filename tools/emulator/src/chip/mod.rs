@@ -119,10 +119,10 @@ pub struct Chip<W> {
     /// Earliest event of what counts time.
     next_slow: u64,
     lines: u128,
-    /// Those of what counts time.
+    /// Lines of what counts time.
     slow_lines: u128,
     reset: bool,
-    /// There may be signals that the core has not been told.
+    /// `true` if there may be signals that the core has not been told.
     news: bool,
 }
 

@@ -30,7 +30,7 @@ const INPUTS: [([Option<Pin>; 4], Pin); 3] = [
 pub struct Amplification {
     /// The positive input.
     pub input: Pin,
-    /// Of the positive input.
+    /// Gain of the positive input.
     pub gain: f64,
     /// The other end of the divider; ground where none.
     pub bias: Option<Pin>,

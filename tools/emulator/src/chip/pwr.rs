@@ -23,11 +23,11 @@ const REGISTERS: &[Register] = &[
 /// Range of the main regulator: CR1.VOS and CR5.R1MODE (6.1.5 "Dynamic voltage scaling management").
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Range {
-    /// Up to 170 MHz.
+    /// Range up to 170 MHz.
     Boost,
-    /// Up to 150 MHz: after reset.
+    /// Range up to 150 MHz: after reset.
     Normal,
-    /// Up to 26 MHz.
+    /// Range up to 26 MHz.
     Low,
 }
 

@@ -132,7 +132,7 @@ pub struct Rcc {
 }
 
 impl Rcc {
-    /// After power-up.
+    /// State after power-up.
     pub fn new() -> Self {
         let block = Block::new("RCC", "7.4", REGISTERS);
         Self { block, hsi: Instant(0), hsi48: Instant::NEVER, lsi: Instant::NEVER, pll: Instant::NEVER }

@@ -31,7 +31,7 @@ pub struct Block {
     table: &'static [Register],
     /// Place in `table` of the register at each word; `NONE` where there is none.
     places: Vec<u8>,
-    /// By word; 0 where there is none.
+    /// Value by word; 0 where there is none.
     values: Vec<u32>,
 }
 

@@ -27,7 +27,7 @@ pub struct Rng {
 
 #[allow(clippy::new_without_default, reason = "as the chip's other parts")]
 impl Rng {
-    /// After power-up.
+    /// State after power-up.
     pub fn new() -> Self {
         Self { block: Block::new("RNG", "26.7", REGISTERS), state: 0x9e37_79b9_7f4a_7c15 }
     }

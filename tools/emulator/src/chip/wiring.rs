@@ -18,7 +18,7 @@ pub struct Pin {
 }
 
 impl Pin {
-    /// From a port's letter and a number.
+    /// Pin of a port's letter and a number.
     pub const fn new(port: char, number: u8) -> Self {
         Self { port: port as u8 - b'A', number }
     }
@@ -63,7 +63,7 @@ pub enum Gate {
     },
     /// Driven to a level.
     Held(bool),
-    /// Not driven by the timer.
+    /// Released pin: not driven by the timer.
     #[default]
     Released,
 }

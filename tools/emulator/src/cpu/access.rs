@@ -7,7 +7,7 @@ use crate::bus::{Bus, Refusal, Width};
 
 /// Registers of the core itself (B3.1: the private peripheral bus).
 const PRIVATE: u32 = 0xe000_0000;
-/// Up to the instrumentation and debug devices, which are the chip's.
+/// Length up to the instrumentation and debug devices, which are the chip's.
 const PRIVATE_LENGTH: u32 = 0x4_2000;
 
 #[inline(always)]

@@ -17,8 +17,8 @@ pub(super) struct Code<B: Bus> {
     line: Option<u32>,
     /// The region that the program is in.
     current: Region,
-    /// From the first to behind the last address in SRAM at which something was ever decoded: a store there may change
-    /// it. A word that begins up to three bytes before reaches into it: the start is that of such a word.
+    /// Range from the first to behind the last address in SRAM at which something was ever decoded: a store there may
+    /// change it. A word that begins up to three bytes before reaches into it: the start is that of such a word.
     changeable: Range<u32>,
     /// Its length.
     changeable_length: u32,
@@ -37,7 +37,7 @@ struct Region {
 /// Places behind each region that stay empty: the last instruction of a region may be wide.
 const BEHIND: usize = 2;
 
-/// From here on memory is SRAM, by the architecture's map (B3.1).
+/// Range of SRAM, from here on, by the architecture's map (B3.1).
 pub(super) const SRAM: Range<u32> = 0x2000_0000..0x4000_0000;
 
 impl<B: Bus> Code<B> {

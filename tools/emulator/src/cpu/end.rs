@@ -31,7 +31,7 @@ pub enum End {
         /// Defect of it.
         why: Refused,
     },
-    /// Something was used that is not modelled.
+    /// Use of something that is not modelled.
     Unmodelled {
         /// Address of the instruction.
         address: u32,

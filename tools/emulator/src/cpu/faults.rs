@@ -1,4 +1,4 @@
-//! From a trap to the fault handler: status registers, escalation to hard fault, lock-up (ARM DDI 0403, B1.5.13 to
+//! Way from a trap to the fault handler: status registers, escalation to hard fault, lock-up (ARM DDI 0403, B1.5.13 to
 //! B1.5.15).
 
 use super::interrupts::{BUS_FAULT, HARD_FAULT, MEMORY_FAULT, USAGE_FAULT};

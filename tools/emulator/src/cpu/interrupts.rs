@@ -28,7 +28,7 @@ pub(super) struct Interrupts {
     lines: [u32; 4],
     nmi_line: bool,
     priorities: [u8; 128],
-    /// By number of the exception, as are the bits of the two below.
+    /// Priorities by number of the exception, as are the bits of the two below.
     system_priorities: [u8; 16],
     pub system_pending: u32,
     pub system_active: u32,

@@ -231,7 +231,7 @@ impl<B: Bus> Cpu<B> {
         }
     }
 
-    /// Something has become pending: an event for WFE where SCR.SEVONPEND says so (B1.5.18).
+    /// Takes that something has become pending: an event for WFE where SCR.SEVONPEND says so (B1.5.18).
     fn pended(&mut self) {
         self.event |= self.system.event_on_pending();
     }

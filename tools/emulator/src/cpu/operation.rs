@@ -33,9 +33,9 @@ pub(super) enum Trap {
 /// Continuation after an instruction if not the one behind it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Leave {
-    /// It has gone elsewhere, or begun an IT block: `Cpu::pc` and `Cpu::it` are to be looked at.
+    /// Jump: it has gone elsewhere, or begun an IT block: `Cpu::pc` and `Cpu::it` are to be looked at.
     Jumped,
-    /// It did not complete.
+    /// Trap: it did not complete.
     Trapped(Trap),
 }
 
@@ -253,7 +253,7 @@ pub(super) enum Flow {
     On,
     /// A branch may be taken.
     Perhaps,
-    /// Something else.
+    /// Another flow.
     Elsewhere,
     /// An IT block, whose state is `x`.
     Block,

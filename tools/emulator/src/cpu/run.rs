@@ -1,4 +1,4 @@
-//! From one instruction to the next: the loop that everything else waits in.
+//! Loop from one instruction to the next, in which everything else waits.
 //!
 //! A run without a watch flows: as long as nothing is due, one stretch follows the other (see `stretch`).
 

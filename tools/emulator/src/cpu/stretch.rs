@@ -30,7 +30,7 @@ const KEPT: usize = 1 << 18;
 /// Counts if a stretch is left behind a step.
 #[derive(Clone, Copy, Default)]
 struct Mark {
-    /// Since the stretch began.
+    /// Cycles since the stretch began.
     cycles: u16,
     bytes: u8,
     instructions: u8,
@@ -60,7 +60,7 @@ struct Stretch {
 #[derive(Clone)]
 pub(super) struct Stretches<B: Bus> {
     steps: Vec<Step<B>>,
-    /// Of the steps.
+    /// Marks of the steps.
     marks: Vec<Mark>,
     /// Stretch that begins at each place of the code; `NONE` where nothing does.
     begins: Vec<Stretch>,
@@ -206,7 +206,7 @@ impl<B: Bus> Stretches<B> {
 
 /// Reason for which no stretch follows.
 enum Stopped {
-    /// Something is due, or the core is in an IT block.
+    /// Stop: something is due, or the core is in an IT block.
     Due,
     /// No stretch begins there yet.
     Unformed,

@@ -24,11 +24,11 @@
 
 /// A taken branch beyond its own cycle: refilling the pipeline.
 pub(super) const REFILL: u64 = 2;
-/// From an interrupt to the first instruction of its handler.
+/// Cycles from an interrupt to the first instruction of its handler.
 pub(super) const ENTRY: u64 = 12;
 /// The same from one handler to the next, without unstacking between.
 pub(super) const TAIL_CHAIN: u64 = 6;
-/// From a handler back to what it interrupted.
+/// Cycles from a handler back to what it interrupted.
 pub(super) const RETURN: u64 = 10;
 /// Seventeen floating-point words to or from the stack: at entry, at return, or at the first use of the unit in a
 /// handler.

@@ -59,7 +59,7 @@ const fn with_parity(word: u16) -> u16 {
 }
 
 impl As5047p {
-    /// After power-up: the first answer is zero.
+    /// Sensor after power-up: the first answer is zero.
     pub fn new() -> Self {
         Self::default()
     }

@@ -11,7 +11,7 @@
 use crate::chip::time::Instant;
 use crate::chip::wiring::SpiFrame;
 
-/// From the enable, or the supply, to the first frame, ns.
+/// Time from the enable, or the supply, to the first frame, ns.
 pub const WAKE_NS: u64 = 1_000_000;
 /// Supply below which the outputs are off, V (VM under-voltage lock-out).
 pub const LOCK_OUT: f64 = 8.0;
@@ -50,7 +50,7 @@ pub struct Drv8353 {
     selected: bool,
     /// Level of its enable.
     enabled: bool,
-    /// Since when it has both enable and supply; none while it sleeps.
+    /// Instant since which it has both enable and supply; none while it sleeps.
     awake: Option<Instant>,
     supplied: bool,
     /// Causes of faults that are still there.
@@ -140,8 +140,8 @@ impl Drv8353 {
         [50e-9, 100e-9, 200e-9, 400e-9][usize::from(self.registers[5] >> 8 & 0b11)]
     }
 
-    /// Something went wrong in the bridge, and is over: bits of both fault status words. They stay until they are
-    /// cleared, and pull nFAULT low.
+    /// Takes that something went wrong in the bridge, and is over: bits of both fault status words. They stay until
+    /// they are cleared, and pull nFAULT low.
     pub fn fail(&mut self, status: [u16; 2]) {
         if status != [0; 2] {
             self.registers[0] |= status[0] & DATA | FAULT;
@@ -149,7 +149,7 @@ impl Drv8353 {
         }
     }
 
-    /// Something is wrong from now on: clearing it has no effect until this is called with zeros.
+    /// Takes that something is wrong from now on: clearing it has no effect until this is called with zeros.
     pub fn set_present(&mut self, status: [u16; 2]) {
         self.present = status;
         self.fail(status);

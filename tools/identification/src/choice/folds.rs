@@ -7,7 +7,7 @@ pub const LEAST_JUDGED: usize = 50;
 /// Fewest samples that a fold leaves to fit.
 pub const LEAST_FITTED: usize = 200;
 
-/// Up to [`MOST_FOLDS`] folds. A sample may be left out by several: of two groupings, each leaves it out once.
+/// Folds, up to [`MOST_FOLDS`]. A sample may be left out by several: of two groupings, each leaves it out once.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Folds {
     /// The groupings that the folds are of, in words.
@@ -19,7 +19,7 @@ pub struct Folds {
     pub groupings: Vec<usize>,
     /// Name of each fold: the motions that it leaves out.
     pub names: Vec<String>,
-    /// For each sample the folds that leave it out, one bit each from bit 0; 0 for a sample that is not used.
+    /// Folds that leave each sample out, one bit each from bit 0; 0 for a sample that is not used.
     pub left_out: Vec<u8>,
 }
 

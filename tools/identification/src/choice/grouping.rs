@@ -35,7 +35,7 @@ pub struct Labels {
     pub column: String,
     /// The different texts.
     pub words: Vec<String>,
-    /// For each sample the index of its text.
+    /// Index of each sample's text.
     pub codes: Vec<u32>,
 }
 
@@ -257,7 +257,7 @@ fn by_file(samples: &Samples, recordings: &[Recording], used: &[bool]) -> Groups
     Groups { what: "file".into(), names, of }
 }
 
-/// Up to two columns of conditions, the one that tells motions apart best first.
+/// Columns of conditions, up to two, the one that tells motions apart best first.
 fn conditions(samples: &Samples, labels: &[Labels], used: &[bool], runs: usize) -> Vec<Groups> {
     let cells = cells(samples, used);
     let mut found: Vec<(f64, Groups)> = Vec::new();

@@ -34,7 +34,7 @@ pub enum BadTermRule {
     /// Neither `+` nor `-` stands before the term.
     #[error("{0:?} says neither + (force) nor - (forbid) before the term")]
     Sign(String),
-    /// There is no such term.
+    /// No such term.
     #[error("no term is called {name:?}; there are {}", names().join(", "))]
     Term {
         /// The name that was given.

@@ -3,8 +3,8 @@
 use super::condition_keys::{Condition, Value};
 use super::load::Table;
 
-/// For each row whether `condition` holds. The columns it names must have been loaded as the kinds that it compares
-/// with.
+/// Flag of each row for which `condition` holds. The columns it names must have been loaded as the kinds that it
+/// compares with.
 pub fn holds(condition: &Condition, table: &Table) -> Vec<bool> {
     // No value is one of an empty list.
     let mut mask = vec![condition.one_of.as_ref().is_none_or(|list| !list.is_empty()); table.len()];
@@ -22,7 +22,7 @@ pub fn holds(condition: &Condition, table: &Table) -> Vec<bool> {
     mask
 }
 
-/// For each row whether all of `conditions` hold.
+/// Flag of each row for which all of `conditions` hold.
 pub fn all_hold(conditions: &[Condition], table: &Table) -> Vec<bool> {
     let mut mask = vec![true; table.len()];
     for condition in conditions {

@@ -37,7 +37,7 @@ pub struct Condition {
     pub not_in: Option<Vec<Value>>,
     /// Text that begins with one of these.
     pub starts_with: Option<Vec<String>>,
-    /// Between these two numbers, ends included.
+    /// Range between these two numbers, ends included.
     pub inside: Option<[f64; 2]>,
     /// Below the first or above the second of these two numbers.
     pub outside: Option<[f64; 2]>,

@@ -70,7 +70,7 @@ pub struct Source {
     /// Separator of the fields.
     #[serde(default = "comma")]
     pub delimiter: char,
-    /// Between the whole and the fraction of a number: `.` or `,`.
+    /// Separator between the whole and the fraction of a number: `.` or `,`.
     #[serde(default = "point")]
     pub decimal: char,
 }
@@ -258,7 +258,7 @@ pub struct RigidDescription {
     pub inertia: bool,
     /// A gravity torque.
     pub gravity: Gravity,
-    /// In addition, an inertia proportional to mass * length^2 and a gravity torque proportional to mass * length.
+    /// Inertia proportional to mass * length^2 and gravity torque proportional to mass * length, in addition.
     pub mass_and_length: bool,
     /// A voltage proportional to the velocity; only where the effort is in V.
     pub back_emf: bool,

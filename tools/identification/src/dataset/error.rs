@@ -171,7 +171,7 @@ pub enum DatasetError {
     /// Too few samples, or none, are left to identify from.
     #[error("{found} usable samples are left {stage}: expected at least {required}")]
     TooFewSamples {
-        /// After which stage.
+        /// Name of the stage after which they are left.
         stage: &'static str,
         /// Number of samples left.
         found: usize,

@@ -29,7 +29,7 @@ pub struct Wanted {
 pub struct TextColumn {
     /// The different words, in order of first appearance.
     pub words: Vec<String>,
-    /// For each row the index of its word.
+    /// Index of each row's word.
     pub codes: Vec<u32>,
     index: HashMap<Vec<u8>, u32>,
 }
@@ -68,11 +68,11 @@ pub struct Table {
     pub numbers: BTreeMap<String, Vec<f64>>,
     /// Text columns by name.
     pub texts: BTreeMap<String, TextColumn>,
-    /// For each row its line in its file; the header is line 1.
+    /// Line of each row in its file; the header is line 1.
     pub line: Vec<u32>,
-    /// For each row the index of its file.
+    /// Index of each row's file.
     pub file: Vec<u32>,
-    /// For each row whether a numeric field means "missing".
+    /// Flag of each row in which a numeric field means "missing".
     pub missing: Vec<bool>,
 }
 

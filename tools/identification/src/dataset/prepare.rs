@@ -34,7 +34,7 @@ pub struct Prepared {
     pub description: Description,
     /// All samples that are left, used or not.
     pub samples: Samples,
-    /// For each value of `samples.run` where it was recorded.
+    /// Origin of each value of `samples.run`: where it was recorded.
     pub recordings: Vec<Recording>,
     /// The test sets, in the order described. Every index is of a sample with `Part::Test`.
     pub test_sets: Vec<TestSet>,
@@ -297,9 +297,9 @@ struct Assembled {
     samples: Samples,
     /// Position and velocity as the joint's observer sees them.
     seen: Option<Track>,
-    /// For each sample its row of the table.
+    /// Row of the table for each sample.
     row: Vec<usize>,
-    /// For each sample the run as recorded (gaps do not count).
+    /// Run of each sample as recorded (gaps do not count).
     parent: Vec<u32>,
     usable: Vec<bool>,
     recordings: Vec<Recording>,
@@ -361,7 +361,7 @@ fn assemble(
     Assembled { samples, seen, row, parent, usable, recordings: continuous, slow }
 }
 
-/// For each row of the table whether the tests of a rule on files, runs and columns hold.
+/// Flag of each row of the table for which the tests of a rule on files, runs and columns hold.
 fn static_match(rule: &Rule, recordings: &Recordings, description: &Description) -> Vec<bool> {
     let mut mask = all_hold(&rule.conditions, &recordings.table);
     if !rule.unless.is_empty() {

@@ -1,4 +1,4 @@
-//! From raw columns to the signals of each run in SI units, with what is missing and what is unused; host.
+//! Conversion of raw columns into the signals of each run in SI units, with what is missing and what is unused; host.
 
 use super::condition::{all_hold, holds};
 use super::description::Description;
@@ -56,7 +56,7 @@ pub struct RunSignals {
     pub run: usize,
     /// The signals; rows are those of `rows`.
     pub raw: RawRun,
-    /// For each row the row of the table.
+    /// Row of the table for each row.
     pub rows: Vec<usize>,
 }
 
@@ -65,7 +65,7 @@ pub struct RunSignals {
 pub struct Extracted {
     /// The runs, in order of appearance, without those that have no row left.
     pub runs: Vec<RunSignals>,
-    /// For each row of the table whether it is used (`select.use`, saturation, frozen read-outs).
+    /// Flag of each row of the table that is used (`select.use`, saturation, frozen read-outs).
     pub used: Vec<bool>,
     /// Findings in the signals.
     pub findings: Findings,

@@ -17,11 +17,11 @@ const RANK: f64 = 1e-10;
 /// A regressor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Term {
-    /// Of the rigid part.
+    /// Regressor of the rigid part.
     Rigid(RigidRegressor),
     /// Proportional to the velocity.
     Viscous,
-    /// In the direction of the velocity.
+    /// Coulomb friction, in the direction of the velocity.
     Coulomb,
     /// Constant.
     Offset,

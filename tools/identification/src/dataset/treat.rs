@@ -38,7 +38,7 @@ pub struct Motion {
     pub effort: Vec<f64>,
     /// Temperature, where recorded.
     pub temperature: Option<Vec<f64>>,
-    /// For each sample the nearest row of the run.
+    /// Nearest row of the run for each sample.
     pub row: Vec<usize>,
 }
 

@@ -1,4 +1,4 @@
-//! From a prepared data set to an image and a report: the whole pipeline, stage by stage; host.
+//! Pipeline from a prepared data set to an image and a report, stage by stage; host.
 //!
 //! Identification sees the samples for training and validation, training stops by those for validation, choices are
 //! made on motions that were left out (`choice`). Test samples are looked at once, at the end, through the image in the
@@ -163,7 +163,7 @@ pub struct Fitted {
     pub rigid: RigidParameters,
     /// Rigid part whose effort is the theoretical torque that the image's terms depend on.
     pub theoretical: RigidParameters,
-    /// Everything worth knowing, for people.
+    /// Report of everything worth knowing, for people.
     pub report: Report,
     /// The effort of every sample as the image and every model beside it predict it, rigid part included.
     pub predictions: Vec<Prediction>,

@@ -42,7 +42,7 @@ enum Load {
 }
 
 impl Cell {
-    /// In words.
+    /// Name in words.
     fn name(self) -> String {
         let direction = if self.backward { "backward" } else { "forward" };
         let from = self.speed.checked_sub(1).map_or(SLOWEST, |below| SPEEDS[below]);

@@ -34,7 +34,7 @@ pub(super) fn with_uncovered(
     set
 }
 
-/// At most `count` points of the box in cells that none of the samples visits.
+/// Points of the box, at most `count`, in cells that none of the samples visits.
 fn points(samples: &[[f64; INPUTS]], input_box: &InputBox, count: usize, seed: u64) -> Vec<[f64; INPUTS]> {
     let visited: HashSet<[i8; INPUTS]> = samples.iter().map(|sample| cell(sample, input_box)).collect();
     let mut random = ChaCha8Rng::seed_from_u64(seed);

@@ -190,7 +190,7 @@ fn fold_error(
     Ok(model.rmse * after / before.max(f64::MIN_POSITIVE))
 }
 
-/// At most `limit` of the indices, evenly.
+/// Indices, at most `limit` of them, evenly.
 fn thinned(indices: &[usize], limit: usize) -> Vec<usize> {
     indices.iter().copied().step_by(indices.len().div_ceil(limit).max(1)).collect()
 }

@@ -53,9 +53,9 @@ pub enum Role {
 /// A physical parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Parameter {
-    /// Of the rigid part.
+    /// Regressor of the rigid part.
     Rigid(RigidRegressor),
-    /// Of the friction.
+    /// Parameter of the friction.
     Friction(P),
 }
 

@@ -88,7 +88,7 @@ pub fn normal_equations(sums: &[f64], n: usize, count: usize) -> NormalEquations
 pub struct Dependence {
     /// The column.
     pub column: usize,
-    /// Those that explain it; none: the column is zero everywhere.
+    /// Columns that explain it; none: the column is zero everywhere.
     pub explained_by: Vec<usize>,
 }
 

@@ -105,7 +105,7 @@ pub enum IdentifyError {
         /// Its value.
         value: f64,
     },
-    /// There are too few train samples.
+    /// Too few train samples.
     #[error("{found} train samples; at least {needed} are needed")]
     TooFewSamples {
         /// Number of train samples.
@@ -278,7 +278,7 @@ fn theoretical_torque(
     Ok((problem, rigid, note))
 }
 
-/// For each row the folds that leave it out, one bit each.
+/// Folds that leave each row out, one bit each.
 fn left_out(samples: &Samples, folds: &Folds) -> Vec<u8> {
     observations::used(samples).into_iter().map(|i| folds.left_out[i]).collect()
 }

@@ -178,7 +178,7 @@ pub struct Candidate {
     pub parameters: usize,
     /// RMSE over the folds, each left out, unit of effort.
     pub unseen_rmse: f64,
-    /// This is the model that is used.
+    /// `true` if this is the model that is used.
     pub kept: bool,
     /// Reason for which it is, or is not.
     pub reason: String,
@@ -191,9 +191,9 @@ pub enum NetworkOutcome {
     /// None was trained.
     #[default]
     NotTrained,
-    /// It lowers the error on validation data and is part of the image.
+    /// Network that lowers the error on validation data and is part of the image.
     Kept,
-    /// It does not pay; the image holds the physical model alone.
+    /// Network that does not pay; the image holds the physical model alone.
     Rejected {
         /// Reason, as a clause: "it raises the validation error by 2 %".
         reason: String,
@@ -284,7 +284,7 @@ pub struct TrainingCurve {
     pub validation: Vec<f64>,
     /// Epoch whose weights are kept.
     pub best_epoch: usize,
-    /// This is the seed whose network is used.
+    /// `true` if this is the seed whose network is used.
     pub chosen: bool,
     /// Reason for the end of training.
     pub stop: String,

@@ -14,7 +14,7 @@ const SIMPLER: f64 = 1.02;
 pub struct Verdict {
     /// The sentence, with a full stop.
     pub sentence: String,
-    /// On every test set the compensation lowers the error and no simpler model does better by 2 %, and the
+    /// `true` if on every test set the compensation lowers the error and no simpler model does better by 2 %, and the
     /// certificate (where there is one) passed.
     pub good: bool,
 }
@@ -30,9 +30,9 @@ pub(super) struct Pooled {
 
 /// Errors that one looks for first.
 pub(super) struct Headline<'a> {
-    /// With the rigid body alone.
+    /// Error with the rigid body alone.
     pub before: Pooled,
-    /// With what the joint would run.
+    /// Error with what the joint would run.
     pub after: Pooled,
     /// Samples of all test sets; those of several count in each.
     pub samples: usize,

@@ -27,7 +27,8 @@ fn text(value: impl AsRef<str>) -> Markup {
     html! { (value.as_ref()) }
 }
 
-/// For each test set: all metrics overall, then RMSE and relative torque error per motion state, then fixed point.
+/// Tables for each test set: all metrics overall, then RMSE and relative torque error per motion state, then fixed
+/// point.
 pub fn errors(report: &Report) -> Markup {
     let unit = &report.units.effort;
     html! {

@@ -1,4 +1,4 @@
-//! From floating-point models to the integers of a parameter image; host.
+//! Quantisation of floating-point models to the integers of a parameter image; host.
 //!
 //! `full_scale` converts single numbers between SI and the image's form, `physical` and `network` whole models. Every
 //! number is rounded to nearest; what does not fit is refused by name, value and limit, never clipped.

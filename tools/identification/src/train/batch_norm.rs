@@ -31,11 +31,11 @@ pub struct BatchNormNetwork {
 /// The derivative of a mini-batch's loss.
 #[derive(Clone, Debug)]
 pub struct Gradient {
-    /// With respect to weights and biases.
+    /// Derivative with respect to weights and biases.
     pub dense: Vec<f64>,
-    /// With respect to the gains.
+    /// Derivative with respect to the gains.
     pub gain: Vec<f64>,
-    /// With respect to the shifts.
+    /// Derivative with respect to the shifts.
     pub shift: Vec<f64>,
 }
 

@@ -257,7 +257,7 @@ impl Task {
 struct Recorder<'a> {
     progress: OnProgress<'a>,
     seed: u64,
-    /// From normalised squares to Nm^2.
+    /// Factor from normalised squares to Nm^2.
     unit: f64,
     train_mse: Vec<f64>,
     validation_mse: Vec<f64>,

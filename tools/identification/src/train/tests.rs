@@ -22,7 +22,7 @@ fn unit_box(used: [bool; INPUTS]) -> InputBox {
     InputBox::new([-1.0; INPUTS], [1.0; INPUTS], used).unwrap()
 }
 
-/// Something smooth in position, velocity and torque that does not depend on the temperature.
+/// Smooth function of position, velocity and torque that does not depend on the temperature.
 fn smooth(x: &[f64; INPUTS]) -> f64 {
     (3.0 * x[1]).tanh() + 0.4 * (2.0 * x[0]).sin() + 0.3 * x[1] * x[2]
 }

@@ -14,8 +14,8 @@ use rand_chacha::ChaCha8Rng;
 /// leave the format whatever its weights do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Bounds {
-    /// In the first layer 62.7 / (number of active inputs + 1), at most 31.9; 8 in all further layers or what their
-    /// width allows.
+    /// Bounds by the firmware's format: in the first layer 62.7 / (number of active inputs + 1), at most 31.9; 8 in all
+    /// further layers or what their width allows.
     Firmware,
     /// Everywhere: for networks that stay in floating point.
     None,

@@ -16,7 +16,7 @@ use std::path::PathBuf;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
-/// Between two looks whether the user has asked to stop.
+/// Time between two looks at whether the user has asked to stop.
 const LOOK: Duration = Duration::from_millis(50);
 
 /// Arguments of `commission`.

@@ -226,7 +226,7 @@ pub enum CommandError {
     #[cfg(feature = "logs")]
     #[error(transparent)]
     Fleet(#[from] ::fleet::night::NightError),
-    /// Somebody ended what was under way.
+    /// End by the user of what was under way.
     #[error("{0}")]
     Interrupted(String),
     /// Arguments that contradict each other.

@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 
 /// Time without any sample after which nobody sends SYNC, or the joint is gone.
 const SILENCE: Duration = Duration::from_secs(3);
-/// Between two looks at whether it is over.
+/// Time between two looks at whether it is over.
 const LOOK: Duration = Duration::from_millis(100);
 /// Name of the description, beside the table.
 const DESCRIPTION: &str = "dataset.toml";

@@ -20,7 +20,7 @@ pub struct Patience {
 }
 
 impl Patience {
-    /// For each answer.
+    /// Duration for each answer.
     pub fn duration(self) -> Duration {
         Duration::from_millis(self.timeout)
     }
@@ -68,8 +68,8 @@ impl Where {
 
 static STOP: AtomicBool = AtomicBool::new(false);
 
-/// From now on Ctrl-C and termination do not kill the program: [`running`] tells of them, and the joint is disabled
-/// first.
+/// Catches Ctrl-C and termination from now on, so that they do not kill the program: [`running`] tells of them, and the
+/// joint is disabled first.
 pub fn catch_interrupts() -> Result<(), CommandError> {
     let caught = ctrlc::set_handler(|| STOP.store(true, Ordering::Relaxed));
     caught.map_err(|error| CommandError::Arguments(format!("Ctrl-C cannot be caught: {error}")))

@@ -92,7 +92,7 @@ pub(super) struct Known<'k> {
     pub inductance: &'k Inductance,
     /// A.
     pub current: f64,
-    /// By the data sheet.
+    /// Number of pole pairs by the data sheet.
     pub pole_pairs: Option<u32>,
     /// Mechanical turns that the joint is free to make.
     pub travel: f64,

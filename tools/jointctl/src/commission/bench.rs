@@ -63,7 +63,7 @@ pub struct Condition {
     pub faults: String,
     /// The motor may be under current, or somebody commands the joint.
     pub armed: bool,
-    /// Somebody has staged settings that are not taken.
+    /// `true` if somebody has staged settings that are not taken.
     pub staged: bool,
     /// Supply, V.
     pub supply: f64,

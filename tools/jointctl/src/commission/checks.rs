@@ -1,4 +1,4 @@
-//! Before anything flows: is the joint in a state to be commissioned, and does what is wanted fit its limits?
+//! Checks before anything flows: is the joint in a state to be commissioned, and does what is wanted fit its limits?
 
 use super::bench::{Bench, Condition};
 use super::failure::Failure;

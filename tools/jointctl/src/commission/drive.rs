@@ -2,9 +2,9 @@
 
 use super::bench::{Bench, DEAD_MAN, Frame, SLEW, Stopped, WINDOW_STEPS, Window};
 
-/// Between two frames, s: a third of what the joint would bear.
+/// Period of frames, s: a third of what the joint would bear.
 const RENEW: f64 = DEAD_MAN / 3.0;
-/// Between two looks at the window, in windows.
+/// Time between two looks at the window, in windows.
 const LOOK: f64 = 0.5;
 /// Windows that may go by without a new one before the joint counts as not sampling.
 const MISSED: u32 = 100;

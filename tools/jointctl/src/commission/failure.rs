@@ -12,7 +12,7 @@ pub enum Failure {
         /// Words for the faults.
         faults: String,
     },
-    /// Somebody commands the joint, or its motor may be under current.
+    /// Armed joint: somebody commands it, or its motor may be under current.
     Armed {
         /// Words for the state.
         state: String,
@@ -26,7 +26,7 @@ pub enum Failure {
         /// Lowest and highest, V.
         limits: [f64; 2],
     },
-    /// Something is too hot to begin.
+    /// Part that is too hot to begin.
     Hot {
         /// Name of the part.
         part: &'static str,

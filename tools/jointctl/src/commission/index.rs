@@ -17,7 +17,7 @@ const STALLED: f64 = 1.5;
 pub struct Index {
     /// Mechanical turns that the rotor made until then, by the encoder's counts; 0 where it had been met before.
     pub turns: f64,
-    /// It was met on the way back.
+    /// `true` if it was met on the way back.
     pub back: bool,
 }
 

@@ -18,7 +18,7 @@ use joint_firmware::objects::settings::Setting;
 
 /// Ways to and fro.
 const WAYS: usize = 10;
-/// Between two set-points, s, and samples of a stretch over which the work is counted.
+/// Period of set-points, s, and samples of a stretch over which the work is counted.
 const PERIOD: f64 = 0.01;
 const STRETCH: usize = 5;
 /// Least speed of a stretch as a part of the largest: near standstill friction is not itself.

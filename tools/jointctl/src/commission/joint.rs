@@ -145,7 +145,7 @@ impl<O: Objects> Joint<O> {
         }
     }
 
-    /// From wherever it is to the last state; `last` is renewed before it is entered.
+    /// Brings the joint from wherever it is to the last state; `last` is renewed before it is entered.
     fn begin(&mut self, mode: i8, set_point: (SetPoint, u64), last: State) -> Result<(), Stopped> {
         self.write_raw(Field::SetPoint(SetPoint::Mode), u64::from(mode as u8))?;
         self.objects.network(Command::Start)?;

@@ -9,7 +9,7 @@ use joint_firmware::objects::settings::Setting;
 
 /// Distance that the joint goes aside before it comes back, rad.
 const ASIDE: f64 = 0.05;
-/// Between two set-points, s; how long a position is approached, and how long it is held.
+/// Period of set-points, s; how long a position is approached, and how long it is held.
 const PERIOD: f64 = 0.01;
 const APPROACH: f64 = 1.0;
 const HELD: f64 = 0.5;

@@ -64,7 +64,7 @@ pub enum Stage {
     Inductance,
     /// A few electrical turns.
     FirstSweep,
-    /// Until the encoder's index is met.
+    /// Turning until the encoder's index is met.
     Index,
     /// A turn of the rotor, and a few electrical turns with less current.
     Alignment,
@@ -79,7 +79,7 @@ pub enum Stage {
 }
 
 impl Stage {
-    /// Those under current, in their order.
+    /// Stages under current, in their order.
     pub const UNDER_CURRENT: [Self; 5] =
         [Self::Resistance, Self::Inductance, Self::FirstSweep, Self::Index, Self::Alignment];
 
@@ -104,7 +104,7 @@ impl Stage {
 pub trait Guide {
     /// A stage begins; under current where it is one of [`Stage::UNDER_CURRENT`].
     fn stage(&mut self, stage: Stage);
-    /// Something was found.
+    /// Tells that something was found.
     fn found(&mut self, text: &str);
     /// Returns `true` to go on; only ever asked while the bridge is off.
     fn agrees(&mut self, question: &str) -> bool;
@@ -263,7 +263,7 @@ fn prepare<B: Bench>(bench: &mut B, plan: &Plan, limit: f64) -> Result<Vec<(Sett
     Ok(before)
 }
 
-/// Everything under current.
+/// Measures everything under current.
 fn measure<B: Bench>(
     bench: &mut B,
     plan: &Plan,

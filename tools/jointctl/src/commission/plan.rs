@@ -32,7 +32,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// With a current, A, and nothing else known.
+    /// Plan with a current, A, and nothing else known.
     pub const fn new(current: f64) -> Self {
         Self {
             current,

@@ -30,7 +30,7 @@ const OPEN_PHASE: [f64; 2] = [0.45, 0.70];
 /// The rotor is at rest when its encoder has moved by less than this between two looks, mechanical turns: more than a
 /// count of 1,000.
 const REST: f64 = 0.0011;
-/// Between two looks at the rotor, and the longest time that it may take to come to rest, s.
+/// Time between two looks at the rotor, and the longest time that it may take to come to rest, s.
 const LOOK: f64 = 0.025;
 const LONGEST: f64 = 4.0;
 /// Along phase A the whole current flows through A and half of it through B and through C: what is lost there over what

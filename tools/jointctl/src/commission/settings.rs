@@ -1,4 +1,5 @@
-//! From what was found to the joint's settings, and what a joint that nobody has commissioned gets beside them.
+//! Conversion of what was found into the joint's settings, and what a joint that nobody has commissioned gets beside
+//! them.
 
 use super::bench::{Bench, Stopped};
 use super::{Found, Plan};

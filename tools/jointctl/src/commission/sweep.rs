@@ -63,7 +63,8 @@ pub(super) enum Taken {
     Followed,
     /// The encoder has met its index meanwhile: its angle has jumped.
     Index,
-    /// It came so late after the field's speed was changed that the field may have made a turn more or less.
+    /// Lost window: it came so late after the field's speed was changed that the field may have made a turn more or
+    /// less.
     Lost,
 }
 

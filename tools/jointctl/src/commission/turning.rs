@@ -12,11 +12,11 @@ const WAY: f64 = 0.5;
 /// Part of the way to the nearest position limit that is used, which the ramps add half of it to, and of the velocity
 /// limit.
 const PART: f64 = 0.4;
-/// Between two set-points, s.
+/// Period of set-points, s.
 const PERIOD: f64 = 0.01;
 /// Longest time, as a multiple of the one that it should take.
 const LONGEST: f64 = 3.0;
-/// At rest before it is switched off, s.
+/// Time at rest before it is switched off, s.
 const REST: f64 = 0.1;
 /// Mean velocity over the second half of each way, as a part of what is wanted: least and most.
 const RIGHT: [f64; 2] = [0.7, 1.3];

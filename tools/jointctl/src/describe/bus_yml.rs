@@ -146,7 +146,7 @@ fn entry(index: u16) -> Entry {
     Entry::at(index, 0).unwrap_or_else(|| unreachable!("{index:04X}h is in the table"))
 }
 
-/// Without an exponent: PyYAML takes 1e-6 for a text.
+/// Number without an exponent: PyYAML takes 1e-6 for a text.
 fn float(number: f64) -> String {
     let text = number.to_string();
     if text.contains('.') { text } else { format!("{text}.0") }

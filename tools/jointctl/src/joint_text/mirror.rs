@@ -60,22 +60,22 @@ struct MotorText {
     encoder_counts: u32,
 }
 
-/// Of a file that says nothing of it.
+/// Default of a file that says nothing of it.
 fn oscillator_trim() -> u8 {
     FACTORY_TRIM
 }
 
-/// Of a file that says nothing of it.
+/// Default of a file that says nothing of it.
 fn encoder_counts() -> u32 {
     4_000
 }
 
-/// Of a file that says nothing of it.
+/// Default of a file that says nothing of it.
 fn chopper_share() -> f32 {
     0.1
 }
 
-/// Of a file that says nothing of it.
+/// Default of a file that says nothing of it.
 fn voltage_fraction() -> f32 {
     1.0
 }

@@ -18,7 +18,7 @@ pub struct RemoteObjects<'r> {
 }
 
 impl<'r> RemoteObjects<'r> {
-    /// Of a joint; once `running` says no, the next wait ends.
+    /// Bench of a joint; once `running` says no, the next wait ends.
     pub const fn new(joint: RemoteJoint, running: &'r dyn Fn() -> bool) -> Self {
         Self { joint, running }
     }

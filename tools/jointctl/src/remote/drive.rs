@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 /// Longest time in which a joint has to brake: the longest braking time of a configuration.
 pub(super) const BRAKING: Duration = Duration::from_secs(11);
-/// Between two looks at a node.
+/// Time between two looks at a node.
 pub(super) const LOOK: Duration = Duration::from_millis(5);
 
 const STATES: [State; 9] = [

@@ -40,7 +40,7 @@ pub enum RemoteError {
     /// The node, or the way to it.
     #[error(transparent)]
     Client(#[from] ClientError),
-    /// Only its owner may do that.
+    /// Owned joint: only its owner may do that.
     #[error("node {node}: only the owner of key {number:08x} may do that; {problem}")]
     Owned {
         /// Node id.
@@ -50,7 +50,7 @@ pub enum RemoteError {
         /// Missing part.
         problem: String,
     },
-    /// Nobody has this node id, or the node is silent. Many nodes send nothing unless they are asked.
+    /// Silent node, or nobody has this node id. Many nodes send nothing unless they are asked.
     #[error("{0} `jointctl scan` asks every node id")]
     Silent(ClientError),
     /// A node that is something else.
@@ -113,7 +113,7 @@ pub enum RemoteError {
         /// Greatest that is possible.
         high: f64,
     },
-    /// Somebody has staged settings and not taken them.
+    /// Staged settings that somebody has not taken.
     #[error(
         "node {node}: settings were staged and neither taken nor forgotten; `jointctl set configuration.command 2` forgets them"
     )]
@@ -121,7 +121,7 @@ pub enum RemoteError {
         /// Node id.
         node: u8,
     },
-    /// Not while the motor may be under current.
+    /// Armed joint: not while the motor may be under current.
     #[error("node {node}: {what} is possible with the motor off only, and the joint is {}; `jointctl disable` switches it off", super::drive::name(*state))]
     Armed {
         /// Node id.
@@ -173,7 +173,7 @@ pub enum RemoteError {
         /// The latched faults.
         faults: Vec<Fault>,
     },
-    /// Somebody else tells the joint what to do.
+    /// Another master that tells the joint what to do.
     #[error(
         "another client sends set-points to node {node} (identifier {identifier:03X}h); the joint was disabled. Stop that client first"
     )]
@@ -244,7 +244,7 @@ pub enum RemoteError {
         /// Image that is still in use, in words.
         unchanged: String,
     },
-    /// Something else about an image.
+    /// Another error of an image.
     #[error("node {node}: {problem}")]
     Image {
         /// Node id.

@@ -25,11 +25,11 @@ const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 /// Use of an uploaded image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Use {
-    /// It is verified and waits.
+    /// Verification: it waits then.
     Verify,
     /// Computed beside the one in use, without effect, for a time, s.
     Shadow(f64),
-    /// In use for a time, s; then the stored one is again.
+    /// Trial for a time, s; then the stored one is in use again.
     Trial(f64),
     /// Stored and in use.
     Commit,
@@ -46,14 +46,14 @@ pub struct StoredImage {
     pub network: bool,
     /// 1 or 2.
     pub slot: u8,
-    /// Since 1970-01-01 UTC, s; 0 where it is not stated.
+    /// Time since 1970-01-01 UTC, s; 0 where it is not stated.
     pub created: u32,
 }
 
 /// State of the images.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImageStatus {
-    /// Of the image that is staged; [`State::Active`] where none is and one is in use.
+    /// State of the image that is staged; [`State::Active`] where none is and one is in use.
     pub state: State,
     /// Remaining time of a trial or shadow, s; 0 outside.
     pub left: f64,

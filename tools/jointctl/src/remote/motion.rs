@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 /// Part of the time in which the rest position of an impedance goes from where the joint is to where it is wanted.
 const APPROACH: f64 = 0.5;
-/// Between two looks at the joint.
+/// Time between two looks at the joint.
 const LOOK: Duration = Duration::from_millis(50);
 /// Longest motion, s: a day.
 const LONGEST: f64 = 86_400.0;
@@ -23,7 +23,7 @@ const LONGEST: f64 = 86_400.0;
 pub struct Motion {
     /// Mode, and set-points in SI units. The joint ramps to velocities and positions by itself, within its limits.
     pub command: Command,
-    /// For how long, s.
+    /// Duration, s.
     pub duration: f64,
     /// Set-points a second.
     pub rate: f64,
@@ -34,7 +34,7 @@ pub struct Motion {
 /// Observed state of the joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observation {
-    /// Since it was enabled, s.
+    /// Time since it was enabled, s.
     pub time: f64,
     /// rad.
     pub position: f64,
@@ -151,7 +151,7 @@ impl Motion {
     }
 }
 
-/// From 0 to 1 with velocity and acceleration of zero at both ends: the minimum-jerk motion.
+/// Transition from 0 to 1 with velocity and acceleration of zero at both ends: the minimum-jerk motion.
 fn smooth(x: f64) -> f64 {
     x * x * x * (10.0 - 15.0 * x + 6.0 * x * x)
 }

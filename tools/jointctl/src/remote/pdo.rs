@@ -12,9 +12,9 @@ const IDENTIFIER: u32 = 0x7FF;
 /// Direction of a PDO.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
-    /// To the joint.
+    /// PDO to the joint.
     Receive,
-    /// From the joint.
+    /// PDO from the joint.
     Transmit,
 }
 

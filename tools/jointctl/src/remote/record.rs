@@ -29,7 +29,7 @@ pub const SIGNALS: [Actual; 4] = [Actual::Position, Actual::Velocity, Actual::To
 pub enum Pace {
     /// This program, so many times a second.
     Send(f64),
-    /// Somebody else on the bus.
+    /// Another node on the bus.
     Follow,
 }
 

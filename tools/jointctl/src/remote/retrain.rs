@@ -81,7 +81,7 @@ pub enum RetrainError {
         /// Missing part.
         problem: String,
     },
-    /// Somebody's image is on its way.
+    /// Image of somebody that is on its way.
     #[error("node {node}: {}; `jointctl discard` ends it", super::info::life(*state, *left))]
     Busy {
         /// Node id.
@@ -108,7 +108,7 @@ pub enum RetrainError {
         node: u8,
         /// Residual torque before, RMS, Nm.
         before: f64,
-        /// With the new image, RMS, Nm.
+        /// Residual torque with the new image, RMS, Nm.
         after: f64,
     },
 }
@@ -122,7 +122,7 @@ pub struct Round {
     pub validation: f64,
     /// Set-points and samples a second.
     pub rate: f64,
-    /// Of the fit; the version is chosen by what the joint has.
+    /// Options of the fit; the version is chosen by what the joint has.
     pub options: Options,
     /// Signs the image.
     pub key: Option<Key>,
@@ -174,10 +174,10 @@ pub struct Outcome {
     pub samples: (usize, u64),
     /// Inertia and gravity that are not the configured ones.
     pub load: Vec<LoadDifference>,
-    /// With what was stored before, or without any compensation: the better of the motions before and after the new
-    /// image's.
+    /// Results with what was stored before, or without any compensation: the better of the motions before and after the
+    /// new image's.
     pub before: Shown,
-    /// With the new image.
+    /// Results with the new image.
     pub after: Shown,
     /// State of the images now.
     pub status: ImageStatus,

@@ -20,7 +20,7 @@ use std::time::{Duration, Instant};
 const SHORTEST_LEAD: f64 = 0.5;
 /// The steepest slope of the smooth step.
 const STEEPEST: f64 = 1.875;
-/// Between two looks at the joint's state.
+/// Time between two looks at the joint's state.
 const LOOK: Duration = Duration::from_millis(100);
 
 /// Route that a joint follows.
@@ -47,7 +47,7 @@ struct Way {
 /// Outcome of a route.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Travelled {
-    /// From the begin of the lead.
+    /// Recording from the begin of the lead.
     pub recording: Recording,
     /// Reference of the joint at each sample of the series, and the sample's number in the recording.
     pub references: Vec<(usize, Reference)>,

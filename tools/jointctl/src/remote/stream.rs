@@ -61,7 +61,7 @@ struct Shared {
     failure: Mutex<Option<RemoteError>>,
 }
 
-/// From a command to frames.
+/// Encoder of a command into frames.
 struct Encoder {
     pdos: Vec<(u16, PdoParameters)>,
     mode: Mode,
@@ -98,7 +98,7 @@ pub struct Stream {
     joint: RemoteJoint,
     shared: Arc<Shared>,
     changes: Vec<Change>,
-    /// To the thread, which ends when it is dropped.
+    /// Channel to the thread, which ends when it is dropped.
     sources: Option<Sender<Source>>,
     thread: Option<JoinHandle<()>>,
     /// `true` if the joint may follow this program. One that does not is not this one's to disable.
@@ -251,13 +251,13 @@ impl Stream {
         }
     }
 
-    /// From now on this is asked of the joint. Its mode is that of [`Stream::begin`].
+    /// Sets what is asked of the joint from now on. Its mode is that of [`Stream::begin`].
     pub fn set(&self, command: Command) {
         self.play(move |_| command);
     }
 
-    /// From now on this is asked of the joint, as a function of the time since now. It runs in the sending thread, once
-    /// a period, and has to be quick.
+    /// Sets what is asked of the joint from now on, as a function of the time since now. It runs in the sending thread,
+    /// once a period, and has to be quick.
     pub fn play(&self, source: impl FnMut(Duration) -> Command + Send + 'static) {
         if let Some(sources) = &self.sources {
             // A thread that has ended has said why.

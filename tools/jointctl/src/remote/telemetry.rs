@@ -73,7 +73,7 @@ pub struct Telemetry {
     joint: RemoteJoint,
     signals: Vec<Signal>,
     changes: Vec<Change>,
-    /// For each TPDO, the places of its signals.
+    /// Places of each TPDO's signals.
     places: Vec<Vec<usize>>,
     frames: Subscription,
     /// TPDOs of the sample that is coming.

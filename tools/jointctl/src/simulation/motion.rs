@@ -68,7 +68,7 @@ pub struct Controller {
 }
 
 impl Led {
-    /// At least two samples, in time; the move before them stays below `speed` (rad/s, above zero).
+    /// Motion through at least two samples, in time; the move before them stays below `speed` (rad/s, above zero).
     #[must_use]
     pub fn new(samples: Samples, speed: f64) -> Self {
         let way = samples.motion.first().map_or(0.0, |first| first.position.abs());

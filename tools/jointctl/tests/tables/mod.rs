@@ -2,7 +2,7 @@
 
 use std::process::Output;
 
-/// Those without a bus, each with what the ones before it wrote.
+/// Commands without a bus, each with what the ones before it wrote.
 #[allow(dead_code, reason = "of two tests each runs one half")]
 pub const WITHOUT_BUS: [&str; 7] = [
     "demo --samples 2000 --restarts 1 --patience 5 --json",
@@ -14,11 +14,11 @@ pub const WITHOUT_BUS: [&str; 7] = [
     "get --list --json",
 ];
 
-/// Those that find joints which have no node id.
+/// Command that finds joints which have no node id.
 #[allow(dead_code, reason = "of two tests each runs one half")]
 pub const ADDRESS: &str = "address --json --first 9 --wait 100";
 
-/// Those of a joint on a bus.
+/// Commands of a joint on a bus.
 #[allow(dead_code, reason = "of two tests each runs one half")]
 pub const OF_A_JOINT: [&str; 5] = [
     "get limits --json",

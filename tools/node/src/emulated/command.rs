@@ -37,7 +37,7 @@ pub enum DriverFault {
     OverCurrent,
     /// Its supply is below its lock-out.
     UnderVoltage,
-    /// It is too hot.
+    /// Over-temperature.
     OverTemperature,
     /// A gate does not follow.
     GateDrive,
@@ -45,7 +45,7 @@ pub enum DriverFault {
     Line,
     /// Its data line is broken.
     Silent,
-    /// It has lost its settings, once, and has no fault.
+    /// Loss of its settings, once, without a fault.
     Forgot,
 }
 
@@ -89,7 +89,7 @@ pub const HELP: [(&str, &str, &str); 11] = [
 /// Reason for which a line is no command.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CommandError {
-    /// Nobody knows it.
+    /// Unknown command.
     #[error("unknown command \"{0}\"; help lists them")]
     Unknown(String),
     /// Missing arguments of the command, or too many.

@@ -1,5 +1,4 @@
-//! Somebody at the bench of an emulated board: obeys [commands](Command) in the board's own time, and answers each in
-//! one line.
+//! Workbench of an emulated board: obeys [commands](Command) in the board's own time, and answers each in one line.
 
 use super::command::{Command, DriverFault, HELP};
 use emulator::board::Wired;
@@ -14,10 +13,10 @@ use std::collections::VecDeque;
 const HAND: u64 = 1_000_000_000;
 /// Speed at which it turns the link, rad/s.
 const SPEED: f64 = 0.25;
-/// It reaches that speed within this time, s, with at most so many times the joint's largest torque.
+/// Time within which it reaches that speed, s, with at most so many times the joint's largest torque.
 const PUSH: f64 = 0.005;
 const STRENGTH: f64 = 4.0;
-/// For how long the button is pressed, ps.
+/// Time for which the button is pressed, ps.
 const PRESSED: u64 = 100_000_000_000;
 
 /// A hand that turns the link.
@@ -46,7 +45,7 @@ pub struct Workbench {
 }
 
 impl Workbench {
-    /// With nothing to do.
+    /// Bench with nothing to do.
     pub fn new() -> Self {
         Self::default()
     }
@@ -117,7 +116,7 @@ impl Workbench {
         self.push(emulation);
     }
 
-    /// Does it; the answer, or why it cannot be.
+    /// Carries a command out; the answer, or why it cannot be.
     fn done<W: Wired>(&mut self, command: Command, emulation: &mut Emulation<W>, now: u64) -> Result<String, String> {
         let powered = emulation.is_powered();
         let board = emulation.cpu.bus.wiring_mut();

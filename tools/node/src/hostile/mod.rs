@@ -72,7 +72,7 @@ macro_rules! hold {
 pub struct Counts {
     /// Frames that the node sent.
     pub sent: u64,
-    /// Of them SDO aborts.
+    /// Number of SDO aborts among them.
     pub aborts: u64,
     /// Trials and shadows.
     pub run: u64,

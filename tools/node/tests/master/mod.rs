@@ -30,12 +30,12 @@ impl Master {
         Self::powered(Storage::with(images).unwrap())
     }
 
-    /// After a loss of power that left this.
+    /// Master after a loss of power that left this.
     pub fn powered(storage: Storage) -> Self {
         Self::built(ActuatorParameters::reference().aligned().without_payload(), storage)
     }
 
-    /// Of another actuator, with nothing stored.
+    /// Master of another actuator, with nothing stored.
     pub fn of(parameters: ActuatorParameters) -> Self {
         Self::built(parameters, Storage::with(SlotImages::empty().unwrap()).unwrap())
     }

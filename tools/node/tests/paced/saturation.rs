@@ -11,7 +11,7 @@ use std::time::Duration;
 /// The longest frame: 8 bytes, as many stuff bits as there can be.
 const FRAME: Duration = Duration::from_micros(135);
 
-/// Somebody who sends without a pause, by an identifier that only NMT, SYNC and EMCYs come before.
+/// Flood by a node that sends without a pause, by an identifier that only NMT, SYNC and EMCYs come before.
 struct Flood {
     station: Station,
 }

@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 
 /// Samples that are taken at once at most, so that orders and STOP have their turn.
 const AT_ONCE: usize = 2_000;
-/// Between two messages with strokes.
+/// Time between two messages with strokes.
 const BATCH: Duration = Duration::from_millis(50);
 /// Time without a sample that a page is told of.
 const SILENCE: Duration = Duration::from_secs(1);

@@ -23,11 +23,11 @@ use std::time::{Duration, Instant};
 const TURN: Duration = Duration::from_millis(5);
 /// The same where nobody looks.
 const IDLE: Duration = Duration::from_millis(50);
-/// Between two looks at a joint that moves.
+/// Time between two looks at a joint that moves.
 const LOOK: Duration = Duration::from_millis(50);
-/// Between two slow values.
+/// Time between two slow values.
 const SLOW: Duration = Duration::from_millis(100);
-/// Between two attempts to find a joint that does not answer.
+/// Time between two attempts to find a joint that does not answer.
 const AGAIN: Duration = Duration::from_secs(2);
 
 /// A motion for a page.

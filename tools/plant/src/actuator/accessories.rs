@@ -20,7 +20,7 @@ pub struct Fitted {
     /// Outputs: the brake is to open, the chopper conducts.
     open: bool,
     conducts: bool,
-    /// Since the brake's output changed, s.
+    /// Time since the brake's output changed, s.
     since: f64,
     grip: Option<Contact>,
     /// Energy that the resistor has burnt, J.

@@ -51,7 +51,7 @@ impl Channel {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Failure {
-    /// It repeats the last reading before the failure.
+    /// Stuck reading: it repeats the last one before the failure.
     Stuck,
     /// Its line is interrupted: the lowest reading of its range, for a thermistor the cold end. An encoder answers with
     /// ones only and its reading is not valid.
@@ -65,7 +65,7 @@ pub enum Failure {
     Noisy(f64),
 }
 
-/// Something that goes wrong.
+/// Fault of the actuator or its load.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Fault {
@@ -80,9 +80,9 @@ pub enum Fault {
     SourceVoltage(f64),
     /// The gate driver reports a fault; the bridge itself is healthy.
     GateDriver,
-    /// Something holds the link where it is.
+    /// Blocked load: something holds the link where it is.
     LoadBlocked,
-    /// Something pushes the link with this torque, -1e5 to 1e5 Nm.
+    /// External torque on the link, -1e5 to 1e5 Nm.
     ExternalTorque(f64),
 }
 

@@ -6,7 +6,7 @@
 /// Directions of the three phases in dq, at one electrical angle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frame {
-    /// For each phase its components along d and q; unit vectors.
+    /// Components of each phase along d and q; unit vectors.
     pub directions: [[f64; 2]; 3],
 }
 

@@ -31,14 +31,14 @@ const LOWEST_SUPPLY: f64 = 5.0;
 /// magnetic energy.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Powers {
-    /// From the bus into the bridge; negative while the motor feeds the bus. Neither the board's idle power nor what a
-    /// shorted leg burns.
+    /// Power from the bus into the bridge; negative while the motor feeds the bus. Neither the board's idle power nor
+    /// what a shorted leg burns.
     pub input: f64,
     /// Heat in the windings.
     pub copper_loss: f64,
     /// Heat in the bridge.
     pub bridge_loss: f64,
-    /// From the windings onto the rotor at the speed it had at the beginning of the period.
+    /// Power from the windings onto the rotor at the speed it had at the beginning of the period.
     pub mechanical: f64,
 }
 

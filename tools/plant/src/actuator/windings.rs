@@ -23,7 +23,7 @@ pub const REFERENCE_TEMPERATURE: f64 = 25.0;
 /// Rise of copper's resistance, 1/K, at 25 °C.
 pub const COPPER_RISE: f64 = 3.85e-3;
 
-/// In which order the motor's phases are wired to the bridge.
+/// Order in which the motor's phases are wired to the bridge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PhaseOrder {

@@ -63,7 +63,7 @@ pub enum Build {
     /// Firmware as flashed.
     #[default]
     Whole,
-    /// Without compensation.
+    /// Step without compensation.
     WithoutCompensation,
 }
 

@@ -175,12 +175,12 @@ impl Rig {
     }
 }
 
-/// Something breaks, and stays so.
+/// Breaks something, which stays so.
 pub fn break_down(rig: &mut Rig, what: Broken) {
     rig.joint.actuator_mut().inject(what).unwrap();
 }
 
-/// Everything is in order again.
+/// Mends everything.
 pub fn mend(rig: &mut Rig) {
     rig.joint.actuator_mut().clear_faults();
 }

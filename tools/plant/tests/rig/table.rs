@@ -14,7 +14,7 @@ pub enum Reset {
     Restart,
     /// Once its cause is gone; a reset waits for that a while.
     Waits,
-    /// At any time: with the bridge off the cause does not show.
+    /// Reset at any time: with the bridge off the cause does not show.
     AnyTime,
 }
 

@@ -29,7 +29,7 @@ pub struct Figure {
     pub title: &'static str,
     /// One sentence that says how to read it.
     pub caption: String,
-    /// It takes the whole width of the page.
+    /// `true` if it takes the whole width of the page.
     pub wide: bool,
     /// The `<svg>` element; its colours come from [`style_sheet`].
     pub svg: String,

@@ -49,7 +49,7 @@ impl Score {
 }
 
 impl<'a> Regressor<'a> {
-    /// In units of these reference motions.
+    /// Regressor in units of these reference motions.
     pub fn new(robot: &'a Robot, reference: &[Motion]) -> Self {
         let n = robot.tree.len();
         let independent = base(robot, 1).independent;

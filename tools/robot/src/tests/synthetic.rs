@@ -118,7 +118,7 @@ pub fn fourier(robot: &Robot, seconds: f64, harmonics: usize, seed: u64) -> Vec<
 pub enum EffortNoise {
     /// Part of each joint's RMS.
     Part(f64),
-    /// Of each joint, in units of effort.
+    /// Size for each joint, in units of effort.
     Size(Vec<f64>),
 }
 

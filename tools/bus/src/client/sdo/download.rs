@@ -5,7 +5,7 @@ use super::crc::crc;
 use super::{Message, Method, SEGMENT, Step, TOGGLE, length, names, request};
 use canopen_node::Abort;
 
-/// Up to so many bytes the segmented protocol needs no more frames than the block protocol.
+/// Bytes up to which the segmented protocol needs no more frames than the block protocol.
 const SEGMENTED: usize = 28;
 const LAST: u8 = 0x80;
 /// Number of blocks in a row of which nothing arrives that are no accident.
@@ -47,7 +47,7 @@ pub(super) struct Download {
 }
 
 impl Download {
-    /// With the first message.
+    /// Download with its first message.
     pub(super) fn new(object: Object, data: &[u8], method: Method) -> (Self, Message) {
         let (phase, first) = match (method, data) {
             (Method::Automatic, [_, rest @ ..]) if rest.len() < 4 => {
@@ -93,7 +93,7 @@ impl Download {
         Some(message)
     }
 
-    /// Up to seven bytes behind a first byte of 0, and whether they are the last.
+    /// Message of up to seven bytes behind a first byte of 0, and whether they are the last.
     fn bytes_from(&self, offset: usize) -> (Message, bool) {
         let rest = self.data.get(offset..).unwrap_or_default();
         let mut message = [0; 8];

@@ -34,7 +34,7 @@ pub enum Method {
     Automatic,
     /// Segmented, also what would fit into one frame. Reading: a node answers up to 4 bytes expedited all the same.
     Segmented,
-    /// By block, with CRC where the node can; else refused with abort code 0504 0001h.
+    /// Block transfer, with CRC where the node can; else refused with abort code 0504 0001h.
     Block,
 }
 
@@ -63,7 +63,7 @@ pub enum Failure {
     Timeout,
     /// The node refused.
     Aborted(Abort),
-    /// Somebody else sent to the node's SDO server.
+    /// Another client sent to the node's SDO server.
     OtherClient,
     /// The node sent what the protocol does not allow.
     Protocol(String),
@@ -81,7 +81,7 @@ enum State {
 enum Step {
     /// No effect: it belongs to something else.
     Ignored,
-    /// It was what was waited for, and the message answers it, if there is one.
+    /// Expected message, and the one that answers it, if there is one.
     Answer(Option<Message>),
     /// The transfer is whole; the message tells the node, if there is one.
     Done(Option<Message>, Vec<u8>),
@@ -95,7 +95,7 @@ pub struct Transfer {
     object: Object,
     settings: Settings,
     state: State,
-    /// To be sent at once.
+    /// Message to be sent at once.
     pending: Option<Message>,
     /// Time at which the node was last heard, or sent something to answer.
     active: Duration,
@@ -210,7 +210,7 @@ impl Transfer {
         self.active = now;
     }
 
-    /// Somebody else sent to the node's SDO server: gives up, and lets the node know.
+    /// Gives up because another client sent to the node's SDO server, and lets the node know.
     pub fn disturbed(&mut self) {
         if !matches!(self.state, State::Over(_)) {
             self.pending = Some(self.abort(Abort::GENERAL));

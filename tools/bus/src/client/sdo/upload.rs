@@ -38,7 +38,7 @@ pub(super) struct Upload {
 }
 
 impl Upload {
-    /// With the first message.
+    /// Upload with its first message.
     pub(super) fn new(object: Object, method: Method, settings: Settings) -> (Self, Message) {
         let block_size = settings.block_size.clamp(1, 127);
         let (phase, first) = match method {

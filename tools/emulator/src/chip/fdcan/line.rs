@@ -97,10 +97,10 @@ impl Bits {
 /// Participation of the controller in the bus.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Part {
-    /// Not at all: it is initialised, or bus-off.
+    /// No participation: it is initialised, or bus-off.
     #[default]
     None,
-    /// It receives and acknowledges.
+    /// Listening: it receives and acknowledges.
     Listening {
         /// Duration of a bit, ps.
         bit: u64,
@@ -161,10 +161,10 @@ pub struct Line {
     /// Duration of a bit, ps.
     bit: u64,
     part: Part,
-    /// Of the host's; of one identifier, in the order that they are to be sent.
+    /// Frames of the host's; of one identifier, in the order that they are to be sent.
     waiting: VecDeque<(Instant, CanFrame)>,
     under_way: Option<(Sender, Instant, Event)>,
-    /// Nobody may begin before.
+    /// Instant before which nobody may begin.
     idle: Instant,
     acknowledged: bool,
     disturbed: Option<Instant>,
@@ -173,7 +173,7 @@ pub struct Line {
 }
 
 impl Line {
-    /// At so many bit/s; others are there to acknowledge.
+    /// Line at so many bit/s; others are there to acknowledge.
     pub const fn new(bit_rate: u64) -> Self {
         Self {
             bit: 1_000_000_000_000 / bit_rate,
@@ -204,7 +204,7 @@ impl Line {
         self.begin(at);
     }
 
-    /// Nobody sends, and nothing waits to be sent by the host: a frame that is sent now begins now.
+    /// Returns `true` if nobody sends, and nothing waits to be sent by the host: a frame that is sent now begins now.
     pub fn is_idle(&self, at: Instant) -> bool {
         self.under_way.is_none() && self.waiting.is_empty() && self.idle <= at
     }

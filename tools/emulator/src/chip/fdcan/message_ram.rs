@@ -33,7 +33,7 @@ pub struct MessageRam {
 }
 
 impl MessageRam {
-    /// After power-up; its contents are undefined and stay over resets.
+    /// Message RAM after power-up; its contents are undefined and stay over resets.
     pub fn new() -> Self {
         Self { words: (0..WORDS as u32).map(|word| word.wrapping_mul(0x9e37_79b9) ^ 0xa5a5_5a5a).collect() }
     }

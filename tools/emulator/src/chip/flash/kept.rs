@@ -18,9 +18,9 @@ const TORN: u8 = 2;
 /// Reason for which bytes are no kept pages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum KeptError {
-    /// They are something else.
+    /// Foreign bytes: they are something else.
     Foreign,
-    /// They are of another number of pages.
+    /// Wrong length: they are of another number of pages.
     Length {
         /// Bytes that there are.
         found: usize,

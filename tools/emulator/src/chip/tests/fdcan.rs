@@ -39,7 +39,7 @@ fn configure(bench: &mut Bench) {
     bench.set(CCCR, 3);
 }
 
-/// With its clock, empty message RAM, not started.
+/// Controller with its clock, empty message RAM, not started.
 fn stopped() -> Bench {
     let mut bench = Bench::new(&variant::STM32G474CE);
     bench.speed_up();

@@ -18,7 +18,7 @@ pub fn unlock(bench: &mut Bench) {
     bench.set(KEYR, 0xcdef_89ab);
 }
 
-/// Until an operation ends, or the power goes; looks every few microseconds.
+/// Waits until an operation ends, or the power goes; looks every few microseconds.
 fn wait(bench: &mut Bench, microseconds: u64) {
     while bench.signals.stall.is_some() {
         bench.pass_us(microseconds);

@@ -17,7 +17,7 @@ pub struct Counter {
     pub tick: u64,
     /// The top in force.
     pub top: u32,
-    /// Up and down.
+    /// `true` if it counts up and down.
     pub centred: bool,
     /// CEN.
     pub running: bool,

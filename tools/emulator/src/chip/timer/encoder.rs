@@ -29,7 +29,7 @@ pub struct Followed {
 }
 
 impl Encoder {
-    /// From a count on.
+    /// Encoder from a count on.
     pub const fn new(count: u32) -> Self {
         Self { count, seen: None, up: true }
     }

@@ -31,9 +31,9 @@ use registers::*;
 /// 29.3.19).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Events {
-    /// On TRGO.
+    /// Rising edge on TRGO.
     pub trigger: bool,
-    /// On TRGO2.
+    /// Rising edge on TRGO2.
     pub trigger2: bool,
     /// The outputs do something new: see [`Timer::pwm`].
     pub outputs: bool,

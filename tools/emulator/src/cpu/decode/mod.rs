@@ -1,5 +1,5 @@
-//! From half-words to operations: which instruction an encoding is, and whether its outcome is defined (ARM DDI 0403,
-//! A5 and A7.7).
+//! Decoding of half-words into operations: which instruction an encoding is, and whether its outcome is defined (ARM
+//! DDI 0403, A5 and A7.7).
 
 mod branch;
 mod data_processing;
@@ -16,7 +16,7 @@ use std::fmt;
 /// Reason for which an encoding is not executed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refused {
-    /// There is no such instruction on a Cortex-M4F, or it is not implemented here.
+    /// No such instruction on a Cortex-M4F, or it is not implemented here.
     Unknown,
     /// The architecture leaves open what it does.
     Unpredictable,

@@ -4,13 +4,13 @@ use crate::bus::Bus;
 use crate::cpu::Cpu;
 use crate::cpu::operation::{Done, Execute, Operands, Rest};
 
-/// To `immediate`.
+/// Branch to `immediate`.
 pub(in crate::cpu) fn branch<B: Bus>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     cpu.branch(o.immediate);
     cpu.jumped(rest)
 }
 
-/// To `immediate` if a condition holds.
+/// Branch to `immediate` if a condition holds.
 fn branch_if<B: Bus, const CONDITION: u8>(cpu: &mut Cpu<B>, o: Operands, rest: Rest<B>) -> Done {
     if !cpu.holds(CONDITION) {
         return cpu.next(rest);

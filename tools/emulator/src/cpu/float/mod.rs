@@ -31,7 +31,7 @@ const DEFAULT_NAN: u32 = 0x7fc0_0000;
 /// Direction of rounding of a result between two numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rounding {
-    /// To the nearer, to the even one from the middle.
+    /// Rounding to the nearer, to the even one from the middle.
     Nearest,
     /// Upwards.
     Up,
@@ -47,7 +47,7 @@ pub enum Rounding {
 pub struct Status(u32);
 
 impl Status {
-    /// From the register's bits; those that it does not have are ignored.
+    /// Status of the register's bits; those that it does not have are ignored.
     pub fn from_bits(bits: u32) -> Self {
         Self(bits & IMPLEMENTED)
     }

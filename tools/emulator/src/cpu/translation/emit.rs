@@ -61,10 +61,10 @@ pub(super) struct Emitter<'a, 'b> {
     pub compared: Option<Compared>,
     /// Values that the last comparison of floats left, which are not taken over yet.
     pub compared_floats: Option<(Value, Value)>,
-    /// In this block the floating-point unit was found ready; in the usual mode.
+    /// `true` if in this block the floating-point unit was found ready; in the usual mode.
     pub ready: bool,
     pub usual: bool,
-    /// It was ready before the instruction that is translated.
+    /// `true` if it was ready before the instruction that is translated.
     pub was_ready: bool,
     pub blocks: HashMap<Place, Block>,
     pub waiting: Vec<Place>,

@@ -53,11 +53,11 @@ struct Instruction {
 /// A word that an instruction loads from an address that decoding knows.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 enum Word {
-    /// There is none, or nothing is known of it.
+    /// Unknown word: there is none, or nothing is known of it.
     Unknown,
-    /// It lies there in memory that answers at once.
+    /// Word that lies there in memory that answers at once.
     Memory(usize),
-    /// It changes only when the core is told; a load of it takes so many cycles more.
+    /// Word that changes only when the core is told; a load of it takes so many cycles more.
     Constant { address: u32, value: u32, waits: u8 },
 }
 
@@ -76,11 +76,11 @@ trait Source {
 /// Reason for which a translated function was left.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Left {
-    /// For an address that is not part of it.
+    /// Jump to an address that is not part of it.
     Jumped = 0,
-    /// By a branch whose target was not known: what the branch takes is not counted yet.
+    /// Branch whose target was not known: what the branch takes is not counted yet.
     Branched = 1,
-    /// Before an instruction that stretches have to go on with.
+    /// Stop before an instruction that stretches have to go on with.
     Call = 2,
 }
 

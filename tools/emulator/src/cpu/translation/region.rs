@@ -45,7 +45,7 @@ pub(super) struct Region {
 }
 
 impl Region {
-    /// Those from an address on.
+    /// Region from an address on.
     pub fn explore(source: &dyn Source, entry: u32) -> Self {
         let mut region = Self {
             entry,

@@ -12,7 +12,7 @@ use ratatui::symbols::Marker;
 use ratatui::widgets::{Axis, Block, Chart, Dataset, GraphType, Paragraph};
 use std::time::{Duration, Instant};
 
-/// Between two pictures.
+/// Time between two pictures.
 const PICTURE: Duration = Duration::from_millis(100);
 /// Lines of the page below the curves, with its frame.
 const PAGE: u16 = 12;
@@ -71,7 +71,7 @@ pub fn run(
     shown
 }
 
-/// In raw mode Ctrl-C is a key.
+/// Returns `true` if the user ends it: in raw mode Ctrl-C is a key.
 fn ends(event: &Event) -> bool {
     let Event::Key(key) = event else { return false };
     let interrupt = key.code == KeyCode::Char('c') && key.modifiers.contains(KeyModifiers::CONTROL);
