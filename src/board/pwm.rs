@@ -4,8 +4,8 @@
 //! sampled, and a control step begins. Its duties act from the next top on, a whole period after the sample, and in the
 //! middle one and a half periods after it, which is what the current loop counts on (`motor::current::DELAY_PERIODS`).
 //!
-//! That must not depend on how long the step took. The timer loads compare values at the bottom as well as at the top,
-//! and the moteus r4's has no repetition counter to change that. So a step only [holds](hold) its duties, and the
+//! The delay must not depend on how long the step took. The timer loads compare values at the bottom as well as at the
+//! top, and the moteus r4's has no repetition counter to change that. So a step only [holds](hold) its duties, and the
 //! timer's update interrupt, of the same priority, writes them while the counter runs up: at the bottom, or at the end
 //! of a step that took longer than that. Loading is held while the three are written, so that a period never has the
 //! duties of two steps.

@@ -6,7 +6,7 @@
 //! | 26 | nSWBOOT0 | 0: BOOT0 is an option bit | PB8 is BOOT0 otherwise, where the B-G431B-ESC1 has its encoder's index and the moteus r4 a connector: a reset could end in the bootloader |
 //! | 27 | nBOOT0 | 1: boots from flash | the option bit counts once nSWBOOT0 is 0 |
 //!
-//! As delivered SRAM_PE and nSWBOOT0 are 1. They are set by an explicit command alone: it resets the chip.
+//! SRAM_PE and nSWBOOT0 are 1 as delivered. They are set by an explicit command alone: it resets the chip.
 
 /// SRAM parity is not checked.
 pub const SRAM_PE: u32 = 1 << 24;

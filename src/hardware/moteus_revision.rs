@@ -1,8 +1,8 @@
 //! Family and revision of a board of the moteus family by its pins, before any other pin is driven.
 //!
-//! As in the vendor's firmware (fw/moteus_hw.cc), read not copied. Boards of other families (c1, x1) pull PB10 or PB11;
-//! those of the families r4 and n1 leave both floating, so they follow the chip's own pull-up and pull-down. An r4
-//! tells its revision by pulling PC6, PA15 and PA10 low. A board of the family n1 is told from an r4 by its gate
+//! Method of the vendor's firmware (fw/moteus_hw.cc), read not copied. Boards of other families (c1, x1) pull PB10 or
+//! PB11; those of the families r4 and n1 leave both floating, so they follow the chip's own pull-up and pull-down. An
+//! r4 tells its revision by pulling PC6, PA15 and PA10 low. A board of the family n1 is told from an r4 by its gate
 //! driver, which lies elsewhere: as an r4 of revision 4 it shows a driver that does not answer, unless its pins happen
 //! to tell of another revision (unconfirmed).
 //!

@@ -1,8 +1,8 @@
 //! The limits of torque, velocity and position as bounds of the torque, by gains of their own; control step, once a
 //! round of the motion loop.
 //!
-//! Whatever mode, stiffness and damping a joint has: within its limits it may be given the whole permitted torque, in
-//! both directions, at rest even at a position limit. Towards a limit the torque is held below a straight line in the
+//! A joint of any mode, stiffness and damping may be given the whole permitted torque within its limits, in both
+//! directions, at rest even at a position limit. Towards a limit the torque is held below a straight line in the
 //! velocity v, with the limit damping D:
 //!
 //! ```text

@@ -1,6 +1,6 @@
 //! Conversion of a command into a torque: ramps, stiffness and damping; control step, once a round of the motion loop.
 //!
-//! Whatever a mode and its gains want, the torque stays within the [bounds](super::limit_law) of the limits.
+//! The torque stays within the [bounds](super::limit_law) of the limits, whatever a mode and its gains want.
 
 use super::active::{Active, JointMotion};
 use super::command::{Command, CommandLimits, Mode, PROFILES};

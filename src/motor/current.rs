@@ -106,9 +106,9 @@ pub struct CurrentControl {
 impl CurrentControl {
     /// The voltage that takes `measured` to `reference`, V, for currents in A at an electrical speed in rad/s.
     ///
-    /// Where a measured or wanted current is not a number its axis has no error in this step, and where the speed is
-    /// not a number nothing is fed forward. The result is finite for any finite currents below 1e15 A.
-    /// [`Self::settle`] must follow.
+    /// If a measured or wanted current is not a number its axis has no error in this step, and if the speed is not a
+    /// number nothing is fed forward. The result is finite for any finite currents below 1e15 A. [`Self::settle`] must
+    /// follow.
     #[inline(always)]
     pub fn step(&mut self, gains: &CurrentGains, reference: Dq, measured: Dq, electrical_speed: f32) -> Dq {
         let error = reference - measured;

@@ -104,7 +104,7 @@ impl FieldWeakening {
     /// the current loop asked for in the step before, `reach` the longest vector, V, `speed` the electrical speed,
     /// rad/s, `limit` the current limit, A. The larger demand of d current counts.
     ///
-    /// What is not a number counts as no voltage and no speed. A function of its own: it is seldom run.
+    /// NaN counts as no voltage and no speed. A function of its own: it is seldom run.
     #[inline(never)]
     pub fn step(&mut self, gains: &WeakeningGains, reference: Dq, asked: Dq, reach: f32, speed: f32, limit: f32) -> Dq {
         let permitted = SHARE * SHARE * reach * reach;

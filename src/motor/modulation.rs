@@ -128,7 +128,7 @@ impl Modulator {
     /// Duties for a voltage vector, V. `currents`, A, out of the bridge: the ones that will flow while the duties act;
     /// the reference's are quieter near zero than measured ones.
     ///
-    /// Where the supply is too low (or not a number) all duties are at their centre and nothing is applied. NaN in a
+    /// If the supply is too low (or not a number) all duties are at their centre and nothing is applied. NaN in a
     /// voltage or current counts as 0.
     #[inline(always)]
     pub fn modulate(&self, voltage: AlphaBeta, bus_voltage: f32, currents: Phases) -> Modulated {

@@ -8,7 +8,7 @@
 //! alternate with an eighth of the control rate, along the field and across it. All voltages slew at [`SLEW`], and fall
 //! where the current exceeds its limit, so that a winding of any resistance is reached slowly.
 //!
-//! Nothing controls the current: it swings about its limit and passes it, by how much is in docs/commissioning.md.
+//! The current is not controlled: it swings about its limit and passes it, by how much is in docs/commissioning.md.
 
 use super::angle::{ElectricalAngle, STEPS};
 use super::modulation::Modulator;

@@ -52,7 +52,7 @@ impl<'a> Receiver<'a> {
     }
 
     /// Takes one frame, received at `now` (microseconds, wrapping). `send` gets up to four TPDOs, after SYNC only.
-    /// What the node itself sends must not come back here.
+    /// Frames that the node itself sends must not come back here.
     pub fn receive(
         &mut self,
         frame: &Frame,

@@ -4,7 +4,7 @@
 //!
 //! After each: it starts, reads back the old content or the new one, whole, over the bus; the same after another start;
 //! it is able to move; and it can store again. The words that were being written read as every kind of [`Torn`] word.
-//! What is not tried everywhere, because it takes long, is drawn by a fixed seed, and counted.
+//! Cases that are not tried everywhere, because they take long, are drawn by a fixed seed, and counted.
 
 use emulator::board::MoteusR4;
 use emulator::chip::flash::Torn;

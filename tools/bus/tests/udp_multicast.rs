@@ -1,6 +1,6 @@
 //! CAN over UDP multicast: two programs of this project, and python-can itself.
 //!
-//! Where this machine takes no multicast, or has no Python with python-can and cannot get one, these tests are reported
+//! On a machine that takes no multicast, or has no Python with python-can and cannot get one, these tests are reported
 //! as ignored by name; with `CI` set they run, and fail.
 
 use bus::{Frame, Transport, open};

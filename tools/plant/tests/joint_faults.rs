@@ -153,8 +153,8 @@ fn current_not_followed() {
     runs_its_course(holding(), Fault::CurrentNotFollowed, opened, |_| true, mend);
 }
 
-/// How soon it shows depends on the current that flows in the phase as it opens; where it is small, the current hardly
-/// misses its reference, and the other name is given.
+/// The time until it shows depends on the current that flows in the phase as it opens; where it is small, the current
+/// hardly misses its reference, and the other name is given.
 #[test]
 fn an_open_phase_is_found_wherever_the_rotor_stands() {
     for n in 0..24 {

@@ -1,7 +1,7 @@
 //! Friction beside the rigid bodies, linear in its coefficients, as wide as a choice needs it; host.
 //!
 //! Only the rigid bodies of this fit are kept: each joint's friction is identified anew by the pipeline of one joint.
-//! What friction lacks here would be learned by inertias.
+//! Friction that is missing here would be learned by inertias.
 
 use identification::pre_sliding;
 use identification::samples::Samples;

@@ -1,7 +1,7 @@
 //! Server and object table without the joint, on a hostile bus: after each frame a judgement whether anything happened
 //! that the protocol does not allow. For `examples/hostile_bus.rs` and the fuzz target; host.
 //!
-//! What is judged:
+//! Judgements:
 //!
 //! - the NMT state changes with an NMT command to this node, and as that command says, or by the server's own two ways
 //!   (boot-up, object 1029h)

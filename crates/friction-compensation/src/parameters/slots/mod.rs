@@ -267,7 +267,7 @@ impl Slots {
     }
 
     /// The newest slot whose payload is whole at this moment, for whoever reads it in place; none where there is none.
-    /// What is damaged is dealt with as by [`Slots::load`].
+    /// Damaged content is dealt with as by [`Slots::load`].
     pub fn usable(&mut self, flash: &mut impl SlotFlash) -> Result<Option<Slot>, SlotError> {
         let Some(active) = self.active() else { return Ok(None) };
         if self.is_whole(flash, active) {

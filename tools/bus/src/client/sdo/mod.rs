@@ -7,7 +7,7 @@
 //!
 //! Lost frames: in a block they are sent again, as the protocol provides. Everywhere else the transfer ends by time-out
 //! with nothing half done, as it may be unknown whether the node acted; whoever asked decides whether to ask again.
-//! What comes late, of a transfer before, is passed over where it can be told apart: by its command or by its object.
+//! Late messages of a transfer before are passed over where they can be told apart: by command or by object.
 
 mod crc;
 mod download;

@@ -7,8 +7,8 @@
 //! core as if all before had been executed one by one, and goes on if nothing else has to be done. It is left before a
 //! block that may last until something is due; then stretches go on.
 //!
-//! Whether anything is translated changes no result: `tests/translation.rs` and `tests/stretches.rs` compare it with
-//! single steps, and the tests of the boards whole runs with and without it.
+//! Translation changes no result: `tests/translation.rs` and `tests/stretches.rs` compare it with single steps, and the
+//! tests of the boards whole runs with and without it.
 
 mod arithmetic;
 mod emit;

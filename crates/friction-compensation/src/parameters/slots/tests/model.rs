@@ -1,7 +1,7 @@
 //! A model of STM32G4 flash whose power can go at any erase or write; host.
 //!
-//! What is under work at that instant is torn: it reads in one of five ways, of which the worst gives the old value,
-//! the new one, an error or anything else at every read anew. Noise is drawn from a seed, so that a case can be
+//! Double words under work at that instant are torn: they read in one of five ways, of which the worst gives the old
+//! value, the new one, an error or anything else at every read anew. Noise is drawn from a seed, so that a case can be
 //! repeated.
 
 use super::super::flash::{BLANK, DOUBLE_WORD, PAGE_WORDS, ReadError, SlotFlash, WriteError, ZERO};
