@@ -60,7 +60,7 @@ pub enum ExciteError {
     },
 }
 
-/// Nothing where a choice lies within its range.
+/// Checks that a choice lies within its range.
 ///
 /// # Errors
 /// [`ExciteError::Choice`].

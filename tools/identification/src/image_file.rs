@@ -9,7 +9,7 @@ use std::fmt::Display;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Why a file is no image that can be used.
+/// Reason for which a file is no image that can be used.
 #[derive(Debug, thiserror::Error)]
 pub enum ImageFileError {
     /// A file that cannot be read.
@@ -17,7 +17,7 @@ pub enum ImageFileError {
     Read {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Cause.
         source: io::Error,
     },
     /// An image that cannot be used.
@@ -25,7 +25,7 @@ pub enum ImageFileError {
     Image {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Reason.
         reason: String,
     },
 }
@@ -63,7 +63,7 @@ pub fn decode(bytes: &[u8], path: &Path, text: bool) -> Result<Image, ImageFileE
     Image::decode(split(bytes).0).map_err(|error| ImageFileError::image(path, error))
 }
 
-/// What a joint checks before it uses an image, after decoding.
+/// Checks of a joint before it uses an image, after decoding.
 ///
 /// # Errors
 /// [`ImageFileError::Image`].

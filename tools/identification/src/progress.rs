@@ -1,4 +1,4 @@
-//! What a long computation tells of itself; host.
+//! Progress of a long computation; host.
 
 /// Listens to a computation's progress, from several threads.
 pub trait Progress: Sync {

@@ -21,7 +21,7 @@ use std::fmt::Write;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Why a fitted robot was not judged.
+/// Reason for which a fitted robot was not judged.
 #[derive(Debug, thiserror::Error)]
 pub enum RobotEvaluateError {
     /// A file that cannot be read.
@@ -29,7 +29,7 @@ pub enum RobotEvaluateError {
     Read {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Cause.
         source: io::Error,
     },
     /// Rigid parts that cannot be used.
@@ -37,7 +37,7 @@ pub enum RobotEvaluateError {
     Bodies {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Reason.
         reason: String,
     },
     /// The image of a joint.

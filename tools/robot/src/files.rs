@@ -20,7 +20,7 @@ use std::path::Path;
 /// Files of a fit, but for those of its joints.
 pub const FILES: [&str; 5] = ["robot.html", "robot.urdf", "mujoco.xml", "parameters.toml", "robot.json"];
 
-/// Why the files of a robot were not written.
+/// Reason for which the files of a robot were not written.
 #[derive(Debug, thiserror::Error)]
 pub enum RobotWriteError {
     /// The report of a joint.

@@ -5,16 +5,16 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 
-/// Who decides about a part of the model.
+/// Decision about a part of the model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Decision {
     /// The error on motions that were left out decides.
     #[default]
     Choose,
-    /// It is kept, unless the certificate refuses it.
+    /// Kept, unless the certificate refuses it.
     Keep,
-    /// It is left out.
+    /// Left out.
     Never,
 }
 
