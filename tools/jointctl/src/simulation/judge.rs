@@ -1,10 +1,10 @@
 //! Judgement of a joint: where it was against where it should have been, and the torque that arrived against the torque
 //! that was asked for; host.
 //!
-//! Torque that did not arrive is the command before compensation less what the motor gives and friction leaves. It is judged
-//! as everywhere ([`mod@identification::torque_error`]): below 20 Hz, as a share of the friction. Beside it stands equation 11
-//! of the mobile-robot paper (001),
-//! |what did not arrive| / |motor torque|, without samples below a tenth of the motor torque's RMS.
+//! Torque that did not arrive is the command before compensation less what the motor gives and friction leaves. It is
+//! judged as everywhere ([`mod@identification::torque_error`]): below 20 Hz, as a share of the friction. Beside it
+//! stands equation 11 of the mobile-robot paper (001), |what did not arrive| / |motor torque|, without samples below a
+//! tenth of the motor torque's RMS.
 
 use super::log::Log;
 use identification::metrics::{Metrics, MetricsError, RELATIVE_FLOOR, metrics, relative_floor};
