@@ -43,7 +43,14 @@ pub fn all() -> Vec<Motion> {
     for trajectory in ["sin_sin", "up_and_down", "sin_time_square"] {
         add("xl330", trajectory.to_owned(), equal("trajectory", &format!("\"{trajectory}\"")));
     }
-    for axis in ["kuka_kr300_axis1", "kuka_kr300_axis2"] {
+    for axis in [
+        "kuka_kr300_axis1",
+        "kuka_kr300_axis2",
+        "kuka_kr300_axis3",
+        "kuka_kr300_axis4",
+        "kuka_kr300_axis5",
+        "kuka_kr300_axis6",
+    ] {
         for run in ["A", "B"] {
             add(axis, format!("run {run}"), file(&format!("run_{run}.csv.gz")));
         }
