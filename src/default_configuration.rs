@@ -30,6 +30,9 @@ pub struct BoardConfiguration {
     pub parameter_sets: usize,
 }
 
+/// The boards, each by the name of its feature, in the order of the columns of docs/boards.md.
+pub const BOARDS: [(&str, BoardConfiguration); 2] = [("b-g431b-esc1", B_G431B_ESC1), ("moteus-r4", MOTEUS_R4)];
+
 const B_G431B_ESC1_ANALOG: Analog = Analog {
     // Derived: 3.3 V / 4096 / (3 mOhm * 64/7); F, O. Codes fall with a current into the motor: the sense resistor lies
     // between the low side and ground, and the low side conducts when the current is sampled. The sign is unconfirmed.
@@ -232,11 +235,9 @@ mod tests {
     use crate::motor::phases::Phases;
     use crate::motor::thermal::WindingTemperature;
 
-    const BOARDS: [BoardConfiguration; 2] = [B_G431B_ESC1, MOTEUS_R4];
-
     #[test]
     fn every_board_starts_switched_off_and_stays_so_while_nobody_commands() {
-        for board in BOARDS {
+        for (_, board) in BOARDS {
             let active = board.joint.prepare(&board.bridge).unwrap();
             let measured = Measurements {
                 phase_currents: Phases { a: 0.4, b: -0.3, c: 0.2 },
@@ -262,7 +263,7 @@ mod tests {
 
     #[test]
     fn the_thermal_model_takes_every_boards_heat_paths() {
-        for board in BOARDS {
+        for (_, board) in BOARDS {
             let thermal = board.joint.prepare(&board.bridge).unwrap().thermal;
             assert!(WindingTemperature::new(&thermal, thermal.warning).is_ok());
         }
@@ -270,9 +271,9 @@ mod tests {
 
     /// The part of docs/boards.md from its heading on.
     fn limits() -> String {
-        let [esc1, moteus] = BOARDS.map(|board| board.bridge.limits);
         let row = |what: &str, unit: &str, value: fn(&BoardLimits) -> String| {
-            format!("| {what}, {unit} | {} | {} |\n", value(&esc1), value(&moteus))
+            let cells = BOARDS.map(|(_, board)| format!(" {} |", value(&board.bridge.limits)));
+            format!("| {what}, {unit} |{}\n", cells.concat())
         };
         let rows = [
             row("highest supply", "V", |of| of.supply.to_string()),
@@ -285,7 +286,9 @@ mod tests {
             row("highest limit of the bridge's temperature", "°C", |of| of.bridge_temperature.to_string()),
             row("longest command deadline", "s", |of| of.command_deadline.to_string()),
         ];
-        format!("{LIMITS}| | `b-g431b-esc1` | `moteus-r4` |\n|---|---|---|\n{}\n", rows.concat())
+        let names = BOARDS.map(|(name, _)| format!(" `{name}` |")).concat();
+        let rule = BOARDS.map(|_| "---|").concat();
+        format!("{LIMITS}| |{names}\n|---|{rule}\n{}\n", rows.concat())
     }
 
     const LIMITS: &str = "## Limits

@@ -1,12 +1,12 @@
 //! The boards' programs, built as they are flashed, those of the probe, built in the same way, and whether that is
 //! possible on this machine.
 
-use joint_firmware::default_configuration::{B_G431B_ESC1, MOTEUS_R4};
+use joint_firmware::default_configuration;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Target of both boards.
+/// Target of the boards.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
 
 /// Returns `true` if the board's target is installed.
@@ -20,6 +20,7 @@ pub fn target_installed() -> bool {
 
 /// A board, and how its program is compiled: as `.cargo/config.toml` says, and the board's own file beside it where it
 /// has one.
+#[derive(Clone, Copy)]
 pub struct Board {
     /// Its feature.
     pub name: &'static str,
@@ -28,10 +29,16 @@ pub struct Board {
 }
 
 /// The boards.
-pub const BOARDS: [Board; 2] = [
-    Board { name: "b-g431b-esc1", parameter_sets: B_G431B_ESC1.parameter_sets },
-    Board { name: "moteus-r4", parameter_sets: MOTEUS_R4.parameter_sets },
-];
+pub const BOARDS: [Board; default_configuration::BOARDS.len()] = {
+    let mut boards = [Board { name: "", parameter_sets: 0 }; default_configuration::BOARDS.len()];
+    let mut number = 0;
+    while number < boards.len() {
+        let (name, board) = &default_configuration::BOARDS[number];
+        boards[number] = Board { name, parameter_sets: board.parameter_sets };
+        number += 1;
+    }
+    boards
+};
 
 impl Board {
     /// Features of the probe with which it has the room that the board's program has.

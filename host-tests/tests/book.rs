@@ -1,6 +1,7 @@
 //! README and the book below `docs/`: every link leads somewhere, every page has a place in the book, and figures in
 //! prose are those of their source.
 
+use joint_firmware::default_configuration::BOARDS;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -179,7 +180,7 @@ fn grouped(number: u32) -> String {
 #[test]
 fn instructions_of_the_control_step_are_within_the_limits_that_the_tests_hold() {
     let cost = read("docs/cost.md");
-    for board in ["b-g431b-esc1", "moteus-r4"] {
+    for (board, _) in BOARDS {
         let limits = read(format!(".ci/instructions/{board}"));
         for part in ["network", "network's inputs", "physical model", "longest step"] {
             let line =

@@ -8,6 +8,7 @@ use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired as _};
 use host_tests::emulated::Bench;
 use host_tests::emulated::bench::program;
 use host_tests::emulated::observed::Observed;
+use joint_firmware::default_configuration::BOARDS;
 use joint_firmware::objects::field::Field;
 use joint_firmware::objects::settings::Setting;
 use joint_firmware::objects::table::{DataType, Object, Text, described};
@@ -56,7 +57,7 @@ impl Facts {
     fn of(board: &str) -> Result<Self, Failed> {
         let document = std::fs::read_to_string(DOCUMENT)?;
         let limits = document.split_once("## Limits").ok_or("no limits")?.1;
-        let column = if board == BG431BEsc1::NAME { 1 } else { 2 };
+        let column = 1 + BOARDS.iter().position(|(name, _)| *name == board).ok_or("no column")?;
         let fact = |name: &str| -> Result<f64, Failed> {
             let row = limits.lines().find(|line| line.starts_with(&format!("| {name}, ")));
             let cell = row.and_then(|row| row.trim_matches('|').split('|').nth(column)).ok_or(format!("no {name}"))?;

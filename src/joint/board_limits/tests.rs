@@ -2,7 +2,7 @@
 //! can.
 
 use super::*;
-use crate::default_configuration::{B_G431B_ESC1, BoardConfiguration, MOTEUS_R4};
+use crate::default_configuration::{BOARDS, BoardConfiguration};
 use crate::joint::configuration::Configuration;
 use crate::joint::fault::Fault;
 use crate::joint::rig::{self, at_rest, enabled};
@@ -13,8 +13,6 @@ use crate::objects::field::Field;
 use crate::objects::settings::Setting;
 use crate::objects::table::{DataType, described};
 use std::collections::BTreeSet;
-
-const BOARDS: [(&str, BoardConfiguration); 2] = [("b-g431b-esc1", B_G431B_ESC1), ("moteus-r4", MOTEUS_R4)];
 
 /// Settings that may take part in harming a bridge; each is tried with each other.
 const ELECTRICAL: [Setting; 25] = [

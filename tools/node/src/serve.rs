@@ -119,7 +119,7 @@ fn send(node: &mut impl Served, bus: &dyn Transport) -> Result<(), BusError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use joint_firmware::default_configuration::{B_G431B_ESC1, MOTEUS_R4};
+    use joint_firmware::default_configuration::BOARDS;
     use std::cell::Cell;
 
     /// Takes twice as long as what it simulates, by a clock that only it moves on, while others on the bus do
@@ -204,7 +204,7 @@ mod tests {
         });
         let given_up = serve_by(&|| clock.get(), &mut node, &*own, &stop).unwrap();
         assert!(given_up > 0.0);
-        for board in [B_G431B_ESC1, MOTEUS_R4] {
+        for (_, board) in BOARDS {
             let half = Duration::from_secs_f32(0.5 * board.joint.limits.command_deadline);
             assert!(took < half, "{took:?} of {half:?}");
         }

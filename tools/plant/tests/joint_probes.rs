@@ -4,15 +4,13 @@
 mod probes;
 mod rig;
 
-use joint_firmware::default_configuration::{B_G431B_ESC1, BoardConfiguration, MOTEUS_R4};
+use joint_firmware::default_configuration::{B_G431B_ESC1, BOARDS, BoardConfiguration};
 use joint_firmware::joint::fault::Fault;
 use probes::{Shows, probed, probes};
 
-const BOARDS: [BoardConfiguration; 2] = [B_G431B_ESC1, MOTEUS_R4];
-
 #[test]
 fn just_below_a_limit_nothing_shows_and_just_above_it_the_fault_does_within_its_time() {
-    let probes = BOARDS.iter().flat_map(|board| probes(&probed(board)));
+    let probes = BOARDS.iter().flat_map(|(_, board)| probes(&probed(board)));
     let failed: Vec<String> = probes.filter_map(|probe| probe.run().err()).collect();
     assert!(failed.is_empty(), "{}", failed.join("\n"));
 }
