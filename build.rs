@@ -2,14 +2,19 @@
 
 use std::env;
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-/// Cargo feature and memory of each board.
-const BOARDS: [(&str, &str); 2] =
-    [("CARGO_FEATURE_B_G431B_ESC1", "src/board/b_g431b_esc1.x"), ("CARGO_FEATURE_MOTEUS_R4", "src/board/moteus_r4.x")];
+/// Folder of the boards, with the memory of each in a file of its name.
+const BOARDS: &str = "src/board";
 
 /// Sections of every board; in each of them the first match counts.
 const SECTIONS: [&str; 2] = ["src/board/preparation.x", "src/board/sections.x"];
+
+/// Returns `true` if a file is the memory of a board whose feature is chosen.
+fn is_chosen(file: &Path) -> bool {
+    let name = file.file_stem().unwrap_or_default().to_string_lossy().to_uppercase();
+    file.extension().is_some_and(|extension| extension == "x") && env::var_os(format!("CARGO_FEATURE_{name}")).is_some()
+}
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
@@ -18,16 +23,17 @@ fn main() {
     if env::var("CARGO_CFG_TARGET_OS").as_deref() != Ok("none") {
         return;
     }
-    let mut chosen = BOARDS.iter().filter(|(feature, _)| env::var_os(feature).is_some());
+    let files = fs::read_dir(BOARDS).expect(BOARDS).map(|file| file.expect(BOARDS).path());
+    let mut chosen = files.filter(|file| is_chosen(file));
     // None is a build of the library; main.rs refuses it for the program.
-    let Some((_, memory)) = chosen.next() else { return };
+    let Some(memory) = chosen.next() else { return };
     if chosen.next().is_some() {
-        // main.rs says the same, but embassy's chip crate fails before that is compiled.
         eprintln!("two boards are chosen: for the moteus r4 build with `--no-default-features --features moteus-r4`");
         std::process::exit(1);
     }
-    let read = |name: &&str| fs::read_to_string(name).expect(name);
-    let memory: String = [*memory].iter().chain(&SECTIONS).map(read).collect();
+    let sections = SECTIONS.iter().map(PathBuf::from);
+    let read = |path: PathBuf| fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    let memory: String = [memory].into_iter().chain(sections).map(read).collect();
     let folder = PathBuf::from(env::var_os("OUT_DIR").expect("OUT_DIR"));
     // memory.x includes it.
     fs::write(folder.join("board.x"), memory).expect("board.x");

@@ -36,9 +36,9 @@ mod b_g431b_esc1;
 #[cfg(feature = "b-g431b-esc1")]
 pub use b_g431b_esc1::*;
 
-#[cfg(feature = "moteus-r4")]
+#[cfg(feature = "gate-driver")]
 mod drv8353;
-#[cfg(feature = "moteus-r4")]
+#[cfg(feature = "gate-driver")]
 pub mod gate;
 #[cfg(feature = "moteus-r4")]
 mod moteus_r4;
@@ -57,7 +57,7 @@ pub struct Parts {
     /// not wait for it.
     pub sensors: Option<Sensors>,
     /// The gate driver, for its task.
-    #[cfg(feature = "moteus-r4")]
+    #[cfg(feature = "gate-driver")]
     pub gate: gate::Parts,
     /// The light that a person sees.
     pub led: Led,

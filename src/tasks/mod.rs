@@ -92,7 +92,7 @@ fn begin(slow: Spawner, medium: impl FnOnce() -> SendSpawner, peripherals: Perip
     // Each task is spawned once, so its only place is free.
     medium.spawn(defmt::unwrap!(supervise(parts.button, watching, watchdog::new(parts.watchdog))));
     medium.spawn(defmt::unwrap!(keep_cool(winding)));
-    #[cfg(feature = "moteus-r4")]
+    #[cfg(feature = "gate-driver")]
     medium.spawn(defmt::unwrap!(mind_gate_driver(parts.gate)));
     slow.spawn(defmt::unwrap!(log()));
     slow.spawn(defmt::unwrap!(show(parts.led)));
@@ -159,7 +159,7 @@ async fn supervise(button: Option<Input<'static>>, mut watching: Watching, watch
 }
 
 /// Sets the gate driver up, and clears its faults.
-#[cfg(feature = "moteus-r4")]
+#[cfg(feature = "gate-driver")]
 #[embassy_executor::task]
 async fn mind_gate_driver(parts: board::gate::Parts) {
     board::gate::supervise(parts).await;
