@@ -269,16 +269,11 @@ mod tests {
         let mut board = crate::default_configuration::B_G431B_ESC1;
         let joint = &mut board.joint;
         (joint.limits.torque, joint.limits.damping) = (2.0, 2.0);
-        joint.compensation = crate::joint::configuration::CompensationConfiguration {
-            request: Request::Physical,
-            gain: 1.0,
-            clamp: 2.0,
-            slew: 32e3,
-            velocity_source: source,
-            standstill_velocity: STANDSTILL,
-            uncertainty: 1.0,
-            adaptation: AdaptationRequest::On,
-        };
+        let compensation = &mut joint.compensation;
+        (compensation.request, compensation.adaptation) = (Request::Physical, AdaptationRequest::On);
+        (compensation.gain, compensation.clamp, compensation.slew) = (1.0, 2.0, 32e3);
+        (compensation.velocity_source, compensation.standstill_velocity) = (source, STANDSTILL);
+        compensation.uncertainty = 1.0;
         let range = Range { low: q16(-100.0), high: q16(100.0) };
         let domain = Domain { ranges: [range; SIGNALS], margin: 1 << 13, reference_temperature: q16(25.0) };
         // Full scale of a signal in such a range is 128.
