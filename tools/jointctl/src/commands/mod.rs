@@ -45,9 +45,27 @@ pub struct Arguments {
     pub command: Command,
 }
 
-/// What to do.
-#[derive(Debug, Subcommand)]
-pub enum Command {
+/// Declares the commands: how each is called, its arguments, and what runs it where that is not `run`.
+macro_rules! commands {
+    ($($(#[$text:meta])* $name:ident($arguments:ty) $(=> $run:ident)?,)+) => {
+        /// What to do.
+        #[derive(Debug, Subcommand)]
+        pub enum Command {
+            $($(#[$text])* $name($arguments),)+
+        }
+
+        /// Runs a command.
+        pub fn run(arguments: Arguments) -> Result<(), CommandError> {
+            match arguments.command {
+                $(Command::$name(command) => commands!(@run command $($run)?),)+
+            }
+        }
+    };
+    (@run $command:ident) => { $command.run() };
+    (@run $command:ident $run:ident) => { $command.$run() };
+}
+
+commands! {
     /// The whole pipeline on a virtual joint: needs no file, writes ./demo
     Demo(demo::Demo),
     /// Identify, train, certify and judge the friction of a recorded joint
@@ -101,9 +119,9 @@ pub enum Command {
     /// Forget the image that is staged in a joint; ends its trial or shadow
     Discard(upload::Discard),
     /// Have a joint keep its configuration over a loss of power
-    Store(keep::Keep),
+    Store(keep::Keep) => store,
     /// Have a joint forget its configuration: defaults after the next reset
-    Restore(keep::Keep),
+    Restore(keep::Keep) => restore,
     /// Write the electronic data sheet of a joint, for CANopen masters
     Eds(describe::Eds),
     /// Write the frames of joints as a DBC file, for what shows CAN traffic
@@ -244,44 +262,6 @@ impl CommandError {
             Self::Remote(error) if error.is_usage() => 2,
             _ => 1,
         }
-    }
-}
-
-/// Runs a command.
-pub fn run(arguments: Arguments) -> Result<(), CommandError> {
-    match arguments.command {
-        Command::Demo(demo) => demo.run(),
-        Command::Fit(fit) => fit.run(),
-        Command::Evaluate(evaluate) => evaluate.run(),
-        Command::Robot(robot) => robot.run(),
-        Command::Fleet(fleet) => fleet.run(),
-        Command::Image(image) => image.run(),
-        Command::Key(key) => key.run(),
-        Command::Sign(sign) => sign.run(),
-        Command::Sim(sim) => sim.run(),
-        Command::Scan(scan) => scan.run(),
-        Command::Address(address) => address.run(),
-        Command::Info(info) => info.run(),
-        Command::Get(get) => get.run(),
-        Command::Set(set) => set.run(),
-        Command::Enable(enable) => enable.run(),
-        Command::Disable(disable) => disable.run(),
-        Command::Move(motion) => motion.run(),
-        Command::Commission(commission) => commission.run(),
-        Command::Monitor(monitor) => monitor.run(),
-        Command::Record(record) => record.run(),
-        Command::Retrain(retrain) => retrain.run(),
-        Command::Upload(upload) => upload.run(),
-        Command::Rollback(back) => back.run(),
-        Command::Discard(discard) => discard.run(),
-        Command::Store(keep) => keep.store(),
-        Command::Restore(keep) => keep.restore(),
-        Command::Eds(eds) => eds.run(),
-        Command::Dbc(dbc) => dbc.run(),
-        Command::BusYml(bus_yml) => bus_yml.run(),
-        Command::Excite(excite) => excite.run(),
-        Command::Completions(completions) => completions.run(),
-        Command::Man(man) => man.run(),
     }
 }
 
