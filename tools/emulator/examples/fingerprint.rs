@@ -2,7 +2,7 @@
 //! over the bus, and how fast the run was: what changes the emulator and not the number has changed no result.
 //! `cargo run --release -p emulator --example fingerprint -- moteus-r4 PROGRAM SECONDS`.
 
-use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired, Witnessed};
+use emulator::board::{Drivetrain, Wired, WithBoard, Witnessed, with_board};
 use emulator::chip::fdcan::line::CanFrame;
 use emulator::emulation::Emulation;
 use emulator::program::Program;
@@ -21,11 +21,22 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [board, path, seconds] = &arguments[..] else { return Err("BOARD PROGRAM SECONDS".into()) };
     let program = Program::parse(std::fs::read(path)?)?;
-    let drivetrain = Drivetrain::new(ActuatorParameters::reference().aligned(), 25.0, 1)?;
-    match &board[..] {
-        "b-g431b-esc1" => run(BG431BEsc1::new(drivetrain), &program, seconds.parse()?),
-        "moteus-r4" => run(MoteusR4::new(drivetrain), &program, seconds.parse()?),
-        other => Err(format!("no board {other}").into()),
+    let run = Run { program, seconds: seconds.parse()? };
+    with_board(board, run).unwrap_or_else(|| Err(format!("no board {board}").into()))
+}
+
+/// A run of a program.
+struct Run {
+    program: Program,
+    seconds: f64,
+}
+
+impl WithBoard for Run {
+    type Outcome = Result<(), Box<dyn std::error::Error>>;
+
+    fn run<W: Wired>(self, new: fn(Drivetrain) -> W) -> Self::Outcome {
+        let drivetrain = Drivetrain::new(ActuatorParameters::reference().aligned(), 25.0, 1)?;
+        run(new(drivetrain), &self.program, self.seconds)
     }
 }
 

@@ -1,16 +1,6 @@
-//! Boards, and actuators behind them.
+//! Actuators behind boards.
 
-use clap::ValueEnum;
 use plant::ActuatorParameters;
-
-/// The boards.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub enum Board {
-    #[value(name = "b-g431b-esc1")]
-    BG431BEsc1,
-    #[value(name = "moteus-r4")]
-    MoteusR4,
-}
 
 /// Parts behind a board.
 #[derive(Debug)]

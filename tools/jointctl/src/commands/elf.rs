@@ -1,8 +1,8 @@
 //! A board's program on an emulated board on a CAN bus.
 
 use super::CommandError;
-use super::bench::{Behind, Board};
-use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired};
+use super::bench::Behind;
+use emulator::board::{Drivetrain, Wired, WithBoard, with_board};
 use emulator::chip::time::Instant;
 use emulator::emulation::Emulation;
 use emulator::program::Program;
@@ -45,13 +45,25 @@ struct Session<'a> {
 }
 
 /// Runs the program `elf` of a board until it is stopped. Time that the machine was too slow for, s.
-pub fn run(elf: &Path, board: Board, behind: &Behind, bench: Bench) -> Result<f64, CommandError> {
+pub fn run(elf: &Path, board: &str, behind: &Behind, bench: Bench) -> Result<f64, CommandError> {
     let Bench { bus, storage, commands, stop } = bench;
     let lines = commands.map(lines).transpose()?;
     let session = Session { elf, bus, storage, lines, stop };
-    match board {
-        Board::BG431BEsc1 => session.run(wired(behind, BG431BEsc1::new)?),
-        Board::MoteusR4 => session.run(wired(behind, MoteusR4::new)?),
+    with_board(board, Served { session, behind })
+        .unwrap_or_else(|| Err(CommandError::Arguments(format!("--board: the emulator has no {board}"))))
+}
+
+/// A session with what is behind the board.
+struct Served<'a> {
+    session: Session<'a>,
+    behind: &'a Behind,
+}
+
+impl WithBoard for Served<'_> {
+    type Outcome = Result<f64, CommandError>;
+
+    fn run<W: Wired>(self, new: fn(Drivetrain) -> W) -> Self::Outcome {
+        self.session.run(wired(self.behind, new)?)
     }
 }
 
@@ -127,5 +139,29 @@ impl Session<'_> {
             ended.map_or(Ok(()), |end| Err(format!("after {:.6} s: {end}", emulation.now().seconds())))
         });
         serve(&mut node, &*transport, stop).map_err(|error| error.to_string())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use joint_firmware::default_configuration::BOARDS;
+
+    struct Name;
+
+    impl WithBoard for Name {
+        type Outcome = &'static str;
+
+        fn run<W: Wired>(self, _: fn(Drivetrain) -> W) -> &'static str {
+            W::NAME
+        }
+    }
+
+    #[test]
+    fn every_board_of_the_firmware_is_emulated_under_its_name() {
+        for (name, _) in BOARDS {
+            assert_eq!(with_board(name, Name), Some(name));
+        }
+        assert_eq!(with_board("moteus-r5", Name), None);
     }
 }

@@ -1,8 +1,10 @@
 //! Arguments of `jointctl sim --elf`: a board's program, as it is flashed, on an emulated board on a CAN bus.
 
 use super::CommandError;
-use super::bench::{Behind, Board};
+use super::bench::Behind;
 use clap::Args;
+use clap::builder::PossibleValuesParser;
+use joint_firmware::default_configuration::BOARDS;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
@@ -15,8 +17,8 @@ pub struct OnBoard {
     #[arg(long, value_name = "ELF", requires_all = ["bus", "board"], conflicts_with_all = ["node", "serial", "image", "config"])]
     elf: Option<PathBuf>,
     /// The board that the program is for
-    #[arg(long, value_name = "BOARD", value_enum, requires = "elf")]
-    board: Option<Board>,
+    #[arg(long, value_name = "BOARD", value_parser = PossibleValuesParser::new(BOARDS.map(|(name, _)| name)), requires = "elf")]
+    board: Option<String>,
     /// What somebody does to the board, a command a line, from this file, or from the terminal with "-"; "help" lists
     /// the commands. Each is answered in one line
     #[arg(long, value_name = "FILE", requires = "elf")]
@@ -42,7 +44,7 @@ impl OnBoard {
         storage: Option<&Path>,
         stop: &AtomicBool,
     ) -> Result<f64, CommandError> {
-        let (Some(elf), Some(board)) = (&self.elf, self.board) else { return Ok(0.0) };
+        let (Some(elf), Some(board)) = (&self.elf, &self.board) else { return Ok(0.0) };
         super::elf::run(
             elf,
             board,
