@@ -146,6 +146,21 @@ fn readme_is_short_and_its_results_are_those_of_the_pages() {
 }
 
 #[test]
+fn motions_that_were_left_out_are_counted_alike_on_every_page() {
+    let joined = |page: &str| read(page).split_whitespace().collect::<Vec<_>>().join(" ");
+    let source = read("docs/motions.md");
+    let summary = source.lines().find(|line| line.starts_with("Of ")).expect("a summary");
+    // Of all, those within 1 % of the best baseline (worst ratio), those within 2 % of the simplest model.
+    let [all, best, _, simplest, ..] = numbers(summary).collect::<Vec<_>>()[..] else { panic!("{summary}") };
+    let readme = joined("README.md");
+    assert!(readme.contains(&format!("prediction of {all} motions")), "{all} motions");
+    assert!(readme.contains(&format!("within 1 % of it or better on {best} |")), "{best} of {all}");
+    let results = joined("docs/results-recordings.md");
+    assert!(results.contains(&format!("best of three baselines on {best} of {all} motions")), "{best} of {all}");
+    assert!(results.contains(&format!("its own simplest model on {simplest}:")), "{simplest} of {all}");
+}
+
+#[test]
 fn names_in_diagrams_are_those_of_the_code() {
     let folders = ["src", "crates", "tools/identification/src", "tools/jointctl/src"];
     let code: String = folders.into_iter().flat_map(|at| files(at, "rs")).map(read).collect();
