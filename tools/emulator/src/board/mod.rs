@@ -78,20 +78,20 @@ pub trait Wired: Wiring {
     fn gate_driver(&mut self) -> Option<&mut Drv8353>;
 }
 
-/// Something to do with a board of which no more than the name is known.
+/// Work on a board of which only the name is known.
 pub trait WithBoard {
-    /// What comes of it.
+    /// Result of the work.
     type Outcome;
 
-    /// Does it with a board that is made of what is behind it.
+    /// Runs the work; `new` makes the board from the drivetrain behind it.
     fn run<W: Wired>(self, new: fn(Drivetrain) -> W) -> Self::Outcome;
 }
 
 /// Outcome on the board of a name; none where there is no such board.
-pub fn with_board<T: WithBoard>(name: &str, what: T) -> Option<T::Outcome> {
+pub fn with_board<T: WithBoard>(name: &str, work: T) -> Option<T::Outcome> {
     match name {
-        BG431BEsc1::NAME => Some(what.run(BG431BEsc1::new)),
-        MoteusR4::NAME => Some(what.run(MoteusR4::new)),
+        BG431BEsc1::NAME => Some(work.run(BG431BEsc1::new)),
+        MoteusR4::NAME => Some(work.run(MoteusR4::new)),
         _ => None,
     }
 }

@@ -40,7 +40,7 @@ use std::path::PathBuf;
 #[derive(Debug, Parser)]
 #[command(name = "jointctl", version, max_term_width = 110)]
 pub struct Arguments {
-    /// What to do.
+    /// Command of the program.
     #[command(subcommand)]
     pub command: Command,
 }
@@ -48,7 +48,7 @@ pub struct Arguments {
 /// Declares the commands: how each is called, its arguments, and what runs it where that is not `run`.
 macro_rules! commands {
     ($($(#[$text:meta])* $name:ident($arguments:ty) $(=> $run:ident)?,)+) => {
-        /// What to do.
+        /// Command of the program.
         #[derive(Debug, Subcommand)]
         pub enum Command {
             $($(#[$text])* $name($arguments),)+

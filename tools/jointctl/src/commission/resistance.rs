@@ -51,7 +51,7 @@ pub struct Resistance {
 }
 
 impl Resistance {
-    /// Values that the joint has: resistance at 25 °C, for a winding at `temperature`; nothing known of what legs lose.
+    /// Values that the joint has: resistance at 25 °C, for a winding at `temperature`; losses of the legs unknown.
     pub fn configured(at_25: f64, temperature: f64) -> Self {
         let exactly = |value| Estimate { value, error: 0.0 };
         let resistance = exactly(at_25 * copper(temperature));
