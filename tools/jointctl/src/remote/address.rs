@@ -33,7 +33,8 @@ fn is_taken(network: &Network, id: u8) -> Result<bool, RemoteError> {
 }
 
 /// Joints that somebody gave an id to and left there, before they began to use it: they begin now. They answer neither
-/// a scan nor a fastscan before.
+/// a scan nor a fastscan before. A joint whose power comes on in these moments sends the same message, and is told with
+/// the id that it has.
 fn begun(network: &Network, wait: Duration) -> Result<Vec<Addressed>, RemoteError> {
     let heartbeats = network.heartbeats();
     network.end_configuration()?;
