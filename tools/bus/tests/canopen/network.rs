@@ -6,9 +6,9 @@ use bus::client::heartbeat::{Change, Watch};
 use bus::client::lss::Address;
 use bus::client::sdo::{Method, Settings};
 use bus::client::{ClientError, Command, Emergency, Network, NmtState, SyncProducer, Target, heartbeat};
-use bus::{Frame, open};
+use bus::{BusError, Frame, Transport, open};
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 const MS: Duration = Duration::from_millis(1);
@@ -129,39 +129,57 @@ fn a_second_client_is_noticed_and_nothing_is_half_done() {
     drop(running);
 }
 
-/// Disturbs the first `times` reads of 2001h on the bus, each in its second frame, until it has done so.
-fn disturb(bus: &str, times: usize) -> std::thread::JoinHandle<()> {
-    let other = open(bus).unwrap();
-    std::thread::spawn(move || {
-        let question = Frame::new(0x605, &[0x40, 0, 0x10, 0, 0, 0, 0, 0]).unwrap();
-        let begins = |frame: &Frame| frame.id() == 0x605 && frame.data().starts_with(&[0x40, 0x01, 0x20]);
-        let mut left = times;
-        while left > 0 {
-            let heard = other.receive(Duration::from_secs(60)).unwrap().expect("a read begins");
-            if begins(&heard) {
-                other.send(&question).unwrap();
-                left -= 1;
+/// A bus on which another client asks in the middle of so many reads of 2001h: before the first segment is asked for.
+#[derive(Debug)]
+struct Interrupted {
+    ours: Arc<dyn Transport>,
+    other: Arc<dyn Transport>,
+    reads: AtomicUsize,
+    begun: AtomicBool,
+}
+
+impl Transport for Interrupted {
+    fn name(&self) -> &str {
+        self.ours.name()
+    }
+
+    fn send(&self, frame: &Frame) -> Result<(), BusError> {
+        let sends = |command: &[u8]| frame.id() == 0x605 && frame.data().starts_with(command);
+        if sends(&[0x60]) && self.begun.swap(false, Ordering::Relaxed) {
+            let left = self.reads.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(1));
+            if left.is_ok() {
+                self.other.send(&Frame::new(0x605, &[0x40, 0, 0x10, 0, 0, 0, 0, 0]).unwrap())?;
             }
         }
-    })
+        self.begun.fetch_or(sends(&[0x40, 0x01, 0x20]), Ordering::Relaxed);
+        self.ours.send(frame)
+    }
+
+    fn receive(&self, timeout: Duration) -> Result<Option<Frame>, BusError> {
+        self.ours.receive(timeout)
+    }
 }
 
 #[test]
 fn a_read_that_another_client_disturbs_is_repeated_four_times() {
     let bus = "virtual:reads";
-    let (network, running) = pair(bus, 5, 0);
+    let (ours, other) = (open(bus).unwrap(), open(bus).unwrap());
+    let interrupted = Arc::new(Interrupted { ours, other, reads: AtomicUsize::new(0), begun: AtomicBool::new(false) });
+    let network = Network::new(interrupted.clone());
+    let booted = network.heartbeats();
+    let running = Running::new(open(bus).unwrap(), Node::new(5, 1, 0));
+    assert!(booted.next(Duration::from_secs(5)).unwrap().is_some(), "boots");
     let node = network.node(5).unwrap();
-    // Long enough for the other one to come in between.
     node.download(0x2001, 0, &pattern(2000)).unwrap();
     for times in [1, 4] {
-        let other = disturb(bus, times);
+        interrupted.reads.store(times, Ordering::Relaxed);
         assert_eq!(node.upload_by(0x2001, 0, Method::Segmented).unwrap(), pattern(2000), "{times}");
-        other.join().unwrap();
+        assert_eq!(interrupted.reads.load(Ordering::Relaxed), 0);
     }
-    let other = disturb(bus, 5);
+    interrupted.reads.store(5, Ordering::Relaxed);
     let error = node.upload_by(0x2001, 0, Method::Segmented).unwrap_err();
     assert!(matches!(error, ClientError::OtherClient { .. }), "{error}");
-    other.join().unwrap();
+    assert_eq!(interrupted.reads.load(Ordering::Relaxed), 0);
     drop(running);
 }
 
