@@ -6,14 +6,23 @@
 //! the work was interrupted.
 
 use crate::estimate::estimate;
-use crate::partition::{FolderError, Misplaced, Partition, fingerprint, partitions};
+use crate::partition::{FolderError, Misplaced, Partition, fingerprint, is_joint, partitions};
 use crate::stored::{self, Entry, FOLDER};
 use crate::sums::Sums;
 use crate::windows;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
-use std::io;
 use std::path::{Path, PathBuf};
+use std::{fs, io};
+
+/// Part of a fleet that is worked on, and the source of its sums.
+#[derive(Clone, Debug, Default)]
+pub struct Scope {
+    /// Names of joints, all where there are none. The table of all is written where there are none.
+    pub joints: Vec<String>,
+    /// Stored sums are taken as they are: no partition is read.
+    pub stored: bool,
+}
 
 /// The outcome.
 #[derive(Debug)]
@@ -34,6 +43,14 @@ pub enum NightError {
     /// The folder.
     #[error(transparent)]
     Folder(#[from] FolderError),
+    /// A joint that is not there.
+    #[error("{}: no folder joint={joint}; --joint takes a name that follows \"joint=\" there", fleet.display())]
+    NoJoint {
+        /// The fleet's folder.
+        fleet: PathBuf,
+        /// Name that was asked for.
+        joint: String,
+    },
     /// Sums that cannot be written.
     #[error("cannot write {}: {source}", path.display())]
     Write {
@@ -57,21 +74,74 @@ pub enum NightError {
 ///
 /// # Errors
 /// [`NightError`]; bad partitions are none, they are entries with a defect.
-pub fn night(fleet: &Path, threads: usize, more: &(dyn Fn() -> bool + Sync)) -> Result<Night, NightError> {
-    let (found, misplaced) = partitions(fleet)?;
+pub fn night(
+    fleet: &Path,
+    scope: &Scope,
+    threads: usize,
+    more: &(dyn Fn() -> bool + Sync),
+) -> Result<Night, NightError> {
+    if let Some(joint) = scope.joints.iter().find(|joint| !is_joint(fleet, joint)) {
+        return Err(NightError::NoJoint { fleet: fleet.to_owned(), joint: joint.clone() });
+    }
+    let (found, misplaced) = partitions(fleet, &scope.joints)?;
+    let mut night = match scope.stored {
+        true => as_stored(fleet, &found),
+        false => summed(fleet, &found, threads, more)?,
+    };
+    night.misplaced.extend(misplaced);
+    night.misplaced.sort_by(|one, other| one.path.cmp(&other.path));
+    tell_copies(&mut night.entries);
+    if scope.joints.is_empty() && night.entries.len() == found.len() && !found.is_empty() {
+        let path = fleet.join(FOLDER).join("all.parquet");
+        stored::write(&path, &night.entries).map_err(|source| NightError::Write { path, source })?;
+    }
+    Ok(night)
+}
+
+/// Stored sums of partitions; a partition without, or with other files since, is misplaced.
+fn as_stored(fleet: &Path, found: &[Partition]) -> Night {
+    let mut night = Night { entries: Vec::new(), misplaced: Vec::new(), read: 0, kept: 0 };
+    for partition in found {
+        let reason = match stored::read(&stored::place(fleet, partition)).as_deref() {
+            Ok([known]) if of_these_files(partition, known) => {
+                night.entries.push(known.clone());
+                continue;
+            }
+            Ok(_) => "files have changed since they were summed up: `jointctl fleet sums` does it anew",
+            Err(_) => "not summed up: `jointctl fleet sums` does it",
+        };
+        let path = fleet.join(format!("joint={}", partition.joint)).join(format!("day={}", partition.day));
+        night.misplaced.push(Misplaced { path, reason: reason.into() });
+    }
+    night.kept = night.entries.len();
+    night
+}
+
+/// True where an entry is of files with these names and sizes. One without sources is of files that cannot be read.
+fn of_these_files(partition: &Partition, known: &Entry) -> bool {
+    let line = |file: &PathBuf| {
+        let size = fs::metadata(file).ok()?.len();
+        Some(format!("{}/{size}:", file.file_name()?.to_string_lossy()))
+    };
+    let known: Vec<&str> = known.source.lines().collect();
+    let same = |(file, known): (&PathBuf, &&str)| line(file).is_some_and(|line| known.starts_with(&line));
+    known.is_empty() || known.len() == partition.files.len() && partition.files.iter().zip(&known).all(same)
+}
+
+/// Sums of partitions, read where they are new or have changed.
+fn summed(
+    fleet: &Path,
+    found: &[Partition],
+    threads: usize,
+    more: &(dyn Fn() -> bool + Sync),
+) -> Result<Night, NightError> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.map_err(|error| NightError::Threads { threads, reason: error.to_string() })?;
     let one = |partition: &Partition| more().then(|| entry(fleet, partition)).transpose();
     let done: Vec<Option<(Entry, bool)>> = pool.install(|| found.par_iter().map(one).collect::<Result<_, _>>())?;
-    let whole = done.iter().all(Option::is_some);
-    let (mut entries, fresh): (Vec<Entry>, Vec<bool>) = done.into_iter().flatten().unzip();
-    tell_copies(&mut entries);
-    if whole && !entries.is_empty() {
-        let path = fleet.join(FOLDER).join("all.parquet");
-        stored::write(&path, &entries).map_err(|source| NightError::Write { path, source })?;
-    }
+    let (entries, fresh): (Vec<Entry>, Vec<bool>) = done.into_iter().flatten().unzip();
     let read = fresh.iter().filter(|fresh| **fresh).count();
-    Ok(Night { kept: fresh.len() - read, read, entries, misplaced })
+    Ok(Night { kept: fresh.len() - read, read, entries, misplaced: Vec::new() })
 }
 
 /// Sums of a partition, and whether it was read.

@@ -3,6 +3,7 @@
 //! Names that begin with `_` or `.` are not data, as in other programs that read such folders.
 
 use sha2::{Digest, Sha256};
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -37,14 +38,20 @@ pub struct FolderError {
     pub source: io::Error,
 }
 
-/// All partitions below a folder, by joint and day, and what is none.
+/// All partitions below a folder, by joint and day, and what is none; of `joints` alone where there are any, whose
+/// folders must exist ([`is_joint`]).
 ///
 /// # Errors
 /// [`FolderError`], of the folder itself; what cannot be read below is misplaced.
-pub fn partitions(folder: &Path) -> Result<(Vec<Partition>, Vec<Misplaced>), FolderError> {
+pub fn partitions(folder: &Path, joints: &[String]) -> Result<(Vec<Partition>, Vec<Misplaced>), FolderError> {
     let (mut found, mut misplaced) = (Vec::new(), Vec::new());
     let wrong = |path: PathBuf, reason: &str| Misplaced { path, reason: reason.into() };
-    for joint_folder in entries(folder)? {
+    let joint_folders = match joints {
+        [] => entries(folder)?,
+        // A joint that is named twice is one joint.
+        named => named.iter().collect::<BTreeSet<_>>().into_iter().map(|name| joint_folder(folder, name)).collect(),
+    };
+    for joint_folder in joint_folders {
         let Some(joint) = value(&joint_folder, "joint=") else {
             misplaced.push(wrong(joint_folder, "expected a folder joint=NAME"));
             continue;
@@ -69,6 +76,15 @@ pub fn partitions(folder: &Path) -> Result<(Vec<Partition>, Vec<Misplaced>), Fol
     found.sort();
     misplaced.sort_by(|one, other| one.path.cmp(&other.path));
     Ok((found, misplaced))
+}
+
+/// True where a fleet has a folder of this joint.
+pub fn is_joint(folder: &Path, name: &str) -> bool {
+    value(&joint_folder(folder, name), "joint=").is_some_and(|value| value == name)
+}
+
+fn joint_folder(folder: &Path, name: &str) -> PathBuf {
+    folder.join(format!("joint={name}"))
 }
 
 /// Paths in a folder that are data, by name.
@@ -143,7 +159,7 @@ mod tests {
         ] {
             write(name);
         }
-        let (found, misplaced) = partitions(folder.path()).unwrap();
+        let (found, misplaced) = partitions(folder.path(), &[]).unwrap();
         let names: Vec<(&str, &str, usize)> =
             found.iter().map(|p| (p.joint.as_str(), p.day.as_str(), p.files.len())).collect();
         assert_eq!(names, [("a", "2026-01-09", 1), ("a", "2026-01-10", 2), ("b", "2026-01-02", 1)]);
@@ -158,7 +174,14 @@ mod tests {
                 "expected a folder joint=NAME"
             ]
         );
-        assert!(partitions(&folder.path().join("nowhere")).unwrap_err().to_string().contains("nowhere: cannot be"));
+        let nowhere = partitions(&folder.path().join("nowhere"), &[]);
+        assert!(nowhere.unwrap_err().to_string().contains("nowhere: cannot be"));
+
+        let (of_b, misplaced) = partitions(folder.path(), &["b".into(), "b".into()]).unwrap();
+        assert_eq!((of_b.as_slice(), misplaced.len()), (&found[2..], 0));
+        for (name, there) in [("a", true), ("b", true), ("c", false), ("", false), ("a/day=2026-01-09", false)] {
+            assert_eq!(is_joint(folder.path(), name), there, "{name:?}");
+        }
     }
 
     #[test]

@@ -4,7 +4,7 @@
 mod fleet_of_joints;
 
 use fleet::finding::{Finding, Kind, findings};
-use fleet::night::{Night, night};
+use fleet::night::{Night, NightError, Scope, night};
 use fleet_of_joints::{DAYS, JOINTS, day, joint};
 use std::collections::BTreeMap;
 use std::fs;
@@ -43,7 +43,7 @@ fn copy() -> tempfile::TempDir {
 }
 
 fn whole(folder: &Path, threads: usize) -> Night {
-    night(folder, threads, &|| true).unwrap()
+    night(folder, &Scope::default(), threads, &|| true).unwrap()
 }
 
 /// Every file of the sums with its bytes.
@@ -144,7 +144,7 @@ fn one_thread_four_threads_and_an_interrupted_night_give_the_same_bytes() {
     whole(four.path(), 4);
     let left = AtomicUsize::new(150);
     let more = || left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(1)).is_ok();
-    let first = night(interrupted.path(), 4, &more).unwrap();
+    let first = night(interrupted.path(), &Scope::default(), 4, &more).unwrap();
     assert_eq!(first.read, 150);
     assert!(!interrupted.path().join("_sums/all.parquet").exists());
     // A process that was killed while it wrote: half of a table, which is made anew, and a file that is none.
@@ -174,4 +174,37 @@ fn what_is_unchanged_is_not_read_again_and_what_changed_is() {
     fs::copy(from, to).unwrap();
     let changed = whole(folder.path(), 0);
     assert_eq!((changed.read, changed.kept), (1, JOINTS * DAYS - 1));
+}
+
+#[test]
+fn joints_one_by_one_and_their_stored_sums_give_the_bytes_of_the_whole() {
+    let (whole_folder, folder) = (copy(), copy());
+    let expected = whole(whole_folder.path(), 0);
+    let of = |joints: &[String], stored| night(folder.path(), &Scope { joints: joints.to_vec(), stored }, 1, &|| true);
+    for number in 1..JOINTS {
+        assert_eq!(of(&[joint(number)], false).unwrap().read, DAYS);
+    }
+    let all = folder.path().join("_sums/all.parquet");
+    let partly = of(&[], true).unwrap();
+    assert_eq!((partly.entries.len(), partly.misplaced.len(), partly.read), ((JOINTS - 1) * DAYS, DAYS, 0));
+    assert!(partly.misplaced.iter().all(|bad| bad.reason.contains("not summed up") && !all.exists()));
+    of(&[joint(0)], false).unwrap();
+    assert!(!all.exists());
+    let joined = of(&[], true).unwrap();
+    assert_eq!((joined.entries.len(), joined.read), (expected.entries.len(), 0));
+    assert!(sums(folder.path()) == sums(whole_folder.path()), "the bytes differ");
+
+    // One byte more: these are other files.
+    let file = folder.path().join(format!("joint={}/day={}/log.parquet", joint(2), day(3)));
+    let mut bytes = fs::read(&file).unwrap();
+    bytes.push(0);
+    fs::remove_file(&file).unwrap();
+    fs::write(&file, bytes).unwrap();
+    let changed = of(&[], true).unwrap();
+    assert_eq!((changed.entries.len(), changed.misplaced.len()), (JOINTS * DAYS - 1, 1));
+    assert!(changed.misplaced[0].reason.contains("changed since"), "{:?}", changed.misplaced);
+
+    let error = of(&[joint(0), "nowhere".into()], false).unwrap_err();
+    assert!(matches!(error, NightError::NoJoint { .. }), "{error}");
+    assert!(error.to_string().contains("no folder joint=nowhere; --joint takes a name"), "{error}");
 }

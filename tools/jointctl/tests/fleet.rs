@@ -64,6 +64,26 @@ fn the_page_names_what_changed_and_only_better_images_are_kept() {
     let signed = ["image", "verify", "new/j11/friction.signed", "--key", "fleet.key"];
     assert!(!jointctl(folder.path(), &signed).stdout.is_empty());
 
+    let key = jointctl(folder.path(), &["key", "number", "fleet.key"]).stdout;
+    let kept: Vec<&Value> =
+        outcomes["joints"].as_array().unwrap().iter().filter(|outcome| outcome["kept"] == true).collect();
+    let images = |folder: &Path| {
+        let listed = json(&jointctl(folder, &["fleet", "images", "fleet", "--json"]));
+        listed["images"].as_array().unwrap().clone()
+    };
+    let registered = images(folder.path());
+    assert_eq!(registered.len(), kept.len());
+    for outcome in kept {
+        let joint = outcome["joint"].as_str().unwrap();
+        let record = registered.iter().find(|record| record["joint"] == joint).unwrap();
+        let image = std::fs::read(folder.path().join(format!("new/{joint}/friction.img"))).unwrap();
+        assert_eq!(record["image"], fleet::registry::sha256(&image), "{joint}");
+        assert_eq!(record["key"], String::from_utf8_lossy(&key).trim(), "{joint}");
+        assert_eq!((&record["event"], &record["version"]), (&"made".into(), &outcome["version"]), "{joint}");
+        let days = record["days"].as_str().unwrap();
+        assert!(days.starts_with("2026-01-0") && days.ends_with(" to 2026-01-08"), "{joint}: {days}");
+    }
+
     // The joints have the new images: another one is no better, and the joints keep what they have.
     let again =
         ["fleet", "retrain", "fleet", "--out", "again", "--images", "new", "--preset", "coulomb-viscous", "--json"];
@@ -74,4 +94,13 @@ fn the_page_names_what_changed_and_only_better_images_are_kept() {
         assert!(found["reason"].as_str().unwrap().starts_with("not kept: "), "{found}");
         assert!(!folder.path().join("again").join(joint).exists());
     }
+
+    // One joint alone, by its stored sums: the same image.
+    let one =
+        ["fleet", "retrain", "fleet", "--out", "one", "--preset", "coulomb-viscous", "--joint", "j11", "--stored"];
+    let before = images(folder.path());
+    jointctl(folder.path(), &one);
+    let read = |path: &str| std::fs::read(folder.path().join(path).join("j11/friction.img")).unwrap();
+    assert_eq!(read("one"), read("new"));
+    assert_eq!(images(folder.path()), before);
 }

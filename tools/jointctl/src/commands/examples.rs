@@ -4,7 +4,7 @@ use clap::Command;
 
 /// Names of commands below `jointctl`, and lines as one types them. `JOINTCTL_BUS` and `JOINTCTL_NODE` stand for
 /// `--bus` and `--node`.
-const EXAMPLES: [(&str, &[&str]); 42] = [
+const EXAMPLES: [(&str, &[&str]); 44] = [
     ("demo", &["jointctl demo", "jointctl demo --seed 7 --out demo-7"]),
     ("fit", &["jointctl fit elbow.toml", "jointctl fit elbow.toml --all"]),
     ("evaluate", &["jointctl evaluate elbow/friction.img other.toml"]),
@@ -23,12 +23,21 @@ const EXAMPLES: [(&str, &[&str]); 42] = [
         "robot evaluate",
         &["jointctl robot evaluate arm second.toml", "jointctl robot evaluate arm recording.toml --test"],
     ),
-    ("fleet sums", &["jointctl fleet sums /data/fleet"]),
+    (
+        "fleet sums",
+        &["jointctl fleet sums /data/fleet", "jointctl fleet sums /data/fleet --joint left-elbow --joint left-wrist"],
+    ),
     (
         "fleet status",
-        &["jointctl fleet status /data/fleet", "jointctl fleet status /data/fleet --page fleet.html --json"],
+        &[
+            "jointctl fleet status /data/fleet",
+            "jointctl fleet status /data/fleet --page fleet.html --json",
+            "jointctl fleet status /data/fleet --stored --bus socketcan:can0",
+        ],
     ),
     ("fleet retrain", &["jointctl fleet retrain /data/fleet --out new --images stored --key fleet.key"]),
+    ("fleet register", &["jointctl fleet register /data/fleet --joint left-elbow --bus socketcan:can0 --node 5"]),
+    ("fleet images", &["jointctl fleet images /data/fleet"]),
     ("image inspect", &["jointctl image inspect elbow/friction.img"]),
     ("image verify", &["jointctl image verify elbow/friction.signed --key joint.key"]),
     ("image convert", &["jointctl image convert elbow/friction.img friction.toml"]),

@@ -244,6 +244,15 @@ pub enum CommandError {
     #[cfg(feature = "logs")]
     #[error(transparent)]
     Fleet(#[from] ::fleet::night::NightError),
+    /// Registry of a fleet.
+    #[cfg(feature = "logs")]
+    #[error("cannot read or write {}: {source}", path.display())]
+    Registry {
+        /// Its folder.
+        path: PathBuf,
+        /// The system's answer.
+        source: std::io::Error,
+    },
     /// End by the user of what was under way.
     #[error("{0}")]
     Interrupted(String),
@@ -260,6 +269,8 @@ impl CommandError {
             Self::Retrain(crate::remote::retrain::RetrainError::NotBetter { .. }) => 3,
             Self::Arguments(_) => 2,
             Self::Remote(error) if error.is_usage() => 2,
+            #[cfg(feature = "logs")]
+            Self::Fleet(::fleet::night::NightError::NoJoint { .. }) => 2,
             _ => 1,
         }
     }

@@ -11,6 +11,7 @@ mod motion;
 mod owner;
 mod page;
 mod refused;
+mod registry;
 mod retrain;
 mod served;
 #[path = "../shown/mod.rs"]
@@ -91,6 +92,9 @@ fn main() {
             two_clients_at_once_are_told_of_each_other_and_the_image_stays,
             two_masters_of_one_joint_end_in_a_joint_that_is_disabled,
             a_string_that_is_no_bus_is_answered_with_those_that_are,
+        }
+        registry {
+            joints_with_the_registrys_image_with_another_unknown_and_silent_ones_are_told_apart,
         }
         retrain {
             a_round_lowers_what_is_unexplained_and_commits_a_newer_version,

@@ -1,11 +1,13 @@
 //! `jointctl fleet retrain`: a new image for each joint whose friction has changed, kept where it is better on days
 //! that neither image has seen.
 
-use super::Retrain;
+use super::{Retrain, registry};
 use crate::commands::CommandError;
 use crate::commands::image::read;
+use crate::commands::remote::running;
 use crate::key_file;
 use ::fleet::finding::{Finding, Kind, PRESENT_DAYS, REFERENCE_DAYS, findings};
+use ::fleet::registry::{Event, Record, sha256};
 use ::fleet::stored::Entry;
 use friction_compensation::parameters::authentication::Key;
 use friction_compensation::parameters::image::Image;
@@ -43,6 +45,9 @@ struct Outcome {
     reason: String,
     #[serde(skip)]
     image: Option<Image>,
+    /// First and last day that it was learned from, and the digest of their files.
+    #[serde(skip)]
+    learned: (String, String),
 }
 
 impl Retrain {
@@ -54,14 +59,19 @@ impl Retrain {
         let findings = findings(&night.entries);
         let changed: Vec<&Finding> =
             findings.iter().filter(|joint| matches!(joint.kind, Kind::Drifted | Kind::FrictionFell)).collect();
-        let outcomes: Vec<Outcome> =
-            changed.par_iter().map(|joint| self.one(joint, &night.entries)).collect::<Result<_, _>>()?;
+        let one = |joint: &&Finding| match running() {
+            true => self.one(joint, &night.entries),
+            false => Err(CommandError::Interrupted("interrupted: nothing is written".into())),
+        };
+        let outcomes: Vec<Outcome> = changed.par_iter().map(one).collect::<Result<_, _>>()?;
         let json = serde_json::json!({ "joints": outcomes });
         let mut files = vec![OutputFile::new("retrain.json", json.to_string())];
         for outcome in &outcomes {
             files.extend(self.files(outcome, key.as_ref())?);
         }
         self.force.permits(files.iter().map(|file| self.out.join(&file.path)))?;
+        // Before the files: a process that is killed in between makes the same images once more, which count once.
+        self.register(&outcomes, key.as_ref())?;
         write_directory(&self.out, &files)?;
         if self.json {
             println!("{json}");
@@ -108,6 +118,7 @@ impl Retrain {
             kept: false,
             reason,
             image: None,
+            learned: Default::default(),
         };
         if learned.is_empty() {
             let since = joint.since.as_deref().unwrap_or("no single day");
@@ -149,7 +160,31 @@ impl Retrain {
             kept,
             reason,
             image: kept.then_some(after),
+            learned: sources(&learned),
         })
+    }
+
+    /// Enters the images that are kept into the registry.
+    fn register(&self, outcomes: &[Outcome], key: Option<&Key>) -> Result<(), CommandError> {
+        let record = |(outcome, image): (&Outcome, &Image)| -> Result<Record, CommandError> {
+            Ok(Record {
+                time_ms: registry::now(),
+                event: Event::Made,
+                joint: outcome.joint.clone(),
+                identity: None,
+                version: image.version,
+                image: sha256(&bytes(image, &self.out)?),
+                days: outcome.learned.0.clone(),
+                data: outcome.learned.1.clone(),
+                key: key.map_or_else(String::new, |key| format!("{:08x}", key.id())),
+            })
+        };
+        let kept = outcomes.iter().filter_map(|outcome| Some((outcome, outcome.image.as_ref()?)));
+        let records = kept.map(record).collect::<Result<Vec<_>, _>>()?;
+        match records.is_empty() {
+            true => Ok(()),
+            false => registry::append(&self.fleet.folder, &records),
+        }
     }
 
     /// The image that a joint has.
@@ -181,17 +216,24 @@ impl Retrain {
             };
             days.iter().flat_map(|entry| names(entry)).collect()
         };
-        let root = self.fleet.folder.join(format!("joint={joint}"));
-        let root = std::path::absolute(&root).map_err(|source| CommandError::Read { path: root, source })?;
+        // The text is digested into the image: where the fleet's folder lies is not to be in it.
+        let root = self.fleet.folder.join(format!("joint={joint}")).to_string_lossy().into_owned();
         let (learned, judged) = (files(learned), files(judged));
         let all: Vec<&String> = learned.iter().chain(&judged).collect();
         let text = format!(
-            "name = {joint:?}\n\n[source]\nroot = {root:?}\nfiles = {all:?}\n\n{}\n\
+            "name = {joint:?}\n\n[source]\nroot = \"$JOINT\"\nfiles = {all:?}\n\n{}\n\
              [split]\ntest = [{{ name = \"last days\", files = {judged:?} }}]\n",
             include_str!("retrain.toml")
         );
-        Ok(prepare_text(&text, &PathBuf::from(format!("{joint}.toml")), &|_| None, |_| ())?)
+        Ok(prepare_text(&text, &PathBuf::from(format!("{joint}.toml")), &|_| Some(root.clone()), |_| ())?)
     }
+}
+
+/// First and last of some days, and SHA-256 over the digests of all their files.
+fn sources(days: &[&Entry]) -> (String, String) {
+    let day = |entry: Option<&&Entry>| entry.map_or("-", |entry| entry.day.as_str()).to_owned();
+    let lines: Vec<String> = days.iter().map(|entry| format!("{}\n{}", entry.day, entry.source)).collect();
+    (format!("{} to {}", day(days.first()), day(days.last())), sha256(lines.join("\n").as_bytes()))
 }
 
 /// RMS error of an image on the test samples, Nm; the rigid part beside it is identified from the training samples.
