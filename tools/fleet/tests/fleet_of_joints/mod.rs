@@ -30,9 +30,15 @@ pub fn day(number: usize) -> String {
 }
 
 /// Writes all partitions.
+#[allow(dead_code, reason = "who uses this writes all joints or some")]
 pub fn write(folder: &Path) {
-    (0..JOINTS * DAYS).into_par_iter().for_each(|at| {
-        let (number, date) = (at / DAYS, at % DAYS);
+    write_days(folder, &(0..JOINTS).collect::<Vec<_>>(), DAYS);
+}
+
+/// Writes the first days of some joints.
+pub fn write_days(folder: &Path, joints: &[usize], days: usize) {
+    (0..joints.len() * days).into_par_iter().for_each(|at| {
+        let (number, date) = (joints[at / days], at % days);
         let place = folder.join(format!("joint={}/day={}", joint(number), day(date)));
         fs::create_dir_all(&place).unwrap();
         let table = recording(number, date);
@@ -45,8 +51,12 @@ pub fn write(folder: &Path) {
         };
         fs::copy(path(from), path(to)).unwrap();
     };
-    copied((7, 7, "log.parquet"), (7, 8, "log.parquet"));
-    copied((8, 6, "log.parquet"), (8, 6, "log-2.parquet"));
+    if joints.contains(&7) {
+        copied((7, 7, "log.parquet"), (7, 8, "log.parquet"));
+    }
+    if joints.contains(&8) {
+        copied((8, 6, "log.parquet"), (8, 6, "log-2.parquet"));
+    }
 }
 
 /// The files that something happened to.
