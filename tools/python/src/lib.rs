@@ -34,6 +34,12 @@ pub const LOGS: Packages = Packages {
     import: "mcap.reader, mcap.writer, pyarrow.parquet",
 };
 
+/// Ray.
+pub const RAY: Packages = Packages { folder: "python-ray", install: &["ray==2.60.0"], import: "ray" };
+
+/// Folder of the package `fleet_on_ray`.
+pub const FLEET_ON_RAY: &str = env!("CARGO_MANIFEST_DIR");
+
 impl Packages {
     /// A Python that finds them, in a virtual environment below a test's temporary folder that is made once. None
     /// without Python, without its module `venv`, or where the packages cannot be installed.
