@@ -82,12 +82,15 @@ def connect(given):
         import ray
     except ImportError as error:
         raise files.NightError(f"Ray cannot be imported: {error}; pip install ray") from error
-    quiet = dict(log_to_driver=False, logging_level="ERROR")
-    if given.address == "local":
-        workers = given.workers or os.cpu_count() or 1
-        ray.init("local", num_cpus=workers, include_dashboard=False, object_store_memory=STORE, **quiet)
+    workers = given.workers or os.cpu_count() or 1
+    alone = dict(num_cpus=workers, include_dashboard=False, object_store_memory=STORE) if given.address == "local" else {}
+    try:
+        ray.init(given.address, log_to_driver=False, logging_level="ERROR", **alone)
+    except Exception as error:
+        # Ray has no class of its own for this.
+        raise files.NightError(f"Ray at {given.address} does not start or answer: {error}") from error
+    if alone:
         return workers
-    ray.init(given.address, **quiet)
     there = max(1, int(ray.cluster_resources().get("CPU", 1)))
     return min(there, given.workers or there)
 
@@ -131,6 +134,9 @@ def run(given):
 
 def main():
     given = arguments()
+    # Ray writes messages to standard output, which is for the report alone.
+    output = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)
     try:
         found = run(given)
     except files.UsageError as error:
@@ -142,7 +148,7 @@ def main():
     except (files.NightError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
-    print(json.dumps(found) if given.json else "\n".join(report(found)))
+    print(json.dumps(found) if given.json else "\n".join(report(found)), file=output, flush=True)
     return 1 if found["failed"] else 0
 
 

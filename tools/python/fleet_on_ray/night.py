@@ -37,8 +37,9 @@ class Night:
         if found is None:
             raise files.NightError(f"no findings: {self.failed[-1]['reason']}")
         report = json.loads(found["output"])
-        if found["warnings"].strip():
-            self.say(found["warnings"].strip())
+        for line in found["warnings"].splitlines():
+            if line.startswith("warning: "):
+                self.say(line)
         report |= {name: sum(count[name] for count in read) for name in ("summed_up", "known")}
         report["changed"] = [joint["joint"] for joint in report["joints"] if joint["kind"] in CHANGED]
         report["retrain"] = self.retrained(report["changed"]) if self.options["out"] else None
