@@ -13,7 +13,7 @@ use friction_compensation::friction::ripple::Ripple;
 use friction_compensation::friction::state::{JointState, SIGNALS, Signal};
 use friction_compensation::friction::{Estimate, FrictionModel, FrictionParameters, ParameterSet};
 use friction_compensation::parameters::certificate::Limits;
-use friction_compensation::parameters::image::{GoldenSequence, GoldenVector, Image, MAX_GOLDEN};
+use friction_compensation::parameters::image::{GoldenSequence, GoldenVector, Image, ImageError, MAX_GOLDEN, MAX_LENGTH};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
@@ -87,9 +87,21 @@ pub fn tame_within(random: &mut ChaCha8Rng, most_sets: usize) -> FrictionParamet
 pub fn to_format_1(parameters: &mut FrictionParameters) {
     parameters.common = CommonTerms::NONE;
     for set in &mut parameters.sets {
-        set.physical.terms = Terms(set.physical.terms.0 & Terms::FORMAT_1.0);
-        set.physical.coefficients.viscous_asymmetry = 0;
+        older(&mut set.physical, Terms::FORMAT_1, Coefficients::FORMAT_1);
     }
+}
+
+/// Takes away what an image of format 2 cannot hold.
+pub fn to_format_2(parameters: &mut FrictionParameters) {
+    parameters.sets.iter_mut().for_each(|set| older(&mut set.physical, Terms::FORMAT_2, Coefficients::FORMAT_2));
+}
+
+/// Leaves the terms and the first coefficients.
+fn older(physical: &mut PhysicalParameters, terms: Terms, coefficients: usize) {
+    physical.terms = Terms(physical.terms.0 & terms.0);
+    let mut array = physical.coefficients.to_array();
+    array[coefficients..].fill(0);
+    physical.coefficients = Coefficients::from_array(array);
 }
 
 /// Pre-sliding over 0.3 to 100 mrad and two ripples of up to 0.2 Nm, some of them absent.
@@ -147,7 +159,7 @@ pub fn tame_domain(random: &mut ChaCha8Rng) -> Domain {
 
 /// A physical model of ordinary size: friction of 0.1 to 5 Nm whose terms each take part in three cases of four.
 pub fn tame_physical(random: &mut ChaCha8Rng, domain: &Domain) -> PhysicalParameters {
-    let terms = (0..15).filter(|_| random.random_bool(0.75)).fold(0, |terms, bit| terms | 1 << bit);
+    let terms = (0..16).filter(|_| random.random_bool(0.75)).fold(0, |terms, bit| terms | 1 << bit);
     let level = random.random_range(0.1..5.0);
     let mut si = [0.0; Coefficients::COUNT];
     for (value, name) in si.iter_mut().zip(Coefficients::NAMES) {
@@ -163,7 +175,8 @@ pub fn tame_physical(random: &mut ChaCha8Rng, domain: &Domain) -> PhysicalParame
             "coulomb_load" => (0.0, 0.02),
             "coulomb_slope" => (5.0, 100.0),
             "breakaway_positive" | "breakaway_negative" => (level, 1.6 * level),
-            "stribeck_slope" => (1.0, 20.0),
+            "stribeck_slope" | "weakening_slope" => (1.0, 20.0),
+            "weakening_positive" | "weakening_negative" => (0.0, 0.9),
             "hysteresis" => (0.0, 0.3 * level),
             "hysteresis_velocity_slope" => (1.0, 50.0),
             "hysteresis_width" => (0.0, 2.0),
@@ -291,7 +304,8 @@ fn extreme_network(random: &mut ChaCha8Rng) -> NetworkParameters {
     }
 }
 
-/// An image of `friction` with `golden` golden vectors (1 to [`MAX_GOLDEN`]) that hold, and no limit below the type's.
+/// An image of `friction` with `golden` golden vectors (1 to [`MAX_GOLDEN`], or fewer where no more have room) that hold,
+/// and no limit below the type's.
 pub fn image(random: &mut ChaCha8Rng, friction: FrictionParameters, golden: usize) -> Image {
     let model = FrictionModel::new(&friction, 20_000);
     let mut vectors = heapless::Vec::new();
@@ -304,7 +318,7 @@ pub fn image(random: &mut ChaCha8Rng, friction: FrictionParameters, golden: usiz
         // The count was held at the capacity.
         let _ = vectors.push(GoldenVector { set: set as u8, signals, expected });
     }
-    Image {
+    let mut image = Image {
         version: random.random(),
         target: Default::default(),
         created: random.random(),
@@ -313,5 +327,9 @@ pub fn image(random: &mut ChaCha8Rng, friction: FrictionParameters, golden: usiz
         friction,
         limits: Limits { output: u32::MAX, torque_gain: u32::MAX, velocity_slope: u32::MAX },
         golden: vectors,
+    };
+    while image.golden.len() > 1 && matches!(image.encode(&mut [0; MAX_LENGTH]), Err(ImageError::TooLong { .. })) {
+        image.golden.pop();
     }
+    image
 }

@@ -72,6 +72,15 @@ fn evaluate_physical(
     let coulomb = (on(Terms::COULOMB, c.coulomb_positive), on(Terms::COULOMB, c.coulomb_negative));
     let factor = saturate(ONE + saturate(round(on(Terms::COULOMB_TEMPERATURE, c.coulomb_temperature) * th, 31)));
     let factor = saturate(factor + saturate(round(on(Terms::COULOMB_LOAD, c.coulomb_load) * magnitude(load), 31)));
+    let factor = if model.terms.contains(Terms::VELOCITY_WEAKENING) {
+        let edge = tanh(argument((c.weakening_slope as i128 * v) >> 22)) as i128;
+        let bell = i32::MAX as i128 - 2 * ((edge * edge) >> 32);
+        let (forward, backward) = (c.weakening_positive as i128 >> 1, c.weakening_negative as i128 >> 1);
+        let amount = saturate(forward + backward + saturate(round((forward - backward) * direction, 31)));
+        saturate(round(factor * saturate(ONE + saturate(round(amount * bell, 31))), 16))
+    } else {
+        factor
+    };
     let level = saturate(by_direction(coulomb.0, coulomb.1, v) + common.ripple.level as i128);
     sum += saturate(round(level * factor, 16)) * direction;
     sum += saturate(round(common.pre_sliding as i128 * factor, 16)) * i32::MAX as i128;

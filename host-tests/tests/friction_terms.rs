@@ -51,7 +51,12 @@ fn equation(terms: Terms, si: &Si, domain: &Domain, signals: &[i32; SIGNALS]) ->
         + on(Terms::COULOMB_TEMPERATURE, c("coulomb_temperature") * th)
         + on(Terms::COULOMB_LOAD, c("coulomb_load") * tau.abs());
     let coulomb = on(Terms::COULOMB, directional("coulomb"));
-    torque += coulomb * coulomb_factor * edge;
+    // One direction's weakening passes into the other's along with the Coulomb edge.
+    let [forward, backward] = ["positive", "negative"].map(|direction| c(&format!("weakening_{direction}")));
+    let amount = 0.5 * (forward + backward) + 0.5 * (forward - backward) * edge;
+    let bell = 1.0 - (v * c("weakening_slope")).tanh().powi(2);
+    let weakening = 1.0 + on(Terms::VELOCITY_WEAKENING, amount * bell);
+    torque += coulomb * coulomb_factor * weakening * edge;
     let u = v * c("stribeck_slope");
     torque += on(Terms::STRIBECK, (2.0 * E).sqrt() * (directional("breakaway") - coulomb) * (-u * u).exp() * u);
     let sign = (c("hysteresis_acceleration_slope") * a).clamp(-1.0, 1.0);
@@ -72,7 +77,7 @@ fn equation(terms: Terms, si: &Si, domain: &Domain, signals: &[i32; SIGNALS]) ->
 fn with_base(term: Terms) -> Terms {
     match term {
         Terms::VISCOUS_TEMPERATURE => term.union(Terms::VISCOUS),
-        Terms::COULOMB_TEMPERATURE | Terms::COULOMB_LOAD => term.union(Terms::COULOMB),
+        Terms::COULOMB_TEMPERATURE | Terms::COULOMB_LOAD | Terms::VELOCITY_WEAKENING => term.union(Terms::COULOMB),
         _ => term,
     }
 }
@@ -97,7 +102,7 @@ fn error(random: &mut ChaCha8Rng, domain: &Domain, parameters: &PhysicalParamete
 #[test]
 fn each_term_alone_and_all_together_follow_their_formula() {
     let mut random = ChaCha8Rng::seed_from_u64(1);
-    let single = (0..15).map(|bit| (Terms::NAMES[bit], with_base(Terms(1 << bit))));
+    let single = (0..16).map(|bit| (Terms::NAMES[bit], with_base(Terms(1 << bit))));
     let combinations = [
         ("all", Terms::ALL),
         ("coulomb and stribeck", Terms::COULOMB.union(Terms::STRIBECK)),
@@ -154,6 +159,7 @@ fn own_coefficients(term: Terms) -> &'static [&'static str] {
             "harmonic_negative_5",
         ],
         Terms::VISCOUS_ASYMMETRY => &["viscous_asymmetry"],
+        Terms::VELOCITY_WEAKENING => &["weakening_positive", "weakening_negative", "weakening_slope"],
         _ => &["rotor_inertia"],
     }
 }
@@ -161,7 +167,7 @@ fn own_coefficients(term: Terms) -> &'static [&'static str] {
 #[test]
 fn a_term_that_is_switched_off_contributes_nothing() {
     let mut random = ChaCha8Rng::seed_from_u64(2);
-    for bit in 0..15 {
+    for bit in 0..16 {
         let term = Terms(1 << bit);
         let mut matters = false;
         for _ in 0..20 {

@@ -1,6 +1,7 @@
 //! A parameter image arrives whole or not at all: every damage is refused and named, everything else decodes and
 //! encodes to the same bytes.
 
+use friction_compensation::friction::common::CommonTerms;
 use friction_compensation::friction::domain::Range;
 use friction_compensation::friction::maxwell_slip::{MAX_LEVEL, MAX_STIFFNESS};
 use friction_compensation::friction::network::{MAX_SCALE, NetworkParameters, Neuron};
@@ -10,11 +11,11 @@ use friction_compensation::friction::state::{SIGNALS, Signal};
 use friction_compensation::friction::{FrictionModel, FrictionParameters, ParameterSet};
 use friction_compensation::parameters::certificate::Limits;
 use friction_compensation::parameters::image::{
-    Effort, GoldenMismatch, Image, ImageError, MAX_GOLDEN, MAX_LENGTH, Target,
+    Effort, FORMAT, GoldenMismatch, Image, ImageError, MAX_GOLDEN, MAX_LENGTH, Target,
 };
 use friction_compensation::quantity::Torque;
 use host_tests::image_bytes::{encoded, sealed};
-use host_tests::parameters::{extreme, frictionless, image, tame, tame_common, to_format_1};
+use host_tests::parameters::{extreme, frictionless, image, tame, tame_common, to_format_1, to_format_2};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -26,18 +27,27 @@ fn parameters(random: &mut ChaCha8Rng, format: u16, sets: usize, networks: bool)
         if in_use.len() == sets && in_use.iter().all(|set| set.network.is_some() == networks) {
             match format {
                 1 => to_format_1(&mut parameters),
-                _ => parameters.common = tame_common(random),
+                2 => to_format_2(&mut parameters),
+                _ => {}
+            }
+            while format > 1 && parameters.common == CommonTerms::NONE {
+                parameters.common = tame_common(random);
             }
             return parameters;
         }
     }
 }
 
+/// Number of golden vectors of an image with `sets` sets, all with a network or none: one a set, as long as they fit.
+fn golden(format: u16, sets: usize, networks: bool) -> usize {
+    sets.min(if format == 3 && networks { 2 } else { 4 })
+}
+
 /// Valid images of every shape, [`SHAPES`] of each format.
 fn valid_images() -> Vec<Vec<u8>> {
     let mut random = ChaCha8Rng::seed_from_u64(1);
     let mut images = vec![];
-    for format in [1, 2] {
+    for format in 1..=FORMAT {
         for sets in [1, 2, 4] {
             for networks in [false, true] {
                 let image = loop {
@@ -68,6 +78,10 @@ fn every_flipped_bit_is_refused_with_its_reason() {
             let stated = u16::from_le_bytes([damaged[6], damaged[7]]) as usize;
             let fits = match bit / 8 {
                 0..4 => error == ImageError::NotAnImage { found: [damaged[0], damaged[1], damaged[2], damaged[3]] },
+                // Another format that is known.
+                4..6 if (1..=FORMAT).contains(&u16::from_le_bytes([damaged[4], damaged[5]])) => {
+                    matches!(error, ImageError::Checksum { .. })
+                }
                 4..6 => error == ImageError::UnsupportedFormat { found: u16::from_le_bytes([damaged[4], damaged[5]]) },
                 6..8 if stated > MAX_LENGTH => error == ImageError::TooLong { length: stated, limit: MAX_LENGTH },
                 6..8 if stated < bytes.len() => error == ImageError::TooLong { length: bytes.len(), limit: stated },
@@ -108,7 +122,7 @@ fn lengths_and_numbers_appear_in_the_messages() {
     assert_eq!(message(&damaged), format!("too long: {} bytes, at most {length} are allowed here", length + 1));
     damaged = bytes.clone();
     damaged[4] = 9;
-    assert_eq!(message(&damaged), "format version 9 is not known, this program reads versions 1 to 2");
+    assert_eq!(message(&damaged), "format version 9 is not known, this program reads versions 1 to 3");
     damaged = bytes.clone();
     damaged[28] = 7;
     assert_eq!(message(&sealed(damaged)), "effort unit (offset 28) is 7, must be 0 to 3");
@@ -148,14 +162,15 @@ fn layout(format: u16, criteria: usize, networks: u8, golden: usize) -> Vec<Byte
         bytes.extend([if criterion < criteria { Dependent } else { Reserved }; 8]);
     }
     bytes.extend([Free; 12]);
-    if format == 2 {
+    if format >= 2 {
         // Numbers that are not negative, and for the stiffness below a limit.
         bytes.extend([Free, Free, Free, Dependent, Free, Free, Free, Dependent].repeat(4));
         bytes.extend([Free; 40]);
     }
     for set in 0..sets {
-        bytes.extend([Free, Dependent, Reserved, Reserved]); // terms: 14 bits, 15 in format 2
-        bytes.extend(vec![Free; if format == 2 { 128 } else { 124 }]);
+        // Terms: 14 bits, 15 in format 2, all in format 3.
+        bytes.extend([Free, if format == 3 { Free } else { Dependent }, Reserved, Reserved]);
+        bytes.extend(vec![Free; [124, 128, 140][usize::from(format) - 1]]);
         if networks >> set & 1 == 1 {
             bytes.extend([Free; 120]);
             for _ in 0..11 {
@@ -177,9 +192,9 @@ fn with_a_right_checksum_reserved_bytes_and_fields_are_refused_and_the_rest_is_c
     let mut random = ChaCha8Rng::seed_from_u64(2);
     let mut refused = [0; 2];
     for (shape, bytes) in valid_images().into_iter().enumerate() {
-        let (format, criteria) = (if shape < SHAPES { 1 } else { 2 }, shape % SHAPES / 2);
+        let (format, criteria) = ((shape / SHAPES) as u16 + 1, shape % SHAPES / 2);
         let sets = 1 << criteria;
-        let layout = layout(format, criteria, if shape % 2 == 1 { (1 << sets) - 1 } else { 0 }, sets);
+        let layout = layout(format, criteria, if shape % 2 == 1 { (1 << sets) - 1 } else { 0 }, golden(format, sets, shape % 2 == 1));
         assert_eq!(layout.len() + 4, bytes.len());
         for (offset, byte) in layout.into_iter().enumerate().skip(8) {
             let bits = (0..8).map(|bit| bytes[offset] ^ 1 << bit);
@@ -384,13 +399,18 @@ fn a_golden_vector_that_this_machine_computes_differently_is_named() {
 }
 
 #[test]
-fn four_sets_with_networks_leave_room_for_six_golden_vectors_and_not_for_seven_in_format_2_for_four_and_not_for_five() {
+fn four_sets_with_networks_leave_room_for_six_golden_vectors_in_format_2_for_four_in_format_3_for_two_and_not_for_one_more()
+ {
     let mut random = ChaCha8Rng::seed_from_u64(6);
-    for (format, before_golden, most) in [(1, 144 + 4 * (128 + 280), 6), (2, 216 + 4 * (132 + 280), 4)] {
+    for (format, before_golden, most) in
+        [(1, 144 + 4 * (128 + 280), 6), (2, 216 + 4 * (132 + 280), 4), (3, 216 + 4 * (144 + 280), 2)]
+    {
         let parameters = parameters(&mut random, format, 4, true);
         let fits = image(&mut random, parameters, most);
         assert_eq!((fits.format(), encoded(&fits).len()), (format, before_golden + most * 36 + 4));
-        let too_many = image(&mut random, parameters, most + 1);
+        assert_eq!(image(&mut random, parameters, MAX_GOLDEN).golden.len(), most);
+        let mut too_many = fits.clone();
+        too_many.golden.push(fits.golden[0]).expect("room for eight");
         let too_long = ImageError::TooLong { length: before_golden + (most + 1) * 36 + 4, limit: MAX_LENGTH };
         assert_eq!(too_many.encode(&mut [0; MAX_LENGTH]), Err(too_long));
     }
@@ -428,7 +448,7 @@ fn what_could_not_be_read_back_is_not_written() {
         refused(&|image| image.friction.selector.criteria[1] = Some(Criterion { leave: 5, ..criterion })),
         "second criterion without a first"
     );
-    assert_eq!(refused(&|image| image.friction.sets[0].physical.terms = Terms(1 << 15)), "terms");
+    assert_eq!(refused(&|image| image.friction.sets[0].physical.terms = Terms(1 << 16)), "terms");
     assert_eq!(refused(&|image| with_network(image, 9)), "fraction bits");
     assert_eq!(refused(&|image| with_network(image, 21)), "fraction bits");
     for scale in [MAX_SCALE + 1, -MAX_SCALE - 1] {

@@ -16,7 +16,7 @@ use host_tests::image_bytes::{crc32, encoded, sealed};
 use host_tests::parameters::frictionless;
 
 /// The coefficients in the order of the bytes: it is part of the format.
-const COEFFICIENTS: [&str; 32] = [
+const COEFFICIENTS: [&str; 35] = [
     "constant",
     "position",
     "temperature",
@@ -49,11 +49,14 @@ const COEFFICIENTS: [&str; 32] = [
     "harmonic_negative_5",
     "rotor_inertia",
     "viscous_asymmetry",
+    "weakening_positive",
+    "weakening_negative",
+    "weakening_slope",
 ];
 
 /// Coefficients of a set in a format.
 fn coefficients_of(format: u16) -> usize {
-    if format == 1 { 31 } else { 32 }
+    [31, 32, 35][usize::from(format) - 1]
 }
 
 /// An image with two sets, the second with a network, written by hand from the table in `parameters::image`.
@@ -61,7 +64,7 @@ fn hand_packed(format: u16) -> Vec<u8> {
     let mut bytes: Vec<u8> = vec![];
     bytes.extend(b"JFPI");
     bytes.extend(format.to_le_bytes());
-    let (common, set) = if format == 1 { (0, 128) } else { (72, 132) };
+    let (common, set) = [(0, 128), (72, 132), (72, 144)][usize::from(format) - 1];
     bytes.extend((144u16 + common + set + set + 280 + 2 * 36 + 4).to_le_bytes());
     bytes.extend(0x0102_0304u32.to_le_bytes()); // version
     bytes.extend(0x1112_1314u32.to_le_bytes()); // product
@@ -85,7 +88,7 @@ fn hand_packed(format: u16) -> Vec<u8> {
     bytes.extend(0xf000_0001u32.to_le_bytes());
     bytes.extend(0xf000_0002u32.to_le_bytes());
     bytes.extend(0xf000_0003u32.to_le_bytes());
-    if format == 2 {
+    if format >= 2 {
         for element in 0..4i32 {
             bytes.extend((100_000 * element + 3).to_le_bytes()); // stiffness
             bytes.extend((7_000 * element + 5).to_le_bytes()); // level
@@ -124,7 +127,7 @@ fn hand_packed(format: u16) -> Vec<u8> {
 
 #[test]
 fn bytes_packed_by_hand_from_the_documented_layout_are_the_image_they_describe() {
-    for format in [1, 2] {
+    for format in [1, 2, 3] {
         bytes_packed_by_hand_are_the_image_they_describe(format);
     }
 }
@@ -142,7 +145,7 @@ fn bytes_packed_by_hand_are_the_image_they_describe(format: u16) {
         ..frictionless()
     };
     friction.domain.ranges = core::array::from_fn(|i| Range { low: -1000 - i as i32, high: 2000 + i as i32 });
-    if format == 2 {
+    if format >= 2 {
         let element = |n: i32| MaxwellElement { stiffness: 100_000 * n + 3, level: 7_000 * n + 5 };
         let number = |n: i32| 123_456 * (n - 4);
         let ripple = |n: i32| Ripple {

@@ -5,7 +5,8 @@
 //! ```text
 //! friction = c0 + c_q q + c_T th + c_tau tau_t                              linear      (001 eq. 5)
 //!          + f_v (1 + k_v th) v + f_2 v |v| + f_a |v|                       viscous
-//!          + (1 + k_c th + k_l |tau_t|) dry
+//!          + (1 + k_c th + k_l |tau_t|) (1 + w (1 - tanh(v / v_w)^2)) dry
+//!    w     = w+ (1 + d)/2 + w- (1 - d)/2                                    weakening
 //!    dry   = (F_c(+/-) + sum_k A_k sin(h_k q) + B_k cos(h_k q)) d           Coulomb     (002 eq. 6, asymmetric), ripple
 //!          + sum_n L_n z_n                                                  pre-sliding (Maxwell-slip elements)
 //!          + sum_k C_k sin(h_k q) + D_k cos(h_k q)                          ripple
@@ -65,6 +66,8 @@ pub enum Term {
     RotorInertia,
     /// f_a |v|: half the difference of the viscous friction of both directions.
     ViscousAsymmetry,
+    /// Factor of dry friction that falls with speed.
+    VelocityWeakening,
     /// The Maxwell-slip elements.
     PreSliding,
     /// The first ripple over the position.
@@ -75,7 +78,7 @@ pub enum Term {
 
 impl Term {
     /// All terms, in the order of the formula.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 19] = [
         Self::Constant,
         Self::Position,
         Self::Temperature,
@@ -91,12 +94,13 @@ impl Term {
         Self::Harmonics,
         Self::RotorInertia,
         Self::ViscousAsymmetry,
+        Self::VelocityWeakening,
         Self::PreSliding,
         Self::Ripple,
         Self::SecondRipple,
     ];
     /// The terms that each parameter set of an image has for itself; the others are common to all.
-    pub const OF_A_SET: usize = 15;
+    pub const OF_A_SET: usize = 16;
 }
 
 /// A set of terms; written to files as the list of their names.
@@ -245,6 +249,12 @@ pub struct FrictionModel {
     /// f_a.
     #[serde(default)]
     pub viscous_asymmetry: f64,
+    /// w: breakaway over Coulomb friction, less one.
+    #[serde(default)]
+    pub weakening: Directional,
+    /// 1/v_w.
+    #[serde(default)]
+    pub weakening_slope: f64,
     /// 1/d_n: the reciprocal of the way that bends a pre-sliding element to its end; 0: absent. Not identified, but
     /// chosen.
     #[serde(default)]
@@ -255,6 +265,16 @@ pub struct FrictionModel {
     /// Ripples over the position; their frequencies are not identified, but chosen.
     #[serde(default)]
     pub ripples: [Ripple; RIPPLES],
+}
+
+/// Velocity weakening in one state.
+struct Weakening {
+    /// Factor of dry friction.
+    factor: f64,
+    /// 1 - tanh(v / v_w)^2.
+    bell: f64,
+    /// Derivative of the factor by 1 / v_w.
+    by_slope: f64,
 }
 
 impl FrictionModel {
@@ -375,15 +395,23 @@ impl FrictionModel {
         if pre_slides {
             dry += self.element_level.iter().zip(s.bent).map(|(level, bent)| level * bent).sum::<f64>();
         }
+        let weakening = self.weakening(v, direction);
         let mut gain = 1.0;
         if self.terms.contains(Term::CoulombTemperature) {
             gain += self.coulomb_temperature * warming;
-            derivative(P::CoulombTemperature, dry * warming);
+            derivative(P::CoulombTemperature, weakening.factor * dry * warming);
         }
         if self.terms.contains(Term::CoulombLoad) {
             gain += self.coulomb_load * s.load.abs();
-            derivative(P::CoulombLoad, dry * s.load.abs());
+            derivative(P::CoulombLoad, weakening.factor * dry * s.load.abs());
         }
+        if self.terms.contains(Term::VelocityWeakening) {
+            derivative(P::WeakeningPositive, gain * dry * weakening.bell * 0.5 * (1.0 + direction));
+            derivative(P::WeakeningNegative, gain * dry * weakening.bell * 0.5 * (1.0 - direction));
+            derivative(P::WeakeningSlope, gain * dry * weakening.by_slope);
+            *by_slope += gain * dry * weakening.bell * self.weakening_difference() * steepness;
+        }
+        gain *= weakening.factor;
         if pre_slides {
             s.bent.into_iter().enumerate().for_each(|(n, bent)| derivative(P::Element(n), gain * bent));
         }
@@ -405,6 +433,22 @@ impl FrictionModel {
         derivative(of_breakaway, bell * u);
         derivative(P::StribeckSlope, excess * bell * (1.0 - 2.0 * u * u) * v);
         gain * dry + excess * bell * u
+    }
+
+    fn weakening_difference(&self) -> f64 {
+        0.5 * (self.weakening.positive - self.weakening.negative)
+    }
+
+    #[inline(always)]
+    fn weakening(&self, v: f64, direction: f64) -> Weakening {
+        if !self.terms.contains(Term::VelocityWeakening) {
+            return Weakening { factor: 1.0, bell: 0.0, by_slope: 0.0 };
+        }
+        let edge = (v * self.weakening_slope).tanh();
+        let bell = 1.0 - edge * edge;
+        let amount =
+            0.5 * (self.weakening.positive + self.weakening.negative) + self.weakening_difference() * direction;
+        Weakening { factor: 1.0 + amount * bell, bell, by_slope: -2.0 * amount * edge * bell * v }
     }
 
     #[inline(always)]
@@ -470,6 +514,9 @@ impl FrictionModel {
             P::HarmonicFrequency => &mut self.harmonic_frequency,
             P::RotorInertia => &mut self.rotor_inertia,
             P::ViscousAsymmetry => &mut self.viscous_asymmetry,
+            P::WeakeningPositive => &mut self.weakening.positive,
+            P::WeakeningNegative => &mut self.weakening.negative,
+            P::WeakeningSlope => &mut self.weakening_slope,
             P::Element(n) => &mut self.element_level[n],
             P::RippleLevelSine(k) => &mut self.ripples[k].level_sine,
             P::RippleLevelCosine(k) => &mut self.ripples[k].level_cosine,

@@ -29,6 +29,8 @@ fn everything() -> FrictionModel {
         rotor_inertia: 0.17,
         reference_temperature: 25.0,
         viscous_asymmetry: 0.06,
+        weakening: Directional { positive: 0.4, negative: 0.7 },
+        weakening_slope: 9.0,
         element_stiffness: [100.0, 20.0, 5.0, 1.0],
         element_level: [0.3, 0.2, 0.15, 0.1],
         ripples: [
@@ -73,10 +75,11 @@ fn it_is_the_sum_that_the_design_writes() {
             .sum();
         let ripple = |h: f64, a: f64, b: f64| a * (h * q).sin() + b * (h * q).cos();
         let level = fc + ripple(4.0, 0.1, 0.05) + ripple(50.0, -0.04, 0.02);
+        let weakening = 1.0 + (0.4 * (1.0 + d) / 2.0 + 0.7 * (1.0 - d) / 2.0) * (1.0 - (9.0 * v).tanh().powi(2));
         let pre_sliding = 0.3 * 1.0 + 0.2 * 0.7 - 0.15 * 0.4;
         let by_hand = 0.11 - 0.07 * q + 0.013 * th + 0.05 * tau + 0.9 * (1.0 - 0.011 * th) * v - 0.08 * v * v.abs()
             + 0.06 * v.abs()
-            + (1.0 - 0.006 * th + 0.04 * tau.abs()) * (level * d + pre_sliding)
+            + (1.0 - 0.006 * th + 0.04 * tau.abs()) * weakening * (level * d + pre_sliding)
             + ripple(4.0, -0.02, 0.03)
             + ripple(50.0, 0.06, 0.01)
             + (2.0 * 1f64.exp()).sqrt() * (fb - fc) * (-u * u).exp() * u

@@ -60,6 +60,12 @@ pub enum FrictionParameter {
     HarmonicNegative(usize),
     /// Half the difference of the viscous coefficients of both directions.
     ViscousAsymmetry,
+    /// Velocity weakening at positive velocity: breakaway over Coulomb friction, less one.
+    WeakeningPositive,
+    /// Velocity weakening at negative velocity.
+    WeakeningNegative,
+    /// Inverse of the velocity over which dry friction weakens.
+    WeakeningSlope,
     /// Torque of a pre-sliding element while it slips; 0-based.
     Element(usize),
     /// Sine of a ripple of the Coulomb friction; 0-based.
@@ -89,7 +95,7 @@ impl Default for Units {
 
 impl FrictionParameter {
     /// Number of different parameters.
-    pub const COUNT: usize = 21 + 2 * HARMONICS + ELEMENTS + 4 * RIPPLES;
+    pub const COUNT: usize = 24 + 2 * HARMONICS + ELEMENTS + 4 * RIPPLES;
 
     /// Position in a table of all parameters, 0..COUNT.
     pub const fn index(self) -> usize {
@@ -117,8 +123,11 @@ impl FrictionParameter {
             Self::HarmonicPositive(n) => 20 + n,
             Self::HarmonicNegative(n) => 20 + HARMONICS + n,
             Self::ViscousAsymmetry => 20 + 2 * HARMONICS,
-            Self::Element(n) => 21 + 2 * HARMONICS + n,
-            Self::RippleLevelSine(k) => 21 + 2 * HARMONICS + ELEMENTS + 4 * k,
+            Self::WeakeningPositive => 21 + 2 * HARMONICS,
+            Self::WeakeningNegative => 22 + 2 * HARMONICS,
+            Self::WeakeningSlope => 23 + 2 * HARMONICS,
+            Self::Element(n) => 24 + 2 * HARMONICS + n,
+            Self::RippleLevelSine(k) => 24 + 2 * HARMONICS + ELEMENTS + 4 * k,
             Self::RippleLevelCosine(k) => Self::RippleLevelSine(k).index() + 1,
             Self::RippleTorqueSine(k) => Self::RippleLevelSine(k).index() + 2,
             Self::RippleTorqueCosine(k) => Self::RippleLevelSine(k).index() + 3,
@@ -159,7 +168,12 @@ impl FrictionParameter {
                 Self::RippleTorqueCosine(k),
             ]
         });
-        let others = (0..ELEMENTS).map(Self::Element).chain(ripples).chain([Self::ViscousAsymmetry]);
+        let others = (0..ELEMENTS).map(Self::Element).chain(ripples).chain([
+            Self::ViscousAsymmetry,
+            Self::WeakeningPositive,
+            Self::WeakeningNegative,
+            Self::WeakeningSlope,
+        ]);
         for parameter in single.into_iter().chain(harmonics).chain(others) {
             all[parameter.index()] = parameter;
         }
@@ -192,6 +206,9 @@ impl FrictionParameter {
             Self::HarmonicPositive(n) => format!("b_{}+", n + 1),
             Self::HarmonicNegative(n) => format!("b_{}-", n + 1),
             Self::ViscousAsymmetry => "f_a".into(),
+            Self::WeakeningPositive => "w+".into(),
+            Self::WeakeningNegative => "w-".into(),
+            Self::WeakeningSlope => "1/v_w".into(),
             Self::Element(n) => format!("L_{}", n + 1),
             Self::RippleLevelSine(k) => format!("A_{}", k + 1),
             Self::RippleLevelCosine(k) => format!("B_{}", k + 1),
@@ -206,12 +223,14 @@ impl FrictionParameter {
         match self {
             Self::PositionSlope => format!("{effort}/{position}"),
             Self::TemperatureSlope => format!("{effort}/K"),
-            Self::LoadSlope | Self::HysteresisWidth => "1".into(),
+            Self::LoadSlope | Self::HysteresisWidth | Self::WeakeningPositive | Self::WeakeningNegative => "1".into(),
             Self::Viscous | Self::ViscousAsymmetry => format!("{effort} s/{position}"),
             Self::ViscousTemperature | Self::CoulombTemperature => "1/K".into(),
             Self::Quadratic => format!("{effort} s^2/{position}^2"),
             Self::CoulombLoad => format!("1/{effort}"),
-            Self::CoulombSlope | Self::StribeckSlope | Self::HysteresisVelocitySlope => format!("s/{position}"),
+            Self::CoulombSlope | Self::StribeckSlope | Self::HysteresisVelocitySlope | Self::WeakeningSlope => {
+                format!("s/{position}")
+            }
             Self::HarmonicFrequency => format!("rad/{position}"),
             Self::RotorInertia => format!("{effort} s^2/{position}"),
             Self::Offset
@@ -258,6 +277,9 @@ impl fmt::Display for FrictionParameter {
             Self::HarmonicPositive(n) => write!(f, "position harmonic {}, positive direction", 2 * n + 1),
             Self::HarmonicNegative(n) => write!(f, "position harmonic {}, negative direction", 2 * n + 1),
             Self::ViscousAsymmetry => f.write_str("viscous asymmetry"),
+            Self::WeakeningPositive => f.write_str("velocity weakening, positive direction"),
+            Self::WeakeningNegative => f.write_str("velocity weakening, negative direction"),
+            Self::WeakeningSlope => f.write_str("weakening slope"),
             Self::Element(n) => write!(f, "pre-sliding friction, element {}", n + 1),
             Self::RippleLevelSine(k) => write!(f, "ripple {} of the Coulomb friction, sine", k + 1),
             Self::RippleLevelCosine(k) => write!(f, "ripple {} of the Coulomb friction, cosine", k + 1),

@@ -205,7 +205,7 @@ impl FrictionModel {
     /// breakaway, hysteresis and pre-sliding.
     pub fn dry_friction(&self) -> Torque {
         let (terms, _) = self.set(0);
-        Torque::from_bits(terms.breakaway().saturating_add(self.common.pre_sliding_level()))
+        Torque::from_bits(terms.breakaway(self.common.pre_sliding_level()))
     }
 
     /// True where the model has pre-sliding elements: friction at a velocity of zero.

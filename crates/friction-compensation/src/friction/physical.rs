@@ -7,6 +7,7 @@
 //! | viscous asymmetry | f_a abs(v): half the difference of both directions | |
 //! | Coulomb | (F_c(+/-) + ripple level) (1 + k_c th + k_l abs(tau)) tanh(v / v_c) | 002 eq. 6, 001 eq. 6 |
 //! | pre-sliding | (1 + k_c th + k_l abs(tau)) sum of level z | [`maxwell_slip`](super::maxwell_slip) |
+//! | velocity weakening | a factor 1 + w(+/-) (1 - tanh(v / v_w)^2) of Coulomb friction and pre-sliding | GMS, LuGre |
 //! | Stribeck | sqrt(2e) (F_brk(+/-) - F_c(+/-)) exp(-(v / v_st)^2) v / v_st | 001 eq. 6 |
 //! | hysteresis | b_h atan(s v + z sign a) | 003 eq. 4 |
 //! | position harmonics | sum over j = 1..5 of b_j(+/-) 4 sin((2j-1) h q) / (pi (2j-1)) | 003 eq. 5 |
@@ -26,7 +27,7 @@ use super::common::CommonTorques;
 use super::domain::{Domain, Range};
 use super::smooth::{atan, odd_sines, stribeck_of_product, tanh_of_product};
 use super::state::{SIGNALS, Signal};
-use crate::dsp::{narrow, narrow_product, saturate, smlal, smull};
+use crate::dsp::{narrow, narrow_product, saturate, smlal, smmul, smull};
 use crate::quantity::Torque;
 
 /// Number of position harmonics.
@@ -67,13 +68,17 @@ impl Terms {
     pub const ROTOR_INERTIA: Self = Self(1 << 13);
     /// f_a |v|.
     pub const VISCOUS_ASYMMETRY: Self = Self(1 << 14);
+    /// Factor 1 + w (1 - tanh(v / v_w)^2) of dry friction.
+    pub const VELOCITY_WEAKENING: Self = Self(1 << 15);
     /// Every term.
-    pub const ALL: Self = Self((1 << 15) - 1);
+    pub const ALL: Self = Self((1 << 16) - 1);
+    /// Every term of an image of format 2.
+    pub const FORMAT_2: Self = Self((1 << 15) - 1);
     /// Every term of an image of format 1.
     pub const FORMAT_1: Self = Self((1 << 14) - 1);
 
     /// Names of the terms, from bit 0 up.
-    pub const NAMES: [&'static str; 15] = [
+    pub const NAMES: [&'static str; 16] = [
         "constant",
         "position",
         "temperature",
@@ -89,6 +94,7 @@ impl Terms {
         "harmonics",
         "rotor_inertia",
         "viscous_asymmetry",
+        "velocity_weakening",
     ];
 
     /// True where every term of `other` takes part.
@@ -211,11 +217,19 @@ coefficients! {
     rotor_inertia: true per Acceleration ^ 1;
     /// f_a, Nm at full-scale velocity.
     viscous_asymmetry: true per Velocity ^ 1;
+    /// w for positive velocity: breakaway over Coulomb friction, less one.
+    weakening_positive: false;
+    /// w for negative velocity.
+    weakening_negative: false;
+    /// 1 / v_w times full-scale velocity.
+    weakening_slope: false per Velocity ^ 1;
 }
 
 impl Coefficients {
     /// Number of coefficients of an image of format 1, the first ones.
     pub const FORMAT_1: usize = 31;
+    /// Number of coefficients of an image of format 2.
+    pub const FORMAT_2: usize = 32;
 }
 
 /// A physical model as it is stored and transferred.
@@ -269,6 +283,7 @@ pub(crate) struct Factors {
     pub(crate) hysteresis_acceleration_slope: i32,
     pub(crate) rotor_inertia: i32,
     pub(crate) viscous_asymmetry: i32,
+    pub(crate) weakening_slope: i32,
 }
 
 impl Factors {
@@ -289,6 +304,7 @@ impl Factors {
         hysteresis_acceleration_slope: 0,
         rotor_inertia: 0,
         viscous_asymmetry: 0,
+        weakening_slope: 0,
     };
 }
 
@@ -300,6 +316,10 @@ pub struct PreparedTerms {
     pub(crate) coulomb: Directional,
     /// F_brk - F_c.
     pub(crate) stribeck: Directional,
+    /// Mean of both directions' w, Q16.16.
+    pub(crate) weakening_mean: i32,
+    /// Half their difference.
+    pub(crate) weakening_difference: i32,
     /// b_h pi / 2.
     pub(crate) hysteresis: i32,
     /// h in turns at full-scale position, Q16.16.
@@ -344,6 +364,12 @@ fn weighted([b1, b3, b5, b7, b9]: &[i32; HARMONICS], [s1, s3, s5, s7, s9]: &[i32
 #[inline(always)]
 pub(crate) fn times(coefficient: i32, factor: i32) -> i32 {
     saturate(smlal(1 << 15, coefficient, factor) >> 16)
+}
+
+/// Hyperbolic tangent of a slope times the velocity, Q31. A function of its own: two terms have one.
+#[inline(never)]
+fn edge(slope: i32, v: i32) -> i32 {
+    tanh_of_product(smull(slope, v))
 }
 
 impl Scaling {
@@ -395,14 +421,22 @@ impl Physical {
 }
 
 impl PreparedTerms {
-    /// Largest Coulomb friction, with breakaway where that is above it, and hysteresis, Nm in Q16.16.
-    pub(super) fn breakaway(&self) -> i32 {
+    /// Largest Coulomb friction, with breakaway where that is above it, hysteresis, and pre-sliding elements (their torque
+    /// where they slip, Q16.16), with the weakening's largest factor, Nm in Q16.16.
+    pub(super) fn breakaway(&self, pre_sliding: i32) -> i32 {
         let of = |coulomb: i32, stribeck: i32| coulomb.saturating_add(stribeck.max(0));
         let forward = of(self.coulomb.positive, self.stribeck.positive);
-        forward
+        let larger = forward
             .max(of(self.coulomb.negative, self.stribeck.negative))
             .max(0)
-            .saturating_add(self.hysteresis.saturating_abs())
+            .saturating_add(self.hysteresis.saturating_abs());
+        times(larger.saturating_add(pre_sliding), saturate(ONE as i64 + self.largest_weakening()))
+    }
+
+    /// Largest magnitude of w, Q16.16.
+    #[inline(never)]
+    pub(crate) fn largest_weakening(&self) -> i64 {
+        (self.weakening_mean as i64).abs() + (self.weakening_difference as i64).abs()
     }
 
     /// No term.
@@ -411,6 +445,8 @@ impl PreparedTerms {
         coefficients: Factors::NONE,
         coulomb: Directional { positive: 0, negative: 0 },
         stribeck: Directional { positive: 0, negative: 0 },
+        weakening_mean: 0,
+        weakening_difference: 0,
         hysteresis: 0,
         harmonic_turns: 0,
         harmonic_mean: [0; HARMONICS],
@@ -433,12 +469,12 @@ impl PreparedTerms {
             (c.harmonic_positive_5, c.harmonic_negative_5),
         ];
         // Half of 4 / (pi (2j - 1)), Q31.
-        const FACTORS: [i64; HARMONICS] = [1_367_130_551, 455_710_184, 273_426_110, 195_304_364, 151_903_395];
+        const FACTORS: [i32; HARMONICS] = [1_367_130_551, 455_710_184, 273_426_110, 195_304_364, 151_903_395];
         let harmonic = |combine: fn(i64, i64) -> i64| {
             let mut amplitudes = [0; HARMONICS];
             for ((amplitude, (positive, negative)), factor) in amplitudes.iter_mut().zip(harmonic_pairs).zip(FACTORS) {
                 let both = combine(positive as i64, negative as i64);
-                *amplitude = saturate((both * factor + (1 << 30)) >> 31);
+                *amplitude = saturate((both * factor as i64 + (1 << 30)) >> 31);
             }
             amplitudes
         };
@@ -459,6 +495,12 @@ impl PreparedTerms {
             hysteresis_acceleration_slope: c.hysteresis_acceleration_slope,
             rotor_inertia: on(Terms::ROTOR_INERTIA, c.rotor_inertia),
             viscous_asymmetry: on(Terms::VISCOUS_ASYMMETRY, c.viscous_asymmetry),
+            weakening_slope: c.weakening_slope,
+        };
+        // Halves first: their sum and difference fit.
+        let (forward, backward) = match parameters.terms.contains(Terms::VELOCITY_WEAKENING) {
+            true => (c.weakening_positive >> 1, c.weakening_negative >> 1),
+            false => (0, 0),
         };
         Self {
             terms: parameters.terms,
@@ -468,6 +510,8 @@ impl PreparedTerms {
                 positive: c.breakaway_positive.saturating_sub(coulomb.positive),
                 negative: c.breakaway_negative.saturating_sub(coulomb.negative),
             },
+            weakening_mean: forward.wrapping_add(backward),
+            weakening_difference: forward.wrapping_sub(backward),
             // pi / 2 in Q30.
             hysteresis: saturate((c.hysteresis as i64 * 1_686_629_713 + (1 << 29)) >> 30),
             // 1 / (2 pi) in Q33.
@@ -497,10 +541,13 @@ impl PreparedTerms {
         // Only quadratic friction needs v |v|: the high word of their product in Q30, shifted to Q31.
         sum.add(c.quadratic, saturate(smull(v, speed) >> 31));
 
-        let direction = tanh_of_product(smull(c.coulomb_slope, v));
-        let coulomb_factor = ONE
+        let direction = edge(c.coulomb_slope, v);
+        let mut coulomb_factor = ONE
             .saturating_add(narrow_product(c.coulomb_temperature, th))
             .saturating_add(narrow_product(c.coulomb_load, load.saturating_abs()));
+        if self.terms.contains(Terms::VELOCITY_WEAKENING) {
+            coulomb_factor = times(coulomb_factor, self.weakening(v, direction));
+        }
         let level = self.coulomb.at(v).saturating_add(common.ripple.level);
         sum.add(times(level, coulomb_factor), direction);
         sum.add(times(common.pre_sliding, coulomb_factor), i32::MAX);
@@ -515,6 +562,16 @@ impl PreparedTerms {
             sum.add(self.harmonic_amplitude(q, direction), i32::MAX);
         }
         Torque::from_bits(narrow(sum.0))
+    }
+
+    /// 1 + w (1 - tanh(v / v_w)^2), Q16.16. A function of its own, as for the harmonics.
+    #[inline(never)]
+    fn weakening(&self, v: i32, direction: i32) -> i32 {
+        let weakening = self.weakening_mean.saturating_add(narrow_product(self.weakening_difference, direction));
+        let tanh = edge(self.coefficients.weakening_slope, v);
+        // 1 - tanh^2 in Q31; the square in Q30 is at most one.
+        let bell = i32::MAX.wrapping_sub(smmul(tanh, tanh).wrapping_mul(2));
+        ONE.saturating_add(narrow_product(weakening, bell))
     }
 
     /// s v + z sign a, Q16.16.

@@ -184,6 +184,7 @@ fn decode_physical(reader: &mut Reader, format: u16, physical: &mut PhysicalPara
     let terms = u32::from(reader.u16());
     let (known, count) = match format {
         1 => (Terms::FORMAT_1, Coefficients::FORMAT_1),
+        2 => (Terms::FORMAT_2, Coefficients::FORMAT_2),
         _ => (Terms::ALL, Coefficients::COUNT),
     };
     if terms & !known.0 != 0 {
@@ -276,7 +277,11 @@ fn encode_common(common: &CommonTerms, writer: &mut Writer) {
 fn encode_set(set: &ParameterSet, format: u16, writer: &mut Writer) {
     writer.put(&(set.physical.terms.0 as u16).to_le_bytes());
     writer.put(&[0; 2]);
-    let count = if format == 1 { Coefficients::FORMAT_1 } else { Coefficients::COUNT };
+    let count = match format {
+        1 => Coefficients::FORMAT_1,
+        2 => Coefficients::FORMAT_2,
+        _ => Coefficients::COUNT,
+    };
     for coefficient in set.physical.coefficients.to_array().into_iter().take(count) {
         writer.i32(coefficient);
     }
@@ -413,5 +418,6 @@ impl Writer<'_> {
 }
 
 /// The sizes that the layout states.
-const _: () = assert!(4 + 4 * Coefficients::FORMAT_1 == 128 && 4 + 4 * Coefficients::COUNT == 132);
+const _: () = assert!(4 + 4 * Coefficients::FORMAT_1 == 128 && 4 + 4 * Coefficients::FORMAT_2 == 132);
+const _: () = assert!(4 + 4 * Coefficients::COUNT == 144);
 const _: () = assert!(4 * NEURONS * (INPUTS + 1) + 11 * 14 + 6 == 280 && 8 * ELEMENTS + 20 * RIPPLES == 72);

@@ -30,19 +30,19 @@
 //! | 132 | 4 | limit of the absolute friction, Q16.16 of the effort's unit, unsigned |
 //! | 136 | 4 | limit of the absolute slope of the network over the measured torque, Q16.16, unsigned |
 //! | 140 | 4 | limit of the absolute slope of friction over velocity, unsigned, 1/256 Nm s/rad |
-//! | 144 | 4 x 8 | only in format 2: pre-sliding elements: stiffness, Q16.16 per rad, 0 to [`MAX_STIFFNESS`]; level, Q16.16 of the effort's unit, 0 to [`MAX_LEVEL`] |
-//! | 176 | 2 x 20 | only in format 2: ripple: periods in a rad; sine and cosine of the level, of the torque; Q16.16 |
+//! | 144 | 4 x 8 | from format 2 on: pre-sliding elements: stiffness, Q16.16 per rad, 0 to [`MAX_STIFFNESS`]; level, Q16.16 of the effort's unit, 0 to [`MAX_LEVEL`] |
+//! | 176 | 2 x 20 | from format 2 on: ripple: periods in a rad; sine and cosine of the level, of the torque; Q16.16 |
 //! | 144, 216 | | parameter sets, one after another |
 //! | | | golden vectors, one after another |
 //! | length - 4 | 4 | CRC-32 (ISO-HDLC: polynomial 0x04C11DB7 reflected, start and final XOR 0xFFFFFFFF) of all bytes before |
 //!
-//! A parameter set is 128 bytes, 132 in format 2, and 280 more where it has a network:
+//! A parameter set is 128 bytes, 132 in format 2, 144 in format 3, and 280 more where it has a network:
 //!
 //! | bytes | content |
 //! |---|---|
 //! | 2 | terms of the physical model that take part, a bit each ([`Terms`]) |
 //! | 2 | reserved |
-//! | 31 x 4, 32 x 4 | coefficients at full scale, Q16.16, in the order of [`Coefficients::NAMES`](crate::friction::physical::Coefficients::NAMES) |
+//! | 31 x 4, 32 x 4, 35 x 4 | coefficients at full scale, Q16.16, in the order of [`Coefficients::NAMES`](crate::friction::physical::Coefficients::NAMES) |
 //! | 5 x 6 x 4 | network layer 0: per neuron five weights in Q26 and a bias in Q25 |
 //! | 10 x 14 | layers 1 and 2: per neuron five weights and a bias, 16 bits each, their fraction bits (8 bits, 10 to 20), a reserved byte |
 //! | 14 | layer 3, one neuron of the same form |
@@ -63,7 +63,7 @@ use super::codec::{Reader, Writer, decode_content, encode_content};
 use crate::friction::common::{Common, CommonTerms, CommonTorques};
 use crate::friction::maxwell_slip::{Bent, MAX_LEVEL, MAX_STIFFNESS};
 use crate::friction::network::{MAX_FRACTION, MAX_SCALE, MIN_FRACTION};
-use crate::friction::physical::Terms;
+use crate::friction::physical::{Coefficients, Terms};
 use crate::friction::regime::MAX_SETS;
 use crate::friction::state::{JointState, SIGNALS, Signal};
 use crate::friction::{Estimate, FrictionModel, FrictionParameters, ParameterSet};
@@ -71,7 +71,7 @@ use crate::friction::{Estimate, FrictionModel, FrictionParameters, ParameterSet}
 /// The magic bytes.
 pub const MAGIC: [u8; 4] = *b"JFPI";
 /// The newest format version that this code reads and writes; the first is 1.
-pub const FORMAT: u16 = 2;
+pub const FORMAT: u16 = 3;
 /// Steps a second of the sequence of golden vectors.
 pub const GOLDEN_RATE: u32 = 1_000;
 /// Longest image: a flash page less 32 bytes for the slot's header.
@@ -80,7 +80,7 @@ pub const MAX_LENGTH: usize = 2048 - 32;
 pub const MAX_GOLDEN: usize = 8;
 /// Longest image that this program has room for: [`MAX_LENGTH`], or less where it has room for fewer parameter sets.
 pub const ROOM: usize = {
-    let longest = 216 + MAX_SETS * (132 + 280) + MAX_GOLDEN * 36 + CRC_LENGTH;
+    let longest = 216 + MAX_SETS * (144 + 280) + MAX_GOLDEN * 36 + CRC_LENGTH;
     if longest < MAX_LENGTH { longest } else { MAX_LENGTH }
 };
 
@@ -334,10 +334,20 @@ impl Image {
     /// The oldest format that can hold the image.
     pub fn format(&self) -> u16 {
         let FrictionParameters { common, sets, .. } = &self.friction;
-        let older = |set: &ParameterSet| {
-            Terms::FORMAT_1.contains(set.physical.terms) && set.physical.coefficients.viscous_asymmetry == 0
+        let without = |terms: Terms, coefficients: usize| {
+            let holds = |set: &ParameterSet| {
+                let newer = set.physical.coefficients.to_array().into_iter().skip(coefficients);
+                terms.contains(set.physical.terms) && newer.fold(0, |any, bits| any | bits) == 0
+            };
+            sets.iter().all(holds)
         };
-        if *common == CommonTerms::NONE && sets.iter().all(older) { 1 } else { 2 }
+        if *common == CommonTerms::NONE && without(Terms::FORMAT_1, Coefficients::FORMAT_1) {
+            1
+        } else if without(Terms::FORMAT_2, Coefficients::FORMAT_2) {
+            2
+        } else {
+            3
+        }
     }
 
     /// Evaluates every golden vector with `model`, which must have been prepared from this image.

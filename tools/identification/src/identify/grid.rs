@@ -8,10 +8,11 @@ use super::layout::Role;
 use super::linear::bounded_step;
 use super::nonlinear::{Candidate, Effort, Fit, Problem, Residuals};
 use super::observations::{Row, decimated};
-use crate::friction_model::Term;
+use crate::friction_model::{FrictionModel, Term};
 use crate::friction_parameter::FrictionParameter as P;
 use crate::levenberg_marquardt::LeastSquares;
 use crate::presets::Structure;
+use crate::rigid::RigidParameters;
 use nalgebra::DVector;
 use rayon::prelude::*;
 
@@ -19,8 +20,10 @@ use rayon::prelude::*;
 const ROWS: usize = 3_000;
 /// Rows at which the grid over the harmonic frequency is evaluated: it has hundreds of points.
 const FREQUENCY_ROWS: usize = 1_500;
-/// Points of a grid over one slope, and over each of two.
-const SLOPES: [usize; 2] = [24, 9];
+/// Points of a grid over one slope, and over each of two or three.
+const SLOPES: [usize; 3] = [24, 9, 6];
+/// Velocity weakening of a grid over its slope.
+const WEAKENING: f64 = 0.5;
 /// Widths z of the hysteresis that the grid tries.
 const WIDTHS: [f64; 4] = [-0.7, 0.3, 1.0, 3.0];
 /// Limit on the points of the grid over the harmonic frequency.
@@ -64,10 +67,11 @@ pub fn search(problem: &Problem, structure: &Structure) -> Fit {
 /// searched on the grid.
 pub fn search_from(problem: &Problem, structure: &Structure, start: &Fit, new: Option<Term>) -> Fit {
     let candidate = Candidate::new(problem, structure);
-    let x = candidate.layout.encode(&start.rigid, &start.friction);
+    let x = encoded(&candidate, &start.rigid, &start.friction);
     let (_, hysteresis, frequency) = axes(problem, &candidate);
     let (axes, rows) = match new {
         Some(Term::Stribeck) => (slope_axes(&candidate, &[P::StribeckSlope]), ROWS),
+        Some(Term::VelocityWeakening) => (slope_axes(&candidate, &[P::WeakeningSlope]), ROWS),
         Some(Term::Hysteresis) => (hysteresis, ROWS),
         Some(Term::Harmonics) => (frequency, FREQUENCY_ROWS),
         _ => (vec![], 0),
@@ -82,12 +86,23 @@ pub fn search_from(problem: &Problem, structure: &Structure, start: &Fit, new: O
     best.unwrap_or_else(|| candidate.descend(problem, &problem.search, &x, NEARBY))
 }
 
+/// The vector of a model, with some weakening where it has none: factors are held on the grid, and without any its slope
+/// would not be seen.
+fn encoded(candidate: &Candidate, rigid: &RigidParameters, friction: &FrictionModel) -> DVector<f64> {
+    let mut x = candidate.layout.encode(rigid, friction);
+    let columns = [P::WeakeningPositive, P::WeakeningNegative].map(|side| candidate.layout.column_of(side));
+    for column in columns.into_iter().flatten() {
+        x[column] = if x[column] == 0.0 { WEAKENING } else { x[column] };
+    }
+    x
+}
+
 /// The best points of the grid, far enough apart to lead to different minima.
 fn starts(problem: &Problem, candidate: &Candidate) -> Vec<DVector<f64>> {
     let rows = decimated(&problem.search, ROWS);
     let few = decimated(&problem.search, FREQUENCY_ROWS);
     let (slopes, hysteresis, frequency) = axes(problem, candidate);
-    let mut x = candidate.layout.encode(&problem.theoretical, &problem.template);
+    let mut x = encoded(candidate, &problem.theoretical, &problem.template);
     let mut points = evaluate(candidate, &rows, &x, &slopes);
     let mut refined = false;
     for (axes, rows) in [(&hysteresis, &rows), (&frequency, &few)] {
@@ -109,7 +124,7 @@ fn axes(problem: &Problem, candidate: &Candidate) -> (Vec<Axis>, Vec<Axis>, Vec<
     let bounds = candidate.layout.bounds();
     let even = |column: usize, points: usize| even(bounds[column], column, points);
     let column_of = |parameter| candidate.layout.column_of(parameter);
-    let slopes = slope_axes(candidate, &[P::CoulombSlope, P::StribeckSlope]);
+    let slopes = slope_axes(candidate, &[P::CoulombSlope, P::StribeckSlope, P::WeakeningSlope]);
     let mut hysteresis: Vec<Axis> =
         column_of(P::HysteresisVelocitySlope).map(|column| even(column, 9)).into_iter().collect();
     hysteresis.extend(column_of(P::HysteresisWidth).map(|column| Axis { column, values: WIDTHS.to_vec() }));

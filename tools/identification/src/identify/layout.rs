@@ -21,6 +21,8 @@ pub const PARAMETERS: usize = RigidRegressor::ALL.len() + P::COUNT;
 const EDGE_VELOCITY: (f64, f64) = (5e-4, 0.5);
 /// Range of v_st, as fractions of the highest velocity.
 const STRIBECK_VELOCITY: (f64, f64) = (2e-3, 0.5);
+/// Largest breakaway friction over Coulomb friction, less one.
+const WEAKENING: f64 = 4.0;
 /// Largest relative change of a friction over the temperatures of the train rows.
 const TEMPERATURE_EFFECT: f64 = 0.9;
 /// Largest relative change of the Coulomb friction over the loads of the train rows.
@@ -161,6 +163,17 @@ impl Layout {
                 layout.own(parameter, Role::Factor, bounds);
             }
         }
+        if on(Term::VelocityWeakening) {
+            let sides: &[&[P]] = match structure.asymmetric_breakaway {
+                true => &[&[P::WeakeningPositive], &[P::WeakeningNegative]],
+                false => &[&[P::WeakeningPositive, P::WeakeningNegative]],
+            };
+            for side in sides {
+                let name = if side.len() == 2 { "velocity weakening".into() } else { side[0].to_string() };
+                let column = layout.column(name, Role::Factor, (0.0, WEAKENING));
+                side.iter().for_each(|&parameter| layout.link(parameter, column, 1.0, true));
+            }
+        }
         if on(Term::Harmonics) {
             for j in 0..HARMONICS {
                 layout.own(P::HarmonicPositive(j), Role::Coefficient, FREE);
@@ -229,6 +242,9 @@ impl Layout {
             if on(Term::Stribeck) {
                 self.own(P::StribeckSlope, Role::Slope, peak);
             }
+        }
+        if on(Term::VelocityWeakening) {
+            self.own(P::WeakeningSlope, Role::Slope, peak);
         }
         if on(Term::Hysteresis) {
             self.own(P::HysteresisVelocitySlope, Role::Slope, edge);

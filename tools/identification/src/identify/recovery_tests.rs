@@ -32,7 +32,7 @@ const ABSENT: usize = 2;
 
 fn asymmetric(terms: &[Term]) -> Structure {
     let terms = Terms::of(terms);
-    let asymmetric_breakaway = terms.contains(Term::Stribeck);
+    let asymmetric_breakaway = terms.contains(Term::Stribeck) || terms.contains(Term::VelocityWeakening);
     Structure { terms, asymmetric_coulomb: true, asymmetric_breakaway, ..Structure::default() }
 }
 
@@ -55,6 +55,7 @@ fn every_term_alone_is_recovered_within_three_standard_errors() {
             Term::CoulombTemperature
             | Term::CoulombLoad
             | Term::Stribeck
+            | Term::VelocityWeakening
             | Term::PreSliding
             | Term::Ripple
             | Term::SecondRipple => terms.push(Term::Coulomb),

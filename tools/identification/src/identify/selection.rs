@@ -31,7 +31,7 @@ const ALWAYS: [Term; 3] = [Term::Constant, Term::Viscous, Term::Coulomb];
 fn supported(problem: &Problem, rigid: &RigidModel) -> (Structure, Vec<String>) {
     use Term::*;
     let mut terms = Terms::of(&[Constant, Position, Viscous, Quadratic, Coulomb, CoulombLoad, Stribeck, Hysteresis]);
-    terms = terms.with(ViscousAsymmetry);
+    terms = terms.with(ViscousAsymmetry).with(VelocityWeakening);
     let limits = &problem.limits;
     for (term, found) in
         [(PreSliding, limits.elements > 0), (Ripple, limits.ripples > 0), (SecondRipple, limits.ripples > 1)]
@@ -147,20 +147,22 @@ fn changed(structure: &Structure, freedom: Freedom, on: bool) -> Option<Structur
         Freedom::AsymmetricBreakaway => changed.asymmetric_breakaway = on,
     }
     let has = |term| changed.terms.contains(term);
+    let breaks_away = has(Term::Stribeck) || has(Term::VelocityWeakening);
     let possible = match freedom {
-        Freedom::AsymmetricBreakaway => has(Term::Stribeck),
+        Freedom::AsymmetricBreakaway => breaks_away,
         Freedom::AsymmetricCoulomb
         | Freedom::Term(
             Term::CoulombLoad
             | Term::CoulombTemperature
             | Term::Stribeck
+            | Term::VelocityWeakening
             | Term::PreSliding
             | Term::Ripple
             | Term::SecondRipple,
         ) => has(Term::Coulomb),
         _ => true,
     };
-    changed.asymmetric_breakaway &= has(Term::Stribeck);
+    changed.asymmetric_breakaway &= breaks_away;
     changed.coupled_slopes &= has(Term::Stribeck);
     (possible || !on).then_some(changed)
 }

@@ -76,10 +76,7 @@ fn columns(problem: &Problem, row: &Row) -> [f64; BASE] {
     let direction = (v * problem.template.coulomb_slope).tanh();
     let (forward, backward) = if v < 0.0 { (0.0, direction) } else { (direction, 0.0) };
     let fastest = problem.limits.velocity.max(f64::MIN_POSITIVE);
-    let bump = |part: f64| {
-        let u = v / (part * fastest);
-        u * (-u * u).exp()
-    };
+    let weakening = |part: f64| direction * (1.0 - (v / (part * fastest)).tanh().powi(2));
     let mut columns = [0.0; BASE];
     for &regressor in &problem.regressors {
         columns[regressor.index()] = row.regressors[regressor.index()];
@@ -93,9 +90,9 @@ fn columns(problem: &Problem, row: &Row) -> [f64; BASE] {
         backward,
         load * direction,
         row.joint.acceleration,
-        bump(0.02),
-        bump(0.1),
-        bump(0.4),
+        weakening(0.02),
+        weakening(0.1),
+        weakening(0.4),
     ];
     columns[RIGID..].copy_from_slice(&friction);
     columns

@@ -47,6 +47,8 @@ pub fn friction(terms: Terms) -> FrictionModel {
         rotor_inertia: 0.3,
         reference_temperature: 30.0,
         viscous_asymmetry: 0.1,
+        weakening: Directional { positive: 0.6, negative: 0.4 },
+        weakening_slope: 12.0,
         element_stiffness: [4.0, 20.0, 0.0, 0.0],
         element_level: [0.4, 0.3, 0.0, 0.0],
         ripples: [

@@ -68,6 +68,8 @@ fn natural(model: &FrictionModel) -> [f64; Coefficients::COUNT] {
     values.extend(model.harmonic_negative.map(harmonic));
     values.push(on(Term::RotorInertia, model.rotor_inertia));
     values.push(on(Term::ViscousAsymmetry, model.viscous_asymmetry));
+    let weakening = [model.weakening.positive, model.weakening.negative, model.weakening_slope];
+    values.extend(weakening.map(|value| on(Term::VelocityWeakening, value)));
     std::array::from_fn(|i| values[i])
 }
 
@@ -102,6 +104,8 @@ pub fn dequantize(parameters: &PhysicalParameters, domain: &Domain) -> FrictionM
         harmonic_negative: std::array::from_fn(|j| values[25 + j]),
         rotor_inertia: values[30],
         viscous_asymmetry: values[31],
+        weakening: Directional { positive: values[32], negative: values[33] },
+        weakening_slope: values[34],
         reference_temperature: from_q16(domain.reference_temperature),
         ..FrictionModel::default()
     }

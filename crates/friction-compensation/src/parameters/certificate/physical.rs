@@ -2,11 +2,11 @@
 
 use super::interval::Interval;
 use super::{bisect, tanh_at};
-use crate::dsp::{narrow, saturate};
+use crate::dsp::{narrow, saturate, smull};
 use crate::friction::common::CommonTerms;
 use crate::friction::domain::Domain;
 use crate::friction::maxwell_slip::MAX_STIFFNESS;
-use crate::friction::physical::{Directional, PhysicalParameters, PreparedTerms, Scaling, Terms, times};
+use crate::friction::physical::{Directional, HARMONICS, PhysicalParameters, PreparedTerms, Scaling, Terms, times};
 use crate::friction::ripple::Ripple;
 use crate::friction::smooth::{TANH, atan, stribeck, stribeck_slope};
 use crate::friction::state::{SIGNALS, Signal};
@@ -37,6 +37,8 @@ struct Common {
     level: Interval,
     /// Sum of products, 47 fraction bits.
     sum: Interval,
+    /// Largest pre-sliding friction, Q16.16.
+    pre_sliding: i64,
     /// See [`Bounds::bending`].
     bending: Interval,
     /// Roundings of pre-sliding and ripple, Q16.16.
@@ -68,14 +70,17 @@ pub(super) fn bounds(
         &|found, new| found.sum.contains(new.sum) && found.slope.contains(new.slope),
         &halves,
     );
+    let coulomb = coulomb_levels(physical, &common, &box_, velocity).abs().high;
+    let dry = coulomb + common.pre_sliding;
+    let slope = plus(found.slope, Interval::point(dry), weakening_slope(physical), 16);
     // Partial sums may wrap and come back; the whole sum must fit, and its rounding too.
     let fits = Interval::symmetric((1 << 62) - (1 << 31));
     fits.contains(found.sum).then(|| Bounds {
         torque: found.sum.map(|sum| narrow(sum) as i64),
         // Zero belongs to it, for beyond the box the velocity is clamped.
-        slope: found.slope.union(Interval::ZERO),
+        slope: slope.union(Interval::ZERO),
         bending: common.bending,
-        resolution: resolution(physical, &common, &box_),
+        resolution: resolution(physical, &common, (coulomb, dry), velocity),
     })
 }
 
@@ -99,7 +104,6 @@ fn scaled_box(scaling: &Scaling) -> [Interval; SIGNALS] {
 
 /// Returns `true` if the harmonics' own sums stay in 64 bits.
 fn harmonics_fit(physical: &PreparedTerms) -> bool {
-    let total = |amplitudes: &[i32]| amplitudes.iter().map(|a| (*a as i64).abs()).sum::<i64>();
     total(&physical.harmonic_mean) < 1 << 31 && total(&physical.harmonic_difference) < 1 << 31
 }
 
@@ -138,11 +142,52 @@ fn clip(interval: Interval) -> Interval {
     interval.map(|value| saturate(value) as i64)
 }
 
-/// The factor of dry friction, Q16.16.
+/// The factor of dry friction, Q16.16, whatever the velocity.
 fn coulomb_factor(physical: &PreparedTerms, box_: &[Interval; SIGNALS]) -> Interval {
     let [_, _, load, _, th, _] = *box_;
     let c = &physical.coefficients;
-    clip(clip(ONE.add(factor_part(c.coulomb_temperature, th))).add(factor_part(c.coulomb_load, load.abs())))
+    let factor =
+        clip(clip(ONE.add(factor_part(c.coulomb_temperature, th))).add(factor_part(c.coulomb_load, load.abs())));
+    let weakening = physical.largest_weakening();
+    rounded_times(factor, Interval { low: ONE.low - weakening, high: ONE.high + weakening })
+}
+
+/// Slope of the weakening's factor over velocity, Q16.16 per full scale: its bell is less steep than the hyperbolic
+/// tangent that it is made of, and its amount follows the Coulomb friction's from one direction's to the other's.
+fn weakening_slope(physical: &PreparedTerms) -> Interval {
+    let either = |slope: i32| {
+        let steepest = slope.unsigned_abs() as i64;
+        Interval { low: -steepest, high: steepest }
+    };
+    let c = &physical.coefficients;
+    let of_bell = Interval::point(physical.largest_weakening()).times(either(c.weakening_slope));
+    plus(of_bell, Interval::point(physical.weakening_difference as i64), either(c.coulomb_slope), 0).shift_right(16)
+}
+
+/// Largest sum of sines with these amplitudes: the sines exceed one by less than 2^-10.
+#[inline(never)]
+fn total(amplitudes: &[i32; HARMONICS]) -> i64 {
+    let total: i64 = amplitudes.iter().map(|a| (*a as i64).abs()).sum();
+    total + (total >> 10) + 1
+}
+
+/// A sum and one product more, without `bits` of its fraction.
+#[inline(never)]
+fn plus(sum: Interval, a: Interval, b: Interval, bits: u32) -> Interval {
+    sum.add(a.times(b).shift_right(bits))
+}
+
+/// Argument of a smooth function over a velocity interval.
+#[inline(never)]
+fn argument(coefficient: i32, v: Interval, bits: u32) -> Interval {
+    product(coefficient, v).map(|p| saturate(p >> bits) as i64)
+}
+
+/// v |v| in Q31.
+#[inline(never)]
+fn signed_square(v: i64) -> i64 {
+    let v = v as i32;
+    saturate(smull(v, v.saturating_abs()) >> 31) as i64
 }
 
 /// The Coulomb levels, with their factor, that a velocity interval can select, Q16.16.
@@ -169,6 +214,7 @@ fn common_bounds(common: &CommonTerms, factor: Interval) -> Option<Common> {
     let fit = [level, torque, pre_sliding].into_iter().all(|bound| bound < 1 << 31);
     // Per rad in 8 fraction bits, a thousandth of it per rad/s; the factor may exceed one.
     let per_step = Interval { low: 0, high: stiffness / (1_000 << 24) + 1 };
+    let bent = rounded_times(Interval::symmetric(pre_sliding), factor);
     fit.then(|| Common {
         level: Interval::symmetric(level),
         // A unit of each sum, and half a one of each element's bending. The factor of dry friction multiplies all but
@@ -179,7 +225,8 @@ fn common_bounds(common: &CommonTerms, factor: Interval) -> Option<Common> {
         },
         sum: Interval::symmetric(torque)
             .times(Interval::point(1 << 31))
-            .add(rounded_times(Interval::symmetric(pre_sliding), factor).times(Interval::point(i32::MAX as i64))),
+            .add(bent.times(Interval::point(i32::MAX as i64))),
+        pre_sliding: bent.high,
         bending: match pre_sliding {
             0 => Interval::ZERO,
             _ => per_step.times(factor).shift_right(16).union(Interval::ZERO),
@@ -198,54 +245,46 @@ fn cell_bounds(physical: &PreparedTerms, common: &Common, box_: &[Interval; SIGN
 
     let viscous_factor = clip(ONE.add(factor_part(c.viscous_temperature, th)));
     let viscous = rounded_times(Interval::point(c.viscous as i64), viscous_factor);
-    sum = sum.add(viscous.times(v));
+    sum = plus(sum, viscous, v, 0);
     let mut slope = viscous;
 
     let speed = v.abs();
-    sum =
-        sum.add(product(c.quadratic, v.map(|v| saturate((v * v.saturating_abs().min(i32::MAX as i64)) >> 31) as i64)));
+    sum = sum.add(product(c.quadratic, v.map(signed_square)));
     slope = slope.add(product(c.quadratic, speed).shift_right(30));
     sum = sum.add(product(c.viscous_asymmetry, speed));
-    let side = c.viscous_asymmetry as i64;
-    slope = slope.add(match (v.low < 0, v.high > 0) {
-        (true, true) => Interval::symmetric(side),
-        (true, false) => Interval::point(-side),
-        _ => Interval::point(side),
-    });
+    let backward = v.low < 0;
+    let side = Interval { low: if backward { -1 } else { 1 }, high: if backward && v.high <= 0 { -1 } else { 1 } };
+    slope = slope.add(product(c.viscous_asymmetry, side));
 
-    let argument = product(c.coulomb_slope, v).map(|p| saturate(p >> 22) as i64);
-    let direction = argument.map(tanh_at);
+    let edge = argument(c.coulomb_slope, v, 22);
+    let direction = edge.map(tanh_at);
     let coulomb = coulomb_levels(physical, common, box_, v);
-    sum = sum.add(coulomb.times(direction));
+    sum = plus(sum, coulomb, direction, 0);
     // Slope of the direction over full-scale velocity, Q16: table slope Q14 times 1 / v_c in Q16.
-    let edge = tanh_slopes(argument).times(Interval::point(c.coulomb_slope as i64)).shift_right(14);
-    slope = slope.add(coulomb.times(edge).shift_right(16));
+    let edge = product(c.coulomb_slope, tanh_slopes(edge)).shift_right(14);
+    slope = plus(slope, coulomb, edge, 16);
 
     if physical.terms.contains(Terms::STRIBECK) {
-        let u = product(c.stribeck_slope, v).map(|p| saturate(p >> 21) as i64);
+        let u = argument(c.stribeck_slope, v, 21);
         let amplitude = level(physical.stribeck, v);
-        sum = sum.add(amplitude.times(stribeck_values(u)));
-        let bump = stribeck_slopes(u).times(Interval::point(c.stribeck_slope as i64)).shift_right(13);
-        slope = slope.add(amplitude.times(bump).shift_right(16));
+        sum = plus(sum, amplitude, stribeck_values(u), 0);
+        let bump = product(c.stribeck_slope, stribeck_slopes(u)).shift_right(13);
+        slope = plus(slope, amplitude, bump, 16);
     }
     if physical.terms.contains(Terms::HYSTERESIS) {
         let at = |v: i64, a: i64| hysteresis_argument(physical, v, a);
         let argument = Interval::between(at(v.low, a.low), at(v.high, a.high))
             .union(Interval::between(at(v.low, a.high), at(v.high, a.low)));
         let amplitude = Interval::point(physical.hysteresis as i64);
-        sum = sum.add(amplitude.times(argument.map(atan_at)));
-        let edge = atan_slopes(argument).times(Interval::point(c.hysteresis_velocity_slope as i64)).shift_right(16);
-        slope = slope.add(amplitude.times(edge).shift_right(16));
+        sum = plus(sum, amplitude, argument.map(atan_at), 0);
+        let edge = product(c.hysteresis_velocity_slope, atan_slopes(argument)).shift_right(16);
+        slope = plus(slope, amplitude, edge, 16);
     }
     if physical.terms.contains(Terms::HARMONICS) {
-        let bound = |amplitudes: &[i32]| {
-            let total: i64 = amplitudes.iter().map(|a| (*a as i64).abs()).sum();
-            total + (total >> 10) + 1 // the sines exceed one by less than 2^-10
-        };
-        let difference = bound(&physical.harmonic_difference);
-        let amplitude = bound(&physical.harmonic_mean) + difference + 2;
-        sum = sum.add(Interval::symmetric(amplitude).times(Interval::point(i32::MAX as i64)));
-        slope = slope.add(Interval::symmetric(difference).times(edge).shift_right(16));
+        let difference = total(&physical.harmonic_difference);
+        let amplitude = total(&physical.harmonic_mean) + difference + 2;
+        sum = plus(sum, Interval::symmetric(amplitude), Interval::point(i32::MAX as i64), 0);
+        slope = plus(slope, Interval::symmetric(difference), edge, 16);
     }
     CellBounds { sum, slope }
 }
@@ -295,12 +334,12 @@ fn tanh_slope(step: i64) -> i64 {
 }
 
 /// Slopes of a table over an interval: those of its ends and of the turning steps between, plus the knots' rounding.
-fn slopes_between(slope: fn(i64) -> i64, argument: Interval, turns: &[i64]) -> Interval {
+fn slopes_between(slope: fn(i64) -> i64, argument: Interval, turns: &[i8]) -> Interval {
     const ROUNDING: i64 = 32;
     let step = |end: i64| (end >> 20).clamp(-256, 255);
     let (low, high) = (step(argument.low), step(argument.high));
     let mut found = Interval::between(slope(low), slope(high));
-    for &turn in turns {
+    for turn in turns.iter().map(|turn| *turn as i64) {
         if (low..=high).contains(&turn) {
             found = found.union(Interval::point(slope(turn)));
         }
@@ -318,16 +357,20 @@ fn atan_slopes(argument: Interval) -> Interval {
     Interval { low: 0, high: ((STEEPEST << 16) / divisor) as i64 + 64 }
 }
 
-/// Worst departure from the smooth model whose slopes are bounded, Q16.16.
-fn resolution(physical: &PreparedTerms, common: &Common, box_: &[Interval; SIGNALS]) -> u32 {
-    let coulomb = coulomb_levels(physical, common, box_, box_[Signal::Velocity as usize]).abs().high;
-    let stribeck = level(physical.stribeck, box_[Signal::Velocity as usize]).abs().high;
-    let harmonics: i64 = physical.harmonic_difference.iter().map(|a| (*a as i64).abs()).sum();
+/// Worst departure from the smooth model whose slopes are bounded, Q16.16. `coulomb`: largest Coulomb level, and with
+/// pre-sliding.
+fn resolution(physical: &PreparedTerms, common: &Common, (coulomb, dry): (i64, i64), velocity: Interval) -> u32 {
+    let stribeck = level(physical.stribeck, velocity).abs().high;
+    let harmonics = total(&physical.harmonic_difference);
     // Arguments are cut to 17 fraction bits before tanh (slope 1), to 18 before the Stribeck bump (slope 2.33): hardly
     // more than 2^-17 of the Coulomb level and of the harmonics that follow the same edge, 2^-16.7 of the Stribeck
     // level. Twice that, because where two directions have different levels, they meet at this distance from zero.
-    // The arc tangent's argument and reciprocal are rounded at 2^-16 (slope 2 / pi).
-    let levels = (coulomb >> 16) + (harmonics >> 16) + (stribeck >> 15) + ((physical.hysteresis as i64).abs() >> 15);
+    // The arc tangent's argument and reciprocal are rounded at 2^-16 (slope 2 / pi). The weakening's bell is a square,
+    // slope 2, and its factor is rounded four times: below five times the next whole amount.
+    let amount = (physical.largest_weakening() + 0xffff) >> 16;
+    let weakened = 5 * amount * ((dry >> 15) + 1);
+    let levels =
+        weakened + (coulomb >> 16) + (harmonics >> 16) + (stribeck >> 15) + ((physical.hysteresis as i64).abs() >> 15);
     // Shifts above, v |v|, the harmonics' two roundings, those of pre-sliding and ripple, and the last one.
     (levels + 4 + 1 + 2 + common.roundings + 1).min(u32::MAX as i64) as u32
 }
