@@ -13,7 +13,9 @@ use friction_compensation::friction::ripple::Ripple;
 use friction_compensation::friction::state::{JointState, SIGNALS, Signal};
 use friction_compensation::friction::{Estimate, FrictionModel, FrictionParameters, ParameterSet};
 use friction_compensation::parameters::certificate::Limits;
-use friction_compensation::parameters::image::{GoldenSequence, GoldenVector, Image, ImageError, MAX_GOLDEN, MAX_LENGTH};
+use friction_compensation::parameters::image::{
+    GoldenSequence, GoldenVector, Image, ImageError, MAX_GOLDEN, MAX_LENGTH,
+};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
@@ -304,8 +306,8 @@ fn extreme_network(random: &mut ChaCha8Rng) -> NetworkParameters {
     }
 }
 
-/// An image of `friction` with `golden` golden vectors (1 to [`MAX_GOLDEN`], or fewer where no more have room) that hold,
-/// and no limit below the type's.
+/// An image of `friction` with `golden` golden vectors (1 to [`MAX_GOLDEN`], or fewer where no more have room) that
+/// hold, and no limit below the type's.
 pub fn image(random: &mut ChaCha8Rng, friction: FrictionParameters, golden: usize) -> Image {
     let model = FrictionModel::new(&friction, 20_000);
     let mut vectors = heapless::Vec::new();

@@ -18,29 +18,29 @@ const FIRST: u64 = 1;
 const JOINTS: (u64, u64) = (6, 20);
 /// Joints in service, likewise.
 const SERVED: (u64, u64) = (2, 20);
-/// Largest relative torque error with compensation, median and worst, %: 4.0 and 10.6 of docs/results-loop.md, and a
+/// Largest relative torque error with compensation, median and worst, %: 3.7 and 10.6 of docs/results-loop.md, and a
 /// tenth of them.
-const TORQUE_ERROR: (f64, f64) = (4.4, 11.7);
-/// Least factor by which the position error of slow reversals falls, median: docs/results-loop.md's 5.3 less a tenth.
-const TRACKING_GAIN: f64 = 4.8;
+const TORQUE_ERROR: (f64, f64) = (4.1, 11.7);
+/// Least factor by which the position error of slow reversals falls, median: docs/results-loop.md's 5.8 less a tenth.
+const TRACKING_GAIN: f64 = 5.2;
 
-/// The same for moves that begin at 0 °C: docs/results-loop.md's 10.6 and 29.9, and a tenth of them.
-const COLD: (f64, f64) = (11.7, 32.9);
+/// The same for moves that begin at 0 °C: docs/results-loop.md's 10.9 and 22.4, and a tenth of them.
+const COLD: (f64, f64) = (12.0, 24.7);
 
 /// Friction left in torque mode at most, led by hand, and moved by a command that tells its offset and one that does
 /// not, median and worst, %: docs/results-loop.md's figures and a tenth of them.
-const TORQUE_MODE: [(f64, f64); 3] = [(69.6, 74.1), (10.3, 44.1), (68.9, 70.3)];
+const TORQUE_MODE: [(f64, f64); 3] = [(69.5, 74.1), (10.0, 45.5), (68.9, 70.5)];
 
 /// Torque errors in service, moves and slow reversals, median and worst, %, with adaptation: docs/adaptation.md's
 /// figures and a tenth of them. As commissioned; all of friction's torques times 0.7, 1.3, 0.4 and 2; viscous friction
 /// times 4.
 const IN_SERVICE: [(f64, f64, f64, f64); 6] = [
-    (5.6, 12.9, 12.0, 31.0),
-    (5.1, 7.9, 13.8, 33.0),
-    (7.0, 17.8, 12.4, 30.0),
-    (3.2, 6.7, 12.9, 31.6),
-    (12.9, 27.3, 12.5, 34.8),
-    (6.7, 12.7, 12.2, 37.5),
+    (5.3, 12.9, 11.4, 20.9),
+    (4.6, 7.9, 13.2, 22.9),
+    (6.7, 17.8, 11.8, 32.6),
+    (2.9, 7.2, 12.1, 23.4),
+    (12.8, 27.3, 10.6, 44.2),
+    (6.4, 13.6, 11.4, 41.7),
 ];
 
 /// Change of what adaptation adds while a hand pushes the link, and while it resists, % of Coulomb friction, median and

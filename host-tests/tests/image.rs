@@ -28,7 +28,8 @@ fn parameters(random: &mut ChaCha8Rng, format: u16, sets: usize, networks: bool)
             match format {
                 1 => to_format_1(&mut parameters),
                 2 => to_format_2(&mut parameters),
-                _ => {}
+                _ if parameters.sets.iter().any(|set| set.physical.terms.contains(Terms::VELOCITY_WEAKENING)) => {}
+                _ => continue,
             }
             while format > 1 && parameters.common == CommonTerms::NONE {
                 parameters.common = tame_common(random);
@@ -194,7 +195,12 @@ fn with_a_right_checksum_reserved_bytes_and_fields_are_refused_and_the_rest_is_c
     for (shape, bytes) in valid_images().into_iter().enumerate() {
         let (format, criteria) = ((shape / SHAPES) as u16 + 1, shape % SHAPES / 2);
         let sets = 1 << criteria;
-        let layout = layout(format, criteria, if shape % 2 == 1 { (1 << sets) - 1 } else { 0 }, golden(format, sets, shape % 2 == 1));
+        let layout = layout(
+            format,
+            criteria,
+            if shape % 2 == 1 { (1 << sets) - 1 } else { 0 },
+            golden(format, sets, shape % 2 == 1),
+        );
         assert_eq!(layout.len() + 4, bytes.len());
         for (offset, byte) in layout.into_iter().enumerate().skip(8) {
             let bits = (0..8).map(|bit| bytes[offset] ^ 1 << bit);

@@ -17,10 +17,10 @@ use std::path::{Path, PathBuf};
 /// Stribeck, asymmetric, quadratic and load-dependent terms; with a network on top) and that of the image, both of
 /// docs/results-recordings.md, in the effort's unit.
 const PUBLISHED: [(&str, &[(f64, f64)]); 10] = [
-    ("emps", &[(3.161, 1.701)]),
-    ("ur10e_joint1", &[(0.0927, 0.0676)]),
-    ("ur10e_joint2", &[(0.0744, 0.0907)]),
-    ("ur10e_joint3", &[(0.0481, 0.0498)]),
+    ("emps", &[(3.161, 1.668)]),
+    ("ur10e_joint1", &[(0.0927, 0.0659)]),
+    ("ur10e_joint2", &[(0.0744, 0.0870)]),
+    ("ur10e_joint3", &[(0.0481, 0.0493)]),
     ("iiwa_joint4", &[(0.658, 0.348)]),
     ("sts3250", &[(0.319, 0.303), (0.262, 0.240)]),
     ("dm_motor1", &[(0.0446, 0.0407)]),

@@ -421,8 +421,8 @@ impl Physical {
 }
 
 impl PreparedTerms {
-    /// Largest Coulomb friction, with breakaway where that is above it, hysteresis, and pre-sliding elements (their torque
-    /// where they slip, Q16.16), with the weakening's largest factor, Nm in Q16.16.
+    /// Largest Coulomb friction, with breakaway where that is above it, hysteresis, and pre-sliding elements (their
+    /// torque where they slip, Q16.16), with the weakening's largest factor, Nm in Q16.16.
     pub(super) fn breakaway(&self, pre_sliding: i32) -> i32 {
         let of = |coulomb: i32, stribeck: i32| coulomb.saturating_add(stribeck.max(0));
         let forward = of(self.coulomb.positive, self.stribeck.positive);

@@ -86,8 +86,8 @@ pub fn search_from(problem: &Problem, structure: &Structure, start: &Fit, new: O
     best.unwrap_or_else(|| candidate.descend(problem, &problem.search, &x, NEARBY))
 }
 
-/// The vector of a model, with some weakening where it has none: factors are held on the grid, and without any its slope
-/// would not be seen.
+/// The vector of a model, with some weakening where it has none: factors are held on the grid, and without any its
+/// slope would not be seen.
 fn encoded(candidate: &Candidate, rigid: &RigidParameters, friction: &FrictionModel) -> DVector<f64> {
     let mut x = candidate.layout.encode(rigid, friction);
     let columns = [P::WeakeningPositive, P::WeakeningNegative].map(|side| candidate.layout.column_of(side));
