@@ -1,5 +1,5 @@
-//! `jointctl fleet register`, `jointctl fleet images`, and the roll call of `fleet status --bus`: which joint runs which
-//! image.
+//! `jointctl fleet register`, `jointctl fleet images`, and the roll call of `fleet status --bus`: which joint runs
+//! which image.
 
 use super::{Images, Register};
 use crate::commands::CommandError;
