@@ -1,5 +1,5 @@
-//! Registry of images: which was made for which joint from which days with which key, and which joint runs which, since
-//! when; host.
+//! Registry of images: which was made for which joint from which days with which key, and which joint runs which,
+//! since when; host.
 //!
 //! Append-only: a file for each batch, `_registry/TIME-DIGEST.parquet`, written beside its place and renamed. No file
 //! is ever changed, so that writers at the same time lose nothing. What is written twice counts once: an image that
