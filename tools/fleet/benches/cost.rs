@@ -1,5 +1,5 @@
-//! Cost of a fleet's night against its size: 10, 100 and 1,000 joints over 30 days, ten seconds of motion in rows of
-//! 4 ms a day, made by the plant. `cargo bench -p fleet --bench cost` prints time, rows a second, the peak of the
+//! Cost of a fleet's night against its size: 10, 100 and 1,000 joints over 30 days, ten seconds of motion in rows
+//! of 4 ms a day, made by the plant. `cargo bench -p fleet --bench cost` prints time, rows a second, the peak of the
 //! memory and bytes on disk; it takes minutes and 3 GB. `FLEET_JOINTS=100` stops at 100.
 
 #[path = "../tests/fleet_of_joints/mod.rs"]

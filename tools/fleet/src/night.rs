@@ -117,7 +117,8 @@ fn as_stored(fleet: &Path, found: &[Partition]) -> Night {
     night
 }
 
-/// True where an entry is of files with these names and sizes. One without sources is of files that cannot be read.
+/// True where an entry is of files with these names and sizes. One without sources is of files that are not
+/// readable.
 fn of_these_files(partition: &Partition, known: &Entry) -> bool {
     let line = |file: &PathBuf| {
         let size = fs::metadata(file).ok()?.len();

@@ -1,14 +1,14 @@
-//! Registry of images: which was made for which joint from which days with which key, and which joint runs which,
-//! since when; host.
+//! Registry of images: which was made for which joint from which days with which key, and which joint runs
+//! which, since when; host.
 //!
-//! Append-only: a file for each batch, `_registry/TIME-DIGEST.parquet`, written beside its place and renamed. No file
-//! is ever changed, so that writers at the same time lose nothing. What is written twice counts once: an image that
-//! was made for a joint by its first record, an image that a joint runs by the first of the records that follow each
-//! other.
+//! Append-only: a file for each batch, `_registry/TIME-DIGEST.parquet`, written beside its place and renamed. No
+//! file is ever changed, so that writers at the same time lose nothing. What is written twice counts once: an
+//! image that was made for a joint by its first record, an image that a joint runs by the first of the records
+//! that follow each other.
 //!
-//! Columns: `time_ms`, ms since 1970-01-01 UTC; `event`, made or runs; `joint`; `product`, `serial`, of a joint that
-//! runs an image, else absent; `version`; `image`, SHA-256; `days`, `data`: first and last day, and SHA-256 of the
-//! digests of all files that were learned from; `key`: number of the key that signed it.
+//! Columns: `time_ms`, ms since 1970-01-01 UTC; `event`, made or runs; `joint`; `product`, `serial`, of a joint
+//! that runs an image, else absent; `version`; `image`, SHA-256; `days`, `data`: first and last day, and SHA-256
+//! of the digests of all files that were learned from; `key`: number of the key that signed it.
 
 use crate::partition::Misplaced;
 use logs::{LogError, Table, Texts, Wanted};

@@ -1,8 +1,8 @@
-//! A night on Ray (`tools/python/fleet_on_ray`): two workers, four, and one process write the same bytes, whichever
-//! worker or driver is killed meanwhile.
+//! A night on Ray (`tools/python/fleet_on_ray`): two workers, four, and one process write the same bytes,
+//! whichever worker or driver is killed meanwhile.
 //!
-//! Without Python, or where Ray cannot be installed, these are reported as ignored by name; with `CI` set they run, and
-//! fail. `FLEET_KILLS=20` kills a worker at 20 instants in place of 4.
+//! Without Python, or where Ray cannot be installed, these are reported as ignored by name; with `CI` set they
+//! run, and fail. `FLEET_KILLS=20` kills a worker at 20 instants in place of 4.
 
 #[path = "../../fleet/tests/fleet_of_joints/mod.rs"]
 mod fleet_of_joints;
