@@ -89,6 +89,11 @@ class Folder:
     def night(self, *more, code=0):
         return self.end(self.start(*more), code)
 
+    def reach(self, night, condition, what):
+        """Waits for a state of a night that is still at work."""
+        until(lambda: condition() or night.poll() is not None, what)
+        self.test.assertIsNone(night.poll(), f"over before {what}: {night.poll() is None or night.communicate()}")
+
     def end(self, night, code=0):
         """The report of a night that ends with this exit code."""
         output, error = night.communicate(timeout=LONG)
@@ -146,14 +151,14 @@ class OnOneMachine(unittest.TestCase):
     def test_ctrl_c_ends_a_night_without_a_half_and_it_goes_on_from_there(self):
         folder = Folder(self, "--workers", "2", pause=0.5)
         night = folder.start()
-        until(lambda: folder.summed() >= 20, "sums")
+        folder.reach(night, lambda: folder.summed() >= 20, "sums")
         os.killpg(night.pid, signal.SIGINT)
         _, error = folder.end(night, 130)
         self.assertRegex(error, "interrupted: sums: [0-9]+ of 12 were done; the same command goes on from there")
         self.assertFalse(os.path.exists(os.path.join(folder.fleet, "_sums", "all.parquet")))
         folder.no_half()
         night = folder.start()
-        until(lambda: folder.retrained() >= 1, "an outcome")
+        folder.reach(night, lambda: folder.retrained() >= 1, "an outcome")
         os.killpg(night.pid, signal.SIGINT)
         _, error = folder.end(night, 130)
         self.assertIn("interrupted: retrain: ", error)
@@ -236,13 +241,13 @@ class Cluster(unittest.TestCase):
     def test_a_driver_that_is_killed_and_started_again_does_nothing_twice(self):
         folder = self.folder()
         night = folder.start()
-        until(lambda: folder.summed() >= 30, "sums")
+        folder.reach(night, lambda: folder.summed() >= 30, "sums")
         # Two nights at once are one too many.
         self.assertIn("another night is at work there", folder.night(code=1)[1])
         night.kill()
         night.communicate()
         night = folder.start()
-        until(lambda: folder.retrained() >= 1, "an outcome")
+        folder.reach(night, lambda: folder.retrained() >= 1, "an outcome")
         night.kill()
         night.communicate()
         report, _ = folder.night("--force")
