@@ -1,7 +1,7 @@
 """The night of a fleet on several machines: sums, findings, and with --out new images.
 
     python -m fleet_on_ray /data/fleet --out new --workers 2
-    python -m fleet_on_ray /data/fleet --out new --address ray://head:10001
+    python -m fleet_on_ray /data/fleet --out new --address head:6379
 
 Ctrl-C ends it, the same command goes on from there. Exit code: 0 done, 1 failed or some joints did (they are named),
 2 wrong arguments, 130 interrupted.
