@@ -8,8 +8,9 @@
 //! z(k) = clamp(z(k-1) + v T / d, -1, 1)        torque = sum of level z
 //! ```
 //!
-//! Source: Iwan 1966; Lampaert, Swevers, Al-Bender 2002 (generalised Maxwell slip), without its velocity weakening: the
-//! Stribeck term has that. The state is bounded by construction, and at a velocity of zero it stays as it is.
+//! Source: Iwan 1966; Lampaert, Swevers, Al-Bender 2002 (generalised Maxwell slip). Its velocity weakening is a factor
+//! of the parameter set's dry friction. The state is bounded by construction, and at a velocity of zero it stays as it
+//! is.
 
 use crate::dsp::{saturate, smlal, smull};
 

@@ -16,8 +16,12 @@
 //!
 //! q position, v velocity, a acceleration, tau theoretical torque, th temperature minus reference; (+/-): one value for
 //! each direction of v. Two steps of the papers' formulas are made continuous, because a loop is closed around them:
-//! sign a is `k_a a` held at +-1, and the harmonics pass from one direction's set to the other's along with tanh(v /
-//! v_c).
+//! sign a is `k_a a` held at +-1, and harmonics and weakening pass from one direction's set to the other's along with
+//! tanh(v / v_c).
+//!
+//! The Stribeck term is zero at standstill. Velocity weakening is largest where sliding begins, as in generalised
+//! Maxwell slip (Lampaert, Swevers, Al-Bender 2002) and LuGre (Canudas de Wit et al. 1995), whose Gaussian is a squared
+//! hyperbolic secant here: its table is there already.
 //!
 //! Signals come in Q31 of their [full scale](super::domain::Domain::shifts), coefficients are Q16.16 torques at full
 //! scale: so a small coefficient of a large signal keeps its resolution. Products have 47 fraction bits and are summed

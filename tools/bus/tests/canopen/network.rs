@@ -15,10 +15,15 @@ const MS: Duration = Duration::from_millis(1);
 
 /// A master, and a node that has booted.
 fn pair(bus: &str, id: u8, heartbeat: u16) -> (Network, Running) {
-    let network = Network::new(open(bus).unwrap());
+    pair_over(open(bus).unwrap(), bus, id, heartbeat)
+}
+
+/// The same, the master over a transport of its own.
+fn pair_over(master: Arc<dyn Transport>, bus: &str, id: u8, heartbeat: u16) -> (Network, Running) {
+    let network = Network::new(master);
     let booted = network.heartbeats();
     let running = Running::new(open(bus).unwrap(), Node::new(id, 1, heartbeat));
-    assert!(booted.next(Duration::from_secs(5)).unwrap().is_some(), "boots");
+    assert!(booted.next(Duration::from_secs(60)).unwrap().is_some(), "boots");
     (network, running)
 }
 
@@ -165,10 +170,7 @@ fn a_read_that_another_client_disturbs_is_repeated_four_times() {
     let bus = "virtual:reads";
     let (ours, other) = (open(bus).unwrap(), open(bus).unwrap());
     let interrupted = Arc::new(Interrupted { ours, other, reads: AtomicUsize::new(0), begun: AtomicBool::new(false) });
-    let network = Network::new(interrupted.clone());
-    let booted = network.heartbeats();
-    let running = Running::new(open(bus).unwrap(), Node::new(5, 1, 0));
-    assert!(booted.next(Duration::from_secs(5)).unwrap().is_some(), "boots");
+    let (network, running) = pair_over(interrupted.clone(), bus, 5, 0);
     let node = network.node(5).unwrap();
     node.download(0x2001, 0, &pattern(2000)).unwrap();
     for times in [1, 4] {

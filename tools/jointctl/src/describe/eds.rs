@@ -13,6 +13,7 @@ use joint_firmware::objects::field::{Constant, Field};
 use joint_firmware::objects::table::{DataType, wants_room};
 use std::fmt::Write;
 use std::time::Duration;
+use time::UtcDateTime;
 
 /// Object types of CiA 306.
 const DOMAIN: u8 = 2;
@@ -60,6 +61,8 @@ pub fn text(name: &str, now: Duration, identity: Identity) -> String {
 }
 
 fn write(text: &mut String, name: &str, now: Duration, identity: Identity) -> std::fmt::Result {
+    let now = i64::try_from(now.as_secs()).ok().and_then(|now| UtcDateTime::from_unix_timestamp(now).ok());
+    let now = now.unwrap_or(UtcDateTime::UNIX_EPOCH);
     let (date, time) = (date(now), time(now));
     writeln!(text, "[FileInfo]\nFileName={}\nFileVersion=1\nFileRevision=0\nEDSVersion=4.0", plain(name))?;
     writeln!(text, "Description=Robot joint with learned friction compensation, CiA 402 subset")?;
@@ -239,26 +242,15 @@ fn pdo(index: u16, defaults: &CommunicationParameters) -> Option<&PdoParameters>
     all.get(usize::from(index & 0x1FF))
 }
 
-/// mm-dd-yyyy, as CiA 306 writes it. Days to a date: H. Hinnant, "chrono-compatible low-level date algorithms",
-/// civil_from_days.
-fn date(now: Duration) -> String {
-    let days = now.as_secs() / 86_400 + 719_468;
-    let (era, of_era) = (days / 146_097, days % 146_097);
-    let year = (of_era - of_era / 1_460 + of_era / 36_524 - of_era / 146_096) / 365;
-    let of_year = of_era - (365 * year + year / 4 - year / 100);
-    let from_march = (5 * of_year + 2) / 153;
-    let day = of_year - (153 * from_march + 2) / 5 + 1;
-    let month = if from_march < 10 { from_march + 3 } else { from_march - 9 };
-    let year = year + era * 400 + u64::from(month <= 2);
-    format!("{month:02}-{day:02}-{year:04}")
+/// mm-dd-yyyy, as CiA 306 writes it.
+fn date(now: UtcDateTime) -> String {
+    format!("{:02}-{:02}-{:04}", u8::from(now.month()), now.day(), now.year())
 }
 
 /// hh:mmAM, as CiA 306 writes it.
-fn time(now: Duration) -> String {
-    let minutes = now.as_secs() % 86_400 / 60;
-    let (hours, minutes) = (minutes / 60, minutes % 60);
-    let half = if hours < 12 { "AM" } else { "PM" };
-    format!("{:02}:{minutes:02}{half}", (hours + 11) % 12 + 1)
+fn time(now: UtcDateTime) -> String {
+    let half = if now.hour() < 12 { "AM" } else { "PM" };
+    format!("{:02}:{:02}{half}", (now.hour() + 11) % 12 + 1, now.minute())
 }
 
 #[cfg(test)]
@@ -267,7 +259,10 @@ mod tests {
 
     #[test]
     fn a_moment_is_written_as_the_standard_wants_it() {
-        let at = |seconds| (date(Duration::from_secs(seconds)), time(Duration::from_secs(seconds)));
+        let at = |seconds| {
+            let now = UtcDateTime::from_unix_timestamp(seconds).unwrap();
+            (date(now), time(now))
+        };
         assert_eq!(at(0), ("01-01-1970".into(), "12:00AM".into()));
         assert_eq!(at(951_827_696), ("02-29-2000".into(), "12:34PM".into()));
         assert_eq!(at(1_700_000_000), ("11-14-2023".into(), "10:13PM".into()));

@@ -73,7 +73,7 @@ pub struct Status {
     /// Compare the registry with what the joints on this bus say, as of `scan`
     #[arg(long, value_name = "BUS")]
     bus: Option<String>,
-    /// How long each joint may take.
+    /// Time that each joint may take.
     #[command(flatten)]
     patience: Patience,
     /// Permission to replace.

@@ -15,6 +15,7 @@ use friction_compensation::parameters::authentication::split;
 use std::fmt::Write;
 use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
+use time::UtcDateTime;
 
 /// Time since 1970-01-01 UTC, ms.
 pub(super) fn now() -> u64 {
@@ -47,16 +48,16 @@ fn answer(joint: &RemoteJoint) -> Result<Answer, RemoteError> {
     Ok(Answer { node: joint.id(), identity, image })
 }
 
-/// A time since 1970, s, as date and time (after Hinnant, chrono-compatible low-level date algorithms).
+/// A time since 1970-01-01 UTC, s, as date and time; "-" beyond the year 9999.
 fn utc(time: u64) -> String {
-    let (days, second) = (time / 86_400 + 719_468, time % 86_400);
-    let (era, day) = (days / 146_097, days % 146_097);
-    let year = (day - day / 1_460 + day / 36_524 - day / 146_096) / 365;
-    let day = day - (365 * year + year / 4 - year / 100);
-    let month = (5 * day + 2) / 153;
-    let (date, month) = (day - (153 * month + 2) / 5 + 1, if month < 10 { month + 3 } else { month - 9 });
-    let year = year + 400 * era + u64::from(month <= 2);
-    format!("{year:04}-{month:02}-{date:02} {:02}:{:02}:{:02}", second / 3_600, second / 60 % 60, second % 60)
+    let time = i64::try_from(time).ok().and_then(|time| UtcDateTime::from_unix_timestamp(time).ok());
+    time.map_or_else(
+        || "-".into(),
+        |t| {
+            let (hour, minute, second) = t.as_hms();
+            format!("{} {hour:02}:{minute:02}:{second:02}", t.date())
+        },
+    )
 }
 
 impl Register {
@@ -174,15 +175,13 @@ mod tests {
     use super::utc;
 
     #[test]
-    fn times_are_dates_on_both_sides_of_leap_days_and_centuries() {
+    fn a_time_is_a_date_up_to_the_year_9999() {
         for (time, date) in [
             (0, "1970-01-01 00:00:00"),
-            (951_782_399, "2000-02-28 23:59:59"),
             (951_782_400, "2000-02-29 00:00:00"),
-            (951_868_800, "2000-03-01 00:00:00"),
-            (1_767_225_599, "2025-12-31 23:59:59"),
-            (4_107_542_399, "2100-02-28 23:59:59"),
-            (4_107_542_400, "2100-03-01 00:00:00"),
+            (253_402_300_799, "9999-12-31 23:59:59"),
+            (253_402_300_800, "-"),
+            (u64::MAX, "-"),
         ] {
             assert_eq!(utc(time), date);
         }
