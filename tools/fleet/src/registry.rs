@@ -95,11 +95,11 @@ pub fn append(fleet: &Path, records: &[Record]) -> io::Result<PathBuf> {
 /// All records by time, each once, and files that are none.
 ///
 /// # Errors
-/// The folder cannot be read; one that is not there has no records.
+/// A folder cannot be read; a fleet without a registry has no records.
 pub fn read(fleet: &Path) -> io::Result<(Vec<Record>, Vec<Misplaced>)> {
     let folder = fleet.join(FOLDER);
     let found = match fs::read_dir(&folder) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok((Vec::new(), Vec::new())),
+        Err(error) if error.kind() == io::ErrorKind::NotFound && fleet.is_dir() => return Ok((Vec::new(), Vec::new())),
         found => found?.map(|entry| entry.map(|entry| entry.path())).collect::<io::Result<BTreeSet<PathBuf>>>()?,
     };
     let (mut records, mut misplaced) = (Vec::new(), Vec::new());
@@ -203,6 +203,7 @@ mod tests {
     fn records_come_back_by_time_and_each_once() {
         let fleet = tempfile::tempdir().unwrap();
         assert_eq!(read(fleet.path()).unwrap(), (Vec::new(), Vec::new()));
+        assert_eq!(read(&fleet.path().join("nowhere")).unwrap_err().kind(), io::ErrorKind::NotFound);
         let batch = [made_record(30, "a", 2), made_record(30, "b", u32::MAX), made_record(u64::from(u32::MAX), "a", 3)];
         append(fleet.path(), &batch).unwrap();
         append(fleet.path(), &batch).unwrap();

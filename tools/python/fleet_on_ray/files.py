@@ -42,7 +42,10 @@ def digest(path):
 
 def lock(fleet):
     """A lock on a fleet's folder for as long as the returned descriptor is open, also beyond a kill."""
-    descriptor = os.open(fleet, os.O_RDONLY)
+    try:
+        descriptor = os.open(fleet, os.O_RDONLY)
+    except OSError as error:
+        raise NightError(f"{fleet}: cannot be read: {error.strerror}") from error
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:

@@ -95,6 +95,8 @@ class Files(Place):
             files.outcomes(os.path.join(self.place, "x"))
 
     def test_one_night_at_a_time_works_on_a_folder(self):
+        with self.assertRaisesRegex(files.NightError, "nowhere: cannot be read: No such file"):
+            files.lock(os.path.join(self.place, "nowhere"))
         locked = files.lock(self.place)
         with self.assertRaisesRegex(files.NightError, "another night is at work there"):
             files.lock(self.place)
