@@ -65,5 +65,28 @@ pub fn all() -> Vec<Motion> {
             add(motor, format!("run {run}"), format!("runs = [{run}]"));
         }
     }
+    // What is faster than half of the greatest speed.
+    for (data_set, column, speed) in [
+        ("ur10e_joint1", "qd1_rad_s", "0.49"),
+        ("ur10e_joint2", "qd2_rad_s", "0.32"),
+        ("ur10e_joint3", "qd3_rad_s", "0.49"),
+        ("ur10e_fourier_joint4", "qd4_rad_s", "0.52"),
+        ("ur10e_fourier_joint6", "qd6_rad_s", "0.71"),
+        ("iiwa_joint4", "velocity_rad_s", "0.7"),
+        ("xl330", "velocity_rad_s", "5.4"),
+        ("kuka_kr300_axis1", "qd1_motor_rad_s", "0.22"),
+        ("kuka_kr300_axis2", "qd2_motor_rad_s", "0.22"),
+        ("kuka_kr300_axis3", "qd3_motor_rad_s", "0.21"),
+        ("kuka_kr300_axis4", "qd4_motor_rad_s", "0.28"),
+        ("kuka_kr300_axis5", "qd5_motor_rad_s", "0.26"),
+        ("kuka_kr300_axis6", "qd6_motor_rad_s", "0.38"),
+        ("dm_motor1", "velocity_rad_s", "3.7"),
+        ("dm_motor2", "velocity_rad_s", "3.8"),
+        ("dm_motor5", "velocity_rad_s", "3.9"),
+        ("dm_motor6", "velocity_rad_s", "3.9"),
+    ] {
+        let rule = format!("where = [{{ column = \"{column}\", outside = [-{speed}, {speed}] }}]");
+        add(data_set, format!("above {speed} rad/s"), rule);
+    }
     all
 }

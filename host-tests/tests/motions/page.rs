@@ -123,7 +123,7 @@ pub fn document(rows: &[Row]) -> String {
     format!(
         "# Motions that were left out
 
-Each row leaves one motion out of a recording: a run, speed, load, gain, trajectory or session. The image and three SciPy baselines are
+Each row leaves one motion out of a recording: a run, speed, load, gain, trajectory or session, or all that is faster than half of the greatest speed. The image and three SciPy baselines are
 fitted to the rest, and judged on that motion. All of them get the same filtered samples and the same split; `tools/python/baselines`
 computes the baselines and judges the image once more on the rows that `fit --export` wrote ([baselines.md](baselines.md)). Figures
 are RMS errors of the effort in % of its RMS. \"Simplest\" is Coulomb and viscous friction as the same fit identifies it.

@@ -2,11 +2,12 @@
 
 use super::{FitError, Learned, Options, coverage};
 use crate::dataset::description::EffortUnit;
+use crate::friction_model::{FrictionModel as FloatModel, Term};
 use crate::identify::Identified;
 use crate::quantize::{self, full_scale::to_unsigned_q16, golden_vectors};
 use crate::samples::Samples;
 use friction_compensation::friction::regime::MAX_SETS;
-use friction_compensation::friction::state::SIGNALS;
+use friction_compensation::friction::state::{SIGNALS, Signal};
 use friction_compensation::friction::{FrictionParameters, ParameterSet};
 use friction_compensation::parameters::certificate::{Certificate, Limits, certify, prove};
 use friction_compensation::parameters::image::{Effort, Image, MAX_LENGTH, Target};
@@ -17,6 +18,9 @@ const GOLDEN: usize = 6;
 const OUTPUT_LIMIT: f64 = 3.0;
 /// Slopes may be this much above what is proved of the image: room for a later retraining within the same limits.
 const SLOPE_ROOM: f64 = 1.5;
+/// Trained speeds up to which a model without network counts: its terms either have an end or grow with the speed, as
+/// friction does. A network knows nothing beyond what it was trained on.
+const REACH: f64 = 2.0;
 /// A loop gain through the measured torque that no image may exceed.
 const TORQUE_GAIN_LIMIT: f64 = 0.5;
 
@@ -41,7 +45,22 @@ pub struct Built {
 }
 
 /// Quantises and certifies the learned model; a network that the certificate refuses is left out, with the reason.
+/// Without one the model counts up to [`REACH`] times the trained speed, or to that speed where more is refused.
 pub fn build_image(
+    samples: &Samples,
+    physical: &Identified,
+    learned: &Learned,
+    context: &Context,
+) -> Result<Built, FitError> {
+    match build_to(REACH, samples, physical, learned, context) {
+        Err(FitError::Refused(_) | FitError::Quantize(_)) => build_to(1.0, samples, physical, learned, context),
+        built => built,
+    }
+}
+
+/// [`build_image`] for a model that counts up to `reach` times the trained speed.
+fn build_to(
+    reach: f64,
     samples: &Samples,
     physical: &Identified,
     learned: &Learned,
@@ -49,10 +68,10 @@ pub fn build_image(
 ) -> Result<Built, FitError> {
     let limit = to_unsigned_q16("limit of the output", OUTPUT_LIMIT * largest_effort(samples))?;
     let mut learned = learned.clone();
-    let mut parameters = match quantized(samples, physical, &learned, context.options) {
+    let mut parameters = match quantized(samples, physical, &learned, context.options, reach) {
         Err(FitError::Quantize(error)) if learned.has_network() => {
             learned = learned.rejected(format!("an image cannot hold it: {error}"));
-            quantized(samples, physical, &learned, context.options)?
+            quantized(samples, physical, &learned, context.options, reach)?
         }
         other => other?,
     };
@@ -67,7 +86,7 @@ pub fn build_image(
     };
     if let Some(refusal) = refusal.filter(|_| learned.has_network()) {
         learned = learned.rejected(format!("the certificate refuses it: {refusal}"));
-        parameters = quantized(samples, physical, &learned, context.options)?;
+        parameters = quantized(samples, physical, &learned, context.options, reach)?;
         proved = prove(&parameters);
     }
     let proved = proved.map_err(FitError::Refused)?;
@@ -114,11 +133,31 @@ fn largest_effort(samples: &Samples) -> f64 {
     coverage::used(samples).fold(0.0, |most, i| most.max(samples.effort[i].abs()))
 }
 
+/// True where what the model knows of one sign of the signal holds for the other: of the velocity without an
+/// asymmetric viscous term, of the load where its magnitude alone counts.
+fn alike_both_ways(signal: usize, friction: &FloatModel) -> bool {
+    let unless = |term| !friction.terms.contains(term);
+    signal == Signal::Velocity as usize && unless(Term::ViscousAsymmetry)
+        || signal == Signal::TheoreticalTorque as usize && unless(Term::Load)
+}
+
+/// The range as wide on either side of zero as on the wider one, where it has both.
+fn both_ways((low, high): (f64, f64)) -> (f64, f64) {
+    let widest = high.max(-low);
+    if low < 0.0 && high > 0.0 { (-widest, widest) } else { (low, high) }
+}
+
+/// The range with each end that lies beyond zero `reach` times as far away from it.
+fn reaching(reach: f64, (low, high): (f64, f64)) -> (f64, f64) {
+    (low.min(reach * low), high.max(reach * high))
+}
+
 fn quantized(
     samples: &Samples,
     physical: &Identified,
     learned: &Learned,
     options: &Options,
+    reach: f64,
 ) -> Result<FrictionParameters, FitError> {
     let depends = quantize::physical::depends_on(&physical.friction);
     let range = |column: &[f64]| coverage::ends(coverage::used(samples).map(|i| column[i]).collect());
@@ -132,7 +171,11 @@ fn quantized(
     ];
     let limits = std::array::from_fn(|i| {
         let network = learned.input_box.as_ref().is_some_and(|input_box| i < 5 && input_box.active()[i]);
-        (depends[i] || network).then(|| range(columns[i]))
+        (depends[i] || network).then(|| {
+            let ends = range(columns[i]);
+            let ends = if !network && alike_both_ways(i, &physical.friction) { both_ways(ends) } else { ends };
+            if i == Signal::Velocity as usize && !learned.has_network() { reaching(reach, ends) } else { ends }
+        })
     });
     let domain = quantize::domain(&limits, options.margin, physical.friction.reference_temperature)?;
     let common = quantize::common::quantize(&physical.friction)?;
@@ -144,4 +187,35 @@ fn quantized(
         };
     }
     Ok(FrictionParameters { domain, selector: learned.selector, common, sets })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::friction_model::Terms;
+
+    #[test]
+    fn what_is_known_of_one_direction_counts_for_the_other_where_both_were_seen() {
+        assert_eq!(both_ways((-0.5, 0.3)), (-0.5, 0.5));
+        assert_eq!(both_ways((-0.3, 0.5)), (-0.5, 0.5));
+        assert_eq!(both_ways((0.0, 0.5)), (0.0, 0.5));
+        assert_eq!(both_ways((-0.5, 0.0)), (-0.5, 0.0));
+    }
+
+    #[test]
+    fn a_range_reaches_away_from_zero_and_never_past_its_near_end() {
+        assert_eq!(reaching(2.0, (-0.5, 0.3)), (-1.0, 0.6));
+        assert_eq!(reaching(2.0, (0.1, 0.3)), (0.1, 0.6));
+        assert_eq!(reaching(2.0, (-0.3, -0.1)), (-0.6, -0.1));
+        assert_eq!(reaching(1.0, (-0.5, 0.3)), (-0.5, 0.3));
+    }
+
+    #[test]
+    fn a_term_that_tells_directions_apart_keeps_each_to_its_own() {
+        let of = |term| FloatModel { terms: Terms::of(&[Term::Viscous, term]), ..FloatModel::default() };
+        let alike = |signal: Signal, term| alike_both_ways(signal as usize, &of(term));
+        assert!(alike(Signal::Velocity, Term::Coulomb) && !alike(Signal::Velocity, Term::ViscousAsymmetry));
+        assert!(alike(Signal::TheoreticalTorque, Term::CoulombLoad) && !alike(Signal::TheoreticalTorque, Term::Load));
+        assert!(!alike(Signal::Position, Term::Harmonics) && !alike(Signal::Acceleration, Term::Hysteresis));
+    }
 }

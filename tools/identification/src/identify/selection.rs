@@ -30,7 +30,8 @@ const ALWAYS: [Term; 3] = [Term::Constant, Term::Viscous, Term::Coulomb];
 /// The terms that the data can support, and why others are left out.
 fn supported(problem: &Problem, rigid: &RigidModel) -> (Structure, Vec<String>) {
     use Term::*;
-    let mut terms = Terms::of(&[Constant, Position, Viscous, Quadratic, Coulomb, CoulombLoad, Stribeck, Hysteresis]);
+    // No quadratic term: what slow motion makes of it, faster motion does not bear.
+    let mut terms = Terms::of(&[Constant, Position, Viscous, Coulomb, CoulombLoad, Stribeck, Hysteresis]);
     terms = terms.with(ViscousAsymmetry).with(VelocityWeakening);
     let limits = &problem.limits;
     for (term, found) in
