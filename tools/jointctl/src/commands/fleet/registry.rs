@@ -51,7 +51,8 @@ fn answer(joint: &RemoteJoint) -> Result<Answer, RemoteError> {
 /// A time since 1970-01-01 UTC, s, as date and time; "-" beyond the year 9999.
 fn utc(time: u64) -> String {
     let time = i64::try_from(time).ok().and_then(|time| UtcDateTime::from_unix_timestamp(time).ok());
-    time.map_or_else(
+    // Other crates of a build may ask `time` for larger years.
+    time.filter(|time| time.year() <= 9999).map_or_else(
         || "-".into(),
         |t| {
             let (hour, minute, second) = t.as_hms();
