@@ -2,9 +2,9 @@
 //! whichever worker or driver is killed meanwhile.
 //!
 //! Without Python, or where Ray cannot be installed, these are reported as ignored by name; with `CI` set they
-//! run, and fail. Kills are chosen instants of a night, and want a machine that does nothing else, and Ray itself aborts
-//! where a task ends just while Ctrl-C cancels it: both run where `FLEET_KILLS`, the number of instants at which a worker
-//! is killed (up to 20), is set.
+//! run, and fail. Kills are chosen instants of a night, and want a machine that does nothing else, and Ray itself
+//! aborts where a task ends just while Ctrl-C cancels it: both run where `FLEET_KILLS`, the number of instants at
+//! which a worker is killed (up to 20), is set.
 
 #[path = "../../fleet/tests/fleet_of_joints/mod.rs"]
 mod fleet_of_joints;
