@@ -116,7 +116,8 @@ class Folder:
 
     def no_half(self):
         """Nothing that was begun and not ended is left."""
-        self.test.assertEqual([name for name in self.names(self.root) if "partial" in name], [])
+        left = [name for name in self.names(self.root) if "partial" in name or "_stop" in name]
+        self.test.assertEqual(left, [])
 
     def same(self):
         """All files are those of one process, and each image was registered once."""

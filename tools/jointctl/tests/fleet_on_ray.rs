@@ -2,9 +2,8 @@
 //! whichever worker or driver is killed meanwhile.
 //!
 //! Without Python, or where Ray cannot be installed, these are reported as ignored by name; with `CI` set they
-//! run, and fail. Kills are chosen instants of a night, and want a machine that does nothing else, and Ray itself
-//! aborts where a task ends just while Ctrl-C cancels it: both run where `FLEET_KILLS`, the number of instants at
-//! which a worker is killed (up to 20), is set.
+//! run, and fail. Kills are chosen instants of a night, and want a machine that does nothing else: they run where
+//! `FLEET_KILLS`, the number of instants at which a worker is killed (up to 20), is set.
 
 #[path = "../../fleet/tests/fleet_of_joints/mod.rs"]
 mod fleet_of_joints;
@@ -28,7 +27,7 @@ fn main() {
     let ignored = !must_run && (python.is_none() || !cfg!(target_os = "linux"));
     let kills = std::env::var_os("FLEET_KILLS").is_some();
     let trial = |(name, file, test): (&str, &'static str, &'static str)| {
-        let (python, asked_for) = (python.clone(), kills || !test.contains("ctrl_c") && test != "Cluster");
+        let (python, asked_for) = (python.clone(), kills || test != "Cluster");
         Trial::test(name, move || pass(python.as_deref(), file, test)).with_ignored_flag(ignored || !asked_for)
     };
     let nights = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/fleet_on_ray.py");

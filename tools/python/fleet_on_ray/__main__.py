@@ -8,13 +8,14 @@ Ctrl-C ends it, the same command goes on from there. Exit code: 0 done, 1 failed
 """
 
 import argparse
+import glob
 import json
 import os
 import shutil
 import signal
 import sys
 
-from . import files
+from . import files, steps
 
 WORKERS = (1, 4096)
 RETRIES = (0, 100)
@@ -70,6 +71,7 @@ def options(given):
             raise files.UsageError(f"{absolute[name]}: no such file or folder; --{name} names it")
     return absolute | {
         "work": absolute["out"] and os.path.join(absolute["out"], "_joints"),
+        "stop": os.path.join(absolute["fleet"], f"_stop-{os.urandom(8).hex()}"),
         "jointctl": os.path.abspath(program), "program": files.digest(program),
         "presets": given.preset, "network": given.network, "force": given.force,
     }
@@ -119,6 +121,9 @@ def run(given):
     catch = lambda: [signal.signal(number, lambda *_: stop.append(True)) for number in (signal.SIGINT, signal.SIGTERM)]
     catch()
     locked = files.lock(chosen["fleet"])
+    stops = os.path.join(glob.escape(chosen["fleet"]), "_stop-*")
+    # Of a driver that was killed while it ended.
+    steps.sweep(stops)
     try:
         workers = connect(given)
         # Ray has handlers of its own, which end the process.
@@ -129,6 +134,7 @@ def run(given):
     finally:
         if "ray" in sys.modules:
             sys.modules["ray"].shutdown()
+        steps.sweep(stops)
         os.close(locked)
 
 

@@ -14,7 +14,7 @@ CHANGED = ("drifted", "friction-fell")
 """Findings for which jointctl fits a new image."""
 
 ENOUGH = 10.0
-"""Longest wait for tasks that were cancelled, s: jointctl is asked to end, then killed."""
+"""Longest wait for tasks that are to end, s: jointctl is asked to, then killed; later Ray's own end takes them along."""
 
 
 class Night:
@@ -71,7 +71,7 @@ class Night:
                 return done
             ready, _ = ray.wait(list(running), timeout=0.2)
             if self.stopped():
-                self.cancel(list(running))
+                self.end(list(running))
                 raise files.Interrupted(f"{name}: {len(done)} of {len(items)} were done")
             for reference in ready:
                 item = running.pop(reference)
@@ -85,11 +85,13 @@ class Night:
                 else:
                     done[item] = outcome
 
-    @staticmethod
-    def cancel(references):
-        """Ends tasks: each ends its jointctl first."""
-        for reference in references:
-            ray.cancel(reference, force=False)
+    def end(self, references):
+        """Ends tasks by a file that each looks for, and ends its jointctl then.
+
+        ray.cancel aborts the driver where a task ends just then ("Tried to complete task that was not pending").
+        """
+        with open(self.options["stop"], "w"):
+            pass
         ray.wait(references, num_returns=len(references), timeout=ENOUGH)
 
 

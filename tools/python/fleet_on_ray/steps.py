@@ -9,7 +9,6 @@ import glob
 import hashlib
 import os
 import shutil
-import signal
 import socket
 import subprocess
 import sys
@@ -17,9 +16,16 @@ import sys
 PATIENCE = 3.0
 """Time that jointctl has to end by itself when it is asked to, s."""
 
+LOOK = 0.5
+"""Time between two looks for the file that ends a night, s."""
+
 
 class Crashed(Exception):
     """A process that a signal ended, for want of memory for example: Ray tries again."""
+
+
+class Stopped(Exception):
+    """The end of a night by its user: the file `stop` of its options is there."""
 
 
 def sums(options, joint):
@@ -70,7 +76,9 @@ def inputs(options, joint):
 def outcome(options, arguments):
     """Runs jointctl: `output` and `warnings` are what it printed, `error` is the last line where it failed."""
     try:
-        code, output, error = call([options["jointctl"], *arguments])
+        code, output, error = call([options["jointctl"], *arguments], lambda: os.path.exists(options["stop"]))
+    except Stopped:
+        return {"error": "the night was stopped"}
     except (FileNotFoundError, PermissionError) as problem:
         place = f"{options['jointctl']} on {socket.gethostname()}"
         return {"error": f"{place}: {problem.strerror}; every node needs jointctl at this path"}
@@ -80,25 +88,24 @@ def outcome(options, arguments):
     return {"output": output, "warnings": error}
 
 
-def call(command):
-    """Runs a program that ends along with this process: exit code, standard output and standard error."""
+def call(command, stopped):
+    """Runs a program that ends along with this process: exit code, standard output and standard error.
+
+    Raises Stopped, and Crashed where a signal ended the program.
+    """
+    if stopped():
+        raise Stopped
     environment = dict(os.environ, RAYON_NUM_THREADS="1")
     pipes = dict(stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, errors="replace")
-    cancelled = []
-    # Ray cancels by Ctrl-C of the main thread. As an exception it could fall between the child's start and its name.
-    before = signal.signal(signal.SIGINT, lambda *_: cancelled.append(True))
-    try:
-        child = subprocess.Popen(command, env=environment, preexec_fn=mortal(), **pipes)
-        while True:
-            try:
-                output, error = child.communicate(timeout=0.1)
-                break
-            except subprocess.TimeoutExpired:
-                if cancelled:
-                    end(child)
-                    raise KeyboardInterrupt from None
-    finally:
-        signal.signal(signal.SIGINT, before)
+    child = subprocess.Popen(command, env=environment, preexec_fn=mortal(), **pipes)
+    while True:
+        try:
+            output, error = child.communicate(timeout=LOOK)
+            break
+        except subprocess.TimeoutExpired:
+            if stopped():
+                end(child)
+                raise Stopped from None
     if child.returncode < 0:
         raise Crashed(f"{os.path.basename(command[0])} was ended by signal {-child.returncode}")
     return child.returncode, output, error

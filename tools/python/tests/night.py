@@ -3,12 +3,12 @@
 import contextlib
 import io
 import os
-import signal
 import stat
 import tempfile
 import threading
 import time
 import unittest
+import unittest.mock
 
 from fleet_on_ray import __main__ as program, files, steps
 
@@ -38,7 +38,8 @@ class Place(unittest.TestCase):
 
     def options(self, **more):
         plain = dict(fleet=self.place, work=os.path.join(self.place, "new/_joints"), jointctl="/nowhere/jointctl",
-                     program="p", presets=[], network=False, images=None, key=None, page=None)
+                     program="p", presets=[], network=False, images=None, key=None, page=None,
+                     stop=os.path.join(self.place, "_stop"))
         return plain | more
 
 
@@ -129,24 +130,27 @@ class Steps(Place):
         there = [name for name in halves + others if os.path.exists(os.path.join(self.place, name))]
         self.assertEqual(there, others)
 
-    def test_a_step_that_is_interrupted_ends_its_program_first(self):
+    def test_a_step_of_a_night_that_is_stopped_ends_its_program_first(self):
         for text in ("trap 'echo > ended; exit 1' TERM; echo > began; while :; do sleep 0.05; done",
                      "trap '' TERM; echo > began; while :; do sleep 0.05; done"):
-            steps.PATIENCE = 0.5
-            script = self.script(f"cd {self.place}; echo $$ > pid; {text}")
+            options = self.options(jointctl=self.script(f"cd {self.place}; echo $$ > pid; {text}"))
 
-            def interrupt():
+            def stop():
                 while not os.path.exists(os.path.join(self.place, "began")):
                     time.sleep(0.01)
-                os.kill(os.getpid(), signal.SIGINT)
+                self.write("_stop")
 
-            thread = threading.Thread(target=interrupt)
+            thread = threading.Thread(target=stop)
             thread.start()
-            with self.assertRaises(KeyboardInterrupt):
-                steps.call([script])
+            with unittest.mock.patch.multiple(steps, PATIENCE=0.5, LOOK=0.01):
+                self.assertEqual(steps.sums(options, "a"), {"error": "the night was stopped"})
             thread.join()
             self.assertFalse(os.path.exists(f"/proc/{int(self.read('pid'))}"))
             os.remove(os.path.join(self.place, "began"))
+            # What comes after it does not even begin.
+            self.assertEqual(steps.sums(options, "a"), {"error": "the night was stopped"})
+            self.assertFalse(os.path.exists(os.path.join(self.place, "began")))
+            os.remove(options["stop"])
         self.assertTrue(os.path.exists(os.path.join(self.place, "ended")))
 
     def test_an_outcome_is_used_again_until_something_that_it_depends_on_changes(self):
