@@ -1,4 +1,5 @@
-//! The files of a virtual fleet, with everything that goes wrong in it.
+//! The files of a virtual fleet, with everything that goes wrong in it: in its first forty joints, and in larger fleets,
+//! which drift every forty joints alike, in some others.
 
 use fleet::windows::COLUMNS;
 use logs::{Format, Table, encode};
@@ -75,9 +76,9 @@ fn damaged(number: usize, date: usize, mut table: Table, bytes: Vec<u8>) -> Vec<
 fn parameters(number: usize, date: usize) -> JointParameters {
     let mut parameters = JointParameters::randomised(1_000 + number as u64);
     let behind = date >= CHANGE;
-    let factors = match number {
-        // Wear: 0 to 60 % over the days.
-        5 => FrictionFactors::torques(1.0 + 0.6 * (date as f64 / (DAYS - 1) as f64).powi(2)),
+    let factors = match number % JOINTS {
+        // Wear: 0 to 60 % over ten days.
+        5 => FrictionFactors::torques(1.0 + 0.6 * (date as f64 / (DAYS - 1) as f64).min(1.0).powi(2)),
         11 if behind => FrictionFactors::torques(1.4),
         17 if behind => FrictionFactors::viscous(2.5),
         23 if behind => FrictionFactors::torques(0.6),
@@ -113,8 +114,17 @@ fn recording(number: usize, date: usize) -> Table {
             + 2.0 * 25.0 * inertia * (reference.velocity - state.velocity);
         let limit = parameters.motor.torque_limit();
         let torque = torque.clamp(-limit, limit);
-        // A damaged place twelve times a revolution.
-        let knock = if number == 29 && behind { 0.8 * dry * (12.0 * state.position).sin() } else { 0.0 };
+        let time = step as f64 * STEP;
+        let knock = match number {
+            // Damaged places, twelve and thirty a revolution.
+            29 if behind => 0.8 * dry * (12.0 * state.position).sin(),
+            69 if behind => 0.8 * dry * (30.0 * state.position).sin(),
+            // A sector that binds.
+            109 if behind && (0.0..0.3).contains(&state.position) => -1.5 * dry * (state.velocity / 0.02).tanh(),
+            // A bearing that rattles.
+            149 if behind => 0.8 * dry * (44.0 * time).sin(),
+            _ => 0.0,
+        };
         joint.drive(torque, 0.0, knock, STEP);
         let state = joint.state();
         // Means over a row, of all signals alike, as `jointctl` records.
@@ -124,9 +134,12 @@ fn recording(number: usize, date: usize) -> Table {
             let scale = match number {
                 35 if behind => 0.8,
                 37 if behind => -1.0,
+                77 if behind => 1.3,
                 _ => 1.0,
             };
-            let torque = scale * torque + 0.01 * dry * uniform(-1.0, 1.0);
+            // A current sensor whose wire is loose.
+            let noise = if number == 189 && behind { 1.0 } else { 0.01 };
+            let torque = scale * torque + noise * dry * uniform(-1.0, 1.0);
             let row = [(step + 1) as f64 * STEP, position, velocity + 1e-4 * uniform(-1.0, 1.0), torque];
             columns.iter_mut().zip(row).for_each(|(column, value)| column.push(value));
             sums = [0.0; 3];
