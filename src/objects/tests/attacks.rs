@@ -389,9 +389,9 @@ const BUS: [Attack; 9] = [
         "Any set-point, also infinite, in any mode",
         "Torque, speed and travel stay within their limits",
         &[
-            ("tools/plant/tests/joint_hostile.rs", "whatever_is_commanded_the_torque_stays_within_its_limit"),
+            ("tools/plant/tests/joint/hostile.rs", "whatever_is_commanded_the_torque_stays_within_its_limit"),
             (
-                "tools/plant/tests/joint_hostile.rs",
+                "tools/plant/tests/joint/hostile.rs",
                 "whatever_is_measured_and_asked_the_joint_keeps_its_promises_and_comes_back",
             ),
         ],

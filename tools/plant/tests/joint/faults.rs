@@ -2,15 +2,13 @@
 //! time that stands there, the torque stays within its limit on the way, and it is left by a reset when the
 //! documentation says so.
 
-mod rig;
-
+use crate::rig::table::{Reset, documented, documented_faults};
+use crate::rig::{Rig, break_down, mend, position, reference, reset, torque, velocity};
 use joint_firmware::joint::configuration::Limits;
 use joint_firmware::joint::fault::{Fault, Reaction};
 use joint_firmware::joint::state_machine::{Controlword, RESET_STEPS, State};
 use plant::actuator::{Channel, Failure, Fault as Broken, Phase};
 use plant::virtual_joint::Setup;
-use rig::table::{Reset, documented, documented_faults};
-use rig::{Rig, break_down, mend, position, reference, reset, torque, velocity};
 
 /// Factor by which the motor's torque may exceed its limit: gain errors of the current sensors and overshoot of the
 /// current loop.

@@ -3,7 +3,7 @@
 
 use joint_firmware::joint::fault::{Fault, Reaction};
 
-const DOCUMENT: &str = include_str!("../../../../docs/faults.md");
+const DOCUMENT: &str = include_str!("../../../../../docs/faults.md");
 
 /// Condition on which a fault can be acknowledged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,10 +1,8 @@
 //! Measurements of the control step differ from the truth exactly as described.
 
-mod support;
-
+use crate::support::{PERIOD, actuator, coast, hold_current};
 use plant::actuator::{DriveSample, Effect};
 use plant::{Actuator, ActuatorParameters};
-use support::{PERIOD, actuator, coast, hold_current};
 
 fn perfect() -> ActuatorParameters {
     ActuatorParameters::reference().ideal().aligned()
@@ -63,7 +61,7 @@ fn currents_come_in_whole_counts_and_end_at_the_converters_range() {
     (parameters.sensors.currents.lowest, parameters.sensors.currents.highest) = (-3.0, 5.0);
     let mut actuator = actuator(parameters);
     let (mut low, mut high) = (false, false);
-    let mut controller = support::CurrentController::new(&parameters);
+    let mut controller = crate::support::CurrentController::new(&parameters);
     for n in 0..2000 {
         let (sine, cosine) = (0.01 * f64::from(n)).sin_cos();
         let duties = controller.duties(&actuator, [8.0 * cosine, 0.3 * sine]);
@@ -141,7 +139,7 @@ fn encoder_and_currents_arrive_late_by_their_delays() {
         parameters.sensors.encoder.delay = delay;
         parameters.sensors.currents.delay = delay;
         let mut actuator = actuator(parameters).released_at(0.0, 3.0);
-        let mut controller = support::CurrentController::new(&parameters);
+        let mut controller = crate::support::CurrentController::new(&parameters);
         let mut truth = vec![*actuator.state()];
         for _ in 0..50 {
             let duties = controller.duties(&actuator, [2.0, 5.0]);

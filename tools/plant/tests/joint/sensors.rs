@@ -1,16 +1,14 @@
 //! Every sensor of the joint broken in every way, as the table in docs/faults.md says; and where nothing can show, what
 //! comes of it.
 
-mod rig;
-
+use crate::rig::table::{SensorRow, documented_sensors};
+use crate::rig::{Rig, break_down, position, reference, velocity};
 use joint_firmware::joint::fault::Fault;
 use joint_firmware::joint::state_machine::State;
 use joint_firmware::motor::thermal::WindingTemperature;
 use plant::actuator::{ActuatorParameters, Channel, Failure, Fault as Broken};
 use plant::thermal::Heat;
 use plant::virtual_joint::Setup;
-use rig::table::{SensorRow, documented_sensors};
-use rig::{Rig, break_down, position, reference, velocity};
 
 /// Time for which a joint whose failure does not show is watched, s.
 const WATCHED: f64 = 0.4;

@@ -1,13 +1,11 @@
 //! Field weakening and the whole hexagon of the virtual joint: how much faster it gets, and that nothing else changes.
 
-mod rig;
-
+use crate::rig::{Rig, reference, torque, velocity};
 use joint_firmware::joint::fault::Fault;
 use joint_firmware::joint::state_machine::Controlword;
 use joint_firmware::motor::modulation::HIGHEST_VOLTAGE_FRACTION;
 use plant::actuator::ActuatorParameters;
 use plant::virtual_joint::Setup;
-use rig::{Rig, reference, torque, velocity};
 
 /// Part of the supply that the joints here have of what they are made for: their base speed lies below the velocity
 /// limit then.

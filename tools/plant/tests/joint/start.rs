@@ -1,12 +1,10 @@
 //! Defects before the joint has moved: it is not switched on, or refused before it gives torque.
 
-mod rig;
-
+use crate::rig::{Rig, break_down, mend, reference, reset, torque};
 use joint_firmware::joint::fault::Fault;
 use joint_firmware::joint::state_machine::{Controlword, State};
 use plant::actuator::{Channel, Failure, Fault as Broken};
 use plant::virtual_joint::Setup;
-use rig::{Rig, break_down, mend, reference, reset, torque};
 
 #[test]
 fn an_encoder_that_never_answers_is_lost_before_anything_can_be_enabled() {

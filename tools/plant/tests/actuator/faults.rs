@@ -1,10 +1,8 @@
 //! Every fault shows, from when it is there to when it is gone, and nothing else changes with it.
 
-mod support;
-
+use crate::support::{CurrentController, PERIOD, actuator, coast, hold_current};
 use plant::actuator::{Channel, DriveSample, Failure, Fault, Phase};
 use plant::{Actuator, ActuatorParameters, ParameterError};
-use support::{CurrentController, PERIOD, actuator, coast, hold_current};
 
 fn quiet() -> ActuatorParameters {
     ActuatorParameters::reference().ideal().aligned()
@@ -217,7 +215,7 @@ fn an_external_torque_pushes_the_link() {
     actuator.inject(Fault::ExternalTorque(12.0)).unwrap();
     actuator.inject(Fault::ExternalTorque(-2.0)).unwrap();
     coast(&mut actuator, 0.0, 0.01);
-    let mut pushed = support::actuator(quiet());
+    let mut pushed = crate::support::actuator(quiet());
     coast(&mut pushed, 10.0, 0.01);
     assert_eq!(actuator.state().joint, pushed.state().joint);
     assert!(pushed.state().joint.velocity > 0.01);

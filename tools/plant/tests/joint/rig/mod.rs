@@ -1,6 +1,5 @@
 //! A virtual joint in a test's hands: commanded as a network would, with what goes wrong counted in control steps;
 //! host.
-#![allow(dead_code)] // Each test program uses its own part.
 
 pub mod table;
 

@@ -1,12 +1,9 @@
 //! Every limit that is a number, probed from both sides: just below it nothing shows, just above it the fault does,
 //! within the time of docs/faults.md. One table of probes, which a new fault and a new limit have to be in.
 
-mod probes;
-mod rig;
-
+use crate::probes::{Shows, probed, probes};
 use joint_firmware::default_configuration::{B_G431B_ESC1, BOARDS, BoardConfiguration};
 use joint_firmware::joint::fault::Fault;
-use probes::{Shows, probed, probes};
 
 #[test]
 fn just_below_a_limit_nothing_shows_and_just_above_it_the_fault_does_within_its_time() {
@@ -52,7 +49,7 @@ fn every_limit_of_the_configuration_moves_a_probe() {
         let probes = probes(board).into_iter().filter(|probe| probe.shows == shows);
         probes.map(|probe| (probe.below, probe.above)).collect()
     };
-    for (name, shows, moved) in probes::table::with_each_limit_moved(&B_G431B_ESC1) {
+    for (name, shows, moved) in crate::probes::table::with_each_limit_moved(&B_G431B_ESC1) {
         assert!(sides(&moved, shows) != sides(&probed(&B_G431B_ESC1), shows), "no probe of {name} as {shows:?}");
     }
 }

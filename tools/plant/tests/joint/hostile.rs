@@ -1,8 +1,7 @@
 //! Promises of the control step, kept whatever bits the measurements and the network's words are made of; and the joint
 //! can be brought back into service once they make sense again.
 
-mod rig;
-
+use crate::rig::reference;
 use joint_firmware::joint::adaptation::Factors;
 use joint_firmware::joint::configuration::MOTION_STEPS;
 use joint_firmware::joint::monitor::UNEXPLAINED_STEPS;
@@ -14,7 +13,6 @@ use joint_firmware::motor::open_loop::Frame;
 use joint_firmware::motor::phases::Phases;
 use plant::virtual_joint::Setup;
 use proptest::prelude::*;
-use rig::reference;
 
 /// A number that a broken sensor, a corrupted frame or an overflow may make.
 fn number() -> impl Strategy<Value = f32> {

@@ -1,7 +1,6 @@
 //! Bridge and supply: what becomes of the duties, and of the energy.
 
-mod support;
-
+use crate::support::{PERIOD, actuator, coast, hold_current};
 use plant::ActuatorParameters;
 use plant::actuator::Effect;
 use plant::actuator::bus::{Bus, BusParameters};
@@ -9,7 +8,6 @@ use plant::actuator::frame::Frame;
 use plant::actuator::freewheel::ImplicitStep;
 use plant::actuator::inverter::{Inverter, InverterParameters};
 use plant::actuator::legs::{Leg, Rails};
-use support::{PERIOD, actuator, coast, hold_current};
 
 const RAILS: Rails = Rails { voltage: 36.0, diode_drop: 0.8 };
 
@@ -75,7 +73,7 @@ fn distortion(parameters: ActuatorParameters) -> f64 {
     for n in 0..2 * periods {
         let angle = std::f64::consts::TAU * f64::from(n) / f64::from(periods);
         let voltages = Frame::at(-angle).phases([0.8, 0.0]);
-        actuator.advance(true, support::duties(voltages, actuator.state().bus_voltage), 0.0, PERIOD);
+        actuator.advance(true, crate::support::duties(voltages, actuator.state().bus_voltage), 0.0, PERIOD);
         if n >= periods {
             for (sum, order) in sums.iter_mut().zip([1.0, 5.0, 7.0]) {
                 let (sine, cosine) = (order * angle).sin_cos();
@@ -214,7 +212,7 @@ fn braking_raises_the_bus_by_the_energy_that_friction_and_copper_leave() {
     let before = *actuator.state();
     let kinetic = actuator.joint().stored_energy();
     let (mut heat, mut idle, mut supplied) = (0.0, 0.0, 0.0);
-    let mut controller = support::CurrentController::new(actuator.parameters());
+    let mut controller = crate::support::CurrentController::new(actuator.parameters());
     while actuator.state().joint.velocity > 0.2 {
         let duties = controller.duties(&actuator, [0.0, -5.0]);
         actuator.advance(true, duties, 0.0, PERIOD);

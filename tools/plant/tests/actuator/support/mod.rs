@@ -1,5 +1,4 @@
 //! A vector current controller that knows the truth: the tests' way to a current, not a drive's.
-#![allow(dead_code)] // Each test program uses its own part.
 
 use plant::actuator::frame::Frame;
 use plant::actuator::windings::PhaseOrder;

@@ -1,13 +1,11 @@
 //! Braking into a supply that takes nothing back: the braking current fades before over-voltage has to switch off, and
 //! what the rotor loses is found again.
 
-mod rig;
-
+use crate::rig::{Rig, torque, velocity};
 use joint_firmware::joint::fault::Fault;
 use joint_firmware::joint::state_machine::Controlword;
 use plant::actuator::{Accessories, ActuatorParameters};
 use plant::virtual_joint::Setup;
-use rig::{Rig, torque, velocity};
 use std::f64::consts::PI;
 
 /// A random joint without a payload on a supply that takes nothing back. Its highest supply is 130 % of the supply's

@@ -1,12 +1,10 @@
 //! Current sensors that drift after the start: a joint that is off follows them, one that is enabled does not.
 
-mod rig;
-
+use crate::rig::{Rig, break_down, reference, torque};
 use joint_firmware::joint::fault::Fault;
 use joint_firmware::joint::state_machine::State;
 use plant::actuator::{Channel, Failure, Fault as Broken};
 use plant::virtual_joint::Setup;
-use rig::{Rig, break_down, reference, torque};
 
 /// The drift, A: 1.2 times what the sum of the currents may be, and within what a sensor may have at the start.
 fn drift(rig: &Rig) -> f64 {

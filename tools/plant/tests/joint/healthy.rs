@@ -1,12 +1,10 @@
 //! A sound joint has no fault: random actuators in hard, ordinary motion.
 
-mod rig;
-
+use crate::rig::{Rig, position, torque, velocity};
 use joint_firmware::joint::Command;
 use joint_firmware::joint::state_machine::State;
 use plant::actuator::ActuatorParameters;
 use plant::virtual_joint::Setup;
-use rig::{Rig, position, torque, velocity};
 
 /// Reversals at nine tenths of the speed limit, moves over most of the travel, full torque either way, and a stop; 2 s.
 fn motion(parameters: &ActuatorParameters) -> [(Command, f64); 9] {

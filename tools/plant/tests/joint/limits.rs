@@ -1,15 +1,13 @@
 //! Velocity and position limits of the virtual joint: torque up to them, holding torque at them, and no way through
 //! them, whatever the modes' gains are.
 
-mod rig;
-
+use crate::rig::{Rig, break_down, position, reference, torque};
 use joint_firmware::joint::configuration::Gains;
 use joint_firmware::joint::fault::Fault;
 use joint_firmware::joint::state_machine::{Controlword, State};
 use joint_firmware::joint::{Command, Mode};
 use plant::actuator::{ActuatorParameters, Fault as Broken};
 use plant::virtual_joint::Setup;
-use rig::{Rig, break_down, position, reference, torque};
 
 /// Actuators drawn at random that each law is tried on.
 const JOINTS: u64 = 100;

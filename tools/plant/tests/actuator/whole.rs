@@ -1,13 +1,11 @@
 //! The whole actuator: motion, energy, effects one by one, random actuators, refusals.
 
-mod support;
-
+use crate::support::{CurrentController, PERIOD, actuator, coast, duties, hold_current};
 use plant::actuator::Effect;
 use plant::actuator::windings::PhaseOrder;
 use plant::contact::{Contact, Side};
 use plant::friction_factors::FrictionFactors;
 use plant::{Actuator, ActuatorParameters, Joint, JointParameters, ParameterError};
-use support::{CurrentController, PERIOD, actuator, coast, duties, hold_current};
 
 #[test]
 fn a_held_current_moves_the_joint_as_the_ideal_torque_source_does() {

@@ -1,7 +1,6 @@
 //! A joint that nobody has described under an open-loop voltage: what it gives, what stops it, and how soon; host.
 
-mod rig;
-
+use crate::rig::{Rig, break_down, reset, velocity};
 use joint_firmware::joint::fault::Fault;
 use joint_firmware::joint::state_machine::{Controlword, State};
 use joint_firmware::joint::{Command, Mode};
@@ -9,7 +8,6 @@ use joint_firmware::motor::angle::{Direction, ElectricalAngle, EncoderAlignment}
 use joint_firmware::motor::open_loop::{Frame, Window};
 use plant::actuator::{ActuatorParameters, Fault as Broken};
 use plant::virtual_joint::Setup;
-use rig::{Rig, break_down, reset, velocity};
 
 fn open_loop(frame: Frame) -> Command {
     Command { mode: Mode::OpenLoop, open_loop: frame, ..Command::NOTHING }

@@ -1,9 +1,8 @@
 //! Every way to stop, with every option code, in every mode, of a joint that bears a load: what the arm does, with a
 //! holding brake and without. The table is published in
-//! `docs/stops.md`; `UPDATE_DOCS=1 cargo test -p plant --test joint_stops` writes it anew.
+//! `docs/stops.md`; `UPDATE_DOCS=1 cargo test -p plant --test joint stops` writes it anew.
 
-mod rig;
-
+use crate::rig::{Rig, break_down, position, reference, torque, velocity};
 use joint_firmware::joint::active::DERATING;
 use joint_firmware::joint::state_machine::{Controlword, State};
 use joint_firmware::joint::stopping::StopConfiguration;
@@ -11,7 +10,6 @@ use joint_firmware::joint::{Command, CommandLimits, Mode};
 use joint_firmware::objects::Operation;
 use plant::actuator::{Accessories, Fault as Broken};
 use plant::virtual_joint::Setup;
-use rig::{Rig, break_down, position, reference, torque, velocity};
 use std::fmt::Write;
 
 /// Times in which the holding brake opens and closes, s.
@@ -253,8 +251,8 @@ fn worst(all: &[(Operation, Stopped)]) -> Stopped {
 const HEAD: &str = "# What the arm does
 
 A joint that bears 3 kg on 0.3 m, nearly level, rises at 0.5 rad/s and is stopped in every way, with every option code, in seven modes
-(profile position, profile velocity, homing to an index, cyclic synchronous position, velocity and torque, impedance). It is the virtual joint with its friction; its numbers are of this joint alone, and the words hold for every one: `tools/plant/tests/joint_stops.rs`
-asserts them, and `UPDATE_DOCS=1 cargo test -p plant --test joint_stops` writes this page anew. The option codes are those of CiA 402-2 (6007h, 605Ah to 605Eh, [objects](objects.md));
+(profile position, profile velocity, homing to an index, cyclic synchronous position, velocity and torque, impedance). It is the virtual joint with its friction; its numbers are of this joint alone, and the words hold for every one: `tools/plant/tests/joint/stops.rs`
+asserts them, and `UPDATE_DOCS=1 cargo test -p plant --test joint stops` writes this page anew. The option codes are those of CiA 402-2 (6007h, 605Ah to 605Eh, [objects](objects.md));
 `[stops]` in joint.toml. The brake opens in 0.15 s and closes in 0.1 s, and both times are configured (2109h).
 
 - way: how far it goes on before it turns or stands, rad; the largest of all modes.

@@ -1,0 +1,11 @@
+//! What a plant is made of and driven by: friction, arms, motions, random joints, their files. One program, as each
+//! links the plant anew.
+
+mod arm;
+mod excitation;
+mod files;
+mod friction;
+mod motion;
+mod randomised;
+mod refusals;
+mod virtual_joint;
