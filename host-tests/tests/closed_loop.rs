@@ -3,7 +3,7 @@
 //! slow reversals track, what is left in torque mode and in the cold is as published, and adaptation makes up for
 //! friction that has changed.
 //!
-//! Six joints are judged, two of them in service; there and in torque mode the worst counts. With `JOINT_SAMPLES=all`
+//! Four joints are judged, two of them in service; there and in torque mode the worst counts. With `JOINT_SAMPLES=all`
 //! all twenty are judged, and the median counts, too.
 
 use host_tests::in_the_loop::{InTorqueMode, Moved, RandomJoint, for_seeds, median};
@@ -15,7 +15,7 @@ use plant::friction_factors::FrictionFactors;
 /// Seed of the first random joint.
 const FIRST: u64 = 1;
 /// Joints: in the test command, and in all.
-const JOINTS: (u64, u64) = (6, 20);
+const JOINTS: (u64, u64) = (4, 20);
 /// Joints in service, likewise.
 const SERVED: (u64, u64) = (2, 20);
 /// Largest relative torque error with compensation, median and worst, %: 3.7 and 10.6 of docs/results-loop.md, and a

@@ -21,7 +21,7 @@ use std::f64::consts::{PI, TAU};
 use std::sync::OnceLock;
 
 /// Random motors on each board: in the test command, and in all.
-const MOTORS: (u64, u64) = (6, 20);
+const MOTORS: (u64, u64) = (4, 20);
 /// Random motors that lose their power.
 const RESTARTED: u64 = 3;
 /// Velocity of a motor that turns again, turns of the rotor per second, for how long, s, and how far off its mean may

@@ -4,7 +4,7 @@
 //! The figures are published in docs/motions.md, which this program writes with `UPDATE_DOCS=1` and holds to them
 //! otherwise. The recordings are others' ([`host_tests::recordings`]): without them, or without Python, what needs them
 //! is reported as ignored by name; with `CI` set a missing Python fails. `MOTIONS=xl330` judges, or writes, only the
-//! recordings whose name begins with that. Every third motion is judged where neither of them is set, and all with
+//! recordings whose name begins with that. Every fourth motion is judged where neither of them is set, and all with
 //! `JOINT_SAMPLES=all`.
 
 mod judge;
@@ -21,7 +21,7 @@ use rayon::iter::{IndexedParallelIterator, IntoParallelRefIterator, ParallelIter
 use std::path::Path;
 
 /// Share of the motions, one of so many, that is judged in the test command.
-const PART: usize = 3;
+const PART: usize = 4;
 
 fn main() {
     let arguments = Arguments::from_args();

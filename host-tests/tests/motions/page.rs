@@ -136,7 +136,7 @@ take. The image's network gets {restarts} restarts instead of the 8 of `jointctl
 more than {margin} % from the one here ({margin_of_c} % for c), in either direction, or where the image holds another model. The last bit of
 a sum decides where c's training ends: OpenBLAS is given the same kernels everywhere (`OPENBLAS_CORETYPE=Haswell`), and yet c depends on the
 processor. On another one it was within 5 % on 41 rows, and by 7 to 25 % away on four (ur10e_joint2, 16 s from 48 s: 4.5 instead of 6.0 %); with
-other kernels by a third on that row (4.1 %). As many aims were held on both. The test command judges every third row; `JOINT_SAMPLES=all` all of them.
+other kernels by a third on that row (4.1 %). As many aims were held on both. The test command judges every fourth row; `JOINT_SAMPLES=all` all of them.
 
 Aims: image / best of a, b, c at most {of_best}; image / simplest at most {of_simplest}. They are not reached everywhere: the table shows where.
 

@@ -3,8 +3,10 @@
 mod figure;
 mod tables;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::sync::OnceLock;
+use tempfile::TempDir;
 
 fn jointctl(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_jointctl")).current_dir(folder).args(arguments).output().expect("jointctl starts")
@@ -19,23 +21,41 @@ fn demo(folder: &Path, out: &str) -> Output {
     jointctl(folder, &["demo", "--out", out, "--samples", "2000", "--restarts", "2", "--patience", "10"])
 }
 
+/// A folder of a test's own with that demo in `demo`, which runs once for all tests.
+fn with_demo() -> TempDir {
+    static MADE: OnceLock<PathBuf> = OnceLock::new();
+    let made = MADE.get_or_init(|| {
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("cli");
+        let _ = std::fs::remove_dir_all(&folder);
+        std::fs::create_dir_all(&folder).unwrap();
+        let output = demo(&folder, "demo");
+        assert!(output.status.success(), "{}", stderr(&output));
+        folder.join("demo")
+    });
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("demo")).unwrap();
+    for entry in std::fs::read_dir(made).unwrap() {
+        let file = entry.unwrap();
+        std::fs::copy(file.path(), folder.path().join("demo").join(file.file_name())).unwrap();
+    }
+    folder
+}
+
 #[test]
 fn the_demo_writes_an_image_and_a_report_the_same_choices_give_the_same_bytes_and_readme_shows_the_joint() {
-    let folder = tempfile::tempdir().unwrap();
-    for out in ["first", "second"] {
-        let output = demo(folder.path(), out);
-        assert!(output.status.success(), "{}", stderr(&output));
-        let text = String::from_utf8_lossy(&output.stdout).into_owned();
-        for row in ["nothing", "coulomb-viscous", "image, fixed point"] {
-            assert!(text.contains(row), "{text}");
-        }
+    let folder = with_demo();
+    let output = demo(folder.path(), "second");
+    assert!(output.status.success(), "{}", stderr(&output));
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    for row in ["nothing", "coulomb-viscous", "image, fixed point"] {
+        assert!(text.contains(row), "{text}");
     }
     for file in ["friction.img", "friction.toml", "log.csv", "report.html"] {
         let read = |out: &str| std::fs::read(folder.path().join(out).join(file)).unwrap();
-        assert!(!read("first").is_empty());
-        assert!(read("first") == read("second"), "{file} differs between two runs");
+        assert!(!read("demo").is_empty());
+        assert!(read("demo") == read("second"), "{file} differs between two runs");
     }
-    let sim = ["sim", "--image", "first/friction.img", "--scenario", "slow-reversal", "--out", "sim", "--json"];
+    let sim = ["sim", "--image", "demo/friction.img", "--scenario", "slow-reversal", "--out", "sim", "--json"];
     let moved = jointctl(folder.path(), &sim);
     assert!(moved.status.success(), "{}", stderr(&moved));
     figure::is_shown_by_readme(&folder.path().join("sim"), &serde_json::from_slice(&moved.stdout).unwrap());
@@ -43,8 +63,7 @@ fn the_demo_writes_an_image_and_a_report_the_same_choices_give_the_same_bytes_an
 
 #[test]
 fn an_image_survives_the_way_to_toml_and_back_and_a_damaged_one_is_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    assert!(demo(folder.path(), "demo").status.success());
+    let folder = with_demo();
     let run = |arguments: &[&str]| jointctl(folder.path(), arguments);
     let read = |file: &str| std::fs::read(folder.path().join(file)).unwrap();
 
@@ -133,8 +152,7 @@ fn exported(path: &Path) -> std::collections::BTreeMap<String, Vec<String>> {
 
 #[test]
 fn the_exported_table_holds_every_sample_and_gives_the_reported_errors() {
-    let folder = tempfile::tempdir().unwrap();
-    assert!(demo(folder.path(), "demo").status.success());
+    let folder = with_demo();
     let run = |arguments: &[&str]| jointctl(folder.path(), arguments);
     let fit = ["fit", "demo/dataset.toml", "--out", "out", "--trainer", "none", "--export", "fit.csv.gz"];
     assert!(run(&fit).status.success());
@@ -206,14 +224,13 @@ fn row<'a>(text: &'a str, first: &str, second: &str) -> Vec<&'a str> {
 
 #[test]
 fn a_simulation_shows_the_joint_without_and_with_its_image_and_repeats_itself_from_the_files_that_it_wrote() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = with_demo();
     let run = |arguments: &[&str]| {
         let output = jointctl(folder.path(), arguments);
         assert!(output.status.success(), "{}", stderr(&output));
         String::from_utf8_lossy(&output.stdout).into_owned()
     };
     let read = |file: &str| std::fs::read(folder.path().join(file)).unwrap();
-    assert!(demo(folder.path(), "demo").status.success());
     let text = run(&["sim", "--image", "demo/friction.img", "--scenario", "sine-sweep", "--scenario", "hot-and-cold"]);
     assert!(text.contains("times faster than real time"), "{text}");
     for scenario in ["sine-sweep", "hot-and-cold/cold", "hot-and-cold/warm"] {

@@ -1,5 +1,5 @@
-// SDO by node-canopen of every length from 1 to 2048 bytes, expedited, segmented and by block, both ways. Run by node_canopen.rs against several
-// virtual joints at once, each with its share of the lengths.
+// SDO by node-canopen of every length from 1 to 2048 bytes by block, and up to 300 bytes expedited and segmented, then every thirteenth (any rest of
+// two segments), both ways. Run by node_canopen.rs against several virtual joints at once, each with its share of the lengths.
 //
 //     node lengths.js MODULES PORT NODE FIRST STEP
 
@@ -23,7 +23,7 @@ async function main() {
     const pattern = Buffer.from([...Array(4096).keys()].map((i) => Number(BigInt(i) * 2654435761n >> 13n & 255n)));
     let count = 0;
     for (let length = Number(first); length <= 2048; length += Number(step)) {
-        for (const blockTransfer of [false, true]) {
+        for (const blockTransfer of length <= 300 || length % 13 === 0 ? [false, true] : [true]) {
             const data = pattern.subarray(length, 2 * length);
             await device.sdo.download({ ...at(0x2210, 0), data, blockTransfer });
             const same = data.equals(await device.sdo.upload({ ...at(0x2210, 0), blockTransfer }));

@@ -1,5 +1,5 @@
-"""SDO by python-canopen of every length from 1 to 2048 bytes, expedited, segmented and by block, both ways. Run by python_canopen.rs against several
-virtual joints at once, each with its share of the lengths.
+"""SDO by python-canopen of every length from 1 to 2048 bytes by block, and up to 300 bytes expedited and segmented, then every thirteenth (any rest of two
+segments), both ways. Run by python_canopen.rs against several virtual joints at once, each with its share of the lengths.
 
     python3 lengths.py GROUP PORT NODE FIRST STEP
 """
@@ -25,7 +25,7 @@ def number(index, subindex):
 pattern = bytes((i * 2_654_435_761 >> 13) & 0xFF for i in range(2048 + 2048))
 lengths = range(first, 2049, step)
 for length in lengths:
-    for block in (False, True):
+    for block in (False, True) if length <= 300 or length % 13 == 0 else (True,):
         data = pattern[length : 2 * length]
         if block:
             with node.sdo.open(0x2210, 0, "wb", size=length, block_transfer=True) as staging:
