@@ -3,6 +3,7 @@
 use super::error::{ClientError, Object};
 use super::network::Network;
 use super::sdo::{Method, Settings, Transfer};
+use canopen_node::Abort;
 use std::time::Duration;
 
 /// Times that an object is read before another client that disturbs each time is an error.
@@ -69,7 +70,13 @@ impl Node {
                 break;
             }
             std::thread::sleep(Duration::from_millis(PAUSE_MS << (again - 1)));
-            outcome = read();
+            outcome = match read() {
+                // A slow node's answers to the transfer that was cut off fall into this one.
+                Err(ClientError::Aborted { object, abort: Abort::COMMAND } | ClientError::Protocol { object, .. }) => {
+                    Err(ClientError::OtherClient { object })
+                }
+                outcome => outcome,
+            };
         }
         outcome
     }

@@ -7,6 +7,7 @@ use bus::client::lss::Address;
 use bus::client::sdo::{Method, Settings};
 use bus::client::{ClientError, Command, Emergency, Network, NmtState, SyncProducer, Target, heartbeat};
 use bus::{BusError, Frame, Transport, open};
+use canopen_node::Abort;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
@@ -135,12 +136,27 @@ fn a_second_client_is_noticed_and_nothing_is_half_done() {
 }
 
 /// A bus on which another client asks in the middle of so many reads of 2001h: before the first segment is asked for.
+/// The next read begins once the node has refused that segment, or, where that is late, with the refusal in its midst.
 #[derive(Debug)]
 struct Interrupted {
     ours: Arc<dyn Transport>,
     other: Arc<dyn Transport>,
     reads: AtomicUsize,
     begun: AtomicBool,
+    refused: AtomicBool,
+    late: AtomicBool,
+}
+
+impl Interrupted {
+    /// Waits for the node's refusal of a segment of no transfer.
+    fn refusal(&self) -> Result<(), BusError> {
+        while !self
+            .other
+            .receive(Duration::from_secs(60))?
+            .is_none_or(|frame| frame.id() == 0x585 && frame.data().starts_with(&[0x80]))
+        {}
+        Ok(())
+    }
 }
 
 impl Transport for Interrupted {
@@ -153,10 +169,18 @@ impl Transport for Interrupted {
         if sends(&[0x60]) && self.begun.swap(false, Ordering::Relaxed) {
             let left = self.reads.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(1));
             if left.is_ok() {
+                self.refused.store(true, Ordering::Relaxed);
                 self.other.send(&Frame::new(0x605, &[0x40, 0, 0x10, 0, 0, 0, 0, 0]).unwrap())?;
+            } else if self.late.swap(false, Ordering::Relaxed) {
+                // In place of the node's answer.
+                return self.other.send(&Frame::new(0x585, &[0x80, 0x01, 0x20, 0, 0x01, 0, 0x04, 0x05]).unwrap());
             }
         }
-        self.begun.fetch_or(sends(&[0x40, 0x01, 0x20]), Ordering::Relaxed);
+        let begins = sends(&[0x40, 0x01, 0x20]);
+        if begins && self.refused.swap(false, Ordering::Relaxed) {
+            self.refusal()?;
+        }
+        self.begun.fetch_or(begins, Ordering::Relaxed);
         self.ours.send(frame)
     }
 
@@ -169,7 +193,9 @@ impl Transport for Interrupted {
 fn a_read_that_another_client_disturbs_is_repeated_four_times() {
     let bus = "virtual:reads";
     let (ours, other) = (open(bus).unwrap(), open(bus).unwrap());
-    let interrupted = Arc::new(Interrupted { ours, other, reads: AtomicUsize::new(0), begun: AtomicBool::new(false) });
+    let no = || AtomicBool::new(false);
+    let interrupted =
+        Arc::new(Interrupted { ours, other, reads: AtomicUsize::new(0), begun: no(), refused: no(), late: no() });
     let (network, running) = pair_over(interrupted.clone(), bus, 5, 0);
     let node = network.node(5).unwrap();
     node.download(0x2001, 0, &pattern(2000)).unwrap();
@@ -178,6 +204,14 @@ fn a_read_that_another_client_disturbs_is_repeated_four_times() {
         assert_eq!(node.upload_by(0x2001, 0, Method::Segmented).unwrap(), pattern(2000), "{times}");
         assert_eq!(interrupted.reads.load(Ordering::Relaxed), 0);
     }
+    // Without a disturbance a refusal is one.
+    interrupted.late.store(true, Ordering::Relaxed);
+    let error = node.upload_by(0x2001, 0, Method::Segmented).unwrap_err();
+    assert!(matches!(error, ClientError::Aborted { abort: Abort::COMMAND, .. }), "{error}");
+    interrupted.late.store(true, Ordering::Relaxed);
+    interrupted.reads.store(1, Ordering::Relaxed);
+    assert_eq!(node.upload_by(0x2001, 0, Method::Segmented).unwrap(), pattern(2000), "late");
+    assert!(!interrupted.late.load(Ordering::Relaxed));
     interrupted.reads.store(5, Ordering::Relaxed);
     let error = node.upload_by(0x2001, 0, Method::Segmented).unwrap_err();
     assert!(matches!(error, ClientError::OtherClient { .. }), "{error}");
