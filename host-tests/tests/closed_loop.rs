@@ -35,12 +35,12 @@ const TORQUE_MODE: [(f64, f64); 3] = [(69.5, 74.1), (10.0, 45.5), (68.9, 70.5)];
 /// figures and a tenth of them. As commissioned; all of friction's torques times 0.7, 1.3, 0.4 and 2; viscous friction
 /// times 4.
 const IN_SERVICE: [(f64, f64, f64, f64); 6] = [
-    (5.3, 12.0, 11.4, 20.8),
-    (4.5, 7.9, 13.2, 22.9),
+    (5.3, 12.0, 10.8, 19.7),
+    (4.3, 7.9, 12.4, 21.2),
     (6.7, 17.8, 11.8, 32.8),
-    (3.0, 7.2, 12.1, 23.4),
-    (12.8, 27.3, 10.6, 44.3),
-    (6.4, 14.4, 11.8, 41.8),
+    (3.0, 7.2, 8.9, 23.4),
+    (12.7, 27.3, 10.6, 44.3),
+    (6.4, 14.4, 11.4, 41.8),
 ];
 
 /// Change of what adaptation adds while a hand pushes the link, and while it resists, % of Coulomb friction, median and

@@ -15,6 +15,8 @@ pub struct Folds {
     /// True where the folds leave out motions; false where they are blocks of time of one motion, which say nothing
     /// about other motions.
     pub motions: bool,
+    /// True where they leave out whole runs or conditions of several, not parts of one or two runs.
+    pub several: bool,
     /// Number of the grouping that each fold is of, from 0.
     pub groupings: Vec<usize>,
     /// Name of each fold: the motions that it leaves out.

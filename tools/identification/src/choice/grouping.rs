@@ -77,6 +77,7 @@ pub fn find(
                 return Err(NoGroups(name.clone()));
             }
         }
+        folds.several = true;
         return Ok(folds);
     }
     let conditions = conditions(samples, labels, &used, runs.names.len());
@@ -85,6 +86,7 @@ pub fn find(
         take(&mut folds, groups, most);
     });
     if folds.len() >= 2 {
+        folds.several = true;
         return Ok(folds);
     }
     let single = runs.names.len() < 2;
@@ -92,6 +94,7 @@ pub fn find(
         let few = runs.names.len() < 3;
         take(&mut folds, runs, MOST_FOLDS);
         if !few && folds.len() >= 2 {
+            folds.several = true;
             return Ok(folds);
         }
     }
@@ -399,7 +402,7 @@ mod tests {
     fn runs_are_left_out_whole_and_similar_ones_together() {
         let (samples, recordings) = recorded(12, |run, _| 1.0 + run as f64);
         let folds = find(&samples, &recordings, &[], &[]).unwrap();
-        assert_eq!((folds.len(), folds.motions), (MOST_FOLDS, true));
+        assert_eq!((folds.len(), folds.motions, folds.several), (MOST_FOLDS, true, true));
         let of_run = |run: usize| folds.left_out[run * 1000];
         for (i, part) in samples.part.iter().enumerate().filter(|(_, part)| **part == Part::Train) {
             assert_eq!(folds.left_out[i], of_run(samples.run[i] as usize), "{part:?}");
@@ -419,6 +422,7 @@ mod tests {
         assert_eq!(folds.names, ["speed 0", "speed 1", "speed 2"]);
         let chosen = find(&samples, &recordings, &columns, &["repetition".into()]).unwrap();
         assert_eq!(chosen.names, ["repetition 0", "repetition 1"]);
+        assert!(folds.several && chosen.several);
         assert!(find(&samples, &recordings, &columns, &["load".into()]).unwrap_err().to_string().contains("\"load\""));
     }
 
@@ -427,6 +431,7 @@ mod tests {
         let (samples, recordings) = recorded(1, |_, stroke| [0.5, 1.0, 2.0, 3.0, 4.0][stroke % 5]);
         let folds = find(&samples, &recordings, &[], &[]).unwrap();
         assert!(folds.motions && folds.grouping.contains("peak speed"), "{}", folds.grouping);
+        assert!(!folds.several);
         let speeds = folds.names.iter().take_while(|name| name.starts_with("peak speed")).count();
         assert_eq!((speeds, folds.len()), (4, 8), "beside the quarters of the recording");
         // A stroke is never divided.

@@ -193,7 +193,7 @@ pub fn identify(
         None if problem.folds.len() < 2 => {
             return Err(IdentifyError::TooFewFolds { found: problem.train.len(), folds: problem.folds.len() });
         }
-        None => selection::select(&problem, &rigid, &options.terms),
+        None => selection::select(&problem, &rigid, &options.terms, folds.several),
     };
     notes.extend(lags);
     let (parameters, undetermined) = estimates::estimates(&fit, problem.train.len(), &options.units);

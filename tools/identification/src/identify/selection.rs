@@ -1,9 +1,11 @@
 //! The `full` model: the terms that pay on motions that were left out; host.
 //!
 //! 1. From Coulomb and viscous friction with an offset, the term that lowers the error of the left-out motions most is
-//!    taken, then those are dropped without which it does not rise, and so on until neither helps. A preset that is
-//!    better starts the same once more.
-//! 2. Of all models on that path the simplest one is chosen that the best does not beat beyond one standard error.
+//!    taken, then those are dropped without which it does not rise, and so on until neither helps. Where several runs or
+//!    conditions are left out in turn, the same is done from the terms that help second and third most alone, as the first
+//!    may stand in the way of two others; parts of one run do not tell so many models apart. And from a preset that is
+//!    better.
+//! 2. Of all models on these ways the simplest one is chosen that the best does not beat beyond one standard error.
 //!
 //! A term that the others nearly explain is not considered (`determined`). Test samples are not seen.
 
@@ -13,7 +15,7 @@ use super::freedom::Freedom;
 use super::grid::{search, search_from};
 use super::nonlinear::{Fit, Problem};
 use crate::choice::{Comparison, TermRule, compare, rank};
-use crate::friction_model::{Term, Terms};
+use crate::friction_model::{FrictionModel, Term, Terms};
 use crate::presets::{Preset, Structure};
 use crate::rigid::RigidModel;
 use rayon::prelude::*;
@@ -24,14 +26,15 @@ pub const TEMPERATURE_RANGE: f64 = 5.0;
 const STEP: f64 = 5e-4;
 /// Limit on terms that are taken: each step fits about a dozen models.
 const STEPS: usize = 12;
+/// Ways, each from another first term, where several runs or conditions are left out in turn.
+const WAYS: usize = 3;
 /// Terms of every model, unless they are forbidden: the simplest model.
 const ALWAYS: [Term; 3] = [Term::Constant, Term::Viscous, Term::Coulomb];
 
 /// The terms that the data can support, and why others are left out.
 fn supported(problem: &Problem, rigid: &RigidModel) -> (Structure, Vec<String>) {
     use Term::*;
-    // No quadratic term: what slow motion makes of it, faster motion does not bear.
-    let mut terms = Terms::of(&[Constant, Position, Viscous, Coulomb, CoulombLoad, Stribeck, Hysteresis]);
+    let mut terms = Terms::of(&[Constant, Position, Viscous, Quadratic, Coulomb, CoulombLoad, Stribeck, Hysteresis]);
     terms = terms.with(ViscousAsymmetry).with(VelocityWeakening);
     let limits = &problem.limits;
     for (term, found) in
@@ -169,7 +172,13 @@ fn changed(structure: &Structure, freedom: Freedom, on: bool) -> Option<Structur
 }
 
 /// The chosen structure fitted to all rows, its fits without each fold, and how it was chosen.
-pub fn select(problem: &Problem, rigid: &RigidModel, rules: &[TermRule]) -> (Fit, Vec<FoldFit>, Vec<String>) {
+/// `several`: the folds leave out whole runs or conditions.
+pub fn select(
+    problem: &Problem,
+    rigid: &RigidModel,
+    rules: &[TermRule],
+    several: bool,
+) -> (Fit, Vec<FoldFit>, Vec<String>) {
     let rules = Rules(rules);
     let (mut full, notes) = supported(problem, rigid);
     let forbidden = rules.0.iter().filter(|rule| !rule.force);
@@ -178,14 +187,20 @@ pub fn select(problem: &Problem, rigid: &RigidModel, rules: &[TermRule]) -> (Fit
     if !rules.forced(Term::Constant) {
         (full, simplest) = (problem.determined(full), problem.determined(simplest));
     }
-    let mut search_path = Path { problem, full, rules, path: vec![], notes };
-    search_path.walk(Crossed::new(problem, search(problem, &simplest)));
-    if let Some((preset, better)) = search_path.best_preset(rigid) {
-        let before = search_path.last().clone();
-        search_path.note(&format!("all terms of {preset} taken"), &before, &better);
-        search_path.walk(better);
+    let start = Crossed::new(problem, search(problem, &simplest));
+    let mut ways = Ways { problem, full, rules, path: vec![start.clone()], notes };
+    let mut first = ways.additions(&start);
+    first.sort_by(|(_, one), (_, other)| start.to(one).mean.total_cmp(&start.to(other).mean));
+    for (taken, model) in first.into_iter().take(if several { WAYS } else { 1 }) {
+        ways.note(&format!("{taken} taken first"), &start, &model);
+        ways.walk(model);
     }
-    let Path { mut path, mut notes, .. } = search_path;
+    if let Some((preset, better)) = ways.best_preset(rigid) {
+        let before = ways.best().clone();
+        ways.note(&format!("all terms of {preset} taken"), &before, &better);
+        ways.walk(better);
+    }
+    let Ways { mut path, mut notes, .. } = ways;
     let errors: Vec<Vec<f64>> = path.iter().map(|model| model.errors.clone()).collect();
     let sizes: Vec<usize> = path.iter().map(|model| model.fit.x.len()).collect();
     let order = rank(&errors, &sizes);
@@ -215,7 +230,7 @@ fn simplest(full: &Structure, rules: &Rules) -> Structure {
 }
 
 /// The models that were come across, the simplest first, and what they may have.
-struct Path<'a> {
+struct Ways<'a> {
     problem: &'a Problem,
     full: Structure,
     rules: Rules<'a>,
@@ -223,9 +238,11 @@ struct Path<'a> {
     notes: Vec<String>,
 }
 
-impl Path<'_> {
-    fn last(&self) -> &Crossed {
-        &self.path[self.path.len() - 1]
+impl Ways<'_> {
+    /// The model with the lowest error on left-out motions so far.
+    fn best(&self) -> &Crossed {
+        let better = |best, model| if Crossed::to(best, model).mean < 0.0 { model } else { best };
+        self.path.iter().reduce(better).unwrap_or(&self.path[0])
     }
 
     fn note(&mut self, what: &str, before: &Crossed, after: &Crossed) {
@@ -233,23 +250,33 @@ impl Path<'_> {
         self.notes.push(format!("{what}: error on left-out motions {before:.4e} -> {after:.4e}"));
     }
 
-    /// Takes and drops terms, one at a time, as long as one of both helps.
+    /// True where the model's viscous friction is one beyond the fastest motion, too: see [`bears_speed`]. What is forced
+    /// is not asked.
+    fn bears_speed(&self, model: &Crossed) -> bool {
+        self.rules.forced(Term::Quadratic) || bears_speed(&model.fit.friction, self.problem.limits.velocity)
+    }
+
+    /// Takes and drops terms, one at a time, as long as one of both helps, or to a model of another way.
     fn walk(&mut self, from: Crossed) {
+        let mut before = from.clone();
         self.path.push(from);
         for _ in 0..STEPS {
-            let before = self.last().clone();
-            let Some((taken, mut current)) = self.best_addition(&before) else { break };
+            let Some((taken, mut current)) = lowest(self.additions(&before)) else { break };
             self.note(&format!("{taken} taken"), &before, &current);
             while let Some((dropped, fewer)) = self.best_removal(&current, taken) {
                 self.note(&format!("{dropped} dropped"), &current, &fewer);
                 current = fewer;
             }
-            self.path.push(current);
+            if self.path.iter().any(|model| model.structure() == current.structure()) {
+                break;
+            }
+            self.path.push(current.clone());
+            before = current;
         }
     }
 
-    /// The freedom that lowers the error of the left-out motions most, if any does.
-    fn best_addition(&self, from: &Crossed) -> Option<(Freedom, Crossed)> {
+    /// The freedoms that lower the error of the left-out motions.
+    fn additions(&self, from: &Crossed) -> Vec<(Freedom, Crossed)> {
         let has = freedoms(&from.structure(), &self.rules);
         let missing: Vec<Freedom> =
             freedoms(&self.full, &self.rules).into_iter().filter(|freedom| !has.contains(freedom)).collect();
@@ -264,9 +291,9 @@ impl Path<'_> {
                 return None;
             }
             let next = Crossed::new(self.problem, fit);
-            from.improves(&next, STEP).then_some((freedom, next))
+            (from.improves(&next, STEP) && self.bears_speed(&next)).then_some((freedom, next))
         });
-        lowest(steps.collect())
+        steps.collect()
     }
 
     /// The freedom, but for the one just taken, without which the error of the left-out motions is lowest, if it does
@@ -277,7 +304,7 @@ impl Path<'_> {
         let steps = others.into_par_iter().filter_map(|freedom| {
             let structure = changed(&from.structure(), freedom, false)?;
             let fewer = Crossed::new(self.problem, search_from(self.problem, &structure, &from.fit, None));
-            from.improves(&fewer, 0.0).then_some((freedom, fewer))
+            (from.improves(&fewer, 0.0) && self.bears_speed(&fewer)).then_some((freedom, fewer))
         });
         lowest(steps.collect())
     }
@@ -299,10 +326,18 @@ impl Path<'_> {
             let fit = search(self.problem, &structure);
             let own = freedoms(&structure, &self.rules).into_iter().all(|freedom| stands_for_itself(&fit, freedom));
             let model = Crossed::new(self.problem, fit);
-            (own && self.last().improves(&model, STEP)).then_some((preset, model))
+            (own && self.best().improves(&model, STEP)).then_some((preset, model))
         });
         lowest(presets.collect())
     }
+}
+
+/// True where a quadratic term bends viscous friction down, as a lubricant that is sheared does, and no further than that
+/// it still grows at one and a half times the greatest speed. Bent up it stands for viscous friction that a narrow range
+/// of speeds does not tell from it, and is far too much beyond.
+fn bears_speed(friction: &FrictionModel, speed: f64) -> bool {
+    let (viscous, quadratic) = (friction.viscous, friction.quadratic);
+    !friction.terms.contains(Term::Quadratic) || quadratic <= 0.0 && viscous + 2.0 * 1.5 * speed * quadratic >= 0.0
 }
 
 /// The model with the lowest error on left-out motions; of equal ones the first.
@@ -331,5 +366,16 @@ mod tests {
     fn a_step_pays_for_no_gain_in_one_grouping_with_the_other() {
         assert!(!improves(&[1.0, 1.0, 1.0], &[0.5, 0.5, 1.01], &[0, 0, 1], 0.0));
         assert!(improves(&[1.0, 1.0, 1.0], &[0.5, 0.5, 1.0], &[0, 0, 1], 0.0));
+    }
+
+    #[test]
+    fn viscous_friction_may_bend_down_as_far_as_it_still_grows_beyond_the_fastest_motion() {
+        let of = |viscous: f64, quadratic: f64| {
+            let terms = Terms::of(&[Term::Viscous, Term::Quadratic]);
+            bears_speed(&FrictionModel { terms, viscous, quadratic, ..FrictionModel::default() }, 2.0)
+        };
+        assert!(of(3.0, 0.0) && of(3.0, -0.499) && !of(3.0, -0.501) && !of(3.0, 1e-6) && !of(0.0, -1e-6));
+        let other = FrictionModel { quadratic: 1.0, ..FrictionModel::default() };
+        assert!(bears_speed(&other, 2.0), "without the term its coefficient means nothing");
     }
 }

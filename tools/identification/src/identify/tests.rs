@@ -116,6 +116,19 @@ fn a_term_is_forced_or_forbidden_by_request() {
 }
 
 #[test]
+fn where_runs_are_left_out_the_search_begins_with_other_terms_as_well() {
+    let ways = |several: bool| {
+        let mut samples = joint(4_000);
+        let folds = Folds { several, ..grouping::of_time(&samples) };
+        let options = Options { folds: Some(folds), ..Options::default() };
+        let found = identify(&mut samples, &RIGID, Preset::Full, &options).unwrap();
+        found.notes.iter().filter(|note| note.contains("taken first")).count()
+    };
+    assert_eq!(ways(false), 1);
+    assert!((2..=3).contains(&ways(true)), "{}", ways(true));
+}
+
+#[test]
 fn full_considers_temperature_only_when_it_varied_enough() {
     let mut samples = joint(4_000);
     samples.temperature.iter_mut().for_each(|t| *t = 30.0 + 0.1 * (*t - 30.0));
