@@ -2,8 +2,8 @@
 //! day, made by the plant.
 //!
 //! `cargo bench -p jointctl --features logs --bench fleet` prints what the commands take, and fails where a joint that
-//! is broken or wrongly configured is not named, or where fewer than 95 % of the joints that drifted get a better image.
-//! It takes most of an hour on two cores, and 3 GB. `FLEET_JOINTS=100` stops at 100.
+//! is broken or wrongly configured is not named, or where fewer than 95 % of the joints that drifted get a better
+//! image. `FLEET_JOINTS=100` stops at 100.
 
 #[path = "../../fleet/tests/fleet_of_joints/mod.rs"]
 mod fleet_of_joints;

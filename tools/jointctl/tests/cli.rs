@@ -33,12 +33,21 @@ fn with_demo() -> TempDir {
         folder.join("demo")
     });
     let folder = tempfile::tempdir().unwrap();
-    std::fs::create_dir(folder.path().join("demo")).unwrap();
-    for entry in std::fs::read_dir(made).unwrap() {
-        let file = entry.unwrap();
-        std::fs::copy(file.path(), folder.path().join("demo").join(file.file_name())).unwrap();
-    }
+    copy(made, &folder.path().join("demo"));
     folder
+}
+
+/// Copies a folder with all that is in it.
+fn copy(from: &Path, to: &Path) {
+    std::fs::create_dir(to).unwrap();
+    for entry in std::fs::read_dir(from).unwrap() {
+        let (path, to) = (entry.as_ref().unwrap().path(), to.join(entry.as_ref().unwrap().file_name()));
+        if path.is_dir() {
+            copy(&path, &to);
+        } else {
+            std::fs::copy(path, to).unwrap();
+        }
+    }
 }
 
 #[test]

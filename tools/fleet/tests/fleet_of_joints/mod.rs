@@ -1,5 +1,5 @@
-//! The files of a virtual fleet, with everything that goes wrong in it: in its first forty joints, and in larger fleets,
-//! which drift every forty joints alike, in some others.
+//! The files of a virtual fleet, with everything that goes wrong in it: in its first forty joints, and in larger
+//! fleets, which drift every forty joints alike, in some others.
 
 use fleet::windows::COLUMNS;
 use logs::{Format, Table, encode};

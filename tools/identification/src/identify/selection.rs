@@ -1,10 +1,10 @@
 //! The `full` model: the terms that pay on motions that were left out; host.
 //!
 //! 1. From Coulomb and viscous friction with an offset, the term that lowers the error of the left-out motions most is
-//!    taken, then those are dropped without which it does not rise, and so on until neither helps. Where several runs or
-//!    conditions are left out in turn, the same is done from the terms that help second and third most alone, as the first
-//!    may stand in the way of two others; parts of one run do not tell so many models apart. And from a preset that is
-//!    better.
+//!    taken, then those are dropped without which it does not rise, and so on until neither helps. Where several runs
+//!    or conditions are left out in turn, the same is done from the terms that help second and third most alone, as the
+//!    first may stand in the way of two others; parts of one run do not tell so many models apart. And from a preset
+//!    that is better.
 //! 2. Of all models on these ways the simplest one is chosen that the best does not beat beyond one standard error.
 //!
 //! A term that the others nearly explain is not considered (`determined`). Test samples are not seen.
@@ -250,8 +250,8 @@ impl Ways<'_> {
         self.notes.push(format!("{what}: error on left-out motions {before:.4e} -> {after:.4e}"));
     }
 
-    /// True where the model's viscous friction is one beyond the fastest motion, too: see [`bears_speed`]. What is forced
-    /// is not asked.
+    /// True where the model's viscous friction is one beyond the fastest motion, too: see [`bears_speed`]. What is
+    /// forced is not asked.
     fn bears_speed(&self, model: &Crossed) -> bool {
         self.rules.forced(Term::Quadratic) || bears_speed(&model.fit.friction, self.problem.limits.velocity)
     }
@@ -332,9 +332,9 @@ impl Ways<'_> {
     }
 }
 
-/// True where a quadratic term bends viscous friction down, as a lubricant that is sheared does, and no further than that
-/// it still grows at one and a half times the greatest speed. Bent up it stands for viscous friction that a narrow range
-/// of speeds does not tell from it, and is far too much beyond.
+/// True where a quadratic term bends viscous friction down, as a lubricant that is sheared does, and no further than
+/// that it still grows at one and a half times the greatest speed. Bent up it stands for viscous friction that a narrow
+/// range of speeds does not tell from it, and is far too much beyond.
 fn bears_speed(friction: &FrictionModel, speed: f64) -> bool {
     let (viscous, quadratic) = (friction.viscous, friction.quadratic);
     !friction.terms.contains(Term::Quadratic) || quadratic <= 0.0 && viscous + 2.0 * 1.5 * speed * quadratic >= 0.0
