@@ -87,7 +87,7 @@ fn of(joints: usize, folder: &Path) {
     }
 }
 
-/// What a command took, and its JSON.
+/// Time of a command, and its JSON.
 struct Took {
     seconds: f64,
     output: Value,

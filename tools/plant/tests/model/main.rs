@@ -1,5 +1,5 @@
-//! What a plant is made of and driven by: friction, arms, motions, random joints, their files. One program, as each
-//! links the plant anew.
+//! Parts of a plant and what drives it: friction, arms, motions, random joints, their files. One program, as each links
+//! the plant anew.
 
 mod arm;
 mod excitation;
