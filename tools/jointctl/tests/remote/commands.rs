@@ -1,6 +1,7 @@
 //! The program itself, with a joint behind slcan over TCP: what it prints, and the exit codes.
 
-use crate::served::{NODE, Served, image, program, repeated};
+use crate::punctual;
+use crate::served::{NODE, Served, image, program};
 use crate::tables::{ADDRESS, OF_A_JOINT, assert_is_table};
 use bus::client::Network;
 use canopen_node::NO_NODE_ID;
@@ -184,7 +185,7 @@ pub fn every_table_of_a_joint_is_json_where_that_is_asked_for() {
             let line = format!("{line}{force}");
             program().current_dir(&desk.folder).args(line.split(' ')).output().unwrap()
         };
-        assert_is_table(&line, &repeated(run));
+        assert_is_table(&line, &punctual::command(run));
     }
 }
 

@@ -10,6 +10,7 @@ mod images;
 mod motion;
 mod owner;
 mod page;
+mod punctual;
 mod refused;
 mod registry;
 mod retrain;
@@ -96,6 +97,7 @@ fn main() {
         registry {
             joints_with_the_registrys_image_with_another_unknown_and_silent_ones_are_told_apart,
         }
+        punctual { a_round_that_failed_is_repeated_only_where_the_machine_was_late, }
         retrain {
             a_round_lowers_what_is_unexplained_and_commits_a_newer_version,
             an_interrupted_round_leaves_the_joint_disabled_with_the_image_that_it_had,

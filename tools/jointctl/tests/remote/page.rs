@@ -1,6 +1,7 @@
 //! docs/on-the-bus.md, line by line as it stands.
 
-use crate::served::{Served, image, program, repeated};
+use crate::punctual;
+use crate::served::{Served, image, program};
 use crate::shown::{ON_THE_BUS, lines};
 use std::io::{BufRead, BufReader};
 use std::process::Stdio;
@@ -54,7 +55,7 @@ pub fn the_page_on_the_bus_runs_line_by_line() {
             assert!(served.is_some(), "{line}: before there are joints");
             // The curves are for a terminal.
             let page = if arguments.starts_with("monitor") { " --once" } else { "" };
-            let output = repeated(|force| command(&format!("{arguments}{page}{force}")).output().unwrap());
+            let output = punctual::command(|force| command(&format!("{arguments}{page}{force}")).output().unwrap());
             let told = [&output.stdout[..], &output.stderr].map(String::from_utf8_lossy).concat();
             assert!(output.status.success(), "{line}: {}\n{told}", output.status);
             run.push(arguments.split_whitespace().next().unwrap().to_owned());

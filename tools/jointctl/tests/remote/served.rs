@@ -12,7 +12,7 @@ use jointctl::remote::RemoteJoint;
 use node::{Options, SlotImages, Storage, VirtualNode, serve};
 use plant::ActuatorParameters;
 use plant::virtual_joint::Setup;
-use std::process::{Command, Output};
+use std::process::Command;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::JoinHandle;
@@ -26,20 +26,6 @@ pub fn program() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_jointctl"));
     command.env("JOINTCTL_TIMEOUT", PATIENCE.as_millis().to_string());
     command
-}
-
-/// A round of `retrain`, and a few more where nothing better came of it: a machine that is late with set-points
-/// disturbs the motion by which a new image is judged, and the joint keeps the one that it has. `run` is given what a
-/// repeated command ends with.
-pub fn repeated(run: impl Fn(&str) -> Output) -> Output {
-    let mut output = run("");
-    for _ in 0..3 {
-        if output.status.code() != Some(3) {
-            break;
-        }
-        output = run(" --force");
-    }
-    output
 }
 
 /// Node id of the first joint.
