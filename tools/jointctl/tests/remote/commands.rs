@@ -89,7 +89,7 @@ pub fn a_joint_is_looked_at_set_moved_and_fed_from_the_command_line() {
     desk.prints(&["set", "command-deadline", "0.06"], &["command-deadline (2103h:"]);
     desk.prints(&["bus-yml", "--out", "master", "--force", "--period", "30"], &["written: master/bus.yml"]);
     desk.fails(&["bus-yml", "--out", "master", "--force", "--period", "31"], &["node 5", "0.06 s", "0.062 s or more"]);
-    desk.prints(&["set", "command-deadline", "0.1"], &["command-deadline (2103h:"]);
+    desk.prints(&["set", "command-deadline", "5"], &["command-deadline (2103h:"]);
     desk.prints(&["store"], &["node 5: stored"]);
     desk.prints(&["move", "velocity", "-0.4", "--duration", "1"], &["rad/s", "node 5: disabled"]);
     desk.prints(&["monitor", "--once"], &["state           disabled", "position      ", "gear "]);

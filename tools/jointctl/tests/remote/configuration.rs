@@ -165,7 +165,7 @@ pub fn the_page_says_what_an_engineer_looks_for_first() {
         "image           none",
         "no key",
         "acting nothing: ",
-        "command deadline 0.5 s",
+        "command deadline 5 s",
         "gear ratio ",
     ] {
         assert!(page.contains(expected), "{expected} in\n{page}");

@@ -1,6 +1,6 @@
 //! Enabled, moved and disabled again, in every mode, and whatever happens meanwhile.
 
-use crate::served::{NODE, Served};
+use crate::served::{DEADLINE, NODE, Served};
 use joint_firmware::joint::state_machine::State;
 use joint_firmware::joint::{Command, Mode};
 use jointctl::remote::motion::{Motion, Observation, Outcome};
@@ -61,6 +61,8 @@ pub fn a_motion_beyond_a_limit_is_refused_by_name_before_the_joint_is_enabled() 
     }
     let message = run(&joint, &motion(Command::default(), 0.0)).unwrap_err().to_string();
     assert!(message.contains("--duration is 0 s"), "{message}");
+    let deadline = Entry::one("command-deadline").unwrap();
+    configuration::set(&joint, &[(deadline, deadline.parse("0.5").unwrap())]).unwrap();
     let slow = Motion { rate: 2.0, ..motion(Command::default(), 1.0) };
     let message = run(&joint, &slow).unwrap_err().to_string();
     assert!(message.contains("rate of set-points is 2 Hz, must lie in 4 to 1000 Hz"), "{message}");
@@ -81,7 +83,7 @@ pub fn an_interrupt_in_motion_leaves_the_joint_disabled_and_without_a_fault() {
 pub fn braking_may_take_longer_than_the_command_deadline() {
     let served = Served::joints(&[NODE]);
     let joint = served.joint();
-    let wanted = [("command-deadline", "0.3"), ("quick-stop-deceleration", "1.5")].map(|(name, text)| {
+    let wanted = [("command-deadline", "1"), ("quick-stop-deceleration", "0.5")].map(|(name, text)| {
         let entry = Entry::one(name).unwrap();
         (entry, entry.parse(text).unwrap())
     });
@@ -107,7 +109,7 @@ pub fn a_master_that_dies_leaves_a_fault_that_is_named_and_acknowledged_only_whe
         }
         Command { mode: Mode::Torque, ..Command::default() }
     });
-    joint.await_state(State::Fault, Duration::from_secs(3)).unwrap();
+    joint.await_state(State::Fault, Duration::from_secs_f32(DEADLINE + 60.0)).unwrap();
     let message = stream.check().unwrap_err().to_string();
     assert!(message.contains("command deadline missed (8100h)"), "{message}");
     std::mem::forget(stream);

@@ -21,6 +21,10 @@ use std::time::Duration;
 /// Longest time for an answer of a joint: these joints run in real time, and the machine may have much else to do.
 const PATIENCE: Duration = Duration::from_secs(60);
 
+/// Command deadline of these joints, s: they run in real time, and the machine may be late with set-points. What the
+/// deadline itself does is told by virtual time, in the tests of the node and the joint.
+pub const DEADLINE: f32 = 5.0;
+
 /// The program, with that patience.
 pub fn program() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_jointctl"));
@@ -55,10 +59,8 @@ impl Served {
             let parameters = ActuatorParameters::reference().aligned().without_payload();
             let options = Options { node_id, serial, seed: 1 };
             let images = SlotImages::empty().unwrap();
-            // Several joints run in real time beside each other here, and the machine is late for some of them at
-            // times.
             let mut setup = Setup::of(&parameters);
-            setup.configuration.limits.command_deadline = 0.5;
+            setup.configuration.limits.command_deadline = DEADLINE;
             let mut joint = VirtualNode::new(parameters, &setup, &options, images).unwrap();
             // The current sensors' offsets are measured before anybody asks.
             joint.advance(4_000);
