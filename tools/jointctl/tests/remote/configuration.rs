@@ -110,7 +110,7 @@ pub fn new_joints_get_the_node_ids_that_are_free() {
     let network = Network::new(bus::open(served.bus()).unwrap());
     let mut told = Vec::new();
     let mut tell = |done: &address::Addressed| told.push((done.node, done.address.serial));
-    let count = address::assign(&network, NODE - 1, true, Duration::from_millis(20), &mut tell).unwrap();
+    let count = address::assign(&network, NODE - 1, true, Duration::from_millis(150), &mut tell).unwrap();
     told.sort_unstable_by_key(|(_, serial)| *serial);
     assert_eq!((count, told.iter().map(|(_, serial)| *serial).collect::<Vec<_>>()), (2, vec![13, 14]));
     let mut ids = told.iter().map(|(node, _)| *node).collect::<Vec<_>>();
