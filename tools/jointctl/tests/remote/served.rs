@@ -21,8 +21,8 @@ use std::time::Duration;
 /// Longest time for an answer of a joint: these joints run in real time, and the machine may have much else to do.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// Command deadline of these joints, s: they run in real time, and the machine may be late with set-points. What the
-/// deadline itself does is told by virtual time, in the tests of the node and the joint.
+/// Command deadline of these joints, s: they run in real time, and the machine may be late with set-points. Tests
+/// about the deadline set their own, or wait for the fault.
 pub const DEADLINE: f32 = 5.0;
 
 /// The program, with that patience.
