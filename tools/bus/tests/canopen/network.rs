@@ -5,11 +5,11 @@ use crate::node::{Node, Running, identity, pattern};
 use bus::client::heartbeat::{Change, Watch};
 use bus::client::lss::Address;
 use bus::client::sdo::{Method, Settings};
-use bus::client::{ClientError, Command, Emergency, Network, NmtState, SyncProducer, Target, heartbeat};
+use bus::client::{ClientError, Command, Emergency, Network, NmtState, Subscription, SyncProducer, Target, heartbeat};
 use bus::{BusError, Frame, Transport, open};
 use canopen_node::Abort;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 const MS: Duration = Duration::from_millis(1);
@@ -136,27 +136,16 @@ fn a_second_client_is_noticed_and_nothing_is_half_done() {
 }
 
 /// A bus on which another client asks in the middle of so many reads of 2001h: before the first segment is asked for.
-/// The next read begins once the node has refused that segment, or, where that is late, with the refusal in its midst.
+/// That segment is refused, and the network has heard of it, before the read goes on: a refusal that is late would fall
+/// into the next one. One that is late is made where `late` asks for it.
 #[derive(Debug)]
 struct Interrupted {
     ours: Arc<dyn Transport>,
     other: Arc<dyn Transport>,
+    refusals: Mutex<Option<Subscription>>,
     reads: AtomicUsize,
     begun: AtomicBool,
-    refused: AtomicBool,
     late: AtomicBool,
-}
-
-impl Interrupted {
-    /// Waits for the node's refusal of a segment of no transfer.
-    fn refusal(&self) -> Result<(), BusError> {
-        while !self
-            .other
-            .receive(Duration::from_secs(60))?
-            .is_none_or(|frame| frame.id() == 0x585 && frame.data().starts_with(&[0x80]))
-        {}
-        Ok(())
-    }
 }
 
 impl Transport for Interrupted {
@@ -166,22 +155,25 @@ impl Transport for Interrupted {
 
     fn send(&self, frame: &Frame) -> Result<(), BusError> {
         let sends = |command: &[u8]| frame.id() == 0x605 && frame.data().starts_with(command);
-        if sends(&[0x60]) && self.begun.swap(false, Ordering::Relaxed) {
-            let left = self.reads.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(1));
-            if left.is_ok() {
-                self.refused.store(true, Ordering::Relaxed);
-                self.other.send(&Frame::new(0x605, &[0x40, 0, 0x10, 0, 0, 0, 0, 0]).unwrap())?;
-            } else if self.late.swap(false, Ordering::Relaxed) {
-                // In place of the node's answer.
-                return self.other.send(&Frame::new(0x585, &[0x80, 0x01, 0x20, 0, 0x01, 0, 0x04, 0x05]).unwrap());
-            }
+        self.begun.fetch_or(sends(&[0x40, 0x01, 0x20]), Ordering::Relaxed);
+        if !sends(&[0x60]) || !self.begun.swap(false, Ordering::Relaxed) {
+            return self.ours.send(frame);
         }
-        let begins = sends(&[0x40, 0x01, 0x20]);
-        if begins && self.refused.swap(false, Ordering::Relaxed) {
-            self.refusal()?;
+        let left = self.reads.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(1));
+        if left.is_ok() {
+            let refusals = self.refusals.lock().unwrap();
+            let refusals = refusals.as_ref().unwrap();
+            while refusals.try_next().unwrap().is_some() {}
+            self.other.send(&Frame::new(0x605, &[0x40, 0, 0x10, 0, 0, 0, 0, 0]).unwrap())?;
+            self.ours.send(frame)?;
+            assert!(refusals.next(Duration::from_secs(60)).unwrap().is_some(), "refused");
+            return Ok(());
         }
-        self.begun.fetch_or(begins, Ordering::Relaxed);
-        self.ours.send(frame)
+        match self.late.swap(false, Ordering::Relaxed) {
+            // In place of the node's answer.
+            true => self.other.send(&Frame::new(0x585, &[0x80, 0x01, 0x20, 0, 0x01, 0, 0x04, 0x05]).unwrap()),
+            false => self.ours.send(frame),
+        }
     }
 
     fn receive(&self, timeout: Duration) -> Result<Option<Frame>, BusError> {
@@ -194,9 +186,17 @@ fn a_read_that_another_client_disturbs_is_repeated_four_times() {
     let bus = "virtual:reads";
     let (ours, other) = (open(bus).unwrap(), open(bus).unwrap());
     let no = || AtomicBool::new(false);
-    let interrupted =
-        Arc::new(Interrupted { ours, other, reads: AtomicUsize::new(0), begun: no(), refused: no(), late: no() });
+    let interrupted = Arc::new(Interrupted {
+        ours,
+        other,
+        refusals: Mutex::default(),
+        reads: AtomicUsize::new(0),
+        begun: no(),
+        late: no(),
+    });
     let (network, running) = pair_over(interrupted.clone(), bus, 5, 0);
+    let refusals = network.subscribe(|frame| frame.id() == 0x585 && frame.data().starts_with(&[0x80]));
+    *interrupted.refusals.lock().unwrap() = Some(refusals);
     let node = network.node(5).unwrap();
     node.download(0x2001, 0, &pattern(2000)).unwrap();
     for times in [1, 4] {
@@ -216,6 +216,8 @@ fn a_read_that_another_client_disturbs_is_repeated_four_times() {
     let error = node.upload_by(0x2001, 0, Method::Segmented).unwrap_err();
     assert!(matches!(error, ClientError::OtherClient { .. }), "{error}");
     assert_eq!(interrupted.reads.load(Ordering::Relaxed), 0);
+    // It holds the network, which holds this bus.
+    interrupted.refusals.lock().unwrap().take();
     drop(running);
 }
 
