@@ -1,11 +1,12 @@
-//! Other people's programs: what this crate writes is read by PyPI's `mcap` and `pyarrow`, and the other way round.
+//! Other people's programs: what this crate writes is read by PyPI's `mcap`, `pyarrow` and `rerun-sdk`, and what the
+//! first two write is read by it.
 //!
 //! Without Python, or where they cannot be installed, these are reported as ignored by name; with `CI` set they run,
 //! and fail.
 
 use libtest_mimic::{Arguments, Failed, Trial};
 use logs::{Format, Table, Wanted, encode, read};
-use python::LOGS;
+use python::{LOGS, Packages, RERUN};
 use std::path::Path;
 use std::process::Command;
 
@@ -18,20 +19,28 @@ type Named = (&'static str, fn(&Path) -> Result<(), Failed>);
 fn main() {
     let arguments = Arguments::from_args();
     let must_run = std::env::var_os("CI").is_some();
-    let python = if arguments.list { None } else { LOGS.python(env!("CARGO_TARGET_TMPDIR")) };
-    let ignored = !must_run && python.is_none();
-    let trial = |(name, test): Named| {
-        let python = python.clone();
-        Trial::test(name, move || test(LOGS.required(python.as_deref())?)).with_ignored_flag(ignored)
+    let trials = |packages: Packages, tests: &[Named]| -> Vec<Trial> {
+        let python = if arguments.list { None } else { packages.python(env!("CARGO_TARGET_TMPDIR")) };
+        let ignored = !must_run && python.is_none();
+        let trial = |&(name, test): &Named| {
+            let python = python.clone();
+            Trial::test(name, move || test(packages.required(python.as_deref())?)).with_ignored_flag(ignored)
+        };
+        tests.iter().map(trial).collect()
     };
-    let tests: [Named; 5] = [
+    let of_logs: [Named; 5] = [
         ("the_mcap_package_reads_every_value_time_and_schema", mcap_reads),
         ("pyarrow_reads_every_value_and_null", pyarrow_reads),
         ("compressed_and_plain_mcap_of_the_package_is_read", mcap_written),
         ("parquet_as_pyarrow_writes_it_is_read", pyarrow_written),
         ("columns_that_are_no_numbers_are_refused_by_name", pyarrow_other_types),
     ];
-    libtest_mimic::run(&arguments, tests.map(trial).into()).exit();
+    let of_rerun: [Named; 2] = [
+        ("rerun_shows_every_value_of_a_parquet_log", rerun_parquet),
+        ("rerun_keeps_every_message_of_an_mcap", rerun_mcap),
+    ];
+    let all = trials(LOGS, &of_logs).into_iter().chain(trials(RERUN, &of_rerun)).collect();
+    libtest_mimic::run(&arguments, all).exit();
 }
 
 /// Runs a script in a folder; what it prints.
@@ -228,4 +237,56 @@ pq.write_table(pa.table({"a": pa.array([1.0, 2.0])}), "gzip.parquet", compressio
     // A compression that is not compiled in is told, not a defect of the file.
     let error = read(&folder.path().join("gzip.parquet"), &Wanted::numbers(["a"])).map(drop).unwrap_err().to_string();
     check(error.contains("gzip.parquet") && error.to_lowercase().contains("gzip"), &error)
+}
+
+/// Rerun's own command reads a log, without a window; the script gets what it made of it, as chunks by entity.
+fn rerun(python: &Path, folder: &Path, arguments: &str, script: &str) -> Result<(), Failed> {
+    let read = format!(
+        r#"
+import os, subprocess, sys
+import rerun.chunk
+subprocess.run([os.path.join(os.path.dirname(sys.executable), "rerun"), {arguments}], check=True,
+               env=dict(os.environ, RERUN_ANALYTICS="0", HOME=os.getcwd()), capture_output=True)
+chunks = {{}}
+for chunk in rerun.chunk.RrdReader("shown.rrd").stream().to_chunks():
+    chunks.setdefault(chunk.entity_path, []).append(chunk.to_record_batch())
+def values(entity, name):
+    found = [batch for batch in chunks[entity] if name in batch.schema.names]
+    return [value for batch in found for value in batch.column(name).to_pylist()]
+{script}"#
+    );
+    run(python, folder, &read).map(drop)
+}
+
+fn rerun_parquet(python: &Path) -> Result<(), Failed> {
+    let folder = tempfile::tempdir()?;
+    std::fs::write(folder.path().join("log.parquet"), encode(&table(), Format::Parquet, "", 0)?)?;
+    rerun(
+        python,
+        folder.path(),
+        r#""log.parquet", "--save", "shown.rrd""#,
+        r#"
+assert values("/time", "s") == [[row / 250] for row in range(3000)]
+expected = [[None] if row % 10 == 4 else [(row - 1500) / 7] for row in range(3000)]
+assert values("/effort", "Nm") == expected, values("/effort", "Nm")[:8]
+"#,
+    )
+}
+
+fn rerun_mcap(python: &Path) -> Result<(), Failed> {
+    let folder = tempfile::tempdir()?;
+    std::fs::write(folder.path().join("log.mcap"), encode(&table(), Format::Mcap, "/joint5", START)?)?;
+    rerun(
+        python,
+        folder.path(),
+        r#""mcap", "convert", "log.mcap", "-o", "shown.rrd""#,
+        r#"
+import datetime, json
+messages = [json.loads(bytes(data[0])) for data in values("/joint5", "McapMessage:data")]
+assert [message["time_s"] for message in messages] == [row / 250 for row in range(3000)]
+start = datetime.datetime(2023, 11, 14, 22, 13, 20)
+expected = [start + datetime.timedelta(milliseconds=4 * row) for row in range(3000)]
+assert values("/joint5", "message_log_time") == expected, values("/joint5", "message_log_time")[:3]
+"#,
+    )
 }

@@ -34,6 +34,10 @@ pub const LOGS: Packages = Packages {
     import: "mcap.reader, mcap.writer, pyarrow.parquet",
 };
 
+/// Rerun's importers, which show logs; an environment of its own, as it takes 820 MB.
+pub const RERUN: Packages =
+    Packages { folder: "python-rerun", install: &["rerun-sdk==0.41.0"], import: "rerun, rerun.chunk" };
+
 /// Ray.
 pub const RAY: Packages = Packages { folder: "python-ray", install: &["ray==2.60.0"], import: "ray" };
 
