@@ -65,7 +65,7 @@ impl Preset {
             Self::Stribeck => Structure { coupled_slopes: true, ..symmetric(&[Viscous, Coulomb, Stribeck]) },
             Self::Nscf => {
                 let base = symmetric(&[Constant, Viscous, Coulomb]);
-                let terms = if rigid.inertia { base.terms } else { base.terms.with(RotorInertia) };
+                let terms = if rigid.has_inertia() { base.terms } else { base.terms.with(RotorInertia) };
                 Structure { terms, asymmetric_coulomb: true, ..base }
             }
             Self::Hysteresis => symmetric(&[Viscous, Hysteresis]),

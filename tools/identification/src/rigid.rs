@@ -32,6 +32,19 @@ pub enum Gravity {
     SineAndCosine,
 }
 
+/// Part that a rigid effort has which is computed elsewhere (a robot's), in the column `rigid` of the samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Given {
+    /// There is no such column.
+    #[default]
+    None,
+    /// It counts as it is.
+    AsItIs,
+    /// It counts times a factor that is identified.
+    Scaled,
+}
+
 /// Regressors of the rigid part.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RigidModel {
@@ -41,10 +54,10 @@ pub struct RigidModel {
     pub gravity: Gravity,
     /// Adds regressors in proportion to m l^2 and m l; needs the columns `mass` (kg) and `length` (m) of the samples.
     pub mass_and_length: bool,
-    /// Number of [`LAGS`] that have a regressor; not without inertia.
+    /// Number of [`LAGS`] that have a regressor; not where nothing accounts for inertia.
     pub lags: usize,
-    /// A rigid part that is computed elsewhere (a robot's); needs the column `rigid` of the samples.
-    pub given: bool,
+    /// Rigid part that is computed elsewhere.
+    pub given: Given,
 }
 
 /// One regressor of the rigid part.
@@ -168,10 +181,20 @@ impl RigidModel {
                 RigidRegressor::LoadInertia => self.inertia && self.mass_and_length,
                 RigidRegressor::LoadGravitySine => sine && self.mass_and_length,
                 RigidRegressor::LoadGravityCosine => cosine && self.mass_and_length,
-                RigidRegressor::LaggedAcceleration(lag) => self.inertia && *lag < self.lags,
-                RigidRegressor::Given => self.given,
+                RigidRegressor::LaggedAcceleration(lag) => self.has_inertia() && *lag < self.lags,
+                RigidRegressor::Given => self.given == Given::Scaled,
             })
             .collect()
+    }
+
+    /// True where the effort of an inertia is part of the rigid effort, identified or given.
+    pub fn has_inertia(&self) -> bool {
+        self.inertia || self.given != Given::None
+    }
+
+    /// Coefficients before anything is identified: what counts as it is.
+    pub fn fixed(&self) -> RigidParameters {
+        RigidParameters { given: if self.given == Given::AsItIs { 1.0 } else { 0.0 }, ..RigidParameters::default() }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Friction image of each joint: what the rigid bodies leave goes through the pipeline of one joint; host.
 //!
-//! The effort of the rigid bodies is the given rigid part of that pipeline, and its theoretical torque. Its factor is
-//! free: it takes up what the gain of a drive is wrong by. So is an inertia of the joint's own.
+//! The effort of the rigid bodies is the given rigid part of that pipeline, and its theoretical torque. It gets a
+//! factor where that pays: it takes up what the gain of a drive is wrong by. An inertia of the joint's own is free.
 
 use super::recording::{Recording, RobotFitError};
 use identification::fit::{Fitted, Options, fit};

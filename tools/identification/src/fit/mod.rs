@@ -33,7 +33,7 @@ use crate::joint_model::{firmware_states, fixed_point, regimes, rigid_efforts};
 use crate::page::{self, NetworkOutcome, Report, Role};
 use crate::presets::Preset;
 use crate::progress::Progress;
-use crate::rigid::{Gravity, RigidModel, RigidParameters};
+use crate::rigid::{Given, Gravity, RigidModel, RigidParameters};
 use crate::samples::Samples;
 use friction_compensation::friction::FrictionParameters;
 use friction_compensation::friction::regime::Measure;
@@ -190,7 +190,7 @@ pub fn fit(prepared: &mut Prepared, options: &Options, progress: &dyn Progress) 
     let physical = &identified[chosen];
     let states = firmware_states(samples)?;
 
-    let static_load = rigid_model.gravity != Gravity::None || rigid_model.given;
+    let static_load = rigid_model.gravity != Gravity::None || rigid_model.given != Given::None;
     let inputs = options.inputs.unwrap_or_else(|| learn::inputs(samples, static_load));
     let thresholds = &prepared.thresholds;
     let reference = simplest(&identified).fold_errors();
@@ -355,7 +355,7 @@ pub fn rigid_model(description: &RigidDescription) -> RigidModel {
         },
         mass_and_length: description.mass_and_length,
         lags: 0,
-        given: description.given,
+        given: if description.given { Given::Scaled } else { Given::None },
     }
 }
 

@@ -1,48 +1,24 @@
 //! Number of lagged accelerations in the rigid part: as many as pay on motions that were left out, beside Coulomb and
 //! viscous friction; host.
 //!
-//! All is linear once the slope of the Coulomb friction is known, so every fold is solved from sums over its rows.
 //! Accelerations of one motion explain each other, and what they explain there they do not explain elsewhere: without
 //! motions to leave out there are none.
 
-use super::linear::{add_to_normal_sums, bounded_step, dependences, normal_equations, normal_sums, sum_over_rows};
-use super::observations::Row;
+use super::fold_sums::{FoldSums, errors};
 use crate::choice::{Decision, Folds, compare, rank};
-use crate::levenberg_marquardt::NormalEquations;
-use crate::rigid::{LAGS, RigidModel, RigidRegressor};
-use nalgebra::DVector;
+use crate::rigid::{LAGS, RigidModel};
 
 /// Least fall of the error, as a fraction. Below it lie filters and sampling, which differ between acceleration and
 /// effort on a rigid joint, too.
 const LEAST_GAIN: f64 = 0.02;
-/// Columns of Coulomb and viscous friction with an offset, before those of the rigid part.
-const FRICTION: usize = 3;
-/// All columns.
-const COLUMNS: usize = FRICTION + RigidRegressor::ALL.len();
-
-/// Number of [`LAGS`] that the rigid part gets, and what to say about it. `left_out` tells for each row which folds
-/// leave it out, one bit each.
-pub fn choose(
-    rows: &[Row],
-    left_out: &[u8],
-    folds: &Folds,
-    rigid: &RigidModel,
-    coulomb_slope: f64,
-    decision: Decision,
-) -> (usize, Option<String>) {
-    let offered = rigid.inertia && (decision == Decision::Keep || decision == Decision::Choose && folds.motions);
-    if !offered || folds.len() < 2 {
+/// Number of [`LAGS`] that the rigid part gets, and what to say about it.
+pub fn choose(sums: &[FoldSums], folds: &Folds, rigid: &RigidModel, decision: Decision) -> (usize, Option<String>) {
+    let offered = rigid.has_inertia() && (decision == Decision::Keep || decision == Decision::Choose && folds.motions);
+    if !offered || sums.len() < 2 {
         return (0, None);
     }
-    let sums: Vec<Sums> = (0..folds.len()).map(|fold| Sums::of(rows, left_out, fold, coulomb_slope)).collect();
     let numbers: Vec<usize> = (0..=LAGS.len()).step_by(2).collect();
-    let errors: Vec<Vec<f64>> = numbers
-        .iter()
-        .map(|&lags| {
-            let columns = columns(&RigidModel { lags, ..*rigid });
-            sums.iter().map(|sums| sums.error(&columns)).collect()
-        })
-        .collect();
+    let errors: Vec<Vec<f64>> = numbers.iter().map(|&lags| errors(sums, &RigidModel { lags, ..*rigid })).collect();
     let best = best(&errors, &numbers, decision);
     let change = compare(&errors[0], &errors[best]);
     let note = format!(
@@ -65,51 +41,9 @@ fn best(errors: &[Vec<f64>], numbers: &[usize], decision: Decision) -> usize {
     }
 }
 
-/// The columns of a rigid part beside Coulomb and viscous friction, in order.
-fn columns(rigid: &RigidModel) -> Vec<usize> {
-    (0..FRICTION).chain(rigid.regressors().into_iter().map(|regressor| FRICTION + regressor.index())).collect()
-}
-
-/// Normal equations over the rows that a fold fits to, and over those that it judges.
-struct Sums {
-    fitted: NormalEquations,
-    judged: NormalEquations,
-}
-
-impl Sums {
-    fn of(rows: &[Row], left_out: &[u8], fold: usize, coulomb_slope: f64) -> Self {
-        let add = |sums: &mut [f64], row: &&Row| {
-            let mut values = [0.0; COLUMNS];
-            let velocity = row.joint.velocity;
-            values[..FRICTION].copy_from_slice(&[velocity, (coulomb_slope * velocity).tanh(), 1.0]);
-            values[FRICTION..].copy_from_slice(&row.regressors);
-            add_to_normal_sums(sums, &values, -row.effort);
-        };
-        let (judged, fitted): (Vec<_>, Vec<_>) =
-            rows.iter().zip(left_out).partition(|(_, left_out)| **left_out >> fold & 1 == 1);
-        let equations = |pairs: Vec<(&Row, &u8)>| {
-            let rows: Vec<&Row> = pairs.into_iter().map(|(row, _)| row).collect();
-            normal_equations(&sum_over_rows(&rows, normal_sums(COLUMNS), add), COLUMNS, rows.len())
-        };
-        Self { fitted: equations(fitted), judged: equations(judged) }
-    }
-
-    /// Root mean square of what the columns, fitted to the rest, leave of the rows that are judged.
-    fn error(&self, columns: &[usize]) -> f64 {
-        let dependent = dependences(&self.fitted.hessian, columns);
-        let free: Vec<usize> =
-            columns.iter().copied().filter(|i| dependent.iter().all(|dependence| dependence.column != *i)).collect();
-        let bounds = vec![(f64::NEG_INFINITY, f64::INFINITY); free.len()];
-        let (solved, _) = bounded_step(&self.fitted, &free, bounds);
-        let mut x = DVector::zeros(COLUMNS);
-        free.into_iter().zip(solved.iter()).for_each(|(column, value)| x[column] = *value);
-        let square = self.judged.cost + 2.0 * self.judged.gradient.dot(&x) + x.dot(&(&self.judged.hessian * &x));
-        square.max(0.0).sqrt()
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::fold_sums;
     use super::super::observations::{rows, used};
     use super::super::synthetic::{RIGID, drive, motion};
     use super::*;
@@ -139,7 +73,8 @@ mod tests {
     fn chosen(elastic: bool, motions: bool, decision: Decision) -> usize {
         let (samples, folds) = joint(elastic);
         let left_out: Vec<u8> = used(&samples).into_iter().map(|i| folds.left_out[i]).collect();
-        choose(&rows(&samples), &left_out, &Folds { motions, ..folds }, &RIGID, 40.0, decision).0
+        let sums = fold_sums::of(&rows(&samples), &left_out, &folds, 40.0);
+        choose(&sums, &Folds { motions, ..folds }, &RIGID, decision).0
     }
 
     #[test]
@@ -168,6 +103,7 @@ mod tests {
         let (samples, folds) = joint(true);
         let left_out: Vec<u8> = used(&samples).into_iter().map(|i| folds.left_out[i]).collect();
         let rigid = RigidModel { inertia: false, ..RIGID };
-        assert_eq!(choose(&rows(&samples), &left_out, &folds, &rigid, 40.0, Decision::Keep), (0, None));
+        let sums = fold_sums::of(&rows(&samples), &left_out, &folds, 40.0);
+        assert_eq!(choose(&sums, &folds, &rigid, Decision::Keep), (0, None));
     }
 }

@@ -8,7 +8,7 @@ use super::observations::Limits;
 use crate::friction_model::{FrictionModel, Ripple, Term};
 use crate::friction_parameter::{FrictionParameter as P, HARMONICS};
 use crate::presets::Structure;
-use crate::rigid::{RigidParameters, RigidRegressor};
+use crate::rigid::{RigidModel, RigidParameters, RigidRegressor};
 use nalgebra::DVector;
 use std::f64::consts::{PI, SQRT_2};
 
@@ -103,12 +103,15 @@ pub struct Layout {
     pub columns: Vec<Column>,
     /// Links by which parameters follow from them.
     pub links: Vec<Link>,
+    /// Coefficients of the rigid part without a column.
+    pub fixed: RigidParameters,
 }
 
 impl Layout {
-    /// Lays out a structure on top of the given regressors, with bounds from the limits of the train rows.
-    pub fn new(structure: &Structure, regressors: &[RigidRegressor], limits: &Limits) -> Self {
-        let mut layout = Self::default();
+    /// Lays out a structure beside the given rigid part, with bounds from the limits of the train rows.
+    pub fn new(structure: &Structure, rigid: &RigidModel, limits: &Limits) -> Self {
+        let mut layout = Self { fixed: rigid.fixed(), ..Self::default() };
+        let regressors = rigid.regressors();
         layout.coulomb(structure);
         let on = |term| structure.terms.contains(term);
         const FREE: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
@@ -120,7 +123,7 @@ impl Layout {
             layout.own(P::Offset, Role::Coefficient, FREE);
         }
         if !structure.holds_rigid() {
-            for &regressor in regressors {
+            for &regressor in &regressors {
                 let inertial = matches!(regressor, RigidRegressor::Inertia | RigidRegressor::LoadInertia);
                 let column = layout.column(regressor, Role::Coefficient, if inertial { POSITIVE } else { FREE });
                 layout.links.push(Link { parameter: Parameter::Rigid(regressor), column, factor: 1.0, made_for: true });
@@ -285,6 +288,7 @@ impl Layout {
         Self {
             columns: columns.collect(),
             links: links.map(|link| Link { column: moved[link.column], ..*link }).collect(),
+            fixed: self.fixed,
         }
     }
 
@@ -305,7 +309,7 @@ impl Layout {
     /// The model at `x`. Parameters without a column are 0, but those that only shape (slopes, widths) and the fixed
     /// ones come from `template`.
     pub fn decode(&self, x: &DVector<f64>, template: &FrictionModel) -> (RigidParameters, FrictionModel) {
-        let mut rigid = RigidParameters::default();
+        let mut rigid = self.fixed;
         let mut friction = FrictionModel {
             terms: template.terms,
             coulomb_slope: template.coulomb_slope,
@@ -367,7 +371,7 @@ mod tests {
     fn layout(structure: &Structure) -> Layout {
         let limits = Limits::of(&super::super::observations::rows(&motion(2_000)), 30.0);
         let limits = Limits { elements: 4, ripples: 2, ripple_torques: [true; 2], ..limits };
-        Layout::new(structure, &RIGID.regressors(), &limits)
+        Layout::new(structure, &RIGID, &limits)
     }
 
     fn free() -> Structure {

@@ -1,22 +1,24 @@
 //! Identification of a joint: rigid part and physical friction from its train samples; host.
 //!
-//! 1. The rigid part is identified with viscous and Coulomb friction and an offset, and gets lagged accelerations where
-//!    they pay. Its effort is the theoretical torque of every sample (`Samples::load`), frozen from then on: friction
-//!    terms that depend on load never see the measured torque.
+//! 1. The rigid part is identified with viscous and Coulomb friction and an offset. It gets lagged accelerations and a
+//!    factor on a given rigid part, where they pay. Its effort is the theoretical torque of every sample
+//!    (`Samples::load`), frozen from then on: friction terms that depend on load never see the measured torque.
 //! 2. The terms of the chosen preset are identified, jointly with the rigid part once more.
 //!
 //! Training and validation samples are both used; what is chosen is chosen by folds over motions (`choice`).
 //!
-//! `observations` checks and thins the samples, `lags` chooses lagged accelerations, `layout` maps parameters to the
-//! searched vector, `linear` and `nonlinear` fit, `grid` finds where to start, `selection` chooses the terms of
-//! `Preset::Full`, `crossed` fits without each fold, `shapes` chooses distances and frequencies, `determined` says
-//! which terms the data determine, `estimates` adds standard errors.
+//! `observations` checks and thins the samples, `lags` chooses lagged accelerations, `given` a factor (both by
+//! `fold_sums`), `layout` maps parameters to the searched vector, `linear` and `nonlinear` fit, `grid` finds where to
+//! start, `selection` chooses the terms of `Preset::Full`, `crossed` fits without each fold, `shapes` chooses distances
+//! and frequencies, `determined` says which terms the data determine, `estimates` adds standard errors.
 
 mod crossed;
 mod determined;
 mod estimates;
 mod fold_rows;
+mod fold_sums;
 mod freedom;
+mod given;
 mod grid;
 mod lags;
 mod layout;
@@ -178,7 +180,8 @@ pub fn identify(
     options: &Options,
 ) -> Result<Identified, IdentifyError> {
     let folds = options.folds.clone().unwrap_or_else(|| grouping::of_time(samples));
-    let (mut problem, rigid, lags) = theoretical_torque(samples, rigid, &folds, options)?;
+    let (mut problem, found) = theoretical_torque(samples, rigid, &folds, options)?;
+    let rigid = problem.rigid;
     if preset == Preset::Full {
         shapes::choose(&mut problem, samples);
     }
@@ -195,7 +198,7 @@ pub fn identify(
         }
         None => selection::select(&problem, &rigid, &options.terms, folds.several),
     };
-    notes.extend(lags);
+    notes.extend(found);
     let (parameters, undetermined) = estimates::estimates(&fit, problem.train.len(), &options.units);
     if problem.own_part_of_offset < linear::OWN_PART && !fit.friction.terms.contains(Term::Constant) {
         notes.push(format!(
@@ -228,7 +231,7 @@ fn theoretical_torque(
     rigid: &RigidModel,
     folds: &Folds,
     options: &Options,
-) -> Result<(Problem, RigidModel, Option<String>), IdentifyError> {
+) -> Result<(Problem, Vec<String>), IdentifyError> {
     observations::check(samples, rigid)?;
     let train = observations::rows(samples);
     if train.len() < MINIMUM_SAMPLES {
@@ -244,27 +247,29 @@ fn theoretical_torque(
             .unwrap_or(5.0 / limits.acceleration_rms.max(f64::MIN_POSITIVE)),
         ..FrictionModel::default()
     };
-    let regressors = rigid.regressors();
     let mut problem = Problem {
-        own_part_of_offset: determined::own_part_of_offset(&train, &regressors),
+        own_part_of_offset: determined::own_part_of_offset(&train, &rigid.regressors()),
         search: observations::decimated(&train, options.search_samples),
         train,
         folds: vec![],
         limits,
-        regressors,
+        rigid: *rigid,
         theoretical: RigidParameters::default(),
         template,
     };
-    let (mut rigid, mut note) = (*rigid, None);
-    if let Some(structure) = Preset::CoulombViscous.structure(&rigid) {
+    let mut notes = vec![];
+    if let Some(structure) = Preset::CoulombViscous.structure(rigid) {
         let fitted =
             |problem: &Problem| -> Fit { grid::search(problem, &problem.determined(structure)).polished(problem) };
         let mut first = fitted(&problem);
         let slope = first.friction.parameter(FrictionParameter::CoulombSlope);
-        let left_out = left_out(samples, folds);
-        (rigid.lags, note) = lags::choose(&problem.train, &left_out, folds, &rigid, slope, options.lags);
-        if rigid.lags > 0 {
-            problem.regressors = rigid.regressors();
+        let sums = fold_sums::of(&problem.train, &left_out(samples, folds), folds, slope);
+        let (chosen, given) = given::choose(&sums, rigid);
+        let (lags, lagged) = lags::choose(&sums, folds, &chosen, options.lags);
+        notes.extend(given.into_iter().chain(lagged));
+        problem.rigid = RigidModel { lags, ..chosen };
+        if problem.rigid != *rigid {
+            problem.own_part_of_offset = determined::own_part_of_offset(&problem.train, &chosen.regressors());
             first = fitted(&problem);
         }
         problem.theoretical = first.rigid;
@@ -275,7 +280,7 @@ fn theoretical_torque(
         rows.iter_mut().for_each(|row| row.joint.load = nonlinear::rigid_effort(&problem.theoretical, row));
     }
     problem.limits = Limits::of(&problem.train, reference_temperature);
-    Ok((problem, rigid, note))
+    Ok((problem, notes))
 }
 
 /// Folds that leave each row out, one bit each.

@@ -7,7 +7,7 @@ use super::observations::{Limits, Row};
 use crate::friction_model::{FrictionModel, Term};
 use crate::levenberg_marquardt::{Damping, LeastSquares, NormalEquations, Options, minimise};
 use crate::presets::Structure;
-use crate::rigid::{RigidParameters, RigidRegressor};
+use crate::rigid::{RigidModel, RigidParameters, RigidRegressor};
 use nalgebra::DVector;
 use std::ops::ControlFlow;
 
@@ -23,7 +23,7 @@ pub struct Problem {
     /// Limits of the train rows.
     pub limits: Limits,
     /// Regressors of the rigid part.
-    pub regressors: Vec<RigidRegressor>,
+    pub rigid: RigidModel,
     /// Rigid part that the theoretical torque in the rows was computed with.
     pub theoretical: RigidParameters,
     /// The part of a constant over the train rows that the rigid part does not explain.
@@ -135,7 +135,7 @@ pub fn rigid_effort(rigid: &RigidParameters, row: &Row) -> f64 {
 impl Candidate {
     /// Lays out a structure and drops the linear columns that the train rows cannot tell from earlier ones.
     pub fn new(problem: &Problem, structure: &Structure) -> Self {
-        let layout = Layout::new(structure, &problem.regressors, &problem.limits);
+        let layout = Layout::new(structure, &problem.rigid, &problem.limits);
         let template = FrictionModel { terms: structure.terms, ..problem.template.clone() };
         let mut candidate = Self { structure: *structure, layout, template, notes: vec![] };
         let linear = |role| matches!(role, Role::Coefficient | Role::Factor);

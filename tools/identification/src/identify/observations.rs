@@ -3,7 +3,7 @@
 use super::IdentifyError;
 use crate::friction_model::{JointState, RIPPLES};
 use crate::joint_model::{float_state, rigid_state};
-use crate::rigid::{RigidModel, RigidParameters, RigidRegressor};
+use crate::rigid::{Given, RigidModel, RigidParameters, RigidRegressor};
 use crate::samples::{Part, Samples};
 
 /// Intervals of position that must be visited for position harmonics to be considered.
@@ -68,7 +68,7 @@ pub fn check(samples: &Samples, rigid: &RigidModel) -> Result<(), IdentifyError>
             columns.push((name, column));
         }
     }
-    if rigid.given {
+    if rigid.given != Given::None {
         columns.push(("rigid", samples.extra.get("rigid").ok_or(IdentifyError::MissingColumn { column: "rigid" })?));
     }
     for (column, values) in columns {

@@ -43,7 +43,7 @@ fn supported(problem: &Problem, rigid: &RigidModel) -> (Structure, Vec<String>) 
         terms = if found { terms.with(term) } else { terms };
     }
     let mut notes = Vec::new();
-    if !rigid.inertia {
+    if !rigid.has_inertia() {
         terms = terms.with(RotorInertia);
     }
     if problem.limits.position_covered {

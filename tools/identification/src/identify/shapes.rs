@@ -78,7 +78,7 @@ fn columns(problem: &Problem, row: &Row) -> [f64; BASE] {
     let fastest = problem.limits.velocity.max(f64::MIN_POSITIVE);
     let weakening = |part: f64| direction * (1.0 - (v / (part * fastest)).tanh().powi(2));
     let mut columns = [0.0; BASE];
-    for &regressor in &problem.regressors {
+    for regressor in problem.rigid.regressors() {
         columns[regressor.index()] = row.regressors[regressor.index()];
     }
     let friction = [

@@ -5,7 +5,7 @@ use super::observations::{Limits, decimated, rows};
 use crate::friction_model::{Directional, FrictionModel, Ripple, Terms};
 use crate::joint_model::{float_state, rigid_efforts};
 use crate::pre_sliding;
-use crate::rigid::{Gravity, RigidModel, RigidParameters};
+use crate::rigid::{Given, Gravity, RigidModel, RigidParameters};
 use crate::samples::{MotionState, Part, Samples};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
@@ -13,7 +13,7 @@ use rand_distr::{Distribution, Normal};
 
 /// Inertia, and gravity of unknown direction.
 pub const RIGID: RigidModel =
-    RigidModel { inertia: true, gravity: Gravity::SineAndCosine, mass_and_length: false, lags: 0, given: false };
+    RigidModel { inertia: true, gravity: Gravity::SineAndCosine, mass_and_length: false, lags: 0, given: Given::None };
 
 /// The rigid part that belongs to it.
 pub fn rigid() -> RigidParameters {
@@ -112,7 +112,7 @@ pub fn problem(samples: &Samples, model: &RigidModel, theoretical: RigidParamete
         train,
         folds: vec![],
         own_part_of_offset: 1.0,
-        regressors: model.regressors(),
+        rigid: *model,
         theoretical,
         template: FrictionModel {
             coulomb_slope: truth.coulomb_slope,
