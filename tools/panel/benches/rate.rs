@@ -1,0 +1,113 @@
+//! Four joints at 1 kHz, a page each, and what the server costs: samples lost, processor time, memory.
+//!
+//! `cargo bench -p panel --bench rate` runs it for ten minutes, `PANEL_SECONDS` for another time of more than a minute.
+//! It fails where a sample is missing that the page was not told of, where the server takes more than a quarter of a
+//! core, or where its memory grows by more than a tenth after the first minute. Joints and pages are in this process,
+//! the server is the program itself; the bus is UDP multicast on this machine.
+
+#![allow(dead_code, reason = "pages and joints are those of the tests, which use more of them")]
+
+#[path = "../tests/panel/page.rs"]
+mod page;
+#[path = "../tests/panel/served.rs"]
+mod served;
+
+use page::Page;
+use serde_json::json;
+use served::{Joints, PATIENCE};
+use std::io::{BufRead, BufReader};
+use std::net::SocketAddr;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// Node ids.
+const NODES: [u8; 4] = [5, 6, 7, 8];
+/// Samples a second.
+const RATE: f64 = 1_000.0;
+/// Time over which the server keeps every sample, s.
+const KEPT: f64 = 60.0;
+/// Largest part of a core that the server may take.
+const CORE: f64 = 0.25;
+/// Largest growth of its memory after the first minute.
+const GROWTH: f64 = 0.1;
+/// Samples by which SYNC and the ends of the last minute may differ from the rate.
+const EDGE: f64 = 60.0;
+
+fn main() {
+    // Cargo passes `--bench`; tests, which pass nothing, have no minutes for it.
+    if !std::env::args().any(|argument| argument == "--bench") {
+        return;
+    }
+    let seconds = std::env::var("PANEL_SECONDS").ok().and_then(|text| text.parse().ok()).unwrap_or(600.0);
+    let bus = format!("udp:239.74.163.9:{}", bus::free_port().unwrap());
+    let joints = Joints::on(&bus, &NODES);
+    let mut server = Command::new(env!("CARGO_BIN_EXE_panel"))
+        .args(["--bus", &bus, "--node", "5", "--port", "0", "--rate", &RATE.to_string()])
+        .args(["--timeout", &PATIENCE.as_millis().to_string()])
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut line = String::new();
+    BufReader::new(server.stdout.take().unwrap()).read_line(&mut line).unwrap();
+    let address: SocketAddr = line.trim().strip_prefix("http://").unwrap().trim_end_matches('/').parse().unwrap();
+    let pages = NODES.map(|node| std::thread::spawn(move || looks(address, node, seconds)));
+    let measured = measure(&server, seconds);
+    let kept = pages.map(|page| page.join().unwrap());
+    server.kill().unwrap();
+    server.wait().unwrap();
+    drop(joints);
+    let (core, [before, after]) = measured;
+    println!("server: {:.1} % of a core, {before:.1} MB after a minute, {after:.1} MB at the end", 100.0 * core);
+    let mut failed = core > CORE || after > (1.0 + GROWTH) * before;
+    for (node, (rows, lost, strokes)) in NODES.into_iter().zip(kept) {
+        let missing = KEPT * RATE - rows - lost;
+        println!("node {node}: {rows} samples of the last minute, {lost} told as lost, {strokes} strokes in all");
+        failed |= missing > EDGE;
+    }
+    assert!(!failed, "beyond what it may be");
+}
+
+/// A page of a joint for a time: samples of the last minute that the server kept, and that it told as lost; strokes.
+fn looks(address: SocketAddr, node: u8, seconds: f64) -> (f64, f64, usize) {
+    let mut page = Page::connect(address, &node.to_string());
+    page.until(|message| message.get("hello").map(drop));
+    let began = Instant::now();
+    let (mut before, mut lost, mut strokes) = (0.0, 0.0, 0);
+    while began.elapsed().as_secs_f64() < seconds {
+        if let Some(live) = page.look().unwrap().as_ref().and_then(|message| message.get("live")) {
+            lost = live["lost"].as_f64().unwrap();
+            if began.elapsed().as_secs_f64() < seconds - KEPT {
+                before = lost;
+            }
+            strokes += live["t"].as_array().unwrap().len();
+        }
+        page.seen.clear();
+    }
+    let table = page.answer(json!("csv")).unwrap();
+    println!("node {node}: {lost} samples lost in all");
+    ((table.as_str().unwrap().lines().count() - 1) as f64, lost - before, strokes)
+}
+
+/// Part of a core that a process takes from the first minute on, and its memory then and at the end, MB.
+fn measure(server: &Child, seconds: f64) -> (f64, [f64; 2]) {
+    let first = seconds.min(KEPT);
+    std::thread::sleep(Duration::from_secs_f64(first));
+    let (from, used, before) = (Instant::now(), processor_time(server.id()), memory(server.id()));
+    std::thread::sleep(Duration::from_secs_f64(seconds - first));
+    let core = (processor_time(server.id()) - used) / from.elapsed().as_secs_f64();
+    (core, [before, memory(server.id())])
+}
+
+/// Processor time of a process, s (proc(5): utime and stime, in ticks of 10 ms).
+fn processor_time(process: u32) -> f64 {
+    let stat = std::fs::read_to_string(format!("/proc/{process}/stat")).unwrap();
+    let fields: Vec<&str> = stat.rsplit(')').next().unwrap().split_whitespace().collect();
+    0.01 * (fields[11].parse::<f64>().unwrap() + fields[12].parse::<f64>().unwrap())
+}
+
+/// Memory of a process (proc(5), VmRSS), MB.
+fn memory(process: u32) -> f64 {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).unwrap();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).unwrap();
+    line.trim().trim_end_matches(" kB").parse::<f64>().unwrap() / 1_024.0
+}
