@@ -63,14 +63,19 @@ export class Joint {
     return this.timer !== null;
   }
 
-  // Moves the joint until `release`. A hold that ended, for whatever reason, is not taken up again.
-  press(motion, reset) {
+  // Begins a hold, until `release`; its number. One that ended, for whatever reason, is not taken up again.
+  hold() {
     this.release();
     this.holds += 1;
     const hold = this.holds;
     this.say({ held: { hold } });
     this.timer = setInterval(() => this.say({ held: { hold } }), HELD);
-    return this.ask({ move: { hold, motion, reset } });
+    return hold;
+  }
+
+  // Moves the joint until `release`.
+  press(motion, reset) {
+    return this.ask({ move: { hold: this.hold(), motion, reset } });
   }
 
   release() {

@@ -1,5 +1,6 @@
 // The page: messages of the joint to its parts, buttons to questions.
 
+import { Commissioning } from "./commissioning.js";
 import { Joint } from "./joint.js";
 import { Plots } from "./plot.js";
 import * as tables from "./tables.js";
@@ -52,7 +53,11 @@ const take = {
     plots.begin(hello.signals);
     alert(null);
   },
+  commission(told) {
+    commissioning.take(told);
+  },
   role(role) {
+    commissioning.commands(role === "commands");
     badge("role", role === "commands" ? "this page commands" : "this page looks on", "quiet");
     by("moves").disabled = role !== "commands";
   },
@@ -97,6 +102,8 @@ const take = {
 
 const wanted = /^#node=(\d{1,3})$/.exec(location.hash);
 const joint = new Joint(wanted ? wanted[1] : "default", (kind, value) => take[kind]?.(value));
+const commissioning = new Commissioning(joint, by);
+panel.isCommissioning = () => commissioning.running;
 addEventListener("hashchange", () => location.reload());
 
 // A button's question; an error goes where it is seen.
@@ -209,6 +216,25 @@ on("look", () => joint.ask("look"));
 
 on("load-checklist", async () => tables.checklist(by("checklist"), await joint.ask("checklist")));
 on("load-scan", async () => tables.joints(by("joints"), await joint.ask("scan"), node));
+
+on("commission", async () => finished(await commissioning.begin(false)));
+on("find-index", async () => finished(await commissioning.begin(true)));
+on("question-yes", () => commissioning.answer(true));
+on("question-no", () => commissioning.answer(false));
+function finished(found) {
+  log(found ? "commissioned" : "the encoder knows its zero until its next loss of power");
+  if (!found) return;
+  if (found.error) throw new Error(`commissioned; no report: ${found.error}`);
+  tables.taken(by("taken"), found.settings);
+  by("reports").replaceChildren(...found.files.map(({ name, text }) => {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.textContent = `Save ${name}`;
+    button.onclick = () => save(name, text);
+    return button;
+  }));
+  if (found.index) log("the encoder's index is to be found after each power-up");
+}
 
 const show = () => objects.show(by("find").value, by("only-settings").checked);
 const read = async () => {

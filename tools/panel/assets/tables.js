@@ -49,6 +49,16 @@ export function joints(body, list, own) {
   }
 }
 
+export function taken(body, settings) {
+  heads(body, ["setting", "value", ""]);
+  for (const { name, value, unit } of settings) {
+    const row = body.insertRow();
+    cell(row, name);
+    cell(row, Number(value.toPrecision(6)), "number");
+    cell(row, unit, "quiet");
+  }
+}
+
 export function images(body, told) {
   const words = (image) => image
     ? `version ${image.version}, ${image.model}, CRC-32 ${image.checksum}, slot ${image.slot}` : "none";

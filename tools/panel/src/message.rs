@@ -1,6 +1,7 @@
 //! Messages of a page, as JSON: `{"id":7,"ask":{"held":{"hold":3}}}`. What is not one of these is an error.
 
 use crate::motion::Motion;
+use jointctl::commission::Plan;
 use serde::Deserialize;
 
 /// Longest message, bytes: an image of the longest kind as an array of numbers, and some more.
@@ -57,6 +58,20 @@ pub enum Ask {
     Scan,
     /// Checklist of what the board still misses.
     Checklist,
+    /// Commissions the joint, or finds its encoder's index alone; the answer comes at its end.
+    Commission {
+        /// What the page says of the joint.
+        plan: Plan,
+        /// Stops after the encoder's index.
+        index_only: bool,
+    },
+    /// Answers the question that a commissioning has asked.
+    Agree {
+        /// Number of the question.
+        question: u64,
+        /// Hold that lasts until the next question; none to end it here.
+        hold: Option<u64>,
+    },
     /// Live values anew, after somebody else has put the joint out of OPERATIONAL.
     Look,
     /// The last minute of live values as CSV.
@@ -112,6 +127,8 @@ impl Ask {
             | Self::Export
             | Self::Images => false,
             Self::Move { .. }
+            | Self::Commission { .. }
+            | Self::Agree { .. }
             | Self::Set { .. }
             | Self::Store
             | Self::Import { .. }
@@ -150,6 +167,11 @@ mod tests {
             ),
             (r#"{"id":1,"ask":{"use":{"usage":{"trial":60}}}}"#, Ask::Use { usage: Usage::Trial(60.0) }),
             (r#"{"id":1,"ask":"roll-back"}"#, Ask::RollBack),
+            (r#"{"id":1,"ask":{"agree":{"question":2,"hold":7}}}"#, Ask::Agree { question: 2, hold: Some(7) }),
+            (
+                r#"{"id":1,"ask":{"commission":{"plan":{"current":8,"travel":1,"turn":true,"acknowledge":false,"pole-pairs":7},"index_only":false}}}"#,
+                Ask::Commission { plan: Plan { pole_pairs: Some(7), ..Plan::new(8.0) }, index_only: false },
+            ),
         ] {
             assert_eq!(parse(text).unwrap(), Message { id: 1, ask }, "{text}");
         }

@@ -376,6 +376,7 @@ fn take<B: Bench>(
     mut found: Found,
     before: &[(Setting, f64)],
 ) -> Result<Found, Failure> {
+    agreed(guide, "Nothing of this is in the joint yet. Shall it take and store it?")?;
     guide.stage(Stage::Settings);
     let fastest =
         before.iter().find(|(setting, _)| *setting == Setting::VelocityLimit).map_or(200.0, |(_, value)| *value);

@@ -1,9 +1,11 @@
 //! Plan of a commissioning: what a user says of a joint before it, and what of it is a number that cannot be.
 
 use super::failure::Failure;
+use serde::Deserialize;
 
 /// Known values of the joint, and how it is to be commissioned. What is absent stays as the joint has it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Plan {
     /// Current that the rotor is held and turned with, A: enough to overcome friction and load with ease.
     pub current: f64,

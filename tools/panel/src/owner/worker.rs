@@ -1,5 +1,6 @@
 //! The thread: orders, supervision of a motion, live values, in turn.
 
+use super::led::{Guided, Led};
 use super::pages::Pages;
 use super::watch::Watch;
 use super::{Order, Setup};
@@ -11,7 +12,10 @@ use crate::{checklist, learning, scan, settings};
 use bus::client::{Command as Nmt, NmtState, Target};
 use joint_firmware::joint::state_machine::State;
 use joint_firmware::objects::field::{Actual, Field};
-use jointctl::remote::{RemoteError, RemoteJoint, Stream, drive};
+use jointctl::commission::joint::Joint;
+use jointctl::commission::{Failure, Found, Plan, commission, find_index, page};
+use jointctl::remote::commission::RemoteObjects;
+use jointctl::remote::{Entry, RemoteError, RemoteJoint, Stream, drive};
 use serde_json::{Value, json};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -275,6 +279,8 @@ impl Worker {
                 let items = checklist::checklist(&joint).map_err(words)?;
                 serde_json::to_value(items).map_err(|error| error.to_string())
             }
+            Ask::Commission { plan, index_only } => self.commission(&joint, page, &plan, index_only),
+            Ask::Agree { .. } => Err("no question is open".into()),
             Ask::Look => self.watch_anew().map(|()| Value::Null).map_err(words),
             Ask::Csv => match &self.watch {
                 Some(watch) => Ok(watch.csv().into()),
@@ -295,6 +301,31 @@ impl Worker {
             Ask::RollBack => learning::roll_back(&joint).map_err(words),
             Ask::Discard => learning::discard(&joint).map_err(words),
         }
+    }
+
+    /// Leads a page through the commissioning of the joint. Live values rest meanwhile: the joint restarts in between.
+    fn commission(&mut self, joint: &RemoteJoint, page: u64, plan: &Plan, index_only: bool) -> Result<Value, String> {
+        plan.check().map_err(|failure| failure.to_string())?;
+        joint.require_configuration().map_err(|error| error.to_string())?;
+        if let Some(watch) = self.watch.take() {
+            watch.end().map_err(|error| error.to_string())?;
+        }
+        let led = Led::new(&mut self.pages, &self.orders, page, [&self.stop, &self.over]);
+        let running = || led.goes_on();
+        let mut bench = Joint::new(RemoteObjects::new(joint.clone(), &running));
+        let found: Result<Value, Failure> = match index_only {
+            true => find_index(&mut bench, plan, &mut Guided(&led)).map(|_| Value::Null),
+            false => commission(&mut bench, plan, &mut Guided(&led))
+                .map(|found| outcome(&found, self.setup.node).unwrap_or_else(|error| json!({ "error": error }))),
+        };
+        drop(bench);
+        let reason = led.end();
+        let watched = self.watch_anew();
+        let found = found.map_err(|failure| match reason {
+            Some(reason) => format!("{reason}: {failure}"),
+            None => failure.to_string(),
+        })?;
+        watched.map(|()| found).map_err(|error| error.to_string())
     }
 
     fn begin_motion(
@@ -332,6 +363,21 @@ impl Worker {
         self.pages.tell(&json!({ "motion": { "moving": true } }));
         Ok(())
     }
+}
+
+/// A commissioning's outcome, for a page: the settings that the joint took, and the files that `jointctl commission`
+/// writes.
+fn outcome(found: &Found, node: u8) -> Result<Value, String> {
+    let settings = found.settings.iter().map(|(setting, value)| {
+        let entry = Entry::of(Field::Setting(*setting));
+        json!({ "name": entry.name(), "value": value, "unit": entry.text.unit })
+    });
+    let files = page::files(found, node).map_err(|error| error.to_string())?;
+    let files =
+        files.into_iter().map(|file| json!({ "name": file.path, "text": String::from_utf8_lossy(&file.contents) }));
+    Ok(
+        json!({ "settings": settings.collect::<Vec<_>>(), "files": files.collect::<Vec<_>>(), "index": found.index.is_some() }),
+    )
 }
 
 /// Brakes and switches off, whoever commands the joint. Where nothing was under current before, it goes on to send live

@@ -132,6 +132,36 @@ impl Drop for Browser {
     }
 }
 
+/// Commissions the joint by the page's buttons; on a machine that is late for it, again.
+fn commission(browser: &Browser) {
+    let set = |id: &str, what: &str| browser.value(&format!("void (document.querySelector('#plan-{id}').{what})"));
+    set("current", "value = '8'");
+    set("travel", "value = '0.4'");
+    set("turn", "checked = false");
+    let click = |selector: &str| {
+        browser.value(&format!("void document.querySelector('{selector}').scrollIntoView({{ block: 'center' }})"));
+        browser.click(selector);
+    };
+    let asks = "!document.querySelector('#question').hidden";
+    let taken = "document.querySelector('#taken tr:nth-child(8)') !== null";
+    let began = Instant::now();
+    while browser.value(taken) != json!(true) {
+        let alert = || browser.value("document.querySelector('#alert').textContent");
+        assert!(began.elapsed() < PATIENCE, "{}", alert());
+        click("#commission");
+        loop {
+            browser.until(&format!("{asks} || !panel.isCommissioning()"));
+            if browser.value("panel.isCommissioning()") != json!(true) {
+                break;
+            }
+            browser.picture("panel-question.png");
+            click("#question-yes");
+        }
+        set("acknowledge", "checked = true");
+    }
+    assert_eq!(browser.value("document.querySelectorAll('#reports button').length"), json!(2));
+}
+
 pub fn the_page_shows_values_that_move_and_the_joint_stands_once_the_button_is_let_go() {
     let served = Served::joints(&[NODE]);
     let browser = Browser::begin();
@@ -178,6 +208,7 @@ pub fn the_page_shows_values_that_move_and_the_joint_stands_once_the_button_is_l
         browser.click(button);
         browser.until(&format!("document.querySelector('{shown}') !== null"));
     }
+    commission(&browser);
     for (width, height, scheme) in
         [(1280, 3200, "light"), (1280, 3200, "dark"), (390, 3200, "light"), (390, 3200, "dark")]
     {

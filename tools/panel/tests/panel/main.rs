@@ -2,6 +2,7 @@
 //! is one. Tests wait for what the joint or the server says, however long the machine takes for it.
 
 mod browser;
+mod commissioning;
 mod page;
 mod parts;
 mod safety;
@@ -47,6 +48,11 @@ fn main() {
             a_button_that_is_let_go_before_the_joint_is_enabled_moves_nothing,
             a_server_that_ends_stops_the_joint,
             #[cfg(unix)] a_program_that_is_terminated_stops_the_joint_and_one_that_is_killed_leaves_it_to_its_deadline,
+        }
+        commissioning {
+            a_joint_is_commissioned_with_the_motor_that_it_has_and_a_no_leaves_it_as_it_was,
+            what_is_let_go_stopped_or_gone_ends_a_commissioning_and_changes_nothing,
+            another_page_sees_the_questions_and_may_not_answer_them,
         }
         security {
             other_hosts_and_origins_are_refused,

@@ -180,17 +180,17 @@ fn every_stage_comes_in_its_order_and_no_question_is_asked_under_current() {
     let found = commission(&mut bench, &plan(), &mut Watched(&mut yes)).unwrap();
     use Stage::*;
     assert_eq!(yes.stages, [Checks, Resistance, Inductance, FirstSweep, Alignment, Settings, Turning]);
-    assert_eq!(yes.questions.len(), 3);
+    assert_eq!(yes.questions.len(), 4);
     assert!(found.turned.is_some_and(|turned| turned.velocity[0] > 0.0 && turned.velocity[1] < 0.0));
     // `Simulated` counts the control steps with the bridge on; a no leaves it off and the settings as they were.
-    for no in 1..=3 {
+    for no in 1..=4 {
         let mut bench = Simulated::new(parameters());
         let before = bench.setting(Setting::PolePairs).unwrap();
         let mut yes = Yes { no, ..Yes::default() };
         let declined = commission(&mut bench, &Plan { current_limit: Some(11.0), ..plan() }, &mut yes);
         assert_eq!(declined, Err(Failure::Declined));
         assert!(!bench.on);
-        if no < 3 {
+        if no < 4 {
             assert_eq!(bench.setting(Setting::CurrentLimit), Ok(20.0), "question {no}");
             assert_eq!(bench.setting(Setting::PolePairs), Ok(before));
         }
