@@ -31,9 +31,12 @@ pub const DRIFT: f64 = 0.15;
 pub const OFFSET_DRIFT: f64 = 0.3;
 /// Change of the rigid torque, as a part of it, from which the configuration is wrong.
 pub const SCALE: f64 = 0.1;
-/// Factor of the residual, beside that of more friction, from which a joint is broken: ripple grows along with
-/// friction.
-pub const BROKEN: f64 = 2.0;
+/// Factors of the residual, beside that of more friction, from which a joint is broken: of one whose residual scatters
+/// little from day to day, and of one whose residual scatters much or whose friction has drifted. More friction brings
+/// ripple and sticking that no parameter explains.
+pub const BROKEN: [f64; 2] = [1.3, 2.0];
+/// Standard errors of the residual, from its scatter, that lie between these two.
+pub const SCATTER: f64 = 3.0;
 /// Least residual that the factor refers to, as a part of the torque's RMS.
 pub const LEAST_RESIDUAL: f64 = 0.01;
 
@@ -105,6 +108,8 @@ pub struct Change {
     pub offset_nm: f64,
     /// Factor of the residual.
     pub residual: f64,
+    /// Factor of the residual, beside that of more friction, from which the joint is broken.
+    pub residual_limit: f64,
     /// Difference of the temperature, K; NaN where it is not recorded.
     pub temperature_k: f64,
 }
@@ -143,7 +148,8 @@ fn finding(entries: &[Entry]) -> Finding {
     let pooled = |days: &[usize]| {
         let mut sums = Sums::default();
         days.iter().for_each(|at| sums.add(&entries[*at].sums));
-        estimate(&sums).map(|found| Side { residual: pooled_residual(days, entries, &estimates), sums, found })
+        let residual = pooled_residual(days, entries, &estimates);
+        estimate(&sums).map(|found| Side { residual, days: days.len() as f64, sums, found })
     };
     let reference = pooled(&good[..good.len().min(REFERENCE_DAYS)]);
     // Days of the reference are not those of the present.
@@ -159,11 +165,12 @@ fn finding(entries: &[Entry]) -> Finding {
         let kind = Kind::NotEnoughMotion;
         return Finding { joint, kind, reason, since: None, change: None, bad_days, days };
     };
-    let change = changed(reference, present);
+    let scatter = scatter(&estimates);
+    let change = changed(reference, present, scatter);
     let (kind, reason) = judge(&change, reference);
     let since = later.iter().rev().take_while(|at| {
         let own = pooled(&[**at]);
-        kind != Kind::Healthy && own.is_some_and(|own| judge(&changed(reference, &own), reference).0 == kind)
+        kind != Kind::Healthy && own.is_some_and(|own| judge(&changed(reference, &own, scatter), reference).0 == kind)
     });
     let since = since.last().map(|at| entries[*at].day.clone());
     Finding { joint, kind, reason, since, change: Some(change), bad_days, days }
@@ -175,6 +182,16 @@ struct Side {
     found: Estimate,
     /// RMS of what each day's own parameters leave, Nm.
     residual: f64,
+    /// Number of days.
+    days: f64,
+}
+
+/// Standard deviation of a day's residual, as a natural logarithm, by the differences from day to day: a change that
+/// stays is one of many.
+fn scatter(estimates: &[Option<Estimate>]) -> f64 {
+    let logarithms: Vec<f64> = estimates.iter().flatten().map(|own| own.residual.max(f64::MIN_POSITIVE).ln()).collect();
+    let squares: f64 = logarithms.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)).sum();
+    (squares / (2.0 * (logarithms.len() as f64 - 1.0)).max(1.0)).sqrt()
 }
 
 /// RMS over days of what their own parameters leave: of several days, parameters that differ would be part of it.
@@ -205,17 +222,21 @@ fn day(entry: &Entry, own: Option<&Estimate>, reference: Option<&Side>) -> Day {
     }
 }
 
-fn changed(reference: &Side, present: &Side) -> Change {
+fn changed(reference: &Side, present: &Side, scatter: f64) -> Change {
     let (sums, now, before) = (&present.sums, &present.found, &reference.found);
     let of = |which: &[usize]| factor(sums, which, now, before).unwrap_or(1.0);
     let least = LEAST_RESIDUAL * before.torque;
+    let error = scatter * (1.0 / reference.days + 1.0 / present.days).sqrt();
+    let friction = of(&FRICTION);
+    let drifted = friction > 1.0 + DRIFT;
     Change {
         rigid: of(&RIGID),
-        friction: of(&FRICTION),
+        friction,
         dry: of(&DRY),
         viscous: of(&VISCOUS),
         offset_nm: mean(sums, &OFFSETS, now) - mean(sums, &OFFSETS, before),
         residual: present.residual.max(least) / reference.residual.max(least),
+        residual_limit: if drifted { BROKEN[1] } else { (SCATTER * error).exp().clamp(BROKEN[0], BROKEN[1]) },
         temperature_k: sums.mean_temperature() - reference.sums.mean_temperature(),
     }
 }
@@ -240,7 +261,7 @@ fn judge(change: &Change, reference: &Side) -> (Kind, String) {
         );
         return (Kind::WrongConfiguration, reason);
     }
-    if change.residual > BROKEN * change.friction.max(1.0) {
+    if change.residual > change.residual_limit * change.friction.max(1.0) {
         let reason = format!(
             "what no parameter explains is times {:.1}: ripple, knocks or a sensor; friction {friction}",
             change.residual
@@ -303,6 +324,24 @@ mod tests {
     }
 
     #[test]
+    fn a_residual_that_scatters_from_day_to_day_has_to_grow_by_more() {
+        let of = |before: [f64; 6], now: f64| {
+            let all = before.into_iter().chain([now; 3]).enumerate();
+            finding(&all.map(|(number, unexplained)| entry(number, JOINT, unexplained)).collect::<Vec<_>>())
+        };
+        let [steady, uneven] = [[0.1; 6], [0.1, 0.13, 0.08, 0.12, 0.08, 0.12]].map(|before| of(before, 0.15));
+        assert_eq!((steady.kind, uneven.kind), (Kind::Broken, Kind::Healthy), "{} {}", steady.reason, uneven.reason);
+        let [steady, uneven] = [steady, uneven].map(|found| found.change.unwrap().residual_limit);
+        assert!(steady == BROKEN[0] && uneven > 1.5 && uneven < BROKEN[1], "{steady} {uneven}");
+        assert_eq!(of([0.1, 0.2, 0.05, 0.2, 0.05, 0.2], 0.15).change.unwrap().residual_limit, BROKEN[1]);
+        // More friction brings more that no parameter explains.
+        for (factor, kind) in [(0.97, Kind::Drifted), (1.05, Kind::Broken)] {
+            let found = after(times(1.0, 1.2), factor * BROKEN[1] * 1.2 * 0.1);
+            assert_eq!(found.kind, kind, "{factor}: {}", found.reason);
+        }
+    }
+
+    #[test]
     fn each_limit_has_a_joint_just_below_and_one_just_above_it() {
         for (friction, kind) in [
             (1.0, Kind::Healthy),
@@ -318,7 +357,7 @@ mod tests {
             let found = after(times(scale, scale), 0.1);
             assert_eq!(found.kind, kind, "{scale}: {}", found.reason);
         }
-        for (factor, kind) in [(0.97 * BROKEN, Kind::Healthy), (1.03 * BROKEN, Kind::Broken)] {
+        for (factor, kind) in [(0.97 * BROKEN[0], Kind::Healthy), (1.03 * BROKEN[0], Kind::Broken)] {
             let found = after(JOINT, factor * 0.1);
             assert_eq!(found.kind, kind, "{factor}: {}", found.reason);
         }

@@ -9,11 +9,12 @@
 use crate::error::LogError;
 use crate::format::Format;
 use crate::table::{Table, Texts, Wanted};
+use bytes::Bytes;
 use parquet::basic::{Compression, ConvertedType, LogicalType, Repetition, Type as PhysicalType};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::{ByteArray, ByteArrayType, DataType, DoubleType};
 use parquet::errors::ParquetError;
-use parquet::file::properties::WriterProperties;
+use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::{ColumnDescriptor, Type};
@@ -25,6 +26,10 @@ use std::sync::Arc;
 const BATCH: usize = 8_192;
 /// Rows of a row group that is written.
 const GROUP: usize = 1 << 20;
+/// Bytes of a file up to which it is read at once: of a large one the columns that are wanted, each by its place.
+const WHOLE: u64 = 16 << 20;
+/// Rows of a table up to which it is written without dictionaries and statistics, which are longer than its values.
+const SMALL: usize = 64;
 
 /// One wanted column of a file.
 struct Target<'a> {
@@ -59,7 +64,7 @@ fn guarded<T>(path: &Path, read: impl FnOnce() -> Result<T, LogError>) -> Result
 
 fn read_columns(path: &Path, wanted: &Wanted) -> Result<Table, LogError> {
     let reader = open(path)?;
-    let mut targets = targets(&reader, path, wanted)?;
+    let mut targets = targets(&*reader, path, wanted)?;
     let mut rows = 0;
     for group in 0..reader.num_row_groups() {
         let damaged = |error: &dyn std::fmt::Display| damaged(path, rows, error);
@@ -100,12 +105,20 @@ fn read_columns(path: &Path, wanted: &Wanted) -> Result<Table, LogError> {
 /// # Errors
 /// [`LogError`].
 pub fn columns(path: &Path) -> Result<Vec<String>, LogError> {
-    guarded(path, || Ok(names(&open(path)?)))
+    guarded(path, || Ok(names(&*open(path)?)))
 }
 
-fn open(path: &Path) -> Result<SerializedFileReader<File>, LogError> {
-    let file = File::open(path).map_err(|source| LogError::Unreadable { file: path.to_owned(), source })?;
-    SerializedFileReader::new(file).map_err(|error| LogError::Foreign {
+fn open(path: &Path) -> Result<Box<dyn FileReader>, LogError> {
+    let unreadable = |source| LogError::Unreadable { file: path.to_owned(), source };
+    let file = File::open(path).map_err(unreadable)?;
+    let reader: Result<Box<dyn FileReader>, ParquetError> = match file.metadata().map_err(unreadable)?.len() <= WHOLE {
+        true => {
+            let bytes = Bytes::from(std::fs::read(path).map_err(unreadable)?);
+            SerializedFileReader::new(bytes).map(|reader| Box::new(reader) as _)
+        }
+        false => SerializedFileReader::new(file).map(|reader| Box::new(reader) as _),
+    };
+    reader.map_err(|error| LogError::Foreign {
         file: path.to_owned(),
         format: Format::Parquet,
         reason: error.to_string(),
@@ -116,15 +129,11 @@ fn damaged(path: &Path, row: usize, error: &dyn std::fmt::Display) -> LogError {
     LogError::Damaged { file: path.to_owned(), row, reason: error.to_string() }
 }
 
-fn names(reader: &SerializedFileReader<File>) -> Vec<String> {
+fn names(reader: &dyn FileReader) -> Vec<String> {
     reader.metadata().file_metadata().schema_descr().columns().iter().map(|column| column.path().string()).collect()
 }
 
-fn targets<'a>(
-    reader: &SerializedFileReader<File>,
-    path: &Path,
-    wanted: &'a Wanted,
-) -> Result<Vec<Target<'a>>, LogError> {
+fn targets<'a>(reader: &dyn FileReader, path: &Path, wanted: &'a Wanted) -> Result<Vec<Target<'a>>, LogError> {
     let names = names(reader);
     let schema = reader.metadata().file_metadata().schema_descr();
     let find = |name: &'a str, numbers: bool| {
@@ -245,10 +254,12 @@ pub fn encode(table: &Table) -> Result<Vec<u8>, LogError> {
     table.check()?;
     let wrong = |error: ParquetError| LogError::Shape { column: String::new(), reason: error.to_string() };
     let mut bytes = Vec::new();
-    let properties = WriterProperties::builder()
-        .set_compression(Compression::SNAPPY)
-        .set_created_by("joint-firmware logs".into())
-        .build();
+    let mut properties =
+        WriterProperties::builder().set_compression(Compression::SNAPPY).set_created_by("joint-firmware logs".into());
+    if table.rows() <= SMALL {
+        properties = properties.set_dictionary_enabled(false).set_statistics_enabled(EnabledStatistics::None);
+    }
+    let properties = properties.build();
     let schema = Arc::new(schema(table).map_err(wrong)?);
     let mut writer = SerializedFileWriter::new(&mut bytes, schema, Arc::new(properties)).map_err(wrong)?;
     for first in (0..table.rows()).step_by(GROUP) {

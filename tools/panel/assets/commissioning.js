@@ -29,7 +29,7 @@ export class Commissioning {
   // Until its end; what was found, or an error in words.
   async begin(indexOnly) {
     const plan = this.plan();
-    for (const id of ["steps", "taken", "reports"]) this.by(id).replaceChildren();
+    for (const id of ["commission-log", "taken", "reports"]) this.by(id).replaceChildren();
     this.running = true;
     this.enable();
     try {
@@ -81,7 +81,7 @@ export class Commissioning {
     const line = document.createElement("li");
     line.textContent = text;
     line.className = kind;
-    this.by("steps").append(line);
-    this.by("steps").scrollTop = this.by("steps").scrollHeight;
+    this.by("commission-log").append(line);
+    this.by("commission-log").scrollTop = this.by("commission-log").scrollHeight;
   }
 }

@@ -58,6 +58,9 @@ mod tests {
                 assert!(name.starts_with('#') || find(name).is_some(), "{name}");
             }
         }
+        let mut ids = page.text.split(" id=\"").skip(1).filter_map(|rest| rest.split('"').next()).collect::<Vec<_>>();
+        ids.sort_unstable();
+        assert!(ids.windows(2).all(|pair| pair[0] != pair[1]), "an id stands twice: {ids:?}");
         for asset in ASSETS {
             assert!(!asset.text.contains("http:") && !asset.text.contains("https:"), "{}", asset.path);
             // Content from a joint is text, never markup.

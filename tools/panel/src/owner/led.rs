@@ -210,8 +210,8 @@ mod tests {
 
     #[test]
     fn a_no_ends_it_without_a_reason_from_here_and_stop_with_one() {
-        assert_eq!(asked(&[(1, 1, None)], false).0, false);
-        assert_eq!(asked(&[(1, 1, None)], false).1, None);
+        let (agrees, reason, _) = asked(&[(1, 1, None)], false);
+        assert_eq!((agrees, reason), (false, None));
         let (agrees, reason, _) = asked(&[], true);
         assert_eq!((agrees, reason), (false, Some("STOP")));
     }

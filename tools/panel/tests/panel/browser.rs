@@ -160,6 +160,7 @@ fn commission(browser: &Browser) {
         set("acknowledge", "checked = true");
     }
     assert_eq!(browser.value("document.querySelectorAll('#reports button').length"), json!(2));
+    browser.until("document.querySelector('#commission-log').textContent.includes('7 pole pairs')");
 }
 
 pub fn the_page_shows_values_that_move_and_the_joint_stands_once_the_button_is_let_go() {
