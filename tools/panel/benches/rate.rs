@@ -12,12 +12,15 @@ mod page;
 #[path = "../tests/panel/served.rs"]
 mod served;
 
+use bus::client::{Network, cob_id};
 use page::Page;
 use serde_json::json;
 use served::{Joints, PATIENCE};
 use std::io::{BufRead, BufReader};
 use std::net::SocketAddr;
 use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 /// Node ids.
@@ -30,8 +33,8 @@ const KEPT: f64 = 60.0;
 const CORE: f64 = 0.25;
 /// Largest growth of its memory after the first minute.
 const GROWTH: f64 = 0.1;
-/// Samples by which SYNC and the ends of the last minute may differ from the rate.
-const EDGE: f64 = 60.0;
+/// Samples that may be on their way, or before the minute, at either end of it.
+const EDGE: f64 = 100.0;
 
 fn main() {
     // Cargo passes `--bench`; tests, which pass nothing, have no minutes for it.
@@ -50,17 +53,26 @@ fn main() {
     let mut line = String::new();
     BufReader::new(server.stdout.take().unwrap()).read_line(&mut line).unwrap();
     let address: SocketAddr = line.trim().strip_prefix("http://").unwrap().trim_end_matches('/').parse().unwrap();
+    // What the joints are asked for: this machine may be late for its SYNC.
+    let network = Network::new(bus::open(&bus).unwrap());
+    let syncs = Arc::<AtomicU64>::default();
+    let counted = Arc::clone(&syncs);
+    let _counts = network.subscribe(move |frame| {
+        counted.fetch_add(u64::from(frame.id() == cob_id::SYNC), Ordering::Relaxed);
+        false
+    });
     let pages = NODES.map(|node| std::thread::spawn(move || looks(address, node, seconds)));
-    let measured = measure(&server, seconds);
+    let measured = measure(&server, seconds, &syncs);
     let kept = pages.map(|page| page.join().unwrap());
     server.kill().unwrap();
     server.wait().unwrap();
     drop(joints);
-    let (core, [before, after]) = measured;
+    let (core, [before, after], asked) = measured;
+    println!("{asked} SYNCs in the last minute");
     println!("server: {:.1} % of a core, {before:.1} MB after a minute, {after:.1} MB at the end", 100.0 * core);
     let mut failed = core > CORE || after > (1.0 + GROWTH) * before;
     for (node, (rows, lost, strokes)) in NODES.into_iter().zip(kept) {
-        let missing = KEPT * RATE - rows - lost;
+        let missing = asked - rows - lost;
         println!("node {node}: {rows} samples of the last minute, {lost} told as lost, {strokes} strokes in all");
         failed |= missing > EDGE;
     }
@@ -88,14 +100,18 @@ fn looks(address: SocketAddr, node: u8, seconds: f64) -> (f64, f64, usize) {
     ((table.as_str().unwrap().lines().count() - 1) as f64, lost - before, strokes)
 }
 
-/// Part of a core that a process takes from the first minute on, and its memory then and at the end, MB.
-fn measure(server: &Child, seconds: f64) -> (f64, [f64; 2]) {
+/// Part of a core that a process takes from the first minute on, its memory then and at the end, MB, and the SYNCs of
+/// the last minute.
+fn measure(server: &Child, seconds: f64, syncs: &AtomicU64) -> (f64, [f64; 2], f64) {
     let first = seconds.min(KEPT);
     std::thread::sleep(Duration::from_secs_f64(first));
     let (from, used, before) = (Instant::now(), processor_time(server.id()), memory(server.id()));
-    std::thread::sleep(Duration::from_secs_f64(seconds - first));
+    std::thread::sleep(Duration::from_secs_f64((seconds - first - KEPT).max(0.0)));
+    let begun = syncs.load(Ordering::Relaxed);
+    std::thread::sleep(Duration::from_secs_f64(KEPT.min(seconds - first)));
+    let asked = (syncs.load(Ordering::Relaxed) - begun) as f64;
     let core = (processor_time(server.id()) - used) / from.elapsed().as_secs_f64();
-    (core, [before, memory(server.id())])
+    (core, [before, memory(server.id())], asked)
 }
 
 /// Processor time of a process, s (proc(5): utime and stime, in ticks of 10 ms).
