@@ -60,7 +60,7 @@ pub enum Ask {
     Checklist,
     /// Commissions the joint, or finds its encoder's index alone; the answer comes at its end.
     Commission {
-        /// What the page says of the joint.
+        /// Known values of the joint, and how far to go.
         plan: Plan,
         /// Stops after the encoder's index.
         index_only: bool,

@@ -1,4 +1,4 @@
-//! Whether a rigid part that is computed elsewhere counts as it is; host.
+//! Choice of a factor on a rigid part that is computed elsewhere; host.
 //!
 //! A robot's links explain the effort of a joint up to what its drive's gain is wrong by, and the rotor's inertia. A
 //! factor on their effort is identified where it shows on samples that are left out. Where it does not, it learns
