@@ -14,6 +14,8 @@ const LONGEST: Duration = Duration::from_millis(2);
 /// Frames that are taken at most before the node lives on: as many of the shortest, 47 bits, as a bus of 1 Mbit/s
 /// carries in that time.
 const MOST: u32 = 42;
+/// Time of a bit on the wire, at 1 Mbit/s.
+const BIT: Duration = Duration::from_micros(1);
 /// A machine that is so much behind gives the time up.
 const LOST: Duration = Duration::from_millis(100);
 
@@ -91,10 +93,17 @@ fn serve_by(
         // Frames do not wait for a machine that is behind to catch up, and it does not wait for them.
         let is_behind = target(lost) > node.now() + TICK;
         let mut wait = if is_behind { Duration::ZERO } else { TICK };
+        let begun = node.now();
+        let mut carried = Duration::ZERO;
         for _ in 0..MOST {
             let Some(frame) = bus.receive(wait)? else { break };
+            // Frames that waited for this machine came one after the other, as a bus carries them.
+            let until = target(lost).min(begun + carried);
+            if until > node.now() {
+                node.live_until(until).map_err(ServeError::Ended)?;
+            }
             node.receive(&frame);
-            send(node, bus)?;
+            carried += on_the_wire(&frame) + send(node, bus)?;
             wait = Duration::ZERO;
         }
         let now = target(lost);
@@ -102,18 +111,27 @@ fn serve_by(
         if behind > LOST {
             lost += behind;
         } else {
-            node.live_until(now.min(node.now() + LONGEST)).map_err(ServeError::Ended)?;
+            let until = now.min(begun + LONGEST).max(node.now());
+            node.live_until(until).map_err(ServeError::Ended)?;
             send(node, bus)?;
         }
     }
     Ok(lost.as_secs_f64())
 }
 
-fn send(node: &mut impl Served, bus: &dyn Transport) -> Result<(), BusError> {
+/// Sends what the node has to say; the time that it takes on the wire.
+fn send(node: &mut impl Served, bus: &dyn Transport) -> Result<Duration, BusError> {
+    let mut carried = Duration::ZERO;
     while let Some(frame) = node.take_frame() {
         bus.send(&frame)?;
+        carried += on_the_wire(&frame);
     }
-    Ok(())
+    Ok(carried)
+}
+
+/// Time that a frame takes on the wire, without stuff bits (ISO 11898-1, base format).
+fn on_the_wire(frame: &Frame) -> Duration {
+    BIT * (47 + 8 * frame.data().len() as u32)
 }
 
 #[cfg(test)]
@@ -164,14 +182,17 @@ mod tests {
     }
 
     #[test]
-    fn a_node_that_is_behind_hears_what_was_sent_before_it_lives_on() {
+    fn a_node_that_is_behind_hears_what_was_sent_in_the_time_that_a_bus_takes_for_it() {
         let [own, other] = ["virtual:slow", "virtual:slow"].map(|bus| bus::open(bus).unwrap());
         let (stop, clock) = (AtomicBool::new(false), Cell::new(Duration::ZERO));
-        let mut sent = 0;
-        let mut node = Slow::new(&clock, |received, _| {
+        let (mut sent, mut last) = (0, Duration::ZERO);
+        let mut node = Slow::new(&clock, |received, now| {
             if received != sent {
-                return Err(format!("{received} of {sent} frames received"));
+                let took = now - last;
+                let late = took > MOST * on_the_wire(&frame());
+                return if late { Err(format!("{received} of {sent} frames received after {took:?}")) } else { Ok(()) };
             }
+            last = now;
             for _ in 0..MOST {
                 other.send(&frame()).unwrap();
                 sent += 1;
@@ -181,6 +202,62 @@ mod tests {
         });
         let given_up = serve_by(&|| clock.get(), &mut node, &*own, &stop).unwrap();
         assert!(given_up > 0.0 && node.received + MOST > 4_000);
+    }
+
+    /// Twenty SYNCs of a master that has a period of 1 ms, and a machine that was late by as much: nodes leave out a SYNC
+    /// that comes too soon after another.
+    #[test]
+    fn frames_that_waited_come_one_after_the_other_as_a_bus_carries_them() {
+        /// Notes the time of each frame; answers with one of 8 bytes.
+        struct Noting<'a> {
+            now: Duration,
+            clock: &'a Cell<Duration>,
+            stop: &'a AtomicBool,
+            at: Vec<Duration>,
+            answers: usize,
+        }
+        impl Served for Noting<'_> {
+            fn now(&self) -> Duration {
+                self.now
+            }
+            fn live_until(&mut self, instant: Duration) -> Result<(), String> {
+                self.now = instant;
+                Ok(())
+            }
+            fn receive(&mut self, _: &Frame) {
+                self.at.push(self.now);
+                self.answers += 1;
+                self.stop.store(self.at.len() == 20, Ordering::Relaxed);
+                self.clock.set(self.clock.get() + Duration::from_micros(1));
+            }
+            fn take_frame(&mut self) -> Option<Frame> {
+                self.answers.checked_sub(1).map(|answers| {
+                    self.answers = answers;
+                    frame()
+                })
+            }
+        }
+        let [own, other] = ["virtual:waited", "virtual:waited"].map(|bus| bus::open(bus).unwrap());
+        let (stop, clock) = (AtomicBool::new(false), Cell::new(Duration::ZERO));
+        let mut node = Noting { now: Duration::ZERO, clock: &clock, stop: &stop, at: Vec::new(), answers: 0 };
+        let sync = Frame::new(0x80, &[]).unwrap();
+        (0..20).for_each(|_| other.send(&sync).unwrap());
+        // The clock is 20 ms ahead by the time that the node looks at the bus.
+        let looked = Cell::new(0);
+        let late = || {
+            looked.set(looked.get() + 1);
+            clock.get() + Duration::from_millis(if looked.get() > 1 { 20 } else { 0 })
+        };
+        serve_by(&late, &mut node, &*own, &stop).unwrap();
+        let apart = |pair: &[Duration]| pair[1] - pair[0];
+        assert!(node.at.windows(2).all(|pair| apart(pair) == BIT * (47 + 111)), "{:?}", node.at);
+        // In time, nothing of the node's future is lived for a frame.
+        stop.store(false, Ordering::Relaxed);
+        node.at.clear();
+        (0..20).for_each(|_| other.send(&sync).unwrap());
+        let origin = clock.get();
+        serve_by(&|| clock.get() - origin, &mut node, &*own, &stop).unwrap();
+        assert!(node.at.windows(2).all(|pair| apart(pair) <= Duration::from_micros(1)), "{:?}", node.at);
     }
 
     /// A client that asks one thing after the other between two of its set-points, each as soon as the one before has

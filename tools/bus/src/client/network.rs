@@ -25,6 +25,8 @@ pub struct Received {
     pub frame: Frame,
     /// Time at which the reader had it: some tens of microseconds after the bus, a millisecond over USB.
     pub at: Instant,
+    /// SYNCs that were on the bus by then, of this program and of others, since it listens.
+    pub syncs: u64,
 }
 
 type Filter = Box<dyn Fn(&Frame) -> bool + Send>;
@@ -47,6 +49,7 @@ struct Shared {
     /// One SDO transfer at a time and node within this program.
     channels: [Mutex<()>; 128],
     frames: AtomicU64,
+    syncs: AtomicU64,
 }
 
 /// A CANopen network as a master sees it. Cloning gives another handle to the same reader, which ends with the last of
@@ -86,7 +89,7 @@ impl Shared {
     fn read(&self) {
         while !self.over.load(Ordering::Relaxed) {
             match self.transport.receive(READ) {
-                Ok(Some(frame)) => self.distribute(Received { frame, at: Instant::now() }),
+                Ok(Some(frame)) => self.distribute(frame, Instant::now()),
                 Ok(None) => {}
                 Err(error) => {
                     *lock(&self.failure) = Some(error);
@@ -98,8 +101,11 @@ impl Shared {
         }
     }
 
-    fn distribute(&self, received: Received) {
+    fn distribute(&self, frame: Frame, at: Instant) {
         self.frames.fetch_add(1, Ordering::Relaxed);
+        let of_others = u64::from(frame.id() == cob_id::SYNC);
+        let syncs = self.syncs.fetch_add(of_others, Ordering::Relaxed) + of_others;
+        let received = Received { frame, at, syncs };
         if let Some(node) = sender(&received.frame)
             && let Some(bits) = self.heard.get(usize::from(node / 64))
         {
@@ -148,6 +154,7 @@ impl Network {
             heard: Default::default(),
             channels: [const { Mutex::new(()) }; 128],
             frames: AtomicU64::new(0),
+            syncs: AtomicU64::new(0),
         });
         let reader = Arc::clone(&shared);
         let thread = std::thread::spawn(move || reader.read());
@@ -210,6 +217,7 @@ impl Network {
 
     /// Sends one SYNC, without counter.
     pub fn sync(&self) -> Result<(), ClientError> {
+        self.shared().syncs.fetch_add(1, Ordering::Relaxed);
         self.send(&frame(cob_id::SYNC, &[]))
     }
 

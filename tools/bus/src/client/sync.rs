@@ -18,10 +18,18 @@ pub struct SyncProducer {
 pub struct Produced {
     /// SYNCs that were sent.
     pub sent: u64,
-    /// Periods without one, because the host came late by more than a period: they are left out, not sent in a burst.
+    /// Periods without one, because the host came late by more than half of one: they are left out, so that two SYNCs are
+    /// half a period apart at least.
     pub missed: u64,
     /// The latest that a SYNC was sent after its time.
     pub latest: Duration,
+}
+
+/// Periods that are left out after a SYNC that was late: the time after it to the nearest, so that none follows sooner
+/// than half a period. Nodes leave out what comes too soon.
+fn missed(late: Duration, period: Duration) -> u32 {
+    let rounded = (late.as_nanos() + period.as_nanos() / 2) / period.as_nanos();
+    u32::try_from(rounded).unwrap_or(u32::MAX)
 }
 
 impl SyncProducer {
@@ -43,9 +51,9 @@ impl SyncProducer {
                 network.sync()?;
                 produced.sent += 1;
                 produced.latest = produced.latest.max(late);
-                let periods = late.as_nanos() / period.as_nanos();
-                produced.missed += periods as u64;
-                due += period * (periods as u32).saturating_add(1);
+                let periods = missed(late, period);
+                produced.missed += u64::from(periods);
+                due += period * periods.saturating_add(1);
             }
         });
         Self { stop: Some(stop), thread: Some(thread) }
@@ -69,5 +77,20 @@ impl Drop for SyncProducer {
             // A failure of the bus is told to everyone else who uses it.
             let _ = thread.join();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sync_follows_half_a_period_after_a_late_one_at_the_soonest() {
+        let period = Duration::from_millis(1);
+        for late in (0..10_000).map(Duration::from_micros) {
+            let next = period * (missed(late, period) + 1);
+            assert!(next >= late + period / 2 && next <= late + 3 * period / 2, "{late:?}");
+        }
+        assert_eq!([499, 500, 1_499, 1_500].map(|late| missed(Duration::from_micros(late), period)), [0, 1, 1, 2]);
     }
 }

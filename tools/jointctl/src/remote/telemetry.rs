@@ -16,6 +16,8 @@ use std::time::{Duration, Instant};
 
 /// Bits of a TPDO.
 const CONTENT: u32 = 64;
+/// Samples after which it counts how many are lost: one that is only late has come by then.
+const BLOCK: u64 = 64;
 /// Transmission type: with every SYNC.
 const EVERY_SYNC: u8 = 1;
 
@@ -78,6 +80,7 @@ pub struct Telemetry {
     frames: Subscription,
     /// TPDOs of the sample that is coming.
     arrived: Vec<Option<Received>>,
+    unanswered: Unanswered,
     incomplete: u64,
     ended: bool,
 }
@@ -96,6 +99,7 @@ impl Telemetry {
             places,
             frames: joint.network().subscribe(|_| false),
             arrived: Vec::new(),
+            unanswered: Unanswered::default(),
             incomplete: 0,
             ended: false,
         };
@@ -156,12 +160,13 @@ impl Telemetry {
             }
         }
         let at = frames.iter().map(|received| received.at).min()?;
+        self.unanswered.sample(frames.iter().map(|received| received.syncs).min()?);
         Some(Sample { at, values })
     }
 
-    /// Samples that were lost, whole or in part, because frames were.
+    /// Samples that are missing, whole or in part: SYNCs that none followed, told [`BLOCK`] samples later.
     pub fn lost(&self) -> u64 {
-        self.incomplete + self.frames.dropped()
+        self.unanswered.lost.max(self.incomplete)
     }
 
     /// Puts the PDOs back as they were.
@@ -186,6 +191,33 @@ impl Drop for Telemetry {
     fn drop(&mut self) {
         // Nobody is left to be told; a bus that is gone has told everyone.
         let _ = self.put_back();
+    }
+}
+
+/// SYNCs that no sample followed.
+///
+/// A sample may come after the next SYNC, one that is lost does not come at all: what counts is the least number of SYNCs
+/// beyond the samples within [`BLOCK`] of them, against the least that there ever was.
+#[derive(Debug, Default)]
+struct Unanswered {
+    samples: u64,
+    /// Least number of SYNCs beyond the samples in this block.
+    beyond: Option<i64>,
+    least: Option<i64>,
+    lost: u64,
+}
+
+impl Unanswered {
+    /// A sample has come, and by then `syncs` had.
+    fn sample(&mut self, syncs: u64) {
+        self.samples += 1;
+        let beyond = syncs as i64 - self.samples as i64;
+        let beyond = *self.beyond.insert(self.beyond.map_or(beyond, |least| least.min(beyond)));
+        if self.samples.is_multiple_of(BLOCK) {
+            let least = *self.least.insert(self.least.map_or(beyond, |least| least.min(beyond)));
+            self.lost = self.lost.max((beyond - least) as u64);
+            self.beyond = None;
+        }
     }
 }
 
@@ -253,6 +285,21 @@ mod tests {
         assert_eq!(error, "9 signals of 288 bits do not fit into 4 TPDOs of 64 bits");
         let error = distribute(&signals(&[Actual::RatedTorque])).unwrap_err().to_string();
         assert!(error.contains("motor-rated-torque (6076h:0): cannot be part of a TPDO"), "{error}");
+    }
+
+    #[test]
+    fn a_sync_without_a_sample_counts_and_one_whose_sample_is_late_does_not() {
+        // Sixty SYNCs before the first that is answered; every third sample comes after the next SYNC.
+        let mut unanswered = Unanswered::default();
+        let mut count = |syncs: std::ops::Range<u64>| {
+            syncs.for_each(|sync| unanswered.sample(sync + u64::from(sync % 3 == 0)));
+            unanswered.lost
+        };
+        assert_eq!(count(60..60 + 10 * BLOCK), 0);
+        let end = 60 + 10 * BLOCK;
+        assert_eq!(count(end + 1..end + BLOCK), 0);
+        assert_eq!(count(end + BLOCK..end + 2 * BLOCK + 1), 1);
+        assert_eq!(count(end + 2 * BLOCK + 12..end + 4 * BLOCK + 12), 12);
     }
 
     #[test]

@@ -106,6 +106,7 @@ fn main() {
         }
         telemetry {
             samples_come_with_every_sync_in_si_units_and_the_pdos_are_put_back,
+            samples_that_a_joint_did_not_send_are_told_of,
             the_pdos_of_a_new_joint_are_read_as_the_firmware_declares_them,
         }
     };
