@@ -4,7 +4,8 @@
 const HELD = 50;
 
 export class Joint {
-  // `node`: 1 to 127, or "default"; `tell(kind, value)`: every message that is no answer.
+  // `node`: 1 to 127, or "default", with "/look" behind it for a page that does not want to command; `tell(kind, value)`:
+  // every message that is no answer.
   constructor(node, tell) {
     this.tell = tell;
     this.ids = 0;

@@ -3,6 +3,8 @@
 import { Commissioning } from "./commissioning.js";
 import { Joint } from "./joint.js";
 import { Plots } from "./plot.js";
+import { Retraining } from "./retraining.js";
+import { Side } from "./side.js";
 import * as tables from "./tables.js";
 
 const by = (id) => document.getElementById(id);
@@ -14,7 +16,13 @@ const number = (id) => {
 const plots = new Plots(by("plots"));
 const objects = new tables.Objects(by("objects"), () => { by("set").disabled = objects.changes.size === 0; });
 const slow = new Map();
-const panel = { plots, problems: [], latest: (name) => plots.latest(name), isHeld: () => joint.held };
+const side = new Side(by("side"));
+// Every joint that this page shows.
+const stop = () => {
+  joint.stop();
+  side.stop();
+};
+const panel = { plots, side, problems: [], latest: (name) => plots.latest(name), isHeld: () => joint.held };
 let node = null;
 window.panel = panel;
 window.addEventListener("error", (event) => panel.problems.push(event.message));
@@ -51,13 +59,22 @@ const take = {
     document.title = `Joint ${node}`;
     by("title").textContent = `Joint ${node}`;
     plots.begin(hello.signals);
+    by("new-board").replaceChildren(...["", ...hello.boards].map((name) => {
+      const option = document.createElement("option");
+      option.value = name;
+      option.textContent = name ? `a new ${name}` : "–";
+      return option;
+    }));
     alert(null);
   },
   commission(told) {
     commissioning.take(told);
   },
+  retrain(told) {
+    retraining.take(told);
+  },
   role(role) {
-    commissioning.commands(role === "commands");
+    for (const led of [commissioning, retraining]) led.commands(role === "commands");
     badge("role", role === "commands" ? "this page commands" : "this page looks on", "quiet");
     by("moves").disabled = role !== "commands";
   },
@@ -103,7 +120,8 @@ const take = {
 const wanted = /^#node=(\d{1,3})$/.exec(location.hash);
 const joint = new Joint(wanted ? wanted[1] : "default", (kind, value) => take[kind]?.(value));
 const commissioning = new Commissioning(joint, by);
-panel.isCommissioning = () => commissioning.running;
+const retraining = new Retraining(joint, by, (files) => offer("learned", files));
+panel.isLed = () => commissioning.running || retraining.running;
 addEventListener("hashchange", () => location.reload());
 
 // A button's question; an error goes where it is seen.
@@ -118,12 +136,23 @@ function on(id, act, event = "click") {
   });
 }
 
-function save(name, text) {
+function save(name, content) {
   const link = document.createElement("a");
-  link.href = URL.createObjectURL(new Blob([text]));
+  link.href = URL.createObjectURL(new Blob([content]));
   link.download = name;
   link.click();
   URL.revokeObjectURL(link.href);
+}
+
+// A button for each file, whose content is text or bytes.
+function offer(id, files) {
+  by(id).replaceChildren(...files.map(({ name, text, bytes }) => {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.textContent = `Save ${name}`;
+    button.onclick = () => save(name, text ?? new Uint8Array(bytes));
+    return button;
+  }));
 }
 
 // Motions, each for as long as its button or key is held.
@@ -176,7 +205,7 @@ addEventListener("keydown", (event) => {
   // STOP, whatever has the focus.
   if (event.code === "Space") {
     event.preventDefault();
-    joint.stop();
+    stop();
     lift();
     return;
   }
@@ -192,12 +221,12 @@ addEventListener("blur", letGo);
 addEventListener("pagehide", letGo);
 document.addEventListener("visibilitychange", letGo);
 by("stop").addEventListener("pointerdown", () => {
-  joint.stop();
+  stop();
   lift();
 });
 // Without a pointer: by the keyboard, or by what reads the page aloud.
 by("stop").addEventListener("click", (event) => {
-  if (event.detail === 0) joint.stop();
+  if (event.detail === 0) stop();
 });
 
 plots.changed = () => {
@@ -215,24 +244,42 @@ on("csv", async () => save(`joint-${node}.csv`, await joint.ask("csv")));
 on("look", () => joint.ask("look"));
 
 on("load-checklist", async () => tables.checklist(by("checklist"), await joint.ask("checklist")));
-on("load-scan", async () => tables.joints(by("joints"), await joint.ask("scan"), node));
+let history = null;
+on("load-history", async () => {
+  history = await joint.ask("history");
+  by("save-history").disabled = history.steps.length === 0;
+  tables.history(by("history"), history);
+  if (history.steps.length === 0) log("no fault is latched: there are no steps before one");
+});
+on("save-history", () => save(`joint-${node}-fault.csv`, tables.historyTable(history)));
+on("address", async () => {
+  const given = await joint.ask({ address: { first: number("address-first") } });
+  for (const { node: id, address } of given) log(`node ${id}: ${address}`);
+  if (given.length === 0) log("no joint without a node id answers");
+  await scan();
+});
+const scan = async () => tables.joints(by("joints"), await joint.ask("scan"), node, side);
+on("load-scan", scan);
 
 on("commission", async () => finished(await commissioning.begin(false)));
 on("find-index", async () => finished(await commissioning.begin(true)));
-on("question-yes", () => commissioning.answer(true));
-on("question-no", () => commissioning.answer(false));
+for (const led of [commissioning, retraining]) {
+  on(`${led.part}-yes`, () => led.answer(true));
+  on(`${led.part}-no`, () => led.answer(false));
+}
+on("retrain", async () => {
+  const learned = await retraining.begin();
+  tables.judged(by("judged"), learned);
+  for (const difference of learned.load) retraining.line(difference, "found");
+  log(`version ${learned.version} is stored and in use where compensation is requested`);
+  told(await joint.ask("images"));
+});
 function finished(found) {
   log(found ? "commissioned" : "the encoder knows its zero until its next loss of power");
   if (!found) return;
   if (found.error) throw new Error(`commissioned; no report: ${found.error}`);
   tables.taken(by("taken"), found.settings);
-  by("reports").replaceChildren(...found.files.map(({ name, text }) => {
-    const button = document.createElement("button");
-    button.type = "button";
-    button.textContent = `Save ${name}`;
-    button.onclick = () => save(name, text);
-    return button;
-  }));
+  offer("reports", found.files);
   if (found.index) log("the encoder's index is to be found after each power-up");
 }
 
@@ -261,6 +308,24 @@ on("import", async () => {
   const changed = done.map(({ name, shown }) => `${name} ${shown}`).join(", ");
   log(changed ? `${file.name}: ${changed}` : "nothing differs");
   await read();
+}, "change");
+
+// What differs becomes changed values, which nothing has set yet.
+async function compare(other) {
+  const differences = await joint.ask({ compare: { with: other } });
+  await read();
+  for (const { name, value } of differences) objects.change(name, String(value));
+  log(`${differences.length} settings differ`);
+  show();
+}
+on("new-board", async () => {
+  const board = by("new-board").value;
+  if (board !== "") await compare({ board });
+}, "change");
+on("compare", async () => {
+  const [file] = by("compare").files;
+  by("compare").value = "";
+  if (file) await compare({ file: await file.text() });
 }, "change");
 
 const told = (state) => {

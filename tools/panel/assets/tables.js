@@ -29,8 +29,9 @@ export function checklist(body, items) {
   }
 }
 
-export function joints(body, list, own) {
-  heads(body, ["node", "name", "state", "faults", "supply", "winding", "bridge"]);
+// `side`: joints that are shown beside this one.
+export function joints(body, list, own, side) {
+  heads(body, ["node", "", "name", "state", "faults", "supply", "winding", "bridge"]);
   for (const joint of list) {
     const row = body.insertRow(), link = document.createElement("a");
     link.href = `#node=${joint.node}`;
@@ -38,6 +39,7 @@ export function joints(body, list, own) {
     link.rel = "noopener";
     link.textContent = joint.node;
     cell(row, joint.node === own ? `${own} (this page)` : link, "number");
+    cell(row, joint.node === own ? "" : beside(joint.node, side));
     if (joint.error) {
       cell(row, joint.error, "bad").colSpan = 6;
       continue;
@@ -47,6 +49,38 @@ export function joints(body, list, own) {
     cell(row, joint.faults, joint.faults === "none" ? "" : "bad");
     for (const key of ["supply", "winding", "bridge"]) cell(row, joint[key], "number");
   }
+}
+
+function beside(node, side) {
+  const button = document.createElement("button");
+  button.type = "button";
+  button.textContent = "beside";
+  const show = () => button.setAttribute("aria-pressed", String(side.shows(node)));
+  button.onclick = () => {
+    side.toggle(node);
+    show();
+  };
+  show();
+  return button;
+}
+
+export function history(body, { signals, steps }) {
+  heads(body, steps.length ? ["step", "state", "faults", ...signals.map(({ name, unit }) => `${name}, ${unit}`)] : []);
+  for (const { step, state, faults, signals: values } of steps) {
+    const row = body.insertRow();
+    cell(row, step, "number");
+    cell(row, state);
+    cell(row, faults, faults ? "bad" : "");
+    for (const value of values) cell(row, value === null ? "" : Number(value.toPrecision(5)), "number");
+  }
+}
+
+// The same as a table of comma-separated values.
+export function historyTable({ signals, steps }) {
+  const names = signals.map(({ name, unit }) => `${name}_${unit}`.replaceAll(/[ /]/g, "_"));
+  const rows = steps.map(({ step, state, faults, signals: values }) =>
+    [step, state, `"${faults}"`, ...values.map((value) => value ?? "")].join(","));
+  return [["step", "state", "faults", ...names].join(","), ...rows, ""].join("\n");
 }
 
 export function taken(body, settings) {
@@ -71,6 +105,17 @@ export function images(body, told) {
   }
 }
 
+// What is unexplained and how far the joint is from its reference, RMS, before and with the new image.
+export function judged(body, { before, after }) {
+  heads(body, ["on the joint, RMS", "before", "now"]);
+  for (const [name, unit, scale, key] of [["unexplained torque", "Nm", 1, "residual"],
+    ["distance from the reference", "mrad", 1000, "tracking"]]) {
+    const row = body.insertRow();
+    cell(row, name, "quiet");
+    for (const on of [before, after]) cell(row, `${(scale * on[key]).toFixed(4)} ${unit}`, "number");
+  }
+}
+
 // Objects with a field for each that can be written; `changes` holds what was typed, by name.
 export class Objects {
   constructor(body, changed) {
@@ -83,6 +128,12 @@ export class Objects {
   set(list) {
     this.list = list;
     this.changes.clear();
+    this.changed();
+  }
+
+  // A value that is not the joint's yet.
+  change(name, value) {
+    this.changes.set(name, value);
     this.changed();
   }
 

@@ -9,16 +9,18 @@
 
 #[path = "../tests/panel/page.rs"]
 mod page;
+#[path = "../tests/panel/program.rs"]
+mod program;
 #[path = "../tests/panel/served.rs"]
 mod served;
 
 use bus::client::{Network, cob_id};
 use page::Page;
+use program::Program;
 use serde_json::json;
-use served::{Joints, PATIENCE};
-use std::io::{BufRead, BufReader};
+use served::Joints;
 use std::net::SocketAddr;
-use std::process::{Child, Command, Stdio};
+use std::process::Child;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -44,15 +46,8 @@ fn main() {
     let seconds = std::env::var("PANEL_SECONDS").ok().and_then(|text| text.parse().ok()).unwrap_or(600.0);
     let bus = format!("udp:239.74.163.9:{}", bus::free_port().unwrap());
     let joints = Joints::on(&bus, &NODES);
-    let mut server = Command::new(env!("CARGO_BIN_EXE_panel"))
-        .args(["--bus", &bus, "--node", "5", "--port", "0", "--rate", &RATE.to_string()])
-        .args(["--timeout", &PATIENCE.as_millis().to_string()])
-        .stdout(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let mut line = String::new();
-    BufReader::new(server.stdout.take().unwrap()).read_line(&mut line).unwrap();
-    let address: SocketAddr = line.trim().strip_prefix("http://").unwrap().trim_end_matches('/').parse().unwrap();
+    let mut server = Program::with(&bus, &["--rate", &RATE.to_string()]);
+    let address = server.address;
     // What the joints are asked for: this machine may be late for its SYNC.
     let network = Network::new(bus::open(&bus).unwrap());
     let syncs = Arc::<AtomicU64>::default();
@@ -62,10 +57,9 @@ fn main() {
         false
     });
     let pages = NODES.map(|node| std::thread::spawn(move || looks(address, node, seconds)));
-    let measured = measure(&server, seconds, &syncs);
+    let measured = measure(&server.child, seconds, &syncs);
     let kept = pages.map(|page| page.join().unwrap());
-    server.kill().unwrap();
-    server.wait().unwrap();
+    server.kill();
     drop(joints);
     let (core, [before, after], asked) = measured;
     println!("{asked} SYNCs in the last minute");

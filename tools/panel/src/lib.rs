@@ -10,8 +10,8 @@
 //! - [`owner`]: the thread that alone talks to a joint: live values, motion, requests in their order
 //! - [`hold`]: the dead man's switch; [`motion`]: jog, sine, steps, impedance, frozen as soon as it is not held
 //! - [`live`]: signals at full rate, reduced to minima and maxima for a page; [`slow`]: values that are read one by one
-//! - [`scan`]: joints on the bus; [`checklist`]: what a board still misses; [`settings`]: objects and joint.toml;
-//!   [`learning`]: images and compensation
+//! - [`scan`]: joints on the bus; [`checklist`]: what a board still misses; [`history`]: steps before a fault;
+//!   [`settings`]: objects and joint.toml; [`learning`]: images and compensation
 
 #![forbid(unsafe_code)]
 
@@ -19,6 +19,7 @@ mod absent;
 pub mod assets;
 pub mod checklist;
 pub mod guard;
+pub mod history;
 pub mod hold;
 pub mod learning;
 pub mod live;

@@ -31,6 +31,30 @@ pub enum Usage {
     Commit,
 }
 
+/// A configuration that a joint's is compared with.
+#[derive(Clone, Debug, Deserialize, PartialEq)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum With {
+    /// Content of a joint.toml.
+    File(String),
+    /// A new board's, by its name.
+    Board(String),
+}
+
+/// A round of learning.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct Wanted {
+    /// Duration of each of the two motions that are recorded, s.
+    pub excitation: f64,
+    /// Duration of the motion that images are judged by, s.
+    pub validation: f64,
+    /// Networks trained from different first weights; 0 trains none.
+    pub restarts: usize,
+    /// A fault whose cause is gone is acknowledged first.
+    pub acknowledge: bool,
+}
+
 /// Request of a page.
 #[derive(Clone, Debug, Deserialize, PartialEq)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
@@ -56,8 +80,15 @@ pub enum Ask {
     },
     /// Joints on the bus.
     Scan,
+    /// Gives joints without a node id the free ones from a number on.
+    Address {
+        /// Least of them, 1 to 127.
+        first: u8,
+    },
     /// Checklist of what the board still misses.
     Checklist,
+    /// The control steps before the fault that is latched.
+    History,
     /// Commissions the joint, or finds its encoder's index alone; the answer comes at its end.
     Commission {
         /// Known values of the joint, and how far to go.
@@ -65,7 +96,12 @@ pub enum Ask {
         /// Stops after the encoder's index.
         index_only: bool,
     },
-    /// Answers the question that a commissioning has asked.
+    /// Lets the joint learn its friction anew; the answer comes at its end.
+    Retrain {
+        /// How.
+        wanted: Wanted,
+    },
+    /// Answers the question that a commissioning or a round of learning has asked.
     Agree {
         /// Number of the question.
         question: u64,
@@ -87,6 +123,11 @@ pub enum Ask {
     Store,
     /// The configuration as joint.toml.
     Export,
+    /// Names what differs in a configuration; nothing is set.
+    Compare {
+        /// The other one.
+        with: With,
+    },
     /// Sets what differs in a joint.toml.
     Import {
         /// The file's content.
@@ -121,13 +162,17 @@ impl Ask {
             | Self::Stop
             | Self::Scan
             | Self::Checklist
+            | Self::History
             | Self::Look
             | Self::Csv
             | Self::Objects
             | Self::Export
+            | Self::Compare { .. }
             | Self::Images => false,
             Self::Move { .. }
+            | Self::Address { .. }
             | Self::Commission { .. }
+            | Self::Retrain { .. }
             | Self::Agree { .. }
             | Self::Set { .. }
             | Self::Store

@@ -1,10 +1,14 @@
-//! Joints on a bus, each on one line; host.
+//! Joints on a bus, each on one line, and node ids for those without one; host.
 
 use bus::client::Network;
 use joint_firmware::objects::field::{Actual, Field};
 use jointctl::remote::present::{PATIENCE, present};
-use jointctl::remote::{RemoteError, RemoteJoint, drive, info};
+use jointctl::remote::{RemoteError, RemoteJoint, address, drive, info};
 use serde_json::{Value, json};
+use std::time::Duration;
+
+/// Time that a node may take to answer one of a fastscan's 133 questions.
+const WAIT: Duration = Duration::from_millis(60);
 
 /// Everybody who answers; `over` ends the search.
 ///
@@ -22,6 +26,19 @@ pub fn scan(network: &Network, over: &dyn Fn() -> bool) -> Result<Value, RemoteE
         });
     }
     Ok(lines.into())
+}
+
+/// Gives the joints without a node id the free ones from `first` on, which they keep.
+///
+/// # Errors
+/// The bus, no free id, or a joint that refuses; those that have got one by then keep it.
+pub fn address(network: &Network, first: u8) -> Result<Value, RemoteError> {
+    let mut given = Vec::new();
+    let mut tell = |done: &address::Addressed| {
+        given.push(json!({ "node": done.node, "address": done.address.to_string() }));
+    };
+    address::assign(network, first, true, WAIT, &mut tell)?;
+    Ok(given.into())
 }
 
 fn line(joint: &RemoteJoint) -> Result<Value, RemoteError> {

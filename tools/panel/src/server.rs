@@ -3,7 +3,7 @@
 use crate::assets::{HEADERS, find};
 use crate::guard::Guard;
 use crate::message::{LONGEST, parse};
-use crate::owner::{Owner, Session, Setup, Syncs, Told, UNREAD};
+use crate::owner::{Owner, Session, Setup, Syncs, Told, UNREAD, Wants};
 use axum::Router;
 use axum::body::Body;
 use axum::extract::ws::rejection::WebSocketUpgradeRejection;
@@ -51,11 +51,11 @@ impl Panel {
         Self { network: network.clone(), node, key, syncs, guard, owners: Mutex::default(), announce }
     }
 
-    fn attach(&self, node: u8, tell: mpsc::Sender<Told>) -> Option<Session> {
+    fn attach(&self, node: u8, wants: Wants, tell: mpsc::Sender<Told>) -> Option<Session> {
         let mut owners = self.owners.lock().unwrap_or_else(PoisonError::into_inner);
         let (network, key, syncs) = (self.network.clone(), self.key.clone(), Arc::clone(&self.syncs));
         let owner = owners.entry(node).or_insert_with(|| Owner::begin(Setup { network, node, key, syncs }));
-        owner.attach(tell)
+        owner.attach(wants, tell)
     }
 
     /// Node of a path's last part.
@@ -112,7 +112,12 @@ impl Drop for Server {
 }
 
 fn router(panel: Arc<Panel>) -> Router {
-    Router::new().route("/joint/{node}", get(joint)).fallback(page).with_state(panel)
+    let joint = |wants| get(move |panel, path, headers, upgrade| joint(wants, panel, path, headers, upgrade));
+    Router::new()
+        .route("/joint/{node}", joint(Wants::ToCommand))
+        .route("/joint/{node}/look", joint(Wants::ToLook))
+        .fallback(page)
+        .with_state(panel)
 }
 
 /// An answer; its headers are constants, which are well formed.
@@ -175,6 +180,7 @@ async fn page(State(panel): State<Arc<Panel>>, method: Method, uri: Uri, headers
 }
 
 async fn joint(
+    wants: Wants,
     State(panel): State<Arc<Panel>>,
     Path(name): Path<String>,
     headers: HeaderMap,
@@ -190,15 +196,15 @@ async fn joint(
         Ok(upgrade) => upgrade
             .max_message_size(LONGEST)
             .max_frame_size(LONGEST)
-            .on_upgrade(move |socket| async move { talk(socket, &panel, node).await }),
+            .on_upgrade(move |socket| async move { talk(socket, &panel, node, wants).await }),
         Err(rejection) => refuse(StatusCode::BAD_REQUEST, &rejection.body_text()),
     }
 }
 
 /// A page's conversation. However it ends, its session ends with it, and with the session its hold.
-async fn talk(mut socket: WebSocket, panel: &Panel, node: u8) {
+async fn talk(mut socket: WebSocket, panel: &Panel, node: u8, wants: Wants) {
     let (tell, mut told) = mpsc::channel(UNREAD);
-    let Some(session) = panel.attach(node, tell) else {
+    let Some(session) = panel.attach(node, wants, tell) else {
         close(&mut socket, POLICY, "too many pages wait for this joint").await;
         return;
     };

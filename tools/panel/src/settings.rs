@@ -1,8 +1,9 @@
 //! A joint's objects by name, and its configuration as joint.toml; host.
 
 use crate::absent::is_absent;
+use crate::message::With;
 use canopen_node::{Access, Group};
-use joint_firmware::default_configuration::MOTEUS_R4;
+use joint_firmware::default_configuration::{BOARDS, MOTEUS_R4};
 use joint_firmware::joint::BoardLimits;
 use joint_firmware::joint::configuration::{BridgeConfiguration, Configuration};
 use joint_firmware::objects::field::Field;
@@ -137,20 +138,51 @@ fn any_board() -> BridgeConfiguration {
     BridgeConfiguration { limits, has_chopper_output: true, ..MOTEUS_R4.bridge }
 }
 
+/// Settings in which the joint's configuration is not `wanted`, with the values there. The node id stays.
+fn differences(
+    joint: &RemoteJoint,
+    wanted: &Configuration,
+    over: &dyn Fn() -> bool,
+) -> Result<Vec<(Entry, jointctl::remote::Value)>, String> {
+    let differs = |(entry, setting, raw): (Entry, Setting, u32)| {
+        let number = setting.get(wanted);
+        (number != raw).then(|| (entry, entry.decode_raw(number.into())))
+    };
+    Ok(settings(joint, over)?.into_iter().filter_map(differs).collect())
+}
+
+fn parsed(text: &str) -> Result<Configuration, String> {
+    joint_text::from_text(text, Path::new("joint.toml"), &any_board()).map_err(|error| error.to_string())
+}
+
+/// Names of the boards that a joint can be compared with.
+#[must_use]
+pub fn boards() -> [&'static str; BOARDS.len()] {
+    BOARDS.map(|(name, _)| name)
+}
+
+/// Names what differs, with the values of the other configuration. Nothing is set.
+///
+/// # Errors
+/// Line and reason of the file, a board that is none, the bus, or no answer.
+pub fn compare(joint: &RemoteJoint, with: &With, over: &dyn Fn() -> bool) -> Result<Value, String> {
+    let wanted = match with {
+        With::File(text) => parsed(text)?,
+        With::Board(name) => {
+            let board = BOARDS.iter().find(|(known, _)| known == name);
+            board.ok_or_else(|| format!("'{name}' is no board; there are {}", boards().join(" and ")))?.1.joint
+        }
+    };
+    let told = |(entry, value): (Entry, jointctl::remote::Value)| json!({ "name": entry.name(), "value": value.json(), "shown": entry.show(&value) });
+    Ok(differences(joint, &wanted, over)?.into_iter().map(told).collect())
+}
+
 /// Sets what differs from the joint's configuration in a joint.toml, all of it or nothing. The node id stays.
 ///
 /// # Errors
 /// Line and reason of the file, or the joint's refusal.
 pub fn import(joint: &RemoteJoint, text: &str, over: &dyn Fn() -> bool) -> Result<Value, String> {
-    let wanted =
-        joint_text::from_text(text, Path::new("joint.toml"), &any_board()).map_err(|error| error.to_string())?;
-    let mut changes = Vec::new();
-    for (entry, setting, raw) in settings(joint, over)? {
-        let number = setting.get(&wanted);
-        if number != raw {
-            changes.push((entry, entry.decode_raw(number.into())));
-        }
-    }
+    let changes = differences(joint, &parsed(text)?, over)?;
     configuration::set(joint, &changes).map_err(|error| error.to_string())?;
     let changed = changes.iter().map(|(entry, value)| json!({ "name": entry.name(), "shown": entry.show(value) }));
     Ok(changed.collect())

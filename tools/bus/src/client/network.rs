@@ -215,6 +215,11 @@ impl Network {
         self.send(&command.frame(target))
     }
 
+    /// SYNCs that were on the bus since this program listens, its own and those of others.
+    pub fn syncs(&self) -> u64 {
+        self.shared().syncs.load(Ordering::Relaxed)
+    }
+
     /// Sends one SYNC, without counter.
     pub fn sync(&self) -> Result<(), ClientError> {
         self.shared().syncs.fetch_add(1, Ordering::Relaxed);

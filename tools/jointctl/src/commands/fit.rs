@@ -253,12 +253,17 @@ impl Fit {
 /// Files of a fit, but for its figures.
 pub const FILES: [&str; 4] = ["friction.img", "friction.toml", "report.html", "report.json"];
 
-/// Writes image, TOML twin, report and figures into `out`, all or nothing.
-pub fn write(fitted: &Fitted, out: &Path) -> Result<(), CommandError> {
+/// Image, TOML twin and report of a fit; `out` is where they belong, for errors.
+pub fn files(fitted: &Fitted, out: &Path) -> Result<Vec<OutputFile>, CommandError> {
     let mut files = render(&fitted.report)?;
     files.push(OutputFile::new("friction.img", bytes(&fitted.image, out)?));
     files.push(OutputFile::new("friction.toml", image_text::to_text(&fitted.image)));
-    write_directory(out, &files)?;
+    Ok(files)
+}
+
+/// Writes them into `out`, all or nothing.
+pub fn write(fitted: &Fitted, out: &Path) -> Result<(), CommandError> {
+    write_directory(out, &files(fitted, out)?)?;
     Ok(())
 }
 

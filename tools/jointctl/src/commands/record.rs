@@ -84,7 +84,7 @@ impl Record {
                     SILENCE.as_secs(),
                     match pace {
                         Pace::Follow => ": does anybody send SYNC?",
-                        Pace::Send(_) => "",
+                        Pace::Send(_) | Pace::Sent => "",
                     }
                 );
                 return Err(CommandError::Bus(text));

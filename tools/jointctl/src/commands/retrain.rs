@@ -5,7 +5,8 @@ use super::fit::{FILES, write};
 use super::force::Force;
 use super::remote::{Where, catch_interrupts, running};
 use super::terminal::Terminal;
-use crate::remote::retrain::{RetrainError, Round, Shown};
+use crate::remote::record::Pace;
+use crate::remote::retrain::{DESCRIPTION, RetrainError, Round, Shown, TABLE};
 use clap::Args;
 use identification::fit::Options;
 use identification::page::verdict;
@@ -53,7 +54,7 @@ impl Retrain {
         let key = self.on.key()?;
         let joint = self.on.joint()?;
         let out = self.out.clone().unwrap_or_else(|| PathBuf::from(format!("retrain-{}", joint.id())));
-        self.force.permits_in(&out, &[&FILES[..], &["log.csv", "dataset.toml"]].concat())?;
+        self.force.permits_in(&out, &[&FILES[..], &[TABLE, DESCRIPTION]].concat())?;
         let options = Options {
             trainer: Options::default().trainer.filter(|_| self.restarts > 0),
             restarts: self.restarts.max(1),
@@ -67,6 +68,7 @@ impl Retrain {
             excitation: self.duration,
             validation: self.validation,
             rate: self.rate,
+            pace: Pace::Send(self.rate),
             options,
             key,
             acknowledge: self.reset,

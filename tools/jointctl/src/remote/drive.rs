@@ -58,6 +58,11 @@ pub fn state_of(statusword: u16) -> State {
     STATES.into_iter().find(tells).unwrap_or_default()
 }
 
+/// The state with this number in the steps before a fault.
+pub fn state_at(number: u32) -> Option<State> {
+    STATES.into_iter().find(|state| *state as u32 == number)
+}
+
 /// The faults in object 2021h:4: bit n - 1 for fault n.
 pub fn faults_of(bits: u16) -> Vec<Fault> {
     Fault::ALL.into_iter().filter(|fault| bits >> (*fault as u32 - 1) & 1 != 0).collect()

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! - [`entry`], [`value`]: objects by name, and their values as people write and read them
-//! - [`joint`]: the node; [`drive`]: its state machine and faults
+//! - [`joint`]: the node; [`drive`]: its state machine and faults, [`history`] the steps before one
 //! - [`pdo`]: what PDOs carry; [`telemetry`]: out of the joint; [`stream`]: into it; [`motion`]: `jointctl move`
 //! - [`image`]: the life of a parameter image, [`refusal`] its numbers in words; [`configuration`]: settings, stored
 //!   and restored
@@ -23,6 +23,7 @@ pub mod configuration;
 pub mod drive;
 pub mod entry;
 pub mod error;
+pub mod history;
 pub mod image;
 pub mod info;
 pub mod joint;

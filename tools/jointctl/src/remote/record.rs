@@ -29,6 +29,8 @@ pub const SIGNALS: [Actual; 4] = [Actual::Position, Actual::Velocity, Actual::To
 pub enum Pace {
     /// This program, so many times a second.
     Send(f64),
+    /// This program, which sends already, for other joints too, for as long as this lasts.
+    Sent,
     /// Another node on the bus.
     Follow,
 }
@@ -39,9 +41,10 @@ pub struct Recorder {
     joint: RemoteJoint,
     telemetry: Telemetry,
     producer: Option<SyncProducer>,
-    /// SYNCs of others: one's own frames are not heard.
-    foreign: Subscription,
-    heard: u64,
+    /// SYNCs of others, where there may be none: one's own frames are not heard.
+    foreign: Option<Subscription>,
+    /// SYNCs on the bus before.
+    before: u64,
     samples: Vec<Sample>,
 }
 
@@ -69,22 +72,23 @@ impl Recorder {
             _ => {}
         }
         let telemetry = Telemetry::begin(joint, signals)?;
-        let foreign = joint.network().subscribe(|frame| frame.id() == cob_id::SYNC);
+        let network = joint.network();
+        let foreign = (pace != Pace::Follow).then(|| network.subscribe(|frame| frame.id() == cob_id::SYNC));
+        let before = network.syncs();
         let producer = match pace {
-            Pace::Send(rate) => Some(SyncProducer::new(joint.network(), Duration::from_secs_f64(1.0 / rate))),
-            Pace::Follow => None,
+            Pace::Send(rate) => Some(SyncProducer::new(network, Duration::from_secs_f64(1.0 / rate))),
+            Pace::Sent | Pace::Follow => None,
         };
-        Ok(Self { joint: joint.clone(), telemetry, producer, foreign, heard: 0, samples: Vec::new() })
+        Ok(Self { joint: joint.clone(), telemetry, producer, foreign, before, samples: Vec::new() })
     }
 
     /// Waits for the next sample; none where it does not come within `timeout`.
     pub fn next(&mut self, timeout: Duration) -> Result<Option<&Sample>, RemoteError> {
         let sample = self.telemetry.next(timeout)?;
-        while self.foreign.try_next()?.is_some() {
-            self.heard += 1;
-            if self.producer.is_some() {
-                return Err(RemoteError::OtherSync { node: self.joint.id() });
-            }
+        if let Some(foreign) = &self.foreign
+            && foreign.try_next()?.is_some()
+        {
+            return Err(RemoteError::OtherSync { node: self.joint.id() });
         }
         match sample {
             Some(sample) => {
@@ -99,7 +103,7 @@ impl Recorder {
     pub fn end(self) -> Result<Recording, RemoteError> {
         let (syncs, late) = match self.producer {
             Some(producer) => producer.stop().map(|produced| (produced.sent, produced.missed))?,
-            None => (self.heard, 0),
+            None => (self.joint.network().syncs() - self.before, 0),
         };
         let signals = self.telemetry.signals().iter().filter_map(|signal| match signal.field() {
             joint_firmware::objects::field::Field::Actual(actual) => Some(actual),

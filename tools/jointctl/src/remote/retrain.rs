@@ -21,7 +21,7 @@ use super::error::RemoteError;
 use super::image::{ImageStatus, Use};
 use super::joint::RemoteJoint;
 use super::load_check::{LoadDifference, configured, differences};
-use super::record::{SIGNALS, description};
+use super::record::{Pace, SIGNALS, description};
 use super::route::{Route, Travelled};
 use super::value::Value;
 use excitation::{Bounds, Effort, Excitation, ExciteError, optimise};
@@ -48,6 +48,10 @@ const SLOW: f64 = 0.15;
 pub const LEAST_GAIN: f64 = 0.02;
 /// Longer than the motion that a shadow or trial is for, s.
 const SPARE: f64 = 20.0;
+/// The recording.
+pub const TABLE: &str = "log.csv";
+/// Its description.
+pub const DESCRIPTION: &str = "dataset.toml";
 /// Requests of object 2200h:1.
 const OFF: u64 = 0;
 const PHYSICAL_AND_NETWORK: u64 = 2;
@@ -120,8 +124,10 @@ pub struct Round {
     pub excitation: f64,
     /// See [`Round::excitation`].
     pub validation: f64,
-    /// Set-points and samples a second.
+    /// Set-points a second.
     pub rate: f64,
+    /// Samples.
+    pub pace: Pace,
     /// Options of the fit; the version is chosen by what the joint has.
     pub options: Options,
     /// Signs the image.
@@ -184,6 +190,7 @@ pub struct Outcome {
 }
 
 /// Settings that have to be as they were at the end.
+#[derive(Debug)]
 struct Tidy<'a> {
     joint: &'a RemoteJoint,
     request: u64,
@@ -207,8 +214,32 @@ impl Drop for Tidy<'_> {
     }
 }
 
+/// A round whose motion is recorded.
+#[derive(Debug)]
+pub struct Recorded<'a> {
+    round: &'a Round,
+    tidy: Tidy<'a>,
+    version: u32,
+    /// Motion that both images are judged by.
+    validation: Vec<Excitation>,
+    samples: (usize, u64),
+    speed: f64,
+}
+
+/// A round with a new image, which the joint does not have yet.
+#[derive(Debug)]
+pub struct Learned<'a> {
+    recorded: Recorded<'a>,
+    /// The fit.
+    pub fitted: Fitted,
+    load: Vec<LoadDifference>,
+}
+
 impl Round {
-    /// Runs it for as long as `running` says so.
+    /// Runs it for as long as `running` says so: [`Round::record`], [`Recorded::learn`] and [`Learned::compare`].
+    ///
+    /// # Errors
+    /// [`RetrainError`]; the joint is as it was.
     pub fn run(
         &self,
         joint: &RemoteJoint,
@@ -216,7 +247,21 @@ impl Round {
         write: &dyn Fn(&Fitted) -> Result<(), RetrainError>,
         progress: &dyn Progress,
     ) -> Result<Outcome, RetrainError> {
-        let node = joint.id();
+        let learned = self.record(joint, running, progress)?.learn(progress)?;
+        write(&learned.fitted)?;
+        learned.compare(running, progress)
+    }
+
+    /// Moves the joint, without compensation, and records it.
+    ///
+    /// # Errors
+    /// [`RetrainError`]; the joint is as it was.
+    pub fn record<'a>(
+        &'a self,
+        joint: &'a RemoteJoint,
+        running: &dyn Fn() -> bool,
+        progress: &dyn Progress,
+    ) -> Result<Recorded<'a>, RetrainError> {
         let version = self.check(joint)?;
         let bounds = bounds(joint)?;
         progress.stage("search an excitation");
@@ -229,59 +274,28 @@ impl Round {
         let validation = vec![series(&bounds, self.validation, seed + 2)?];
         let speed = 0.5 * bounds.velocity;
         let request = joint.raw(Field::AtOnce(Setting::Request))?;
-        let mut tidy = Tidy { joint, request, staged: false };
-        let travel = |route: &Route, signals: &[Actual], acknowledge| {
-            let travelled = route.travel(joint, signals, self.rate, acknowledge, running)?;
-            travelled.ok_or(RetrainError::Interrupted { node })
-        };
+        let tidy = Tidy { joint, request, staged: false };
 
         progress.stage("excite and record");
         tidy.request(OFF)?;
-        let route = Route { series: excitation, speed, rigid: RigidParameters::default() };
-        let recording = travel(&route, &SIGNALS, self.acknowledge)?.recording;
+        let route = self.route(excitation, speed, RigidParameters::default());
+        let recording = travel(&route, joint, &SIGNALS, self.acknowledge, running)?.recording;
         let samples = (recording.samples.len(), recording.unanswered());
-        let files = [
-            OutputFile::new("log.csv", recording.table()),
-            OutputFile::new("dataset.toml", description(node, "log.csv")),
-        ];
+        let files =
+            [OutputFile::new(TABLE, recording.table()), OutputFile::new(DESCRIPTION, description(joint.id(), TABLE))];
         write_directory(&self.out, &files)?;
-        let mut prepared = prepare(&self.out.join("dataset.toml"))?;
-        let fitted = fit(&mut prepared, &Options { version, ..self.options.clone() }, progress)?;
-        write(&fitted)?;
-        let load = differences(&configured(joint)?, &fitted.report.parameters);
-        if !running() {
-            return Err(RetrainError::Interrupted { node });
-        }
+        Ok(Recorded { round: self, tidy, version, validation, samples, speed })
+    }
 
-        let mut buffer = [0; MAX_LENGTH];
-        let length = fitted.image.encode(&mut buffer).map_err(|error| RetrainError::Report(error.to_string()))?;
-        let mut upload = buffer[..length].to_vec();
-        if let Some(key) = &self.key {
-            upload.extend_from_slice(&key.sign(&upload));
-        }
-        tidy.request(PHYSICAL_AND_NETWORK)?;
-        tidy.staged = true;
-        joint.upload_image(&upload, Use::Verify, progress)?;
-        let route = Route { series: validation, speed, rigid: rigid(&fitted) };
-        let signals = [&SIGNALS[..], &[Actual::Residual, Actual::ShadowRms]].concat();
-        let time = self.validation + SPARE;
-        let shown = |way| -> Result<Shown, RetrainError> {
-            joint.use_image(&upload, way, progress)?;
-            Ok(Shown::of(&travel(&route, &signals, false)?))
-        };
-        let first = shown(Use::Shadow(time))?;
-        let after = shown(Use::Trial(time))?;
-        let before = first.lower(shown(Use::Shadow(time))?);
-        if !after.is_better_than(&before) {
-            return Err(RetrainError::NotBetter { node, before: before.residual, after: after.residual });
-        }
-        let status = joint.use_image(&upload, Use::Commit, progress)?;
-        tidy.staged = false;
-        Ok(Outcome { fitted, samples, load, before, after, status })
+    fn route(&self, series: Vec<Excitation>, speed: f64, rigid: RigidParameters) -> Route {
+        Route { series, speed, rigid, rate: self.rate, pace: self.pace }
     }
 
     /// Refuses what can be seen to fail before anything moves; the version of the new image.
-    fn check(&self, joint: &RemoteJoint) -> Result<u32, RetrainError> {
+    ///
+    /// # Errors
+    /// [`RetrainError`].
+    pub fn check(&self, joint: &RemoteJoint) -> Result<u32, RetrainError> {
         let node = joint.id();
         if joint.raw(Field::Configuration(ConfigurationField::Changed))? != 0 {
             return Err(RemoteError::Staged { node }.into());
@@ -306,8 +320,76 @@ impl Round {
     }
 }
 
-/// Bounds of the joint for the motion.
-fn bounds(joint: &RemoteJoint) -> Result<Bounds, RemoteError> {
+impl<'a> Recorded<'a> {
+    /// Fits an image to the recording. Nothing moves.
+    ///
+    /// # Errors
+    /// [`RetrainError`]; the joint is as it was.
+    pub fn learn(self, progress: &dyn Progress) -> Result<Learned<'a>, RetrainError> {
+        let mut prepared = prepare(&self.round.out.join(DESCRIPTION))?;
+        let options = Options { version: self.version, ..self.round.options.clone() };
+        let fitted = fit(&mut prepared, &options, progress)?;
+        let load = differences(&configured(self.tidy.joint)?, &fitted.report.parameters);
+        Ok(Learned { recorded: self, fitted, load })
+    }
+}
+
+impl Learned<'_> {
+    /// Moves the joint with what it had and with the new image, and commits it where it is better.
+    ///
+    /// # Errors
+    /// [`RetrainError`]; the joint is as it was.
+    pub fn compare(self, running: &dyn Fn() -> bool, progress: &dyn Progress) -> Result<Outcome, RetrainError> {
+        let Self { recorded, fitted, load } = self;
+        let Recorded { round, mut tidy, validation, samples, speed, .. } = recorded;
+        let (joint, node) = (tidy.joint, tidy.joint.id());
+        if !running() {
+            return Err(RetrainError::Interrupted { node });
+        }
+        let mut buffer = [0; MAX_LENGTH];
+        let length = fitted.image.encode(&mut buffer).map_err(|error| RetrainError::Report(error.to_string()))?;
+        let mut upload = buffer[..length].to_vec();
+        if let Some(key) = &round.key {
+            upload.extend_from_slice(&key.sign(&upload));
+        }
+        tidy.request(PHYSICAL_AND_NETWORK)?;
+        tidy.staged = true;
+        joint.upload_image(&upload, Use::Verify, progress)?;
+        let route = round.route(validation, speed, rigid(&fitted));
+        let signals = [&SIGNALS[..], &[Actual::Residual, Actual::ShadowRms]].concat();
+        let time = round.validation + SPARE;
+        let shown = |way| -> Result<Shown, RetrainError> {
+            joint.use_image(&upload, way, progress)?;
+            Ok(Shown::of(&travel(&route, joint, &signals, false, running)?))
+        };
+        let first = shown(Use::Shadow(time))?;
+        let after = shown(Use::Trial(time))?;
+        let before = first.lower(shown(Use::Shadow(time))?);
+        if !after.is_better_than(&before) {
+            return Err(RetrainError::NotBetter { node, before: before.residual, after: after.residual });
+        }
+        let status = joint.use_image(&upload, Use::Commit, progress)?;
+        tidy.staged = false;
+        Ok(Outcome { fitted, samples, load, before, after, status })
+    }
+}
+
+fn travel(
+    route: &Route,
+    joint: &RemoteJoint,
+    signals: &[Actual],
+    acknowledge: bool,
+    running: &dyn Fn() -> bool,
+) -> Result<Travelled, RetrainError> {
+    let travelled = route.travel(joint, signals, acknowledge, running)?;
+    travelled.ok_or(RetrainError::Interrupted { node: joint.id() })
+}
+
+/// Bounds of a joint for the motion.
+///
+/// # Errors
+/// The bus, or no answer.
+pub fn bounds(joint: &RemoteJoint) -> Result<Bounds, RemoteError> {
     let setting = |setting| joint.number(Field::Setting(setting));
     let range = joint.number(Field::Range(Range::Position))?;
     let (low, high) = (setting(Setting::LowestPosition)?.max(-range), setting(Setting::HighestPosition)?.min(range));

@@ -32,6 +32,10 @@ pub struct Route {
     pub speed: f64,
     /// The rigid body whose torque is sent with the reference.
     pub rigid: RigidParameters,
+    /// Set-points a second.
+    pub rate: f64,
+    /// Samples.
+    pub pace: Pace,
 }
 
 /// A joint on its route.
@@ -101,7 +105,6 @@ impl Route {
         &self,
         joint: &RemoteJoint,
         signals: &[Actual],
-        rate: f64,
         acknowledge: bool,
         running: &dyn Fn() -> bool,
     ) -> Result<Option<Travelled>, RemoteError> {
@@ -110,8 +113,8 @@ impl Route {
         };
         let (stiffness, damping) =
             (least(Setting::Stiffness, Range::Stiffness)?, least(Setting::Damping, Range::Damping)?);
-        let mut recorder = Recorder::begin(joint, signals, Pace::Send(rate))?;
-        let stream = Stream::begin(joint, Mode::Impedance, rate, acknowledge)?;
+        let mut recorder = Recorder::begin(joint, signals, self.pace)?;
+        let stream = Stream::begin(joint, Mode::Impedance, self.rate, acknowledge)?;
         let from = joint.number(Field::Actual(Actual::Position))?;
         let centre = self.series.first().map_or(from, |series| series.centre);
         let lead = (STEEPEST * (centre - from).abs() / self.speed).max(SHORTEST_LEAD);
@@ -120,14 +123,16 @@ impl Route {
         let began = Instant::now();
         let played = way.clone();
         stream.play(move |elapsed| played.command(elapsed.as_secs_f64()));
-        let mut looked = began;
+        let patience = joint.network().patience();
+        let (mut looked, mut heard) = (began, began);
         while began.elapsed() < duration {
             if !running() {
                 stream.end()?;
                 return Ok(None);
             }
-            let patience = joint.network().patience();
-            if recorder.next(patience)?.is_none() {
+            if recorder.next(patience.min(LOOK))?.is_some() {
+                heard = Instant::now();
+            } else if heard.elapsed() >= patience {
                 return Err(RemoteError::NoSamples { node: joint.id(), within_ms: patience.as_millis() as u64 });
             }
             if looked.elapsed() > LOOK {
@@ -178,7 +183,8 @@ mod tests {
         let series = FourierSeries { fundamental: 2.0, cosine: vec![0.4, -0.1], sine: vec![0.2, 0.3] };
         let series = |duration| Excitation { series: series.clone(), centre: 0.3, duration };
         let rigid = RigidParameters { inertia: 2.0, gravity_sine: 5.0, ..RigidParameters::default() };
-        let route = Route { series: vec![series(3.0), series(2.5)], speed: 0.5, rigid };
+        let series = vec![series(3.0), series(2.5)];
+        let route = Route { series, speed: 0.5, rigid, rate: 100.0, pace: Pace::Follow };
         let way = Way { from: -0.2, lead: 1.9, route, stiffness: 7.0, damping: 3.0 };
         assert_eq!((way.at(0.0).position, way.duration()), (-0.2, 1.9 + 5.5));
         let step = 1e-4;

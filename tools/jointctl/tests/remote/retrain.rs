@@ -22,7 +22,8 @@ use std::time::{Duration, Instant};
 /// The smallest round that still learns.
 fn round(out: &Path) -> Round {
     let options = Options { presets: vec![Preset::CoulombViscous], trainer: None, ..Options::default() };
-    Round { excitation: 4.0, validation: 2.5, rate: 200.0, options, key: None, acknowledge: false, out: out.to_owned() }
+    let (rate, pace) = (200.0, Pace::Send(200.0));
+    Round { excitation: 4.0, validation: 2.5, rate, pace, options, key: None, acknowledge: false, out: out.to_owned() }
 }
 
 /// A round on a joint with a friction and an inertia that are not its own, and what it was before.

@@ -1,11 +1,12 @@
-//! A commissioning with a page as its guide: the owner's thread stays with it until its end and takes orders meanwhile.
+//! A sequence with a page as its guide, a commissioning or a round of learning: the owner's thread stays with it until
+//! its end and takes orders meanwhile.
 //!
 //! While the bridge may be on, a hold of the page has to last as in a motion, without a button: the page begins it with
 //! its yes and ends it where it is hidden, loses the focus, or is told to stop. While a question is open nothing flows,
 //! and nothing needs to be held.
 
 use super::Order;
-use super::pages::Pages;
+use super::pages::{LOOKS_ON, Pages};
 use crate::message::Ask;
 use jointctl::commission::{Guide, Stage, page};
 use serde_json::{Value, json};
@@ -15,9 +16,19 @@ use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
 /// Longest wait for an order while a question is open.
-const TURN: Duration = Duration::from_millis(5);
+pub const TURN: Duration = Duration::from_millis(5);
+
+/// Part of the page that is led.
+#[derive(Clone, Copy, Debug)]
+pub struct Part {
+    /// Key of its messages.
+    pub key: &'static str,
+    /// Answer to whatever else is asked meanwhile.
+    pub busy: &'static str,
+}
 
 struct Inner<'w> {
+    part: Part,
     pages: &'w mut Pages,
     /// Page that commands.
     page: u64,
@@ -31,7 +42,7 @@ struct Inner<'w> {
     reason: Option<&'static str>,
 }
 
-/// The page's side of a commissioning.
+/// The page's side of a sequence.
 pub struct Led<'w> {
     inner: RefCell<Inner<'w>>,
     orders: &'w Receiver<Order>,
@@ -39,12 +50,18 @@ pub struct Led<'w> {
     ends: [&'w AtomicBool; 2],
 }
 
-/// The same, as a guide.
+/// The same, as the guide of a commissioning.
 pub struct Guided<'l, 'w>(pub &'l Led<'w>);
 
 impl<'w> Led<'w> {
-    pub const fn new(pages: &'w mut Pages, orders: &'w Receiver<Order>, page: u64, ends: [&'w AtomicBool; 2]) -> Self {
-        let inner = Inner { pages, page, hold: None, question: (0, None), stage: String::new(), reason: None };
+    pub const fn new(
+        part: Part,
+        pages: &'w mut Pages,
+        orders: &'w Receiver<Order>,
+        page: u64,
+        ends: [&'w AtomicBool; 2],
+    ) -> Self {
+        let inner = Inner { part, pages, page, hold: None, question: (0, None), stage: String::new(), reason: None };
         Self { inner: RefCell::new(inner), orders, ends }
     }
 
@@ -57,6 +74,42 @@ impl<'w> Led<'w> {
         inner.goes_on(self.ends)
     }
 
+    /// A stage begins.
+    pub fn stage(&self, stage: String) {
+        let mut inner = self.inner.borrow_mut();
+        inner.tell("stage", stage.clone().into());
+        inner.stage = stage;
+    }
+
+    /// Tells something worth knowing.
+    pub fn tell(&self, key: &str, value: Value) {
+        self.inner.borrow_mut().tell(key, value);
+    }
+
+    /// Nothing flows or moves from now until the next yes: nothing needs to be held.
+    pub fn rests(&self) {
+        self.inner.borrow_mut().let_go();
+    }
+
+    /// Asks the page that commands, which holds from its yes on.
+    pub fn agrees(&self, question: &str) -> bool {
+        let mut inner = self.inner.borrow_mut();
+        inner.let_go();
+        inner.question = (inner.question.0 + 1, Some(question.to_owned()));
+        let open = inner.open();
+        inner.tell("question", open);
+        while inner.question.1.is_some() {
+            if let Ok(order) = self.orders.recv_timeout(TURN) {
+                inner.take(order);
+            }
+            if !inner.goes_on(self.ends) {
+                inner.question.1 = None;
+            }
+        }
+        inner.tell("question", Value::Null);
+        inner.reason.is_none() && inner.hold.is_some()
+    }
+
     /// Ends it: the reason, where it was ended from here.
     pub fn end(self) -> Option<&'static str> {
         let mut inner = self.inner.into_inner();
@@ -67,7 +120,7 @@ impl<'w> Led<'w> {
 
 impl Inner<'_> {
     fn tell(&mut self, key: &str, value: Value) {
-        self.pages.tell(&json!({ "commission": { key: value } }));
+        self.pages.tell(&json!({ self.part.key: { key: value } }));
     }
 
     fn open(&self) -> Value {
@@ -87,9 +140,9 @@ impl Inner<'_> {
 
     fn take(&mut self, order: Order) {
         match order {
-            Order::Attach { page, hold, tell } => {
-                self.pages.attach(page, hold, tell);
-                let told = json!({ "commission": { "stage": self.stage, "question": self.open() } });
+            Order::Attach { page, wants, hold, tell } => {
+                self.pages.attach(page, wants, hold, tell);
+                let told = json!({ self.part.key: { "stage": self.stage, "question": self.open() } });
                 self.pages.tell_one(page, &told);
             }
             Order::Ask { page, id, ask } => {
@@ -104,10 +157,10 @@ impl Inner<'_> {
 
     fn answer(&mut self, page: u64, ask: &Ask) -> Result<(), &'static str> {
         let Ask::Agree { question, hold } = ask else {
-            return Err("the joint is being commissioned: this waits until it ends");
+            return Err(self.part.busy);
         };
         if page != self.page {
-            return Err("another page commands this joint; this one looks on, and may stop it");
+            return Err(LOOKS_ON);
         }
         if self.question.1.is_none() || self.question.0 != *question {
             return Err("this question is not open");
@@ -140,32 +193,15 @@ impl Inner<'_> {
 
 impl Guide for Guided<'_, '_> {
     fn stage(&mut self, stage: Stage) {
-        let mut inner = self.0.inner.borrow_mut();
-        inner.stage = page::headline(stage);
-        let stage = inner.stage.clone();
-        inner.tell("stage", stage.into());
+        self.0.stage(page::headline(stage));
     }
 
     fn found(&mut self, text: &str) {
-        self.0.inner.borrow_mut().tell("found", text.into());
+        self.0.tell("found", text.into());
     }
 
     fn agrees(&mut self, question: &str) -> bool {
-        let mut inner = self.0.inner.borrow_mut();
-        inner.let_go();
-        inner.question = (inner.question.0 + 1, Some(question.to_owned()));
-        let open = inner.open();
-        inner.tell("question", open);
-        while inner.question.1.is_some() {
-            if let Ok(order) = self.0.orders.recv_timeout(TURN) {
-                inner.take(order);
-            }
-            if !inner.goes_on(self.0.ends) {
-                inner.question.1 = None;
-            }
-        }
-        inner.tell("question", Value::Null);
-        inner.reason.is_none() && inner.hold.is_some()
+        self.0.agrees(question)
     }
 }
 
@@ -173,8 +209,11 @@ impl Guide for Guided<'_, '_> {
 mod tests {
     use super::*;
     use crate::hold::{Hold, LIMIT};
+    use crate::owner::Wants;
     use std::sync::Arc;
     use std::sync::mpsc::sync_channel;
+
+    const PART: Part = Part { key: "commission", busy: "busy" };
 
     /// A guide's answer to one question, to which a page gives these answers, and the reason where it ended otherwise.
     fn asked(answers: &[(u64, u64, Option<u64>)], stop: bool) -> (bool, Option<&'static str>, Vec<String>) {
@@ -183,14 +222,14 @@ mod tests {
         let hold = Arc::<Hold>::default();
         hold.renew(3, Instant::now() + 100 * LIMIT);
         let mut pages = Pages::default();
-        pages.attach(1, hold, tell);
+        pages.attach(1, Wants::ToCommand, hold, tell);
         for (id, (page, question, hold)) in (1..).zip(answers) {
             let ask = Ask::Agree { question: *question, hold: *hold };
             orders.send(Order::Ask { page: *page, id, ask }).unwrap();
         }
         let (stop, over) = (AtomicBool::new(stop), AtomicBool::new(false));
-        let led = Led::new(&mut pages, &inbox, 1, [&stop, &over]);
-        let agrees = Guided(&led).agrees("Is it free?");
+        let led = Led::new(PART, &mut pages, &inbox, 1, [&stop, &over]);
+        let agrees = led.agrees("Is it free?");
         let reason = led.end();
         let told = std::iter::from_fn(|| told.try_recv().ok()).map(|text| text.to_string());
         (agrees, reason, told.collect())
@@ -222,12 +261,18 @@ mod tests {
         let (tell, _told) = tokio::sync::mpsc::channel(32);
         let hold = Arc::<Hold>::default();
         let mut pages = Pages::default();
-        pages.attach(1, Arc::clone(&hold), tell);
+        pages.attach(1, Wants::ToCommand, Arc::clone(&hold), tell);
         let (stop, over) = (AtomicBool::new(false), AtomicBool::new(false));
-        let led = Led::new(&mut pages, &inbox, 1, [&stop, &over]);
+        let led = Led::new(PART, &mut pages, &inbox, 1, [&stop, &over]);
         assert!(led.goes_on());
         hold.renew(1, Instant::now() + 100 * LIMIT);
         led.inner.borrow_mut().hold = Some(1);
+        assert!(led.goes_on());
+        // Where it rests, nothing has to be held.
+        led.rests();
+        assert!(led.goes_on());
+        hold.renew(2, Instant::now() + 100 * LIMIT);
+        led.inner.borrow_mut().hold = Some(2);
         assert!(led.goes_on());
         hold.release();
         assert!(!led.goes_on());

@@ -1,14 +1,16 @@
 //! The owner of a joint: one thread that alone talks to it, for all pages; host.
 //!
-//! Pages give orders, which the thread takes one after the other, and are told as JSON; a commissioning (`led`) takes
-//! them while it lasts. Three things do not wait for
-//! their turn: held-messages and releases, which go straight to the [hold](crate::hold) that the stream of set-points
+//! Pages give orders, which the thread takes one after the other, and are told as JSON; a sequence that a page leads
+//! (`led`) takes them while it lasts. Three things do not wait for their turn: held-messages and releases, which go straight to the [hold](crate::hold) that the stream of set-points
 //! looks at, and STOP, which the stream sees as well.
 
 mod led;
 mod pages;
+mod retraining;
 mod watch;
 mod worker;
+
+pub use pages::Wants;
 
 use crate::hold::Hold;
 use crate::message::{Ask, Message};
@@ -67,7 +69,7 @@ pub struct Setup {
 }
 
 enum Order {
-    Attach { page: u64, hold: Arc<Hold>, tell: Sender<Told> },
+    Attach { page: u64, wants: Wants, hold: Arc<Hold>, tell: Sender<Told> },
     Ask { page: u64, id: u64, ask: Ask },
 }
 
@@ -92,10 +94,10 @@ impl Owner {
     }
 
     /// A page that wants to be told of this joint; none where too many orders wait.
-    pub fn attach(&self, tell: Sender<Told>) -> Option<Session> {
+    pub fn attach(&self, wants: Wants, tell: Sender<Told>) -> Option<Session> {
         let page = self.pages.fetch_add(1, Ordering::Relaxed);
         let hold = Arc::<Hold>::default();
-        let order = Order::Attach { page, hold: Arc::clone(&hold), tell };
+        let order = Order::Attach { page, wants, hold: Arc::clone(&hold), tell };
         self.orders.try_send(order).ok()?;
         Some(Session { page, hold, orders: self.orders.clone(), stop: Arc::clone(&self.stop) })
     }

@@ -1,4 +1,4 @@
-//! Pages that look at a joint. The one that came first commands it; the others look.
+//! Pages that look at a joint. Of those that want to, the one that came first commands it; the others look.
 
 use super::Told;
 use crate::hold::Hold;
@@ -6,9 +6,22 @@ use serde_json::{Value, json};
 use std::sync::Arc;
 use tokio::sync::mpsc::Sender;
 
+/// Answer to a page that does not command.
+pub const LOOKS_ON: &str = "another page commands this joint; this one looks on, and may stop it";
+
+/// Part of a page in a joint's life.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wants {
+    /// It commands the joint where nobody else does.
+    ToCommand,
+    /// It looks on, and may stop the joint.
+    ToLook,
+}
+
 #[derive(Debug)]
 struct Page {
     id: u64,
+    wants: Wants,
     hold: Arc<Hold>,
     tell: Sender<Told>,
 }
@@ -23,8 +36,8 @@ pub struct Pages {
 
 impl Pages {
     /// Takes a page in and tells it whether it commands.
-    pub fn attach(&mut self, id: u64, hold: Arc<Hold>, tell: Sender<Told>) {
-        self.pages.push(Page { id, hold, tell });
+    pub fn attach(&mut self, id: u64, wants: Wants, hold: Arc<Hold>, tell: Sender<Told>) {
+        self.pages.push(Page { id, wants, hold, tell });
         if self.commander() == Some(id) {
             self.announce();
         } else {
@@ -54,7 +67,16 @@ impl Pages {
 
     /// Page that may change something.
     pub fn commander(&self) -> Option<u64> {
-        self.pages.first().map(|page| page.id)
+        self.pages.iter().find(|page| page.wants == Wants::ToCommand).map(|page| page.id)
+    }
+
+    /// Reason for which a page may not change anything; none where it commands.
+    pub fn refusal(&self, id: u64) -> Option<&'static str> {
+        match self.commander() {
+            Some(commander) if commander == id => None,
+            Some(_) => Some(LOOKS_ON),
+            None => Some("this page looks on, and may stop the joint"),
+        }
     }
 
     /// Hold of a page.
@@ -85,8 +107,11 @@ mod tests {
         let mut pages = Pages::default();
         let (first, mut of_first) = channel(2);
         let (second, mut of_second) = channel(8);
-        pages.attach(1, Arc::default(), first);
-        pages.attach(2, Arc::default(), second);
+        let (only, mut of_only) = channel(8);
+        pages.attach(0, Wants::ToLook, Arc::default(), only);
+        assert_eq!(pages.commander(), None);
+        pages.attach(1, Wants::ToCommand, Arc::default(), first);
+        pages.attach(2, Wants::ToCommand, Arc::default(), second);
         assert_eq!(pages.commander(), Some(1));
         assert_eq!(of_second.try_recv().unwrap().as_ref(), r#"{"role":"looks"}"#);
         // There is room for its role and one more.
@@ -100,6 +125,11 @@ mod tests {
         let told = std::iter::from_fn(|| of_second.try_recv().ok()).map(|text| text.to_string()).collect::<Vec<_>>();
         assert_eq!(told, ["1", "2", r#"{"role":"commands"}"#]);
         drop(of_second);
+        pages.forget();
+        // Who wants to look alone never commands.
+        assert_eq!((pages.commander(), pages.is_empty()), (None, false));
+        assert_eq!(of_only.try_recv().unwrap().as_ref(), r#"{"role":"looks"}"#);
+        drop(of_only);
         pages.forget();
         assert!(pages.is_empty());
     }

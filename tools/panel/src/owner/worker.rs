@@ -1,19 +1,20 @@
 //! The thread: orders, supervision of a motion, live values, in turn.
 
-use super::led::{Guided, Led};
+use super::led::{Guided, Led, Part};
 use super::pages::Pages;
+use super::retraining::retrain;
 use super::watch::Watch;
 use super::{Order, Setup};
 use crate::hold::{Hold, LIMIT};
-use crate::message::Ask;
+use crate::message::{Ask, Wanted};
 use crate::motion::{Motion, RATE, Steered};
 use crate::slow::Slow;
-use crate::{checklist, learning, scan, settings};
+use crate::{checklist, history, learning, scan, settings};
 use bus::client::{Command as Nmt, NmtState, Target};
 use joint_firmware::joint::state_machine::State;
 use joint_firmware::objects::field::{Actual, Field};
 use jointctl::commission::joint::Joint;
-use jointctl::commission::{Failure, Found, Plan, commission, find_index, page};
+use jointctl::commission::{Found, Plan, commission, find_index, page};
 use jointctl::remote::commission::RemoteObjects;
 use jointctl::remote::{Entry, RemoteError, RemoteJoint, Stream, drive};
 use serde_json::{Value, json};
@@ -31,6 +32,10 @@ const IDLE: Duration = Duration::from_millis(50);
 const LOOK: Duration = Duration::from_millis(50);
 /// Time between two slow values.
 const SLOW: Duration = Duration::from_millis(100);
+/// Parts of the page that are led.
+const COMMISSIONING: Part =
+    Part { key: "commission", busy: "the joint is being commissioned: this waits until it ends" };
+const LEARNING: Part = Part { key: "retrain", busy: "the joint learns: this waits until it ends" };
 /// Time between two attempts to find a joint that does not answer.
 const AGAIN: Duration = Duration::from_secs(2);
 
@@ -84,8 +89,8 @@ impl Worker {
             self.obey_stop();
             self.supervise();
             match order {
-                Ok(Order::Attach { page, hold, tell }) => {
-                    self.pages.attach(page, hold, tell);
+                Ok(Order::Attach { page, wants, hold, tell }) => {
+                    self.pages.attach(page, wants, hold, tell);
                     self.greet(page);
                 }
                 Ok(Order::Ask { page, id, ask }) => {
@@ -126,7 +131,9 @@ impl Worker {
     fn hello(&self) -> Option<Value> {
         let signals = self.watch.as_ref()?.signals();
         let limit = LIMIT.as_millis() as u64;
-        Some(json!({ "hello": { "node": self.setup.node, "signals": signals, "held_ms": limit } }))
+        Some(
+            json!({ "hello": { "node": self.setup.node, "signals": signals, "held_ms": limit, "boards": settings::boards() } }),
+        )
     }
 
     /// Finds the joint, takes what it sends, reads a slow value where one is due.
@@ -258,8 +265,10 @@ impl Worker {
     }
 
     fn answer(&mut self, page: u64, ask: Ask) -> Result<Value, String> {
-        if ask.changes() && self.pages.commander() != Some(page) {
-            return Err("another page commands this joint; this one looks on, and may stop it".into());
+        if ask.changes()
+            && let Some(reason) = self.pages.refusal(page)
+        {
+            return Err(reason.into());
         }
         if self.moving.is_some() && ask != Ask::Csv {
             return Err("the joint moves: this waits until it stands".into());
@@ -275,11 +284,14 @@ impl Worker {
                 self.begin_motion(&joint, page, hold, motion, reset).map(|()| Value::Null)
             }
             Ask::Scan => scan::scan(&self.setup.network, &over).map_err(words),
+            Ask::Address { first } => self.address(first).map_err(words),
             Ask::Checklist => {
                 let items = checklist::checklist(&joint).map_err(words)?;
                 serde_json::to_value(items).map_err(|error| error.to_string())
             }
+            Ask::History => history::history(&joint).map_err(words),
             Ask::Commission { plan, index_only } => self.commission(&joint, page, &plan, index_only),
+            Ask::Retrain { wanted } => self.retrain(&joint, page, &wanted),
             Ask::Agree { .. } => Err("no question is open".into()),
             Ask::Look => self.watch_anew().map(|()| Value::Null).map_err(words),
             Ask::Csv => match &self.watch {
@@ -290,6 +302,7 @@ impl Worker {
             Ask::Set { values } => settings::set(&joint, &values).map_err(words),
             Ask::Store => settings::store(&joint).map_err(words),
             Ask::Export => settings::export(&joint, &over).map(Value::from),
+            Ask::Compare { with } => settings::compare(&joint, &with, &over),
             Ask::Import { text } => settings::import(&joint, &text, &over),
             Ask::Images => learning::images(&joint).map_err(words),
             Ask::Upload { image, usage } => {
@@ -303,29 +316,67 @@ impl Worker {
         }
     }
 
-    /// Leads a page through the commissioning of the joint. Live values rest meanwhile: the joint restarts in between.
+    /// Gives node ids, and obeys STOP meanwhile: it takes seconds for each joint.
+    fn address(&mut self, first: u8) -> Result<Value, RemoteError> {
+        let network = self.setup.network.clone();
+        std::thread::scope(|scope| {
+            let giving = scope.spawn(|| scan::address(&network, first));
+            while !giving.is_finished() {
+                self.obey_stop();
+                std::thread::sleep(TURN);
+            }
+            giving.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+        })
+    }
+
+    /// Leads a page through the commissioning of the joint.
     fn commission(&mut self, joint: &RemoteJoint, page: u64, plan: &Plan, index_only: bool) -> Result<Value, String> {
         plan.check().map_err(|failure| failure.to_string())?;
         joint.require_configuration().map_err(|error| error.to_string())?;
+        let node = self.setup.node;
+        self.lead(COMMISSIONING, page, |led| {
+            let running = || led.goes_on();
+            let mut bench = Joint::new(RemoteObjects::new(joint.clone(), &running));
+            let found = match index_only {
+                true => find_index(&mut bench, plan, &mut Guided(led)).map(|_| Value::Null),
+                false => commission(&mut bench, plan, &mut Guided(led))
+                    .map(|found| outcome(&found, node).unwrap_or_else(|error| json!({ "error": error }))),
+            };
+            found.map_err(|failure| failure.to_string())
+        })
+    }
+
+    /// Leads a page through a round of learning. SYNC goes on as other joints' pages have it.
+    fn retrain(&mut self, joint: &RemoteJoint, page: u64, wanted: &Wanted) -> Result<Value, String> {
+        let folder = tempfile::tempdir().map_err(|error| format!("no folder for the recording: {error}"))?;
+        let round = learning::round(wanted, self.setup.key.clone(), folder.path())?;
+        let _sync = self.setup.syncs.join();
+        self.lead(LEARNING, page, |led| match retrain(joint, &round, led) {
+            Ok(outcome) => Ok(learning::outcome(&outcome)),
+            Err(error) => Err(error.to_string()),
+        })
+    }
+
+    /// Leads a page through a sequence, whose errors have the reason for which it was ended before them. Live values
+    /// rest meanwhile: it has the joint's PDOs, or restarts it.
+    fn lead(
+        &mut self,
+        part: Part,
+        page: u64,
+        run: impl FnOnce(&Led<'_>) -> Result<Value, String>,
+    ) -> Result<Value, String> {
         if let Some(watch) = self.watch.take() {
             watch.end().map_err(|error| error.to_string())?;
         }
-        let led = Led::new(&mut self.pages, &self.orders, page, [&self.stop, &self.over]);
-        let running = || led.goes_on();
-        let mut bench = Joint::new(RemoteObjects::new(joint.clone(), &running));
-        let found: Result<Value, Failure> = match index_only {
-            true => find_index(&mut bench, plan, &mut Guided(&led)).map(|_| Value::Null),
-            false => commission(&mut bench, plan, &mut Guided(&led))
-                .map(|found| outcome(&found, self.setup.node).unwrap_or_else(|error| json!({ "error": error }))),
-        };
-        drop(bench);
+        let led = Led::new(part, &mut self.pages, &self.orders, page, [&self.stop, &self.over]);
+        let done = run(&led);
         let reason = led.end();
         let watched = self.watch_anew();
-        let found = found.map_err(|failure| match reason {
+        let done = done.map_err(|failure| match reason {
             Some(reason) => format!("{reason}: {failure}"),
-            None => failure.to_string(),
+            None => failure,
         })?;
-        watched.map(|()| found).map_err(|error| error.to_string())
+        watched.map(|()| done).map_err(|error| error.to_string())
     }
 
     fn begin_motion(

@@ -132,39 +132,58 @@ impl Drop for Browser {
     }
 }
 
-/// Commissions the joint by the page's buttons; on a machine that is late for it, again.
-fn commission(browser: &Browser) {
-    let set = |id: &str, what: &str| browser.value(&format!("void (document.querySelector('#plan-{id}').{what})"));
-    set("current", "value = '8'");
-    set("travel", "value = '0.4'");
-    set("turn", "checked = false");
+/// Sets a field of the page.
+fn set(browser: &Browser, id: &str, what: &str) {
+    browser.value(&format!("void (document.querySelector('#{id}').{what})"));
+}
+
+/// Leads a sequence by its buttons until an expression is true; on a machine that is late for it, again.
+fn lead(browser: &Browser, part: &str, acknowledge: &str, done: &str) {
     let click = |selector: &str| {
         browser.value(&format!("void document.querySelector('{selector}').scrollIntoView({{ block: 'center' }})"));
         browser.click(selector);
     };
-    let asks = "!document.querySelector('#question').hidden";
-    let taken = "document.querySelector('#taken tr:nth-child(8)') !== null";
+    let asks = format!("!document.querySelector('#{part}-question').hidden");
     let began = Instant::now();
-    while browser.value(taken) != json!(true) {
+    while browser.value(done) != json!(true) {
         let alert = || browser.value("document.querySelector('#alert').textContent");
-        assert!(began.elapsed() < PATIENCE, "{}", alert());
-        click("#commission");
+        assert!(began.elapsed() < 3 * PATIENCE, "{}", alert());
+        click(&format!("#{part}"));
         loop {
-            browser.until(&format!("{asks} || !panel.isCommissioning()"));
-            if browser.value("panel.isCommissioning()") != json!(true) {
+            browser.until(&format!("{asks} || !panel.isLed()"));
+            if browser.value("panel.isLed()") != json!(true) {
                 break;
             }
-            browser.picture("panel-question.png");
-            click("#question-yes");
+            browser.picture(&format!("panel-{part}.png"));
+            click(&format!("#{part}-yes"));
         }
-        set("acknowledge", "checked = true");
+        set(browser, acknowledge, "checked = true");
     }
+}
+
+/// Commissions the joint by the page's buttons.
+fn commission(browser: &Browser) {
+    set(browser, "plan-current", "value = '8'");
+    set(browser, "plan-travel", "value = '0.4'");
+    set(browser, "plan-turn", "checked = false");
+    let taken = "document.querySelector('#taken tr:nth-child(8)') !== null";
+    lead(browser, "commission", "plan-acknowledge", taken);
     assert_eq!(browser.value("document.querySelectorAll('#reports button').length"), json!(2));
     browser.until("document.querySelector('#commission-log').textContent.includes('7 pole pairs')");
 }
 
+/// Lets it learn by the page's buttons.
+fn retrain(browser: &Browser) {
+    for (name, value) in [("excitation", 4.0), ("validation", 2.5), ("restarts", 0.0)] {
+        set(browser, &format!("retrain-{name}"), &format!("value = '{value}'"));
+    }
+    lead(browser, "retrain", "retrain-acknowledge", "document.querySelector('#judged tr:nth-child(3)') !== null");
+    assert_eq!(browser.value("document.querySelectorAll('#learned button').length"), json!(6));
+    browser.until("document.querySelector('#images').textContent.includes('version 1')");
+}
+
 pub fn the_page_shows_values_that_move_and_the_joint_stands_once_the_button_is_let_go() {
-    let served = Served::joints(&[NODE]);
+    let served = Served::joints(&[NODE, 9]);
     let browser = Browser::begin();
     browser.window(1280, 1000, "light");
     browser.call("POST", "/url", &json!({ "url": format!("http://{}/", served.address) }));
@@ -209,7 +228,20 @@ pub fn the_page_shows_values_that_move_and_the_joint_stands_once_the_button_is_l
         browser.click(button);
         browser.until(&format!("document.querySelector('{shown}') !== null"));
     }
+    // The other joint stands beside this one, and no longer.
+    browser.value("void document.querySelector('#joints button').click()");
+    browser.until("Number.isFinite(panel.side.cards.get(9).plots.latest('velocity-actual-value'))");
+    browser.picture("panel-beside.png");
+    browser.value("void document.querySelector('#joints button').click()");
+    browser.until("document.querySelector('#side').childElementCount === 0");
+    // A new board's settings are filled in, and none of them is set.
+    browser.value("void (document.querySelector('#new-board').value = 'moteus-r4')");
+    browser.value("void document.querySelector('#new-board').dispatchEvent(new Event('change'))");
+    browser.until("document.querySelectorAll('#objects tr.changed').length > 5");
+    browser.value("void document.querySelector('#load-objects').click()");
+    browser.until("document.querySelectorAll('#objects tr.changed').length === 0");
     commission(&browser);
+    retrain(&browser);
     for (width, height, scheme) in
         [(1280, 3200, "light"), (1280, 3200, "dark"), (390, 3200, "light"), (390, 3200, "dark")]
     {

@@ -1,5 +1,6 @@
 //! A joint is commissioned from a page. A busy machine may miss held-messages or a joint's frames: it is done again.
 
+use crate::led::{Led, Next, TIMES};
 use crate::page::Page;
 use crate::served::{NODE, PATIENCE, Served};
 use joint_firmware::objects::field::Field;
@@ -9,78 +10,13 @@ use plant::ActuatorParameters;
 use serde_json::{Value, json};
 use std::time::Instant;
 
-/// Attempts on a machine that has much else to do.
-const TIMES: usize = 20;
-
 /// Little travel, so that it does not take long.
 fn plan(acknowledge: bool) -> Value {
     json!({ "current": 8.0, "travel": 0.4, "turn": false, "acknowledge": acknowledge })
 }
 
-enum Next {
-    Question(u64),
-    Stage(String),
-    End(Result<Value, String>),
-}
-
-/// Page and what it does of its own accord.
-struct Led<'p> {
-    page: &'p mut Page,
-    id: u64,
-}
-
-impl<'p> Led<'p> {
-    fn begin(page: &'p mut Page, acknowledge: bool) -> Self {
-        let id = page.tell(json!({ "commission": { "plan": plan(acknowledge), "index_only": false } }));
-        Self { page, id }
-    }
-
-    fn next(&mut self) -> Next {
-        let id = self.id;
-        self.page.until(|message| {
-            if message["answer"] == json!(id) {
-                let error = message["error"].as_str().map(str::to_owned);
-                return Some(Next::End(error.map_or_else(|| Ok(message["done"].clone()), Err)));
-            }
-            let told = &message["commission"];
-            let stage = || told["stage"].as_str().map(|stage| Next::Stage(stage.to_owned()));
-            told["question"]["number"].as_u64().map(Next::Question).or_else(stage)
-        })
-    }
-
-    /// Presses the button of a question until it counts.
-    fn agree(&mut self, question: u64) {
-        for _ in 0..TIMES {
-            let hold = self.page.press();
-            match self.page.answer(json!({ "agree": { "question": question, "hold": hold } })) {
-                Ok(_) => return,
-                Err(error) => assert!(error.contains("let go before"), "{error}"),
-            }
-            self.page.let_go(true);
-        }
-        panic!("no yes counted in {TIMES}");
-    }
-
-    /// Says yes to everything but question `no`.
-    fn answer_all(&mut self, no: Option<u64>) -> Result<Value, String> {
-        loop {
-            match self.next() {
-                Next::Stage(_) => {}
-                Next::Question(question) => {
-                    self.page.let_go(true);
-                    if Some(question) == no {
-                        self.page.answer(json!({ "agree": { "question": question, "hold": null } })).unwrap();
-                    } else {
-                        self.agree(question);
-                    }
-                }
-                Next::End(ended) => {
-                    self.page.let_go(true);
-                    return ended;
-                }
-            }
-        }
-    }
+fn begin(page: &mut Page, acknowledge: bool) -> Led<'_> {
+    Led::begin(page, "commission", json!({ "plan": plan(acknowledge), "index_only": false }))
 }
 
 /// Returns `true` if a machine was late.
@@ -106,12 +42,12 @@ pub fn a_joint_is_commissioned_with_the_motor_that_it_has_and_a_no_leaves_it_as_
     forget(&mut page);
     // The third question is whether the joint shall take what was measured.
     let mut lead = |no| {
-        let mut ended = Led::begin(&mut page, false).answer_all(no);
+        let mut ended = begin(&mut page, false).answer_all(no);
         for _ in 0..TIMES {
             if !late(&ended) {
                 break;
             }
-            ended = Led::begin(&mut page, true).answer_all(no);
+            ended = begin(&mut page, true).answer_all(no);
         }
         ended
     };
@@ -161,7 +97,7 @@ fn under_current(led: &mut Led<'_>) -> bool {
 /// Ends a commissioning under current in a way; what it says.
 fn ended_by(served: &Served, page: &mut Page, way: impl Fn(&mut Page)) -> String {
     for _ in 0..TIMES {
-        let mut led = Led::begin(page, true);
+        let mut led = begin(page, true);
         if !under_current(&mut led) {
             continue;
         }
@@ -197,7 +133,7 @@ pub fn what_is_let_go_stopped_or_gone_ends_a_commissioning_and_changes_nothing()
     assert!(told.contains("STOP") || told.contains("not held any more"), "{told}");
     // The page is gone while its joint is under current: the next one commands a joint that is off.
     for _ in 0..TIMES {
-        if under_current(&mut Led::begin(&mut page, true)) {
+        if under_current(&mut begin(&mut page, true)) {
             break;
         }
     }
@@ -221,7 +157,7 @@ pub fn another_page_sees_the_questions_and_may_not_answer_them() {
     let mut page = Page::open(served.address);
     page.commands();
     let mut other = Page::open(served.address);
-    let mut led = Led::begin(&mut page, false);
+    let mut led = begin(&mut page, false);
     let question = loop {
         match led.next() {
             Next::Question(question) => break question,

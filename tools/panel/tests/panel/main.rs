@@ -3,8 +3,12 @@
 
 mod browser;
 mod commissioning;
+mod led;
 mod page;
 mod parts;
+#[cfg(unix)]
+mod program;
+mod retraining;
 mod safety;
 mod security;
 mod served;
@@ -33,6 +37,7 @@ fn main() {
             every_motion_goes_where_it_was_asked_to_go_and_ends_disabled,
             a_motion_beyond_a_limit_is_refused_by_name,
             joints_on_the_bus_and_what_they_miss_are_listed,
+            joints_without_a_node_id_get_one,
             a_fault_is_told_with_its_emcy,
             objects_are_read_set_stored_exported_and_imported,
             an_image_is_shadowed_tried_discarded_committed_and_rolled_back,
@@ -53,6 +58,10 @@ fn main() {
             a_joint_is_commissioned_with_the_motor_that_it_has_and_a_no_leaves_it_as_it_was,
             what_is_let_go_stopped_or_gone_ends_a_commissioning_and_changes_nothing,
             another_page_sees_the_questions_and_may_not_answer_them,
+        }
+        retraining {
+            a_joint_learns_and_what_was_let_go_while_it_computed_is_held_again,
+            what_is_let_go_while_the_joint_moves_ends_a_round_and_keeps_what_it_had,
         }
         security {
             other_hosts_and_origins_are_refused,

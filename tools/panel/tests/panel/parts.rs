@@ -119,15 +119,36 @@ pub fn joints_on_the_bus_and_what_they_miss_are_listed() {
     for name in ["friction image", "compensation requested", "owner"] {
         assert!(!done(name), "{name}: {list}");
     }
+    // The other joint can be looked at without a page that commands it, which may come later.
+    let mut card = Page::connect(served.address, "9/look");
+    assert_eq!(card.until(|message| message["hello"]["node"].as_u64()), 9);
+    assert!(card.seen.contains(&json!({ "role": "looks" })));
+    let error = card.answer(json!({ "set": { "values": [["damping", "3"]] } })).unwrap_err();
+    assert_eq!(error, "this page looks on, and may stop the joint");
     // The other joint has a page of its own.
     let mut other = Page::connect(served.address, "9");
     assert_eq!(other.until(|message| message["hello"]["node"].as_u64()), 9);
     assert!(other.seen.contains(&json!({ "role": "commands" })));
 }
 
+pub fn joints_without_a_node_id_get_one() {
+    let served = Served::joints(&[NODE, 255]);
+    let mut page = Page::open(served.address);
+    let first = |first: u8| json!({ "address": { "first": first } });
+    let error = page.answer(first(128)).unwrap_err();
+    assert!(error.contains("128"), "{error}");
+    let given = page.answer(first(9)).unwrap();
+    assert_eq!((&given[0]["node"], given.as_array().unwrap().len()), (&json!(9), 1), "{given}");
+    let joints = page.answer(json!("scan")).unwrap();
+    let nodes = joints.as_array().unwrap().iter().map(|joint| joint["node"].as_u64().unwrap()).collect::<Vec<_>>();
+    assert_eq!(nodes, [5, 9], "{joints}");
+    assert_eq!(page.answer(first(9)).unwrap(), json!([]));
+}
+
 pub fn a_fault_is_told_with_its_emcy() {
     let served = Served::joints(&[NODE]);
     let mut page = Page::open(served.address);
+    assert_eq!(page.answer(json!("history")).unwrap()["steps"], json!([]));
     // A supply that counts as too low from now on.
     let set = json!({ "set": { "values": [["lowest-bus-voltage", "90"], ["highest-bus-voltage", "95"], ["regeneration-band", "1"]] } });
     page.answer(set).unwrap();
@@ -148,6 +169,14 @@ pub fn a_fault_is_told_with_its_emcy() {
     let open = list.as_array().unwrap().iter().filter(|item| item["done"] == json!(false));
     let open = open.map(|item| item["name"].as_str().unwrap()).collect::<Vec<_>>();
     assert!(open.contains(&"supply") && open.contains(&"faults"), "{open:?}");
+    // The steps before it: the last one has the fault, the first one of them has not.
+    let history = page.answer(json!("history")).unwrap();
+    let (signals, steps) = (history["signals"].as_array().unwrap(), history["steps"].as_array().unwrap());
+    assert_eq!((steps.len(), &steps[0]["step"], &steps[63]["step"]), (64, &json!(-63), &json!(0)), "{history}");
+    assert!(steps[63]["faults"].as_str().unwrap().contains("voltage") && steps[0]["faults"] == json!(""), "{history}");
+    let supply = signals.iter().position(|signal| signal["name"] == json!("supply")).unwrap();
+    let volts = steps[63]["signals"][supply].as_f64().unwrap();
+    assert!((10.0..60.0).contains(&volts), "{volts} V");
 }
 
 pub fn objects_are_read_set_stored_exported_and_imported() {
@@ -186,6 +215,15 @@ pub fn objects_are_read_set_stored_exported_and_imported() {
         assert!(error.contains(expected), "{error}");
     }
     page.answer(json!("store")).unwrap();
+    // What differs from before is named, and not set.
+    let compared = page.answer(json!({ "compare": { "with": { "file": &exported } } })).unwrap();
+    let differ = compared.as_array().unwrap().iter().find(|entry| entry["name"] == json!("torque-limit")).unwrap();
+    assert_eq!((&differ["value"], compared.as_array().unwrap().len()), (&before["value"], 2), "{compared}");
+    assert_eq!(limit(&page.answer(json!("objects")).unwrap()), now);
+    let board = page.answer(json!({ "compare": { "with": { "board": "moteus-r4" } } })).unwrap();
+    assert!(board.as_array().unwrap().len() > 5, "{board}");
+    let error = page.answer(json!({ "compare": { "with": { "board": "moteus" } } })).unwrap_err();
+    assert_eq!(error, "'moteus' is no board; there are b-g431b-esc1 and moteus-r4");
     // The file of before brings everything of before back.
     let changed = page.answer(json!({ "import": { "text": &exported } })).unwrap();
     let names = changed.as_array().unwrap().iter().map(|entry| entry["name"].as_str().unwrap()).collect::<Vec<_>>();

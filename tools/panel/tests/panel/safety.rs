@@ -244,25 +244,18 @@ pub fn a_server_that_ends_stops_the_joint() {
 
 #[cfg(unix)]
 pub fn a_program_that_is_terminated_stops_the_joint_and_one_that_is_killed_leaves_it_to_its_deadline() {
-    use std::io::{BufRead, BufReader};
-    use std::process::{Command, Stdio};
+    use crate::program::Program;
+    use std::process::Command;
     for (signal, faults) in [("-TERM", vec![]), ("-KILL", vec![Fault::StaleCommand])] {
         let port = bus::free_port().unwrap();
         let joints = Joints::on(&format!("slcan:listen://127.0.0.1:{port}"), &[NODE]);
         let client = format!("slcan:tcp://127.0.0.1:{port}");
-        let mut child = Command::new(env!("CARGO_BIN_EXE_panel"))
-            .args(["--bus", &client, "--node", "5", "--port", "0", "--timeout", &PATIENCE.as_millis().to_string()])
-            .stdout(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let mut line = String::new();
-        BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
-        let address = line.trim().strip_prefix("http://").unwrap().trim_end_matches('/').parse().unwrap();
-        let mut page = Page::open(address);
+        let mut program = Program::begin(&client);
+        let mut page = Page::open(program.address);
         page.move_until(&jog(), VELOCITY, fast);
-        let kill = Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();
+        let kill = Command::new("kill").args([signal, &program.child.id().to_string()]).status().unwrap();
         assert!(kill.success());
-        child.wait().unwrap();
+        program.child.wait().unwrap();
         // The adapter is free again.
         let joint = RemoteJoint::open_within(&client, NODE, PATIENCE).unwrap();
         let wanted = if faults.is_empty() { State::SwitchOnDisabled } else { State::Fault };
