@@ -83,6 +83,7 @@ export class Side {
     const opened = new Card(node, () => this.toggle(node));
     this.cards.set(node, opened);
     this.place.append(opened.element);
+    opened.element.scrollIntoView({ block: "nearest" });
   }
 
   stop() {

@@ -29,8 +29,8 @@ use std::time::{Duration, Instant};
 use tungstenite::Message;
 
 const MS: Duration = Duration::from_millis(1);
-/// Velocity of the motion, and that from which on it moves, rad/s.
-const VELOCITY: [f64; 2] = [0.6, 0.5];
+/// Speed of the motion, towards the middle of the joint's range, and that from which on it moves, rad/s.
+const SPEED: [f64; 2] = [0.6, 0.5];
 /// Velocity at which a joint stands, rad/s.
 const STANDS: f64 = 0.02;
 /// Instants lie within this time of a motion.
@@ -81,6 +81,7 @@ impl Way {
 #[derive(Clone, Copy, Debug)]
 struct Seen {
     state: State,
+    position: f64,
     velocity: f64,
 }
 
@@ -98,7 +99,8 @@ impl Served for Watched {
     fn live_until(&mut self, instant: Duration) -> Result<(), String> {
         self.node.live_until(instant)?;
         let telemetry = self.node.joint().joint().telemetry();
-        *self.seen.lock().unwrap() = Seen { state: telemetry.state, velocity: f64::from(telemetry.motion.velocity) };
+        let [position, velocity] = [telemetry.motion.position, telemetry.motion.velocity].map(f64::from);
+        *self.seen.lock().unwrap() = Seen { state: telemetry.state, position, velocity };
         Ok(())
     }
 
@@ -126,7 +128,7 @@ fn follows(seen: Seen) -> bool {
 }
 
 fn moves(seen: Seen) -> bool {
-    follows(seen) && seen.velocity > VELOCITY[1]
+    follows(seen) && seen.velocity.abs() > SPEED[1]
 }
 
 /// A page whose joint moves; it holds.
@@ -136,7 +138,8 @@ fn moving(program: &Program, seen: &Mutex<Seen>, acknowledge: bool) -> Page {
     let began = Instant::now();
     while began.elapsed() < PATIENCE {
         let hold = page.press();
-        let motion = json!({ "jog": { "velocity": VELOCITY[0] } });
+        let velocity = -SPEED[0].copysign(seen.lock().unwrap().position);
+        let motion = json!({ "jog": { "velocity": velocity } });
         let id = page.tell(json!({ "move": { "hold": hold, "motion": motion, "reset": acknowledge } }));
         let asked = Instant::now();
         while asked.elapsed() < PATIENCE && !moves(*seen.lock().unwrap()) {
@@ -167,14 +170,15 @@ fn main() {
     let options = Options { node_id: NODE, serial: 12, seed: 1 };
     let mut node = VirtualNode::new(parameters, &setup, &options, SlotImages::empty().unwrap()).unwrap();
     node.advance(4_000);
-    let seen = Arc::new(Mutex::new(Seen { state: State::NotReadyToSwitchOn, velocity: 0.0 }));
+    let seen = Arc::new(Mutex::new(Seen { state: State::NotReadyToSwitchOn, position: 0.0, velocity: 0.0 }));
     let mut watched = Watched { node, seen: Arc::clone(&seen) };
     let transport = bus::open(&bus).unwrap();
     let ended = AtomicBool::new(false);
     std::thread::scope(|scope| {
         scope.spawn(|| serve(&mut watched, &*transport, &ended).unwrap());
+        let end = End(&ended);
         let worst = measure(&bus, instants, &seen);
-        ended.store(true, Ordering::Relaxed);
+        drop(end);
         println!("{:<26}{:>10}{:>16}{:>16}{:>16}", "way", "instants", "safe, ms", "permitted, ms", "stands, ms");
         let mut failed = false;
         for (way, times) in Way::ALL.into_iter().zip(worst) {
@@ -186,6 +190,15 @@ fn main() {
         }
         assert!(!failed, "a joint followed its set-points for longer than it may");
     });
+}
+
+/// Ends the joint's life, whatever happens.
+struct End<'e>(&'e AtomicBool);
+
+impl Drop for End<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
 }
 
 /// For each way, the times of its instants until the joint follows no set-points, and until it stands.
