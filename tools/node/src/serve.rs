@@ -204,8 +204,8 @@ mod tests {
         assert!(given_up > 0.0 && node.received + MOST > 4_000);
     }
 
-    /// Twenty SYNCs of a master that has a period of 1 ms, and a machine that was late by as much: nodes leave out a SYNC
-    /// that comes too soon after another.
+    /// Twenty SYNCs of a master that has a period of 1 ms, and a machine that was late by as much: nodes leave out
+    /// a SYNC that comes too soon after another.
     #[test]
     fn frames_that_waited_come_one_after_the_other_as_a_bus_carries_them() {
         /// Notes the time of each frame; answers with one of 8 bytes.
@@ -260,8 +260,8 @@ mod tests {
         assert!(node.at.windows(2).all(|pair| apart(pair) <= Duration::from_micros(1)), "{:?}", node.at);
     }
 
-    /// A client that asks one thing after the other between two of its set-points, each as soon as the one before has
-    /// been answered.
+    /// A client that asks one thing after the other between two of its set-points, each as soon as the one before
+    /// has been answered.
     #[test]
     fn a_dozen_reads_of_a_node_that_is_behind_take_less_than_half_of_the_command_deadline() {
         let [own, other] = ["virtual:reads", "virtual:reads"].map(|bus| bus::open(bus).unwrap());

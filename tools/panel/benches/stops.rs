@@ -1,9 +1,10 @@
 //! Ways in which a page ceases to hold its joint, at instants all over a motion, and when the joint is safe.
 //!
-//! `cargo bench -p panel --bench stops` ends motions at 100 instants, or `PANEL_INSTANTS`, by each way in turn, and tells
-//! the longest time until the joint brakes or is off, and until it stands. It fails where a joint follows its set-points
-//! for longer than its way permits. Joint and page are in this process, the server is the program itself, the bus is
-//! UDP multicast on this machine; the joint's own state is what counts, not what it says on the bus.
+//! `cargo bench -p panel --bench stops` ends motions at 100 instants, or `PANEL_INSTANTS`, by each way in turn,
+//! and tells the longest time until the joint brakes or is off, and until it stands. It fails where a joint
+//! follows its set-points for longer than its way permits. Joint and page are in this process, the server is the
+//! program itself, the bus is UDP multicast on this machine; the joint's own state is what counts, not what it
+//! says on the bus.
 
 #![allow(dead_code, reason = "pages are those of the tests, which use more of them")]
 

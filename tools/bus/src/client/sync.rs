@@ -18,15 +18,15 @@ pub struct SyncProducer {
 pub struct Produced {
     /// SYNCs that were sent.
     pub sent: u64,
-    /// Periods without one, because the host came late by more than half of one: they are left out, so that two SYNCs are
-    /// half a period apart at least.
+    /// Periods without one, because the host came late by more than half of one: they are left out, so that two
+    /// SYNCs are half a period apart at least.
     pub missed: u64,
     /// The latest that a SYNC was sent after its time.
     pub latest: Duration,
 }
 
-/// Periods that are left out after a SYNC that was late: the time after it to the nearest, so that none follows sooner
-/// than half a period. Nodes leave out what comes too soon.
+/// Periods that are left out after a SYNC that was late: the time after it to the nearest, so that none follows
+/// sooner than half a period. Nodes leave out what comes too soon.
 fn missed(late: Duration, period: Duration) -> u32 {
     let rounded = (late.as_nanos() + period.as_nanos() / 2) / period.as_nanos();
     u32::try_from(rounded).unwrap_or(u32::MAX)

@@ -1,9 +1,9 @@
 //! Telemetry of a joint, sample by sample in SI units: TPDOs that follow SYNC; host.
 //!
-//! [`Telemetry::begin`] packs the wanted signals into as few TPDOs as carry them and has them answer every SYNC, so
-//! that all values of a sample are of one control step. Somebody has to send SYNC: [`bus::client::SyncProducer`], once
-//! for all joints of a bus. [`Telemetry::end`] puts the PDOs back; dropping it does too, and says nothing where that
-//! fails.
+//! [`Telemetry::begin`] packs the wanted signals into as few TPDOs as carry them and has them answer every SYNC,
+//! so that all values of a sample are of one control step. Somebody has to send SYNC:
+//! [`bus::client::SyncProducer`], once for all joints of a bus. [`Telemetry::end`] puts the PDOs back; dropping it
+//! does too, and says nothing where that fails.
 
 use super::entry::Entry;
 use super::error::RemoteError;
@@ -86,8 +86,8 @@ pub struct Telemetry {
 }
 
 impl Telemetry {
-    /// Has the joint send these signals with every SYNC, and puts it into OPERATIONAL, where PDOs exist. A joint there
-    /// without set-points brakes and stays off: nothing moves because of this.
+    /// Has the joint send these signals with every SYNC, and puts it into OPERATIONAL, where PDOs exist. A joint
+    /// there without set-points brakes and stays off: nothing moves because of this.
     pub fn begin(joint: &RemoteJoint, wanted: &[Actual]) -> Result<Self, RemoteError> {
         let rated = joint.number(Field::Actual(Actual::RatedTorque))?;
         let signals = wanted.iter().map(|actual| signal(*actual, rated)).collect::<Vec<_>>();
@@ -196,8 +196,8 @@ impl Drop for Telemetry {
 
 /// SYNCs that no sample followed.
 ///
-/// A sample may come after the next SYNC, one that is lost does not come at all: what counts is the least number of SYNCs
-/// beyond the samples within [`BLOCK`] of them, against the least that there ever was.
+/// A sample may come after the next SYNC, one that is lost does not come at all: what counts is the least number
+/// of SYNCs beyond the samples within [`BLOCK`] of them, against the least that there ever was.
 #[derive(Debug, Default)]
 struct Unanswered {
     samples: u64,

@@ -1,8 +1,9 @@
 //! The owner of a joint: one thread that alone talks to it, for all pages; host.
 //!
-//! Pages give orders, which the thread takes one after the other, and are told as JSON; a sequence that a page leads
-//! (`led`) takes them while it lasts. Three things do not wait for their turn: held-messages and releases, which go straight to the [hold](crate::hold) that the stream of set-points
-//! looks at, and STOP, which the stream sees as well.
+//! Pages give orders, which the thread takes one after the other, and are told as JSON; a sequence that a page
+//! leads (`led`) takes them while it lasts. Three things do not wait for their turn: held-messages and releases,
+//! which go straight to the [hold](crate::hold) that the stream of set-points looks at, and STOP, which the stream
+//! sees as well.
 
 mod led;
 mod pages;

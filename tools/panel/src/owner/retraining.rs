@@ -1,5 +1,5 @@
-//! A round of learning with a page as its guide. The round has a thread of its own, because it computes for a while; the
-//! owner's thread stays with the pages, tells them of it and ends it.
+//! A round of learning with a page as its guide. The round has a thread of its own, because it computes for a
+//! while; the owner's thread stays with the pages, tells them of it and ends it.
 
 use super::led::{Led, TURN};
 use identification::page::verdict;
