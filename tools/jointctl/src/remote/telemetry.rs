@@ -164,7 +164,7 @@ impl Telemetry {
         Some(Sample { at, values })
     }
 
-    /// Samples that are missing, whole or in part: SYNCs that none followed, told [`BLOCK`] samples later.
+    /// Samples that are missing, whole or in part: SYNCs that none followed, told 64 samples later.
     pub fn lost(&self) -> u64 {
         self.unanswered.lost.max(self.incomplete)
     }
