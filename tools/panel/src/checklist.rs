@@ -1,7 +1,6 @@
 //! Checklist of what a board still misses on its way from unboxing to a joint that moves and learns:
 //! docs/on-a-board.md; host.
 
-use crate::absent::is_absent;
 use joint_firmware::default_configuration::B_G431B_ESC1;
 use joint_firmware::joint::state_machine::State;
 use joint_firmware::objects::field::{Actual, Field, HardwareField, OwnerField, ResetField, StorageField};
@@ -26,7 +25,7 @@ pub struct Item {
 fn optional(joint: &RemoteJoint, field: Field) -> Result<Option<u64>, RemoteError> {
     match joint.raw(field) {
         Ok(raw) => Ok(Some(raw)),
-        Err(error) if is_absent(&error) => Ok(None),
+        Err(error) if error.is_absent() => Ok(None),
         Err(error) => Err(error),
     }
 }

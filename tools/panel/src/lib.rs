@@ -15,7 +15,6 @@
 
 #![forbid(unsafe_code)]
 
-mod absent;
 pub mod assets;
 pub mod checklist;
 pub mod guard;

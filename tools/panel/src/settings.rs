@@ -1,6 +1,5 @@
 //! A joint's objects by name, and its configuration as joint.toml; host.
 
-use crate::absent::is_absent;
 use crate::message::With;
 use canopen_node::{Access, Group};
 use joint_firmware::default_configuration::{BOARDS, MOTEUS_R4};
@@ -36,7 +35,7 @@ pub fn objects(joint: &RemoteJoint, over: &dyn Fn() -> bool) -> Result<Value, St
         let value = match entry.is_readable() {
             true => match joint.read(entry) {
                 Ok(value) => Some(value),
-                Err(error) if is_absent(&error) => continue,
+                Err(error) if error.is_absent() => continue,
                 Err(error) => return Err(error.to_string()),
             },
             false => None,
@@ -98,7 +97,7 @@ fn settings(joint: &RemoteJoint, over: &dyn Fn() -> bool) -> Result<Vec<(Entry, 
         }
         match joint.raw(entry.object.field) {
             Ok(raw) => list.push((entry, setting, raw as u32)),
-            Err(error) if is_absent(&error) => {}
+            Err(error) if error.is_absent() => {}
             Err(error) => return Err(error.to_string()),
         }
     }

@@ -1,6 +1,5 @@
 //! Values that change slowly, read one by one beside the live ones; host.
 
-use crate::absent::is_absent;
 use bus::client::ClientError;
 use joint_firmware::objects::field::{Actual, Field};
 use joint_firmware::objects::settings::Setting;
@@ -66,7 +65,7 @@ impl Slow {
                 let shown = words(entry.object.field, value.number()).unwrap_or_else(|| entry.show(&value));
                 Ok(Some(json!({ "title": title, "name": entry.name(), "value": known, "shown": shown })))
             }
-            Err(error) if is_absent(&error) => {
+            Err(error) if error.is_absent() => {
                 self.entries.remove(self.next);
                 Ok(None)
             }

@@ -1,7 +1,7 @@
 //! Errors between this program and a joint, in one line each: what, where, which limit; host.
 
 use bus::BusError;
-use bus::client::ClientError;
+use bus::client::{Abort, ClientError};
 use canopen_node::NmtState;
 use joint_firmware::joint::fault::Fault;
 use joint_firmware::joint::state_machine::State;
@@ -17,6 +17,12 @@ impl std::fmt::Display for Short {
 }
 
 impl RemoteError {
+    /// Returns `true` if a joint refused because it has no such object: not every board has room for every one.
+    #[must_use]
+    pub const fn is_absent(&self) -> bool {
+        matches!(self, Self::Client(ClientError::Aborted { abort: Abort::NO_OBJECT | Abort::NO_SUB_INDEX, .. }))
+    }
+
     /// Returns `true` if what was asked for is wrong, whatever the joint is and does.
     #[must_use]
     pub const fn is_usage(&self) -> bool {

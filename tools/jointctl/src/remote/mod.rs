@@ -26,6 +26,7 @@ pub mod error;
 pub mod history;
 pub mod image;
 pub mod info;
+mod interpolation;
 pub mod joint;
 pub mod load_check;
 pub mod motion;

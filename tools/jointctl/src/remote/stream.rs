@@ -8,6 +8,7 @@
 use super::drive::{BRAKING, LOOK};
 use super::entry::Entry;
 use super::error::RemoteError;
+use super::interpolation::Interpolation;
 use super::joint::RemoteJoint;
 use super::pdo::{Change, Direction, Pdo, pack};
 use bus::Frame;
@@ -98,6 +99,7 @@ pub struct Stream {
     joint: RemoteJoint,
     shared: Arc<Shared>,
     changes: Vec<Change>,
+    interpolation: Option<Interpolation>,
     /// Channel to the thread, which ends when it is dropped.
     sources: Option<Sender<Source>>,
     thread: Option<JoinHandle<()>>,
@@ -114,7 +116,8 @@ impl std::fmt::Debug for Stream {
 
 impl Stream {
     /// Enables the joint in a mode and holds it: no torque, no velocity, or the position where it is. `rate` set-points
-    /// a second, at least two within the joint's command deadline. `acknowledge` resets a fault whose cause is
+    /// a second, at least two within the joint's command deadline; where it can, the joint goes from one position or
+    /// velocity to the next in a straight line. `acknowledge` resets a fault whose cause is
     /// gone; without it a fault is an error.
     pub fn begin(joint: &RemoteJoint, mode: Mode, rate: f64, acknowledge: bool) -> Result<Self, RemoteError> {
         let deadline = joint.number(Field::Setting(Setting::CommandDeadline))?;
@@ -148,6 +151,7 @@ impl Stream {
             joint: joint.clone(),
             shared: Arc::new(shared),
             changes: Vec::new(),
+            interpolation: None,
             sources: None,
             thread: None,
             commanding: false,
@@ -166,11 +170,15 @@ impl Stream {
                 stream.changes.push(pdo.ensure(joint, wanted)?);
             }
         }
+        let period = Duration::from_secs_f64(1.0 / rate);
+        if matches!(mode, Mode::Position | Mode::Velocity) {
+            stream.interpolation = Interpolation::begin(joint, period)?;
+        }
         joint.write_raw(Field::SetPoint(SetPoint::Mode), u64::from(operation(mode).number() as u8))?;
         stream.commanding = true;
         joint.nmt(Nmt::Start, NmtState::Operational)?;
         let encoder = encoder_of(&stream.changes)?;
-        stream.start(encoder, hold, Duration::from_secs_f64(1.0 / rate));
+        stream.start(encoder, hold, period);
         stream.enable(acknowledge)?;
         Ok(stream)
     }
@@ -274,7 +282,7 @@ impl Stream {
         }
     }
 
-    /// Brakes, switches off and puts the RPDOs back as they were; the state that the joint is left in.
+    /// Brakes, switches off and puts RPDOs and 60C2h back as they were; the state that the joint is left in.
     pub fn end(mut self) -> Result<State, RemoteError> {
         self.finish()
     }
@@ -282,7 +290,7 @@ impl Stream {
     fn finish(&mut self) -> Result<State, RemoteError> {
         self.ended = true;
         if !self.commanding {
-            self.changes.iter().try_for_each(|change| change.undo(&self.joint))?;
+            self.put_back()?;
             return self.joint.state();
         }
         self.shared.controlword.store(Controlword::QUICK_STOP.0, Ordering::Relaxed);
@@ -308,8 +316,13 @@ impl Stream {
             let _ = self.joint.network().command(Nmt::EnterPreOperational, Target::Node(self.joint.id()));
         }
         let state = disabled?;
-        self.changes.iter().try_for_each(|change| change.undo(&self.joint))?;
+        self.put_back()?;
         Ok(state)
+    }
+
+    fn put_back(&self) -> Result<(), RemoteError> {
+        self.interpolation.iter().try_for_each(|interpolation| interpolation.undo(&self.joint))?;
+        self.changes.iter().try_for_each(|change| change.undo(&self.joint))
     }
 }
 

@@ -67,6 +67,7 @@ fn main() {
         }
         motion {
             each_mode_moves_the_joint_and_leaves_it_disabled,
+            a_stream_of_positions_is_interpolated_and_60c2h_is_put_back,
             a_motion_beyond_a_limit_is_refused_by_name_before_the_joint_is_enabled,
             an_interrupt_in_motion_leaves_the_joint_disabled_and_without_a_fault,
             braking_may_take_longer_than_the_command_deadline,

@@ -46,6 +46,25 @@ pub fn each_mode_moves_the_joint_and_leaves_it_disabled() {
     assert_eq!(joint.faults().unwrap(), []);
 }
 
+pub fn a_stream_of_positions_is_interpolated_and_60c2h_is_put_back() {
+    let served = Served::joints(&[NODE]);
+    let joint = served.joint();
+    let interpolated = || [1, 2].map(|sub_index| joint.node().upload(0x60C2, sub_index).unwrap()[0]);
+    let before = interpolated();
+    // 10 ms in tenths of a millisecond.
+    for (mode, expected) in [(Mode::Position, [100, -4i8 as u8]), (Mode::Torque, before)] {
+        let stream = Stream::begin(&joint, mode, 100.0, false).unwrap();
+        assert_eq!(interpolated(), expected, "{mode:?}");
+        stream.end().unwrap();
+        assert_eq!(interpolated(), before, "{mode:?}");
+    }
+    // One that is dropped puts it back as well.
+    let other = served.joint();
+    let stream = Stream::begin(&other, Mode::Velocity, 100.0, false).unwrap();
+    drop(stream);
+    assert_eq!(interpolated(), before);
+}
+
 pub fn a_motion_beyond_a_limit_is_refused_by_name_before_the_joint_is_enabled() {
     let served = Served::joints(&[NODE]);
     let joint = served.joint();

@@ -1,7 +1,6 @@
 //! Live values of a joint as they come: samples, changes of its state, EMCYs.
 
 use super::{Setup, Syncs};
-use crate::absent::is_absent;
 use crate::live::{DRAWN, Kept, Reduction, STATE, Stroke, rounded};
 use bus::client::{Emergency, Subscription, SyncProducer, cob_id};
 use joint_firmware::objects::field::{Actual, Field};
@@ -70,7 +69,7 @@ impl Watch {
         for actual in DRAWN.into_iter().chain(STATE) {
             match joint.raw(Field::Actual(actual)) {
                 Ok(_) => wanted.push(actual),
-                Err(error) if is_absent(&error) => continue,
+                Err(error) if error.is_absent() => continue,
                 Err(error) => return Err(error),
             }
             drawn += usize::from(DRAWN.contains(&actual));
