@@ -80,7 +80,7 @@ const take = {
   },
   live(live) {
     plots.push(live);
-    by("lost").textContent = live.lost ? `${live.lost} samples lost` : "";
+    by("lost").textContent = live.lost ? `${live.lost} ${live.lost === 1 ? "sample" : "samples"} lost` : "";
   },
   event(event) {
     plots.mark(event);
