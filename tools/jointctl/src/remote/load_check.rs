@@ -3,7 +3,6 @@
 
 use super::error::RemoteError;
 use super::joint::RemoteJoint;
-use bus::client::{Abort, ClientError};
 use identification::page::Parameter;
 use identification::rigid::RigidRegressor;
 use joint_firmware::joint::configuration::LoadConfiguration;
@@ -49,7 +48,7 @@ impl fmt::Display for LoadDifference {
 /// Load that is configured, with the payload; zero where the joint has no such objects.
 pub fn configured(joint: &RemoteJoint) -> Result<Load, RemoteError> {
     let setting = |setting| match joint.number(Field::AtOnce(setting)) {
-        Err(RemoteError::Client(ClientError::Aborted { abort: Abort::NO_OBJECT, .. })) => Ok(0.0),
+        Err(error) if error.is_absent() => Ok(0.0),
         other => other.map(|value| value as f32),
     };
     Ok(Load::of(&LoadConfiguration {

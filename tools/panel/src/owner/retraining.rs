@@ -109,7 +109,7 @@ fn work(
     learned.compare(&running, talk)
 }
 
-/// What `jointctl retrain` writes, for a page to save: text, or bytes where it is none.
+/// Files of `jointctl retrain` for a page to save, as text, or as bytes where they are none.
 fn files(round: &Round, fitted: &identification::fit::Fitted) -> Result<Value, RetrainError> {
     let mut files = fit::files(fitted, &round.out).map_err(|error| RetrainError::Report(error.to_string()))?;
     // The report has its figures within.
