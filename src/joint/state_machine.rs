@@ -77,6 +77,16 @@ impl Controlword {
         self.has(0x0f) && self.commands()
     }
 
+    /// Permits operation, whether or not bit 7 is set: a joint in operation stays in it.
+    pub const fn permits_operation(self) -> bool {
+        self.has(0x0f)
+    }
+
+    /// Returns `true` if the fault reset rises behind the word `last`.
+    pub const fn begins_reset(self, last: Self) -> bool {
+        self.0 & !last.0 & Self::FAULT_RESET.0 != 0
+    }
+
     /// Halt: the joint stops and holds where it came to a stop, in whatever mode.
     pub const fn halts(self) -> bool {
         self.has(Self::HALT.0)

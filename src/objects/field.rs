@@ -177,6 +177,62 @@ impl SetPoint {
     }
 }
 
+/// Several set-points, a bit each.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Several(u16);
+
+const _: () = assert!(SET_POINTS <= 16);
+
+impl Several {
+    pub(super) const NONE: Self = Self(0);
+    /// Targets, and the torque that is added to them, which count once they have come.
+    pub(super) const TARGETS: Self = Self::one(SetPoint::TargetTorque)
+        .and(SetPoint::TargetPosition)
+        .and(SetPoint::TargetVelocity)
+        .and(SetPoint::ImpedanceFrame)
+        .and(SetPoint::TorqueOffset);
+    /// Everything that is asked of the joint: not choices, the counter and a neighbour's velocity.
+    pub(super) const ASKED: Self = Self::TARGETS
+        .and(SetPoint::Controlword)
+        .and(SetPoint::OpenLoop)
+        .and(SetPoint::PositionOffset)
+        .and(SetPoint::VelocityOffset);
+
+    /// Target of a cyclic mode, which its master has to renew: what is added to it is none. None in the other
+    /// modes, where every PDO or value that is asked of the joint is a sign of life.
+    pub(super) const fn target(mode: Operation) -> Self {
+        match mode {
+            Operation::Position => Self::one(SetPoint::TargetPosition),
+            Operation::Velocity => Self::one(SetPoint::TargetVelocity),
+            Operation::Torque => Self::one(SetPoint::TargetTorque),
+            Operation::Impedance => Self::one(SetPoint::ImpedanceFrame),
+            Operation::OpenLoop
+            | Operation::None
+            | Operation::ProfilePosition
+            | Operation::ProfileVelocity
+            | Operation::Homing => Self::NONE,
+        }
+    }
+
+    pub(super) const fn one(set_point: SetPoint) -> Self {
+        Self(1 << set_point as u16)
+    }
+
+    /// These and one more.
+    pub(super) const fn and(self, set_point: SetPoint) -> Self {
+        Self(self.0 | Self::one(set_point).0)
+    }
+
+    /// Those of them that are among `others`, too.
+    pub(super) const fn among(self, others: Self) -> Self {
+        Self(self.0 & others.0)
+    }
+
+    pub(super) const fn has(self, set_point: SetPoint) -> bool {
+        self.among(Self::one(set_point)).0 != 0
+    }
+}
+
 /// Number of [`SetPoint`]s.
 pub(super) const SET_POINTS: usize = FIRST_OF_PROFILES + PROFILE_SET_POINTS;
 /// The first one that only a program with [`PROFILES`] has.

@@ -1,8 +1,12 @@
 //! Process data of the joint: RPDOs to one [`Demand`], actual values to TPDOs; the receive interrupt.
 //!
 //! An RPDO counts as a whole, once all of its objects are there. That it arrives renews the command deadline
-//! ([`Demand::sequence`]), whatever its mapping. Where a master maps object 2010h:1 beside its set-points, one that
-//! repeats itself without thinking is not alive: the PDO with the number of the one before renews nothing.
+//! ([`Demand::sequence`]), whatever its mapping; of a joint in operation in a cyclic mode only if it carries that
+//! mode's set-point ([`Several::target`]), because another PDO says nothing of whether that one still comes. A
+//! controlword with which there is no operation, or that begins to reset a fault, renews it in every mode:
+//! otherwise a joint whose set-points came late could not be had out of its fault before they come again. Where a
+//! master maps object 2010h:1 beside its set-points, one that repeats itself without thinking is not alive: the
+//! PDO with the number of the one before renews nothing.
 //!
 //! A demand comes before everything that can wait: copies of the set-points for the task are left behind it, by
 //! [`JointImage::leave_copies`].
@@ -13,7 +17,7 @@
 //! the node's own demand, and its sequence changes with the transition only: a joint that still brakes when the command
 //! deadline is over has a fault.
 
-use super::field::{Field, SetPoint};
+use super::field::{Field, SetPoint, Several};
 use super::interpolation::Interpolation;
 use super::observed::Observed;
 use super::set_points::SetPoints;
@@ -35,7 +39,8 @@ pub struct JointImage<'a> {
     points: SetPoints,
     /// Set-points with what has arrived of an RPDO.
     arriving: SetPoints,
-    arrived: Arrived,
+    /// Parts of it.
+    arrived: Several,
     sequence: u32,
     coupled_sequence: u32,
     interpolation: [Interpolation; PROFILES as usize],
@@ -45,18 +50,6 @@ pub struct JointImage<'a> {
     changed: bool,
     /// Reaction to a collision that nobody has acknowledged yet.
     reaction: [Option<CollisionReaction>; LOADS as usize],
-}
-
-/// Parts of an RPDO that have arrived.
-#[derive(Clone, Copy, Debug, Default)]
-struct Arrived {
-    /// `true` if something has arrived that is asked of the joint.
-    asked: bool,
-    /// A position is part of it.
-    position: bool,
-    /// A neighbour's velocity.
-    coupled: bool,
-    counter: Option<u8>,
 }
 
 impl<'a> JointImage<'a> {
@@ -70,7 +63,7 @@ impl<'a> JointImage<'a> {
             state: NmtState::Initialising,
             points,
             arriving: points,
-            arrived: Arrived::default(),
+            arrived: Several::NONE,
             sequence: 0,
             coupled_sequence: 0,
             interpolation: [Interpolation::default(); PROFILES as usize],
@@ -185,28 +178,24 @@ impl<'a> JointImage<'a> {
 
     fn put(&mut self, set_point: SetPoint, value: u64) {
         self.arriving.set(set_point, value);
-        match set_point {
-            SetPoint::CoupledVelocity => self.arrived.coupled = true,
-            SetPoint::Counter => self.arrived.counter = Some(value as u8),
-            // Choices are not asked of the joint.
-            choice if choice.is_choice() => {}
-            SetPoint::TargetPosition => (self.arrived.asked, self.arrived.position) = (true, true),
-            _ => self.arrived.asked = true,
-        }
+        self.arrived = self.arrived.and(set_point);
     }
 
     fn come_into_force(&mut self) {
-        let Arrived { asked, position, coupled, counter } = core::mem::take(&mut self.arrived);
-        let repeated = counter.is_some() && counter == self.points.counter;
-        if asked && !repeated {
+        let arrived = core::mem::take(&mut self.arrived);
+        let (word, last) = (Controlword(self.arriving.controlword), Controlword(self.points.controlword));
+        let own = Several::target(self.arriving.mode);
+        let any = own == Several::NONE || !word.permits_operation() || word.begins_reset(last);
+        let renewing = if any { Several::ASKED } else { own };
+        let repeated = arrived.has(SetPoint::Counter) && self.arriving.counter == self.points.counter;
+        if arrived.among(renewing) != Several::NONE && !repeated {
             self.sequence = self.sequence.wrapping_add(1);
         }
-        if coupled {
+        if arrived.has(SetPoint::CoupledVelocity) {
             self.coupled_sequence = self.coupled_sequence.wrapping_add(1);
         }
         let actual = if PROFILES { self.shared.position() } else { 0 };
-        self.arriving.succeed(&self.points, position, actual);
-        let (word, last) = (Controlword(self.arriving.controlword), Controlword(self.points.controlword));
+        self.arriving.succeed(&self.points, arrived.has(SetPoint::TargetPosition), actual);
         self.points = self.arriving;
         self.change();
         let halts_anew = word.halts() && !last.halts();
@@ -251,7 +240,7 @@ impl ProcessImage for JointImage<'_> {
         }
         self.state = state;
         self.arriving = none;
-        self.arrived = Arrived::default();
+        self.arrived = Several::NONE;
         self.points = none;
         self.reaction = [None; LOADS as usize];
         self.change();

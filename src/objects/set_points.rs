@@ -1,6 +1,6 @@
 //! Conversion of the numbers of the bus into a command; the receive interrupt.
 
-use super::field::{FIRST_OF_PROFILES, PROFILE_SET_POINTS, Range, SetPoint};
+use super::field::{FIRST_OF_PROFILES, PROFILE_SET_POINTS, Range, SetPoint, Several};
 use super::interpolation::Target;
 use super::operation::Operation;
 use super::profile_positions::Positions;
@@ -23,22 +23,12 @@ pub(super) struct SetPoints {
     /// Set-points of the profile modes, where a program has them: [`SetPoint`]s from [`FIRST_OF_PROFILES`] on, raw.
     more: [u32; PROFILE_SET_POINTS],
     positions: [Positions; PROFILES as usize],
-    /// Targets that count: those that came since operation was enabled in this mode.
-    targets: Targets,
+    /// Targets that count: those that came since operation was enabled in this mode. A joint must not run to zero,
+    /// or to where it was to go an hour ago, because nobody said where to.
+    targets: Several,
     /// mrad/s.
     pub(super) coupled: i32,
     open_loop: Frame,
-}
-
-/// Set of the targets that there are. A joint must not run to zero, or to where it was to go an hour ago, because
-/// nobody said where to.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Targets {
-    torque: bool,
-    torque_offset: bool,
-    position: bool,
-    velocity: bool,
-    impedance: bool,
 }
 
 /// A raw limit that limits nothing: the joint's own counts.
@@ -71,7 +61,7 @@ impl SetPoints {
         impedance: 0,
         more: more(),
         positions: [Positions::NONE; PROFILES as usize],
-        targets: Targets { torque: false, torque_offset: false, position: false, velocity: false, impedance: false },
+        targets: Several::NONE,
         coupled: 0,
         open_loop: Frame { voltage: 0, speed: 0, along: 0, across: 0 },
     };
@@ -95,10 +85,10 @@ impl SetPoints {
         let (word, last) = (Controlword(self.controlword), Controlword(before.controlword));
         let goes_on = last.enables_operation() && self.mode == before.mode;
         if word.enables_operation() && !goes_on {
-            self.targets = Targets::default();
+            self.targets = Several::NONE;
             self.positions.iter_mut().for_each(Positions::forget);
         } else if position && last.halts() && !word.halts() {
-            self.targets.position = true;
+            self.insist(SetPoint::TargetPosition);
         }
         if self.mode == Operation::ProfilePosition && word.enables_operation() {
             let rises = goes_on && !last.is_new_set_point();
@@ -114,18 +104,18 @@ impl SetPoints {
 
     /// Sets one from the low bits of `value`. A mode that does not exist changes nothing.
     pub(super) fn set(&mut self, set_point: SetPoint, value: u64) {
+        if set_point != SetPoint::TargetPosition || self.position != value as i32 {
+            self.insist(set_point);
+        }
         match set_point {
             SetPoint::Controlword => self.controlword = value as u16,
             SetPoint::Mode => self.mode = Operation::of(value as i8).unwrap_or(self.mode),
             SetPoint::Counter => self.counter = Some(value as u8),
-            SetPoint::TargetTorque => (self.torque, self.targets.torque) = (value as i16, true),
-            SetPoint::TorqueOffset => (self.torque_offset, self.targets.torque_offset) = (value as i16, true),
-            SetPoint::TargetPosition => {
-                self.targets.position |= self.position != value as i32;
-                self.position = value as i32;
-            }
-            SetPoint::TargetVelocity => (self.velocity, self.targets.velocity) = (value as i32, true),
-            SetPoint::ImpedanceFrame => (self.impedance, self.targets.impedance) = (value, true),
+            SetPoint::TargetTorque => self.torque = value as i16,
+            SetPoint::TorqueOffset => self.torque_offset = value as i16,
+            SetPoint::TargetPosition => self.position = value as i32,
+            SetPoint::TargetVelocity => self.velocity = value as i32,
+            SetPoint::ImpedanceFrame => self.impedance = value,
             SetPoint::CoupledVelocity => self.coupled = value as i32,
             SetPoint::OpenLoop => self.open_loop = Frame::from_bits(value),
             SetPoint::ProfileVelocity
@@ -147,21 +137,17 @@ impl SetPoints {
         self.more.get(number).copied().unwrap_or(MORE[number])
     }
 
-    /// A position by SDO is meant: it counts also where it is the one that was there.
+    /// A target counts. One by SDO is meant, also where it is the position that was there.
     pub(super) fn insist(&mut self, set_point: SetPoint) {
-        self.targets.position |= set_point == SetPoint::TargetPosition;
+        self.targets = self.targets.and(set_point).among(Several::TARGETS);
     }
 
     /// Returns `true` if there is a target for the mode, and nothing halts the joint.
     fn follows(&self) -> bool {
         let target = match self.mode {
-            Operation::Torque => self.targets.torque,
-            Operation::ProfileVelocity if !PROFILES => false,
-            Operation::Velocity | Operation::ProfileVelocity => self.targets.velocity,
-            Operation::Position => self.targets.position,
+            Operation::ProfileVelocity => PROFILES && self.targets.has(SetPoint::TargetVelocity),
             Operation::ProfilePosition => self.positions.iter().any(|positions| positions.target().is_some()),
-            Operation::Impedance => self.targets.impedance,
-            Operation::OpenLoop | Operation::None | Operation::Homing => false,
+            mode => self.targets.among(Several::target(mode)) != Several::NONE,
         };
         target && !Controlword(self.controlword).halts()
     }
@@ -234,10 +220,11 @@ impl SetPoints {
         let torque = |counts: bool, value: i16| {
             if counts { f32::from(value) * (1e-3 * shared.rated_torque()) } else { 0.0 }
         };
-        let target = torque(self.targets.torque, self.torque);
-        let offset = torque(self.targets.torque_offset, self.torque_offset);
+        let has_offset = self.targets.has(SetPoint::TorqueOffset);
+        let target = torque(self.targets.has(SetPoint::TargetTorque), self.torque);
+        let offset = torque(has_offset, self.torque_offset);
         // A master that does not say what holds the joint may mean gravity by the target.
-        let push = if self.targets.torque_offset { target } else { 0.0 };
+        let push = if has_offset { target } else { 0.0 };
         let plain = Command { mode: self.mode.of_the_joint(), torque: target + offset, push, ..Command::NOTHING };
         let halts = Controlword(self.controlword).halts();
         match self.mode {
@@ -309,7 +296,7 @@ impl SetPoints {
 /// 12, damping 12, torque 12. Position, velocity and torque count from minus their range to plus it, the gains from 0.
 /// As the number of steps is odd, no number stands for exactly zero: of velocity and torque the nearest are half a
 /// step, range / 4095, off.
-fn impedance(frame: u64, range: impl Fn(Range) -> f32) -> Command {
+pub(super) fn impedance(frame: u64, range: impl Fn(Range) -> f32) -> Command {
     let bits = frame.swap_bytes();
     let part = |shift: u32, mask: u16| (bits >> shift) as u16 & mask;
     let both = |range: f32, raw: u16, steps: f32| range * (2.0 * f32::from(raw) / steps - 1.0);

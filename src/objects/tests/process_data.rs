@@ -282,22 +282,111 @@ fn set_points_by_sdo_need_operational_and_a_mode_does_not() {
     assert_eq!(node.number(0x60FF, 0), 1_000);
 }
 
+/// Number of times that the deadline was renewed meanwhile.
+fn renewals(node: &mut Node, what: impl FnOnce(&mut Node)) -> u32 {
+    let before = node.image.demand().sequence;
+    what(node);
+    node.image.demand().sequence - before
+}
+
+/// Maps these objects, each with its bits, into RPDO 4.
+fn map_rpdo4(node: &mut Node, objects: &[u32]) {
+    node.download(0x1403, 1, &0x8000_0505u32.to_le_bytes()).unwrap();
+    node.download(0x1603, 0, &[0]).unwrap();
+    for (entry, object) in (1..).zip(objects) {
+        node.download(0x1603, entry, &object.to_le_bytes()).unwrap();
+    }
+    node.download(0x1603, 0, &[objects.len() as u8]).unwrap();
+    node.download(0x1403, 1, &0x505u32.to_le_bytes()).unwrap();
+}
+
 #[test]
-fn a_pdo_renews_the_deadline_by_its_arrival_whatever_it_carries() {
-    let mut node = Node::operational();
-    let mut last = node.image.demand().sequence;
-    for _ in 0..3 {
-        for (id, data) in [(0x205, rpdo1(0x0F, 0, 0)), (0x305, rpdo2(0x0F, 9, 0)), (0x405, vec![0; 8])] {
-            node.receive(id, &data);
-            last += 1;
-            assert_eq!(node.image.demand().sequence, last, "{id:03x}");
+fn a_cyclic_mode_is_renewed_by_the_pdo_that_carries_its_set_point_and_by_no_other() {
+    // Mode, and which of RPDOs 1 to 3 renew it.
+    for (mode, renew) in [
+        (8, [1, 0, 0]),
+        (9, [0, 1, 0]),
+        (10, [1, 0, 0]),
+        (-1, [0, 0, 1]),
+        (0, [1, 1, 1]),
+        (1, [1, 1, 1]),
+        (3, [1, 1, 1]),
+        (6, [1, 1, 1]),
+        (-2, [1, 1, 1]),
+    ] {
+        let mut node = Node::operational();
+        set_mode(&mut node, mode);
+        for controlword in [0x0F, 0x10F] {
+            let pdos = [(0x205, rpdo1(controlword, 0, 1)), (0x305, rpdo2(controlword, mode, 0)), (0x405, vec![0; 8])];
+            for ((id, data), expected) in pdos.into_iter().zip(renew) {
+                for _ in 0..2 {
+                    let found = renewals(&mut node, |node| drop(node.receive(id, &data)));
+                    assert_eq!(found, expected, "mode {mode}, {id:03x}, controlword {controlword:#x}");
+                }
+            }
         }
+    }
+}
+
+#[test]
+fn whatever_the_mapping_the_set_point_of_the_mode_counts_alone() {
+    const CONTROLWORD: u32 = 0x6040_0010;
+    // What is added to a target, and another mode's target, is no set-point of the mode.
+    for (mode, mapped, expected) in [
+        (9, &[CONTROLWORD][..], 0),
+        (9, &[CONTROLWORD, 0x6071_0010, 0x60B1_0020], 0),
+        (9, &[CONTROLWORD, 0x60B2_0010, 0x607A_0020], 0),
+        (9, &[0x60FF_0020], 1),
+        (8, &[CONTROLWORD, 0x60FF_0020, 0x6071_0010], 0),
+        (8, &[0x60B0_0020, 0x60B2_0010], 0),
+        (8, &[CONTROLWORD, 0x607A_0020], 1),
+        (10, &[CONTROLWORD, 0x60B2_0010, 0x6072_0010], 0),
+        (10, &[0x6071_0010], 1),
+        (-1, &[CONTROLWORD, 0x6071_0010, 0x607A_0020], 0),
+        (-1, &[0x2011_0140], 1),
+        (3, &[CONTROLWORD], 1),
+    ] {
+        let mut node = Node::new();
+        map_rpdo4(&mut node, mapped);
+        node.receive(0, &[1, NODE]);
+        set_mode(&mut node, mode);
+        node.download(0x6040, 0, &[0x0F, 0]).unwrap();
+        for _ in 0..3 {
+            let found = renewals(&mut node, |node| drop(node.receive(0x505, &[0x0F, 0, 0, 0, 0, 0, 0, 0])));
+            assert_eq!(found, expected, "mode {mode}, {mapped:x?}");
+        }
+    }
+}
+
+#[test]
+fn a_set_point_by_sdo_renews_its_mode_and_another_value_does_not() {
+    let mut node = Node::operational();
+    set_mode(&mut node, 9);
+    node.download(0x6040, 0, &[0x0F, 0]).unwrap();
+    for (index, value, expected) in [
+        (0x60FF, &500i32.to_le_bytes()[..], 1),
+        (0x60FF, &500i32.to_le_bytes(), 1),
+        (0x6040, &[0x0F, 0], 0),
+        (0x6071, &[0, 0], 0),
+        (0x607A, &[0; 4], 0),
+        (0x60B1, &[0; 4], 0),
+        (0x6060, &[9], 0),
+    ] {
+        let found = renewals(&mut node, |node| node.download(index, 0, value).unwrap());
+        assert_eq!(found, expected, "{index:04x}");
+    }
+    // Words with which there is no operation, and a fault reset that begins: the joint can be had out of its
+    // fault.
+    for (word, expected) in [(0x0F, 0), (0x8F, 1), (0x8F, 0), (0x07, 1), (0x06, 1), (0x02, 1), (0x00, 1), (0x80, 1)] {
+        let found = renewals(&mut node, |node| node.download(0x6040, 0, &[word, 0]).unwrap());
+        assert_eq!(found, expected, "controlword {word:#x}");
     }
 }
 
 #[test]
 fn a_counter_that_is_mapped_and_repeated_does_not_renew_the_deadline() {
     let mut node = Node::new();
+    set_mode(&mut node, 9);
     node.download(0x1401, 1, &0x8000_0305u32.to_le_bytes()).unwrap();
     node.download(0x1601, 0, &[0]).unwrap();
     for (entry, object) in (1..).zip([0x6040_0010u32, 0x2010_0108, 0x60FF_0020]) {
@@ -314,6 +403,7 @@ fn a_counter_that_is_mapped_and_repeated_does_not_renew_the_deadline() {
     assert_eq!(sequences, [first, first, first + 1, first + 1, first + 2]);
     // A PDO without the counter is not measured by it.
     sequences[4] += 1;
+    set_mode(&mut node, 10);
     node.receive(0x205, &rpdo1(0x0F, 0, 0));
     assert_eq!(node.image.demand().sequence, sequences[4]);
 }

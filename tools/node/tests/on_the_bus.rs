@@ -52,6 +52,43 @@ fn a_velocity_by_rpdo_is_followed_and_told_by_tpdo_and_silence_ends_in_a_fault()
 }
 
 #[test]
+fn a_velocity_whose_pdo_has_died_is_late_whatever_else_still_comes() {
+    let mut master = Master::new();
+    // RPDO 4 is the controlword alone.
+    for (index, sub_index, value) in
+        [(0x1603, 0, &[0][..]), (0x1603, 1, &0x6040_0010u32.to_le_bytes()), (0x1603, 0, &[1])]
+    {
+        master.download(index, sub_index, value).unwrap();
+    }
+    master.download(0x1403, 1, &(0x500 + u32::from(ID)).to_le_bytes()).unwrap();
+    master.enabled();
+    master.drive(15, 500, 600);
+    let others = |master: &mut Master, controlword: u8, milliseconds: u32| {
+        for _ in 0..milliseconds / 5 {
+            master.send(0x500 + u16::from(ID), &[controlword, 0]);
+            // RPDO 1, whose torque and position are no set-points of this mode.
+            master.send(0x200 + u16::from(ID), &[controlword, 0, 0, 0, 0, 0, 0, 0]);
+            master.wait(5);
+        }
+    };
+    others(&mut master, 15, 85);
+    assert_eq!(master.state(), State::OperationEnabled);
+    others(&mut master, 15, 1_000);
+    assert_eq!((master.state(), master.number(0x603F, 0)), (State::Fault, 0x8100));
+    assert!(master.node.joint().actuator().state().joint.velocity.abs() < 0.02);
+    // The controlword alone, too, has the joint out of its fault.
+    others(&mut master, 0x80, 20);
+    assert_eq!(master.state(), State::SwitchOnDisabled);
+    for controlword in [6, 7, 15] {
+        others(&mut master, controlword, 300);
+    }
+    // And into operation, where it holds until the velocity comes again.
+    assert_eq!(master.state(), State::OperationEnabled);
+    master.drive(15, 500, 600);
+    assert!((master.node.joint().actuator().state().joint.velocity - 0.5).abs() < 0.05);
+}
+
+#[test]
 fn nmt_stop_in_motion_brakes_the_joint_and_set_points_no_longer_count() {
     let mut master = Master::new();
     master.enabled();
