@@ -19,6 +19,10 @@ use friction_compensation::parameters::image::Target;
 pub const SESSIONS: bool = !cfg!(all(feature = "little-room", target_os = "none"));
 /// Duration of a session after what was last written in it, ms.
 pub const SESSION: u64 = 60_000;
+/// Longest life of a session from its opening, ms, whatever is written in it: while it is open it serves
+/// everybody, who must not keep it open for good. An owner whose work takes longer opens the next one with a new
+/// response.
+pub const LIFE: u64 = 600_000;
 /// Time after its supply has come in which a joint without a button takes its client for somebody who is there, ms.
 pub const POWER_UP: u64 = 60_000;
 /// Number that makes a joint forget its key, where somebody is present: "back".
@@ -64,6 +68,8 @@ pub struct Ownership {
     challenge: [Option<[u8; CHALLENGE]>; SESSIONS as usize],
     /// End of the session, ms.
     end: u64,
+    /// Latest end that it can have, ms.
+    latest: u64,
     upload: Option<(OwnerField, usize)>,
     bytes: [u8; UPLOAD],
     /// Settings as the owner left them.
@@ -78,6 +84,7 @@ impl Ownership {
             locked: guard.locked,
             challenge: [None; SESSIONS as usize],
             end: 0,
+            latest: 0,
             upload: None,
             bytes: [0; UPLOAD],
             owned: [0; OWNED],
@@ -110,16 +117,16 @@ impl Ownership {
         }
     }
 
-    /// Returns `true` if what changes what the joint can do may be written at `now` (ms); the session lasts on then.
-    pub(super) fn permits(&mut self, now: u64) -> bool {
-        if !self.is_owned() {
-            return true;
+    /// Returns `true` if what changes what the joint can do may be written at `now` (ms).
+    pub(super) fn is_open(&self, now: u64) -> bool {
+        !self.is_owned() || SESSIONS && now < self.end
+    }
+
+    /// A session that is open lasts on.
+    pub(super) fn prolong(&mut self, now: u64) {
+        if SESSIONS && self.is_owned() {
+            self.end = (now + SESSION).min(self.latest);
         }
-        let open = SESSIONS && now < self.end;
-        if open {
-            self.end = now + SESSION;
-        }
-        open
     }
 
     /// Returns `true` if a setting that acts at once asks for no more compensation than the owner set, which is open to
@@ -232,7 +239,8 @@ impl Ownership {
         }
         self.challenge = [None; SESSIONS as usize];
         if opens {
-            self.end = place.now + SESSION;
+            self.latest = place.now + LIFE;
+            self.prolong(place.now);
         }
         Ok(match (forgets, self.locked) {
             (true, _) => Some(Change::Forgotten),

@@ -4,6 +4,7 @@ use super::Objects;
 use crate::joint::configuration::Configuration;
 use crate::objects::emergency::over;
 use crate::objects::number::to_i32;
+use crate::objects::ownership::SESSIONS;
 use crate::objects::program::{NotConfigured, Program};
 use crate::objects::refused::Refused;
 use crate::objects::settings::Setting;
@@ -63,7 +64,8 @@ impl<P: Program> Objects<'_, P> {
             return Err(Abort::VALUE);
         }
         self.configure(&configuration)?;
-        if self.authorise().is_ok() {
+        // Whoever lowers something without being the owner does not keep the session open by it.
+        if SESSIONS && self.is_authorised() {
             self.images.owner.note(&configuration);
         }
         self.staged.compensation = configuration.compensation;

@@ -69,13 +69,19 @@ impl<P: Program> Objects<'_, P> {
         self.program.button().unwrap_or_else(new)
     }
 
-    /// Checks for the owner's session, without which nothing may change what the joint can do.
+    /// Returns `true` if the owner's session is open, without which nothing may change what the joint can do;
+    /// where there are none, if somebody is at the joint.
+    pub(super) fn is_authorised(&self) -> bool {
+        self.images.owner.is_open(self.now) || !SESSIONS && self.is_present()
+    }
+
+    /// Checks for that; the session lasts on.
     pub(super) fn authorise(&mut self) -> Result<(), Abort> {
-        if self.images.owner.permits(self.now) || !SESSIONS && self.is_present() {
-            Ok(())
-        } else {
-            Err(Abort::LOCAL_CONTROL)
+        if !self.is_authorised() {
+            return Err(Abort::LOCAL_CONTROL);
         }
+        self.images.owner.prolong(self.now);
+        Ok(())
     }
 
     fn place(&self) -> Place {

@@ -1,7 +1,7 @@
 //! Ownership of the joint: each way in that is not the owner's, tried over SDO.
 
 use super::*;
-use crate::objects::ownership::{FORGET, POWER_UP, SESSION};
+use crate::objects::ownership::{FORGET, LIFE, POWER_UP, SESSION};
 use friction_compensation::parameters::authentication::{Challenge, Key, Purpose};
 
 const ROLL_BACK: u8 = 4;
@@ -139,6 +139,51 @@ fn a_session_lasts_sixty_seconds_after_what_was_written_last() {
     node.passes(1);
     assert_eq!((node.download(0x2101, 4, &0.5f32.to_le_bytes()), node.number(0x2215, 8)), (Err(REFUSED), 0));
     assert_eq!(node.download(0x2215, 8, &1u32.to_le_bytes()), Err(0x0609_0030), "nobody lengthens it");
+}
+
+#[test]
+fn a_session_ends_ten_minutes_after_it_was_opened_whatever_is_written_in_it() {
+    let mut node = owned();
+    node.respond(&key(1), Purpose::Session).unwrap();
+    let write = |node: &mut Node| node.download(0x2101, 4, &0.5f32.to_le_bytes());
+    for _ in 0..LIFE / SESSION - 1 {
+        node.passes(SESSION - 1);
+        write(&mut node).unwrap();
+        assert_eq!(node.number(0x2215, 8), SESSION);
+    }
+    // What is left of the ten minutes, and no more.
+    node.passes(10);
+    write(&mut node).unwrap();
+    assert_eq!(node.number(0x2215, 8), SESSION - 1);
+    node.passes(SESSION - 2);
+    write(&mut node).unwrap();
+    assert_eq!((u64::from(node.now / 1_000), node.number(0x2215, 8)), (LIFE - 1, 1));
+    node.passes(1);
+    assert_eq!((write(&mut node), node.number(0x2215, 8)), (Err(REFUSED), 0));
+    // The owner opens the next one, which lives as long.
+    node.respond(&key(1), Purpose::Session).unwrap();
+    node.passes(SESSION - 1);
+    write(&mut node).unwrap();
+    assert_eq!(node.number(0x2215, 8), SESSION);
+}
+
+#[test]
+fn who_lowers_the_compensation_keeps_no_session_open() {
+    let mut node = owned();
+    node.respond(&key(1), Purpose::Session).unwrap();
+    node.download(0x2200, 3, &0.9f32.to_le_bytes()).unwrap();
+    node.passes(SESSION - 1);
+    for gain in [0.9, 0.8, 0.7f32] {
+        node.download(0x2200, 3, &gain.to_le_bytes()).unwrap();
+    }
+    assert_eq!(node.number(0x2215, 8), 1);
+    // What takes the session keeps it open: more than before is the owner's alone.
+    node.download(0x2200, 3, &0.9f32.to_le_bytes()).unwrap();
+    assert_eq!(node.number(0x2215, 8), SESSION);
+    node.passes(SESSION);
+    node.download(0x2200, 3, &0.6f32.to_le_bytes()).unwrap();
+    assert_eq!(node.number(0x2215, 8), 0);
+    node.download(0x2200, 3, &0.9f32.to_le_bytes()).unwrap();
 }
 
 #[test]
