@@ -145,10 +145,20 @@ impl<'a> Images<'a> {
         CRC.checksum(self.staging.get(..self.life.length()).unwrap_or_default())
     }
 
-    /// Carries a command out as far as the life cycle does.
-    pub(super) fn command(&mut self, number: u8, circumstances: Circumstances) -> Result<(), Refusal> {
+    fn stored_checksum(&self) -> Option<u32> {
+        self.stored.active.map(|(summary, _)| summary.checksum)
+    }
+
+    /// Returns `true` if the verified image is the one in use as it is stored: a commit writes nothing.
+    pub(super) fn is_stored(&self) -> bool {
+        self.life.is_verified(self.stored_checksum())
+    }
+
+    /// Carries a command out as far as the life cycle does; `is_stored` as of [`Images::is_stored`].
+    pub(super) fn command(&mut self, number: u8, is_stored: bool, circumstances: Circumstances) -> Result<(), Refusal> {
         let Circumstances { now, armed, single_bank } = circumstances;
-        let conditions = Conditions { now, armed, single_bank, key: self.owner.key(), locked: self.owner.is_locked() };
+        let (key, locked) = (self.owner.key(), self.owner.is_locked());
+        let conditions = Conditions { now, armed, single_bank, key, locked, is_stored };
         let action = self.life.command_number(number, self.staging, &conditions)?;
         if action != Action::Nothing {
             self.action = action;
@@ -181,6 +191,11 @@ impl<'a> Images<'a> {
         self.life.forget_owner();
     }
 
+    /// The floor that has risen could not be kept.
+    pub(super) fn restore_floor(&mut self, floor: u32) {
+        self.life.restore_floor(floor);
+    }
+
     pub(super) fn count_failure(&mut self) {
         self.life.count_failure();
     }
@@ -198,7 +213,7 @@ impl<'a> Images<'a> {
 
     /// Returns `true` if the bytes from `offset` on are of the image whose first bytes were read.
     pub(super) fn is_same_image(&mut self, offset: u32) -> bool {
-        let now = self.stored.active.map(|(summary, _)| summary.checksum);
+        let now = self.stored_checksum();
         if offset == 0 {
             self.reading = now;
         }

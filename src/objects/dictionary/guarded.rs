@@ -12,18 +12,21 @@ use friction_compensation::parameters::slots::SlotError;
 impl<P: Program> Objects<'_, P> {
     #[inline(never)]
     pub(super) fn write_image(&mut self, field: ImageField, number: u32) -> Result<(), Abort> {
-        if matches!(field, ImageField::Command) && number == Command::RollBack as u32 {
+        let is = |command: Command| matches!(field, ImageField::Command) && number == command as u32;
+        let is_stored = self.images.is_stored();
+        let (rolls_back, stores) = (is(Command::RollBack), is(Command::Commit) && !is_stored);
+        // What is not newer may be what its owner has rolled back from.
+        if rolls_back || stores && !self.images.life().is_newer() {
             self.authorise()?;
         }
         // Both write a page of flash, and may write what guards the joint.
-        let writes = matches!(field, ImageField::Command)
-            && (number == Command::Commit as u32 || number == Command::RollBack as u32);
+        let writes = rolls_back || stores;
         if writes && self.stores.left() == 0 {
             return Err(Abort::DEVICE_STATE);
         }
         let (floor, failures) = (self.images.life().floor(), self.images.life().failures());
         let result = match field {
-            ImageField::Command => self.images.command(number as u8, self.circumstances()),
+            ImageField::Command => self.images.command(number as u8, is_stored, self.circumstances()),
             ImageField::TrialTime => self.images.set_trial_time(number),
             _ => return Err(Abort::READ_ONLY),
         };
@@ -33,7 +36,8 @@ impl<P: Program> Objects<'_, P> {
         let (risen, counted) = (self.images.life().floor() != floor, self.is_counted(failures));
         let kept = if risen || counted { self.keep() } else { Ok(()) };
         if let (true, Err(error)) = (risen, kept) {
-            // The image comes after its floor, or not at all.
+            // The image comes after its floor, or not at all, also when it comes again.
+            self.images.restore_floor(floor);
             let _ = self.images.take_action();
             let _ = self.images.finished(Err(error), self.observed.latched);
         }

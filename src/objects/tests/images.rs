@@ -9,7 +9,7 @@ use friction_compensation::friction::regime::Selector;
 use friction_compensation::friction::state::{JointState, SIGNALS};
 use friction_compensation::friction::{FrictionModel, FrictionParameters, ParameterSet};
 use friction_compensation::parameters::Summary;
-use friction_compensation::parameters::authentication::Key;
+use friction_compensation::parameters::authentication::{Challenge, Key, Purpose};
 use friction_compensation::parameters::image::{GoldenVector, Image, MAX_LENGTH};
 use friction_compensation::parameters::life_cycle::{Action, Mode};
 use friction_compensation::parameters::slots::Slot;
@@ -142,7 +142,7 @@ fn a_commit_goes_through_flash_to_active_and_back() {
     assert_eq!(node.download(0x2210, 0, &bytes), Err(0x0800_0022));
     assert_eq!(node.objects.take_action(), Action::Store { length: bytes.len() });
     node.objects.finished(Ok(()), stored(&bytes));
-    // Without a key there is no floor to be kept.
+    // Without a key there is no floor, kept or not.
     assert!(node.objects.program().kept.is_empty());
     assert_eq!((node.number(0x2212, 2), node.objects.take_action()), (6, Action::Activate));
     node.objects.program().image = bytes.clone();
@@ -150,7 +150,7 @@ fn a_commit_goes_through_flash_to_active_and_back() {
     assert_eq!(node.number(0x2212, 2), 7);
     assert_eq!(node.upload(0x2211, 0), Ok(bytes.clone()));
     assert_eq!([1, 3, 4, 5].map(|sub| node.number(0x2213, sub)), [4, 1, 1, 1_700_000_000]);
-    assert_eq!((node.number(0x2214, 1), node.number(0x2215, 3)), (0, 4));
+    assert_eq!((node.number(0x2214, 1), node.number(0x2215, 3)), (0, 0));
     command(&mut node, ROLL_BACK).unwrap();
     assert_eq!(node.objects.take_action(), Action::RollBack);
     node.objects.finished(Err(SlotError::NoPrevious), stored(&bytes));
@@ -161,7 +161,9 @@ fn a_commit_goes_through_flash_to_active_and_back() {
 fn commits_and_roll_backs_are_counted_with_the_other_stores_and_stop_with_the_last() {
     let bytes = image(4);
     let mut node = verified(&bytes);
-    let both = StoredImages { previous: stored(&bytes).active, ..stored(&bytes) };
+    // What is committed is never the one in use.
+    let other = image(3);
+    let both = StoredImages { previous: stored(&bytes).active, ..stored(&other) };
     let mut left = STORES;
     let mut again = |node: &mut Node, number: u8| {
         if number == COMMIT {
@@ -192,6 +194,111 @@ fn commits_and_roll_backs_are_counted_with_the_other_stores_and_stop_with_the_la
     }
     // Only tried, it is not written.
     command(&mut node, TRIAL).unwrap();
+}
+
+/// A joint with a key that had so many stores left, of which the image in use took one.
+fn owned_with(bytes: &[u8], stores_left: u8) -> (Node, Key) {
+    let key = Key::new(core::array::from_fn(|i| i as u8)).unwrap();
+    let guard = Guard { floor: 0, failures: 0, key: Some(key.clone()), locked: false };
+    let start = Start { single_bank: false, stores_left, ..Start::new(None, false, &BOARD.joint, &BOARD.bridge) };
+    let mut node = Node::starting(Memory::default(), &start, &guard);
+    stage(&mut node, &key, bytes);
+    command(&mut node, COMMIT).unwrap();
+    assert!(matches!(node.objects.take_action(), Action::Store { .. }));
+    for _ in 0..2 {
+        node.objects.finished(Ok(()), stored(bytes));
+        node.objects.take_action();
+    }
+    (node, key)
+}
+
+/// Uploads with the key's tag, and verifies.
+fn stage(node: &mut Node, key: &Key, bytes: &[u8]) {
+    node.download(0x2210, 0, &[bytes, &key.sign(bytes)].concat()).unwrap();
+    command(node, VERIFY).unwrap();
+}
+
+#[test]
+fn an_image_that_is_not_newer_is_its_owners_to_store_and_costs_a_stranger_and_the_flash_nothing() {
+    let old = image(5);
+    let (mut node, key) = owned_with(&image(7), STORES);
+    // The owner has gone back to the image before.
+    node.objects.finished(Ok(()), stored(&old));
+    let left = node.number(0x2304, 2);
+    for _ in 0..2 * STORES {
+        stage(&mut node, &key, &image(7));
+        assert_eq!(command(&mut node, COMMIT), Err(0x0800_0021));
+        assert_eq!((node.number(0x2212, 2), node.objects.take_action()), (2, Action::Nothing));
+    }
+    // Only tried, it is as it was.
+    node.download(0x2212, 7, &5_000u32.to_le_bytes()).unwrap();
+    command(&mut node, TRIAL).unwrap();
+    node.objects.take_action();
+    node.objects.finished(Ok(()), stored(&old));
+    assert_eq!((command(&mut node, COMMIT), node.number(0x2212, 2)), (Err(0x0800_0021), 4));
+    command(&mut node, DISCARD).unwrap();
+    node.objects.take_action();
+    node.objects.finished(Ok(()), stored(&old));
+    assert_eq!((node.number(0x2304, 2), node.number(0x2215, 3)), (left, 7));
+    // In the owner's session it is stored.
+    let random = node.upload(0x2215, 5).unwrap().try_into().unwrap();
+    let response = key.respond(Purpose::Session, &Challenge { product: 2, serial: 4, random }, &[]);
+    node.download(0x2215, 7, &response).unwrap();
+    stage(&mut node, &key, &image(7));
+    command(&mut node, COMMIT).unwrap();
+    assert!(matches!(node.objects.take_action(), Action::Store { .. }));
+    assert_eq!(node.number(0x2304, 2), left - 1);
+    for _ in 0..2 {
+        node.objects.finished(Ok(()), stored(&image(7)));
+        node.objects.take_action();
+    }
+    // The next version is everybody's who has it with its tag.
+    node.download(0x2215, 8, &[0; 4]).unwrap();
+    stage(&mut node, &key, &image(8));
+    command(&mut node, COMMIT).unwrap();
+    assert!(matches!(node.objects.take_action(), Action::Store { .. }));
+}
+
+#[test]
+fn a_commit_of_the_image_in_use_is_done_at_once_writes_nothing_and_costs_no_store() {
+    let bytes = image(7);
+    for left in [1, 0] {
+        let (mut node, key) = owned_with(&bytes, left + 1);
+        let kept = node.objects.program().kept.len();
+        for _ in 0..3 {
+            stage(&mut node, &key, &bytes);
+            command(&mut node, COMMIT).unwrap();
+            assert_eq!((node.objects.take_action(), node.number(0x2212, 2)), (Action::Revert, 7));
+            node.objects.finished(Ok(()), stored(&bytes));
+        }
+        assert_eq!((node.number(0x2304, 2), node.objects.program().kept.len()), (left.into(), kept));
+        // Another one of the next version is stored, or there is no store left.
+        stage(&mut node, &key, &image(8));
+        assert_eq!(command(&mut node, COMMIT).is_ok(), left > 0);
+    }
+    // Without a key it is the same.
+    let mut node = verified(&bytes);
+    node.objects.finished(Ok(()), stored(&bytes));
+    command(&mut node, COMMIT).unwrap();
+    assert_eq!((node.objects.take_action(), node.number(0x2212, 2)), (Action::Revert, 7));
+    assert_eq!(node.number(0x2304, 2), u64::from(STORES));
+}
+
+#[test]
+fn without_a_key_an_image_of_the_highest_version_shuts_no_other_out() {
+    let last = image(u32::MAX);
+    let mut node = verified(&last);
+    command(&mut node, COMMIT).unwrap();
+    node.objects.take_action();
+    for _ in 0..2 {
+        node.objects.finished(Ok(()), stored(&last));
+        node.objects.take_action();
+    }
+    assert_eq!((node.number(0x2213, 1), node.number(0x2215, 3)), (u64::from(u32::MAX), 0));
+    node.download(0x2210, 0, &image(1)).unwrap();
+    command(&mut node, VERIFY).unwrap();
+    command(&mut node, COMMIT).unwrap();
+    assert!(matches!(node.objects.take_action(), Action::Store { .. }));
 }
 
 #[test]
@@ -280,9 +387,11 @@ fn the_floor_is_kept_before_an_image_with_a_tag_is_stored_or_it_is_not_stored() 
     node.objects.program().fails = Some(SlotError::Verify { slot: Slot::First });
     assert_eq!(command(&mut node, COMMIT), Err(0x0606_0000));
     assert_eq!((node.objects.take_action(), node.number(0x2212, 2)), (Action::Nothing, 2));
+    assert_eq!((node.number(0x2215, 3), node.objects.program().kept.iter().map(|kept| kept.floor).max()), (0, Some(0)));
     node.objects.program().fails = None;
     command(&mut node, COMMIT).unwrap();
     assert_eq!(node.objects.take_action(), Action::Store { length: image.len() });
+    assert_eq!(node.objects.program().kept.last().map(|kept| kept.floor), Some(7));
 }
 
 #[test]
@@ -296,7 +405,6 @@ fn what_is_stored_and_damaged_is_announced_and_stays_in_the_error_register() {
                 effort: Effort::NewtonMetre,
                 limits: Limits { output: u32::MAX, torque_gain: u32::MAX, velocity_slope: u32::MAX },
             },
-            0,
             0,
             0,
         ),

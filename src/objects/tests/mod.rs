@@ -246,7 +246,7 @@ impl Node {
             limits: Limits { output: u32::MAX, torque_gain: u32::MAX, velocity_slope: u32::MAX },
         };
         let staging = Box::leak(Box::new([0; STAGING]));
-        let life = LifeCycle::new(requirements, guard.floor, 0, guard.failures);
+        let life = LifeCycle::new(requirements, guard.floor, guard.failures);
         let images = Images::new(staging, life, Ownership::new(guard), StoredImages::default());
         let mut node = Self {
             shared,

@@ -458,6 +458,6 @@ fn a_session_ends_with_the_program() {
         limits: Limits { output: u32::MAX, torque_gain: u32::MAX, velocity_slope: u32::MAX },
     };
     let start = Start { single_bank: false, ..Start::new(None, false, &BOARD.joint, &BOARD.bridge) };
-    node.objects.restart(LifeCycle::new(requirements, 3, 0, 0), StoredImages::default(), &start);
+    node.objects.restart(LifeCycle::new(requirements, 3, 0), StoredImages::default(), &start);
     assert_eq!((node.number(0x2215, 8), node.owner()), (0, key(1).id()));
 }

@@ -85,7 +85,6 @@ fn whoever_stores_in_a_loop_is_stopped_and_no_reset_over_the_bus_gives_anything_
         },
         0,
         0,
-        0,
     );
     let start = Start { stores_left: STORES, ..Start::new(None, false, &BOARD.joint, &BOARD.bridge) };
     node.objects.restart(life, StoredImages::default(), &start);

@@ -60,7 +60,6 @@ fn identity() -> &'static Identity<'static> {
 fn images(program: &BoardProgram, stored: &StoredImages, identity: &Identity, start: &Start) -> Images<'static> {
     static BUFFER: ConstStaticCell<[u8; STAGING]> = ConstStaticCell::new([0; STAGING]);
 
-    let newest = [stored.active, stored.previous].iter().flatten().map(|(image, _)| image.version).fold(0, u32::max);
     let requirements = Requirements {
         target: Target { product: identity.product, serial: identity.serial },
         effort: Effort::NewtonMetre,
@@ -71,7 +70,7 @@ fn images(program: &BoardProgram, stored: &StoredImages, identity: &Identity, st
             velocity_slope: u32::MAX,
         },
     };
-    let life = LifeCycle::new(requirements, program.guard.floor, newest, program.guard.failures);
+    let life = LifeCycle::new(requirements, program.guard.floor, program.guard.failures);
     Images::new(BUFFER.take(), life, Ownership::new(&program.guard), *stored)
 }
 

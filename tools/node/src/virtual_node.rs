@@ -484,7 +484,6 @@ impl VirtualNode {
 /// The life cycle of a joint that starts, and what its slots hold.
 fn life(requirements: Requirements, storage: &mut Storage) -> (LifeCycle, StoredImages) {
     let stored = storage.images.stored();
-    let versions = [stored.active, stored.previous].into_iter().flatten().map(|(summary, _)| summary.version);
     let guard = storage.guard();
-    (LifeCycle::new(requirements, guard.floor, versions.fold(0, u32::max), guard.failures), stored)
+    (LifeCycle::new(requirements, guard.floor, guard.failures), stored)
 }

@@ -87,6 +87,17 @@ fn the_version_floor_stays_on_every_path_of_an_image_but_a_commit_which_raises_i
     open_session(&mut master);
     master.image(ROLL_BACK).unwrap();
     assert_eq!((floor(&mut master), in_use(&mut master)), (7, 5));
+    // Whoever has heard the image that the owner went back from sends it again: its tag is right.
+    close_session(&mut master);
+    let left = master.number(0x2304, 2);
+    for _ in 0..3 {
+        assert!(verifies(&mut master, &signed(7)) && master.image(COMMIT).is_err());
+        master.image(TRIAL).unwrap();
+        assert!(master.image(COMMIT).is_err());
+        master.image(DISCARD).unwrap();
+    }
+    assert_eq!((in_use(&mut master), master.number(0x2304, 2)), (5, left));
+    open_session(&mut master);
     // Defaults are those of the configuration, not of what guards the joint.
     master.download(0x1011, 1, b"load").unwrap();
     close_session(&mut master);

@@ -190,17 +190,23 @@ fn a_damaged_an_old_and_an_unsigned_image_are_refused_and_nothing_changes() {
         assert!(master.image(1).is_err());
         master.number(0x2212, 3)
     };
-    let codes = [refused(&mut master, &damaged), refused(&mut master, &SampleImage::constant(2, 0.5))];
+    let signed = |image: Vec<u8>| [&image[..], &key.sign(&image)].concat();
+    let stores = |master: &mut Master, upload: &[u8]| {
+        master.download(0x2210, 0, upload).unwrap();
+        master.image(1).unwrap();
+        master.image(3).unwrap();
+        master.number(0x2213, 1)
+    };
+    let damaged = refused(&mut master, &damaged);
     master.download(0x2215, 6, &key.to_bytes()).unwrap();
     let unsigned = refused(&mut master, &SampleImage::constant(4, 0.5));
-    assert!(codes[0] != 0 && codes[1] != 0 && unsigned != 0 && codes[0] != codes[1] && codes[1] != unsigned);
-
-    let mut signed = SampleImage::constant(4, 0.5);
-    signed.extend(key.sign(&signed));
-    master.download(0x2210, 0, &signed).unwrap();
-    master.image(1).unwrap();
-    master.image(3).unwrap();
-    assert_eq!(master.number(0x2213, 1), 4);
+    // With its tag the image in use is what no older one may replace.
+    let left = master.number(0x2304, 2);
+    assert_eq!((stores(&mut master, &signed(good.clone())), master.number(0x2215, 3)), (3, 3));
+    assert_eq!((master.number(0x2304, 2), master.number(0x2214, 1)), (left, 0), "it was not written again");
+    let old = refused(&mut master, &signed(SampleImage::constant(2, 0.5)));
+    assert!(damaged != 0 && old != 0 && unsigned != 0 && damaged != old && old != unsigned);
+    assert_eq!(stores(&mut master, &signed(SampleImage::constant(4, 0.5))), 4);
     // A key is written once.
     assert!(master.download(0x2215, 6, &[7; 32]).is_err());
 }

@@ -90,7 +90,8 @@ pub struct Sign {
     /// The joint's key
     #[arg(long, value_name = "FILE")]
     key: PathBuf,
-    /// Version to sign it as; a joint takes none that is older than what it had [default: the image's]
+    /// Version to sign it as; a joint with this key takes none that is older than the newest it had [default: the
+    /// image's]
     #[arg(long, value_name = "N")]
     version: Option<u32>,
     /// Product to sign it for, 0 for any [default: the image's]

@@ -106,12 +106,33 @@ impl RemoteJoint {
     fn image_command(&self, command: Command, upload: &[u8]) -> Result<(), RemoteError> {
         let Entry { object, .. } = Entry::of(Field::Image(ImageField::Command));
         let (index, sub_index, number) = (object.index, object.sub_index, [command as u8]);
-        // A roll back is the owner's; of the others what is refused is the image.
         let sent = match command {
             Command::RollBack => self.download(index, sub_index, &number),
+            Command::Commit => self.commit(index, sub_index),
             _ => self.node().download(index, sub_index, &number).map_err(RemoteError::from),
         };
         sent.map_err(|error| self.explain(error, Attempt { command: Some(command), upload }))
+    }
+
+    /// A commit is refused for the image's sake, with a reason, or because the image is not newer than the floor
+    /// and so the owner's to store.
+    fn commit(&self, index: u16, sub_index: u8) -> Result<(), RemoteError> {
+        let number = [Command::Commit as u8];
+        match self.node().download(index, sub_index, &number) {
+            Err(ClientError::Aborted { abort: Abort::LOCAL_CONTROL, .. })
+                if self.raw(Field::Image(ImageField::Result))? == 0 =>
+            {
+                let floor = self.raw(Field::Image(ImageField::Floor))?;
+                self.download(index, sub_index, &number).map_err(|error| match error {
+                    RemoteError::Owned { node, number, problem } => {
+                        let problem = format!("the image is not newer than version {floor}; {problem}");
+                        RemoteError::Owned { node, number, problem }
+                    }
+                    error => error,
+                })
+            }
+            sent => Ok(sent?),
+        }
     }
 
     fn explain(&self, error: RemoteError, attempt: Attempt) -> RemoteError {

@@ -268,15 +268,15 @@ pub fn life(state: State, left: f64) -> String {
 
 fn authentication(joint: &RemoteJoint) -> Result<String, RemoteError> {
     let raw = |field| joint.raw(Field::Image(field));
-    let floor = raw(ImageField::Floor)?;
     let of_owner = |field| joint.raw(Field::Owner(field));
     if of_owner(OwnerField::KeyPresent)? == 0 {
-        return Ok(format!("no key: belongs to nobody, images need no tag; version {floor} or newer"));
+        return Ok("no key: belongs to nobody, images need no tag and may have any version".into());
     }
     let number = of_owner(OwnerField::KeyNumber)?;
     if number == 0 {
         return Ok("the stored key is damaged: nothing that needs it is taken, `jointctl key forget` repairs it".into());
     }
+    let floor = raw(ImageField::Floor)?;
     let mut text = format!("key {number:08x}: images need its tag, settings a session; version {floor} or newer");
     let failures = raw(ImageField::Failures)?;
     if failures > 0 {

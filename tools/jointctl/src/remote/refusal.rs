@@ -29,7 +29,7 @@ const WORDS: [(u16, &str); 33] = [
     (0x0301, "the joint has a key, but no tag of 32 bytes follows the image; `jointctl sign` puts one there"),
     (0x0302, "the tag is not that of this image and the joint's key"),
     (0x0304, "the joint's key is damaged: it takes no image, and keeps the one that it has"),
-    (0x0401, "the image is older than one that the joint has had"),
+    (0x0401, "the image is older than the newest that the joint has stored with its key's tag"),
     (0x0501, "the image is for another product"),
     (0x0502, "the image is for another joint"),
     (0x0503, "the image's unit of effort is not the joint's"),

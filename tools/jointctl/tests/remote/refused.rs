@@ -102,7 +102,32 @@ pub fn a_damaged_image_is_refused_and_the_one_in_use_stays() {
 pub fn an_image_for_another_joint_or_of_the_past_is_refused_with_both_numbers() {
     let joint = InService::new();
     joint.refused(&image(4, 0.5, 99), &["image for serial number 99, this joint has 12", "0502h"]);
-    joint.refused(&image(2, 0.5, 0), &["image version 2, must be at least 3", "0401h"]);
+    // Of the past is what the key of an owner has let in; a joint of nobody's takes any version, or one image of
+    // the highest would be its last.
+    let joint = InService::new();
+    joint.joint.upload_image(&image(u32::MAX, 0.5, 0), Use::Commit, &Silent).unwrap();
+    let status = joint.joint.upload_image(&image(3, 0.5, 0), Use::Commit, &Silent).unwrap();
+    assert_eq!(status.active.unwrap().version, 3);
+    let key = Key::new(std::array::from_fn(|i| i as u8)).unwrap();
+    joint.joint.give_key(&key).unwrap();
+    let signed = |version, torque| {
+        let plain = image(version, torque, 0);
+        [&plain[..], &key.sign(&plain)[..]].concat()
+    };
+    let commit = |upload: &[u8], joint: &RemoteJoint| {
+        joint.upload_image(upload, Use::Commit, &Silent).map(|status| status.active.unwrap().version)
+    };
+    assert_eq!(commit(&signed(4, 0.5), &joint.joint).unwrap(), 4);
+    let message = joint.joint.upload_image(&signed(3, 0.5), Use::Verify, &Silent).unwrap_err().to_string();
+    assert!(message.contains("image version 3, must be at least 4") && message.contains("0401h"), "{message}");
+    // The one in use again is nothing new; another one of its version, or what was rolled back from, is the
+    // owner's.
+    assert_eq!(commit(&signed(4, 0.5), &joint.joint).unwrap(), 4);
+    let message = commit(&signed(4, 0.25), &joint.joint).unwrap_err().to_string();
+    assert!(message.contains("only the owner of key") && message.contains("not newer than version 4"), "{message}");
+    assert!(message.contains("--key FILE, or JOINTCTL_KEY"), "{message}");
+    let owner = joint.joint.clone().owned_by(key.clone());
+    assert_eq!(commit(&signed(4, 0.25), &owner).unwrap(), 4);
 }
 
 pub fn a_wrong_key_is_refused_and_counted_and_keeps_no_right_one_out() {

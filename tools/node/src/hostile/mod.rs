@@ -8,8 +8,8 @@
 //! - outside OPERATIONAL the joint is asked for a quick stop and nothing else; SDO, LSS, heartbeats and NMT commands
 //!   that change no state set no set-point in the receive interrupt; every number of a command is finite
 //! - what is configured is always something that the joint can be
-//! - with a key, nothing is run or stored without a tag of that key, or older than what was stored before; the previous
-//!   image comes back by a roll back only; the key stays
+//! - with a key, nothing is run or stored without a tag of that key or older than what was stored before, and
+//!   nothing is stored that is not newer; the previous image comes back by a roll back only; the key stays
 //! - nothing is written to flash under current
 //! - the node sends with its own identifiers only, or with one that PDOs and EMCY may have
 
@@ -162,7 +162,7 @@ impl<'a> HostileNode<'a> {
         let (bus, shared) = (&*bus, &*shared);
         let guard = Guard { floor: 3, key: key.cloned(), ..Guard::default() };
         storage.store_guard(&guard)?;
-        let images = Images::new(staging, LifeCycle::new(requirements, 3, 0, 0), Ownership::new(&guard), stored_images);
+        let images = Images::new(staging, LifeCycle::new(requirements, 3, 0), Ownership::new(&guard), stored_images);
         let start = Start { stores_left: STORES, ..Start::new(None, false, &board.joint, &board.bridge) };
         let mut node = Self {
             bus,
@@ -345,6 +345,8 @@ impl<'a> HostileNode<'a> {
                 Action::Store { length } => {
                     let summary = self.judge_image(length)?;
                     hold!(!self.objects.program().armed, "an image is stored under current");
+                    let newer = self.key.is_none() || summary.version > self.floor;
+                    hold!(newer, "version {} is stored without its owner, {} was", summary.version, self.floor);
                     self.floor = summary.version;
                     self.counts.stored += 1;
                     let image = self.objects.staging().get(..length).unwrap_or_default().to_vec();
@@ -370,8 +372,8 @@ impl<'a> HostileNode<'a> {
         let image = staging.get(..length).unwrap_or_default();
         let Ok(summary) = Image::summary(image) else { return Err(Violation("what runs is no image".into())) };
         hold!(Image::decode(image).is_ok(), "what runs is no image");
-        hold!(summary.version >= floor, "version {} runs, {floor} was stored", summary.version);
         if let Some(key) = key {
+            hold!(summary.version >= floor, "version {} runs, {floor} was stored", summary.version);
             let tag = staging.get(length..).and_then(|rest| rest.first_chunk::<TAG>());
             hold!(tag.is_some_and(|tag| key.verify(image, tag)), "what runs has no tag of the key");
         }

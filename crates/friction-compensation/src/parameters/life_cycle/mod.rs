@@ -11,11 +11,14 @@
 //! upload lie in a buffer of the caller's that nobody else writes; what was verified is compared by its checksum before
 //! it is run or stored.
 //!
-//! Versions: an image older than the floor is refused. Storing an image whose tag was right raises the floor to its
-//! version; the same version may come again. Rolling back goes to the stored previous image alone, whatever its
-//! version, and leaves the floor. A joint without a key takes none that is older than what it stored, which guards
-//! against slips; a key that is given later begins without that, or an image of version FFFFFFFFh from anybody would be
-//! the last one for good.
+//! Versions: with a key, an image older than the floor is refused. Storing an image whose tag was right raises the
+//! floor to its version; the same version may come again, but whoever stores one that is [not
+//! newer](LifeCycle::is_newer) takes back what an owner may have rolled back from, and the caller asks for more
+//! than a tag. Rolling back goes to the stored previous image alone, whatever its version, and leaves the floor.
+//! Without a key there is no floor, or an image of version FFFFFFFFh from anybody would be the last one for good.
+//!
+//! The image in use is not stored again: a commit of it raises the floor as any, and has the stored one swapped
+//! in.
 //!
 //! A key that is damaged locks: no image is taken, tried or rolled back.
 
@@ -174,6 +177,8 @@ pub struct Conditions<'a> {
     pub key: Option<&'a Key>,
     /// The stored key is damaged.
     pub locked: bool,
+    /// What was verified is the image in use, as it is stored ([`LifeCycle::is_verified`]).
+    pub is_stored: bool,
 }
 
 /// Results of verification.
@@ -202,7 +207,6 @@ pub struct LifeCycle {
     trial_time: u32,
     ending: Option<Ending>,
     floor: u32,
-    newest: u32,
     failures: u16,
     result: Option<Refusal>,
 }
@@ -210,9 +214,8 @@ pub struct LifeCycle {
 impl LifeCycle {
     /// Life cycle at start: nothing is staged.
     ///
-    /// `floor`: as it was kept. `newest`: the highest version of the stored images, whose tags nobody knows.
-    /// `failures`: the kept count of wrong tags.
-    pub const fn new(requirements: Requirements, floor: u32, newest: u32, failures: u16) -> Self {
+    /// `floor`: as it was kept. `failures`: the kept count of wrong tags.
+    pub const fn new(requirements: Requirements, floor: u32, failures: u16) -> Self {
         Self {
             requirements,
             state: State::Empty,
@@ -224,7 +227,6 @@ impl LifeCycle {
             trial_time: 0,
             ending: None,
             floor,
-            newest,
             failures,
             result: None,
         }
@@ -261,9 +263,25 @@ impl LifeCycle {
         self.floor
     }
 
-    /// Lowest version that is taken by a joint with a key, or without.
-    pub fn lowest(&self, has_key: bool) -> u32 {
-        if has_key { self.floor } else { self.floor.max(self.newest) }
+    /// Goes back to the floor before, because the risen one could not be kept.
+    pub const fn restore_floor(&mut self, floor: u32) {
+        self.floor = floor;
+    }
+
+    /// Lowest version that is taken by a joint with a key, or without: that one has no floor.
+    pub const fn lowest(&self, has_key: bool) -> u32 {
+        if has_key { self.floor } else { 0 }
+    }
+
+    /// Returns `true` if the verified image, where there is one, is newer than every one whose tag was right and
+    /// that was to be stored.
+    pub fn is_newer(&self) -> bool {
+        self.verified.is_none_or(|checked| checked.verified.version > self.floor)
+    }
+
+    /// Returns `true` if the verified image has this checksum of a stored one.
+    pub fn is_verified(&self, stored: Option<u32>) -> bool {
+        self.verified.is_some_and(|checked| stored == Some(checked.verified.checksum))
     }
 
     /// Wrong tags so far.
@@ -397,9 +415,6 @@ impl LifeCycle {
         let Some((action, before)) = self.pending.take() else { return Action::Nothing };
         let next = match (action, outcome) {
             (Action::Store { .. }, Ok(())) => {
-                if let Some(checked) = self.verified {
-                    self.newest = self.newest.max(checked.verified.version);
-                }
                 self.state = State::Committed;
                 Action::Activate
             }
@@ -535,6 +550,10 @@ impl LifeCycle {
         }
         if conditions.key.is_some() {
             self.floor = self.floor.max(version);
+        }
+        if conditions.is_stored {
+            self.forget();
+            return Ok(self.revert(State::Active));
         }
         let before = self.state;
         self.state = State::Storing;

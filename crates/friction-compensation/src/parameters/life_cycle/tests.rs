@@ -61,12 +61,19 @@ struct Joint {
     single_bank: bool,
     key: Option<Key>,
     locked: bool,
+    stored: Option<u32>,
+}
+
+/// The image's own checksum.
+fn checksum(bytes: &[u8]) -> u32 {
+    Image::summary(bytes).expect("an image").checksum
 }
 
 impl Joint {
     fn new() -> Self {
-        let life = LifeCycle::new(REQUIREMENTS, 0, 0, 0);
-        Self { life, staging: [0; STAGING], now: 0, armed: false, single_bank: true, key: None, locked: false }
+        let life = LifeCycle::new(REQUIREMENTS, 0, 0);
+        let staging = [0; STAGING];
+        Self { life, staging, now: 0, armed: false, single_bank: true, key: None, locked: false, stored: None }
     }
 
     fn upload(&mut self, bytes: &[u8]) {
@@ -77,9 +84,9 @@ impl Joint {
     }
 
     fn command(&mut self, command: Command) -> Result<Action, Refusal> {
-        let key = self.key.as_ref();
-        let conditions =
-            Conditions { now: self.now, armed: self.armed, single_bank: self.single_bank, key, locked: self.locked };
+        let Self { now, armed, single_bank, locked, .. } = *self;
+        let is_stored = self.life.is_verified(self.stored);
+        let conditions = Conditions { now, armed, single_bank, key: self.key.as_ref(), locked, is_stored };
         let result = self.life.command(command, &self.staging, &conditions);
         assert_eq!(self.life.result(), result.err());
         result
@@ -131,9 +138,9 @@ fn an_image_goes_from_bytes_to_flash() {
         assert_eq!(joint.life.state(), state);
     }
     assert_eq!(joint.command(Command::Commit), Ok(Action::Store { length: bytes.len() }));
-    assert_eq!((joint.life.state(), joint.life.lowest(false)), (State::Storing, 0));
+    assert_eq!(joint.life.state(), State::Storing);
     assert_eq!(joint.life.finished(Ok(())), Action::Activate);
-    assert_eq!((joint.life.state(), joint.life.lowest(false)), (State::Committed, 3));
+    assert_eq!(joint.life.state(), State::Committed);
     assert_eq!(joint.life.finished(Ok(())), Action::Nothing);
     assert_eq!((joint.life.state(), joint.life.length()), (State::Active, 0));
     assert_eq!(joint.command(Command::Discard), Ok(Action::Nothing));
@@ -182,14 +189,14 @@ fn a_discarded_trial_reverts_and_a_failed_one_too() {
 }
 
 #[test]
-fn a_failed_store_leaves_the_image_where_it_was_and_the_floor_too() {
+fn a_failed_store_leaves_the_image_where_it_was() {
     let mut joint = Joint::verified(&encoded(&image(8)));
     joint.command(Command::Trial).expect("runs");
     joint.life.finished(Ok(()));
     joint.command(Command::Commit).expect("stores");
     let error = SlotError::Write(WriteError { word: 3 });
     assert_eq!(joint.life.finished(Err(error)), Action::Nothing);
-    assert_eq!((joint.life.state(), joint.life.lowest(false)), (State::Trial, 0));
+    assert_eq!(joint.life.state(), State::Trial);
     assert_eq!(joint.life.result(), Some(Refusal::Slots(error)));
     assert_eq!(joint.life.tick(5_000, false), Action::Revert, "and still ends");
 }
@@ -234,13 +241,14 @@ fn the_floor_rises_with_right_tags_alone() {
         floor
     };
     let mut joint = Joint::new();
-    assert_eq!(store(&mut joint, &encoded(&image(u32::MAX))), 0);
-    // Without a key nothing older is taken by mistake.
-    joint.upload(&encoded(&image(u32::MAX - 1)));
-    assert_eq!(joint.refuses_to_verify(), Refusal::Version { version: u32::MAX - 1, floor: u32::MAX });
+    // Without a key no image shuts another one out.
+    for version in [u32::MAX, 1, 0, u32::MAX] {
+        assert_eq!(store(&mut joint, &encoded(&image(version))), 0);
+        assert_eq!((joint.life.lowest(false), joint.life.lowest(true)), (0, 0));
+    }
     // The owner of a key begins anew, also after a loss of power.
     joint.key = Some(key());
-    for life in [joint.life.clone(), LifeCycle::new(REQUIREMENTS, 0, u32::MAX, 0)] {
+    for life in [joint.life.clone(), LifeCycle::new(REQUIREMENTS, 0, 0)] {
         joint.life = life;
         assert_eq!(store(&mut joint, &signed(&image(5))), 5);
         joint.upload(&signed(&image(4)));
@@ -248,6 +256,48 @@ fn the_floor_rises_with_right_tags_alone() {
         assert_eq!(store(&mut joint, &signed(&image(5))), 5);
         assert_eq!(store(&mut joint, &signed(&image(6))), 6);
     }
+}
+
+#[test]
+fn an_image_is_newer_than_the_floor_from_the_next_version_on() {
+    let mut joint = Joint::new();
+    joint.key = Some(key());
+    assert!(joint.life.is_newer(), "nothing is verified, so nothing is old");
+    joint.life = LifeCycle::new(REQUIREMENTS, 5, 0);
+    for (version, newer) in [(5, false), (6, true)] {
+        joint.upload(&signed(&image(version)));
+        joint.command(Command::Verify).expect("verified");
+        assert_eq!(joint.life.is_newer(), newer, "version {version}");
+    }
+    joint.command(Command::Commit).expect("stores");
+    assert!(!joint.life.is_newer(), "it is the newest itself");
+    joint.life.restore_floor(5);
+    assert!(joint.life.is_newer(), "it could not be kept");
+}
+
+#[test]
+fn the_image_in_use_is_not_stored_again_and_raises_the_floor_all_the_same() {
+    let bytes = encoded(&image(7));
+    let mut joint = Joint::new();
+    // It was stored before the key came.
+    (joint.key, joint.stored) = (Some(key()), Some(checksum(&bytes)));
+    joint.upload(&signed(&image(7)));
+    joint.command(Command::Verify).expect("verified");
+    assert_eq!(joint.command(Command::Commit), Ok(Action::Revert));
+    assert_eq!((joint.life.state(), joint.life.length(), joint.life.floor()), (State::Active, 0, 7));
+    assert_eq!(joint.life.finished(Ok(())), Action::Nothing);
+    // From a trial of it the stored one comes back, too.
+    joint.upload(&signed(&image(7)));
+    joint.command(Command::Verify).expect("verified");
+    joint.life.set_trial_time(5_000).expect("a time");
+    joint.command(Command::Trial).expect("runs");
+    joint.life.finished(Ok(()));
+    assert_eq!(joint.command(Command::Commit), Ok(Action::Revert));
+    assert_eq!((joint.life.finished(Ok(())), joint.life.state()), (Action::Nothing, State::Active));
+    // Any other one is.
+    joint.upload(&signed(&image(8)));
+    joint.command(Command::Verify).expect("verified");
+    assert_eq!(joint.command(Command::Commit), Ok(Action::Store { length: bytes.len() }));
 }
 
 #[test]
@@ -273,12 +323,13 @@ fn a_damaged_key_takes_nothing_and_leaves_what_there_is() {
 #[test]
 fn rolling_back_goes_past_the_floor_and_leaves_it() {
     let mut joint = Joint::new();
-    joint.life = LifeCycle::new(REQUIREMENTS, 0, 9, 0);
+    joint.key = Some(key());
+    joint.life = LifeCycle::new(REQUIREMENTS, 9, 0);
     assert_eq!(joint.command(Command::RollBack), Ok(Action::RollBack));
     assert_eq!(joint.life.finished(Ok(())), Action::Activate);
     assert_eq!(joint.life.finished(Ok(())), Action::Nothing);
-    assert_eq!((joint.life.state(), joint.life.lowest(false)), (State::Active, 9));
-    joint.upload(&encoded(&image(8)));
+    assert_eq!((joint.life.state(), joint.life.floor()), (State::Active, 9));
+    joint.upload(&signed(&image(8)));
     assert_eq!(joint.refuses_to_verify(), Refusal::Version { version: 8, floor: 9 });
     joint.command(Command::RollBack).expect("rolls back");
     assert_eq!(joint.life.finished(Err(SlotError::NoPrevious)), Action::Nothing);
@@ -377,7 +428,7 @@ fn the_certificate_is_held_to_the_images_limits_and_the_joints() {
     assert!(bound >= 1 << 15 && limit == 1 << 14);
     let mut joint = Joint::new();
     let limits = Limits { output: 1 << 13, ..GENEROUS };
-    joint.life = LifeCycle::new(Requirements { limits, ..REQUIREMENTS }, 0, 0, 0);
+    joint.life = LifeCycle::new(Requirements { limits, ..REQUIREMENTS }, 0, 0);
     joint.upload(&encoded(&image(1)));
     assert_eq!(joint.refuses_to_verify().code(), 0x0603);
 }
@@ -442,7 +493,7 @@ fn wrong_tags_are_counted_and_a_right_one_is_always_taken() {
         joint.upload(&right);
         assert_eq!(joint.command(Command::Verify), Ok(Action::Nothing));
     }
-    joint.life = LifeCycle::new(REQUIREMENTS, 0, 0, u16::MAX);
+    joint.life = LifeCycle::new(REQUIREMENTS, 0, u16::MAX);
     joint.upload(&wrong);
     assert_eq!(joint.refuses_to_verify(), Refusal::TagWrong { failures: u16::MAX });
     joint.upload(&right);

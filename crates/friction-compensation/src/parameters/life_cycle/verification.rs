@@ -29,6 +29,8 @@ pub struct Verified {
     pub length: usize,
     /// Version of the image.
     pub version: u32,
+    /// The image's own checksum.
+    pub checksum: u32,
     /// Bounds that were proved.
     pub certificate: Certificate,
 }
@@ -71,7 +73,8 @@ pub(super) fn verify(upload: &[u8], requirements: &Requirements, floor: u32) -> 
     };
     let certificate = certified(&image, &limits).map_err(Refusal::Certificate)?;
     image.verify_golden().map_err(Refusal::Golden)?;
-    Ok(Verified { length: bytes.len(), version: header.version, certificate })
+    let checksum = bytes.last_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
+    Ok(Verified { length: bytes.len(), version: header.version, checksum, certificate })
 }
 
 /// A function of its own, so that its stack and that of the golden vectors are not taken side by side.
