@@ -171,10 +171,11 @@ impl<'a, P: Program> Objects<'a, P> {
     /// while it is enabled: the control step moves its references with it.
     #[inline(never)]
     fn follow_profile(&mut self) {
+        let permitted = self.images.owner.is_open(self.now);
         let wishes = self
             .profile_modes
             .each_mut()
-            .map(|modes| modes.poll(self.now, &self.observed, &self.configuration, self.shared));
+            .map(|modes| modes.poll(self.now, &self.observed, &self.configuration, self.shared, permitted));
         for wish in wishes {
             let Wish::Zero(zero) = wish else { continue };
             let mut configuration = self.configuration;

@@ -8,6 +8,7 @@
 use super::field::{ProfileParameter, SetPoint};
 use super::observed::Observed;
 use super::operation::Operation;
+use super::set_points::impedance;
 use super::shared::{STARTED, Shared};
 use crate::joint::configuration::Configuration;
 use crate::joint::state_machine::{Controlword, State};
@@ -80,20 +81,30 @@ pub(super) struct ProfileModes {
     shift: (f32, f32),
     /// The start of homing was asked for when it was looked at last.
     started: bool,
+    /// It was not, in homing mode: it begins with the rising edge alone.
+    waits: bool,
 }
 
 impl ProfileModes {
     /// State at the start.
-    pub(super) const NOTHING: Self =
-        Self { arrived: Since(None), astray: Since(None), homing: Homing::Idle, shift: (0.0, 0.0), started: false };
+    pub(super) const NOTHING: Self = Self {
+        arrived: Since(None),
+        astray: Since(None),
+        homing: Homing::Idle,
+        shift: (0.0, 0.0),
+        started: false,
+        waits: false,
+    };
 
-    /// Every millisecond or so, at `now`, ms.
+    /// Every millisecond or so, at `now`, ms. `permitted`: whoever asks for homing now may have it, because it
+    /// moves the joint's zero, and its limits with it.
     pub(super) fn poll(
         &mut self,
         now: u64,
         observed: &Observed,
         configuration: &Configuration,
         shared: &Shared,
+        permitted: bool,
     ) -> Wish {
         let telemetry = &observed.telemetry;
         let motion = &telemetry.motion;
@@ -128,6 +139,7 @@ impl ProfileModes {
         let outside = |position: f32| position < limits.position.0 || position > limits.position.1;
         let torque = shared.set_point(SetPoint::TargetTorque) as i16;
         let offset = shared.set_point(SetPoint::TorqueOffset) as i16;
+        let most = shared.set_point(SetPoint::MaxTorque).min(1_000) as u16;
         let limited = match mode {
             Some(Operation::ProfilePosition) => target.is_some_and(|(target, _)| outside(1e-6 * target as f32)),
             Some(Operation::Position) => {
@@ -135,7 +147,15 @@ impl ProfileModes {
             }
             Some(Operation::ProfileVelocity) => magnitude(velocity) > limits.velocity,
             Some(Operation::Velocity) => magnitude(velocity + milli(SetPoint::VelocityOffset)) > limits.velocity,
-            Some(Operation::Torque) => torque.saturating_add(offset).unsigned_abs() > 1_000,
+            Some(Operation::Torque) => torque.saturating_add(offset).unsigned_abs() > most,
+            Some(Operation::Impedance) => {
+                let asked = impedance(shared.set_point(SetPoint::ImpedanceFrame), |range| shared.range(range));
+                let torque = 1e3 * asked.torque + f32::from(offset) * limits.torque;
+                // A number without a gain asks for nothing.
+                asked.stiffness > 0.0 && outside(asked.position)
+                    || asked.damping > 0.0 && magnitude(asked.velocity) > limits.velocity
+                    || magnitude(torque) > f32::from(most) * limits.torque
+            }
             _ => false,
         };
         let mut bits = if limited && (shared.follows() || target.is_some()) { LIMITED } else { 0 };
@@ -151,7 +171,13 @@ impl ProfileModes {
             }
             _ => 0,
         };
-        let (wish, homes) = self.home(mode == Some(Operation::Homing), word, observed, configuration, shared);
+        let is_homing = mode == Some(Operation::Homing);
+        let (begins, asked) = (self.waits && is_homing, is_homing && word.is_new_set_point());
+        (self.started, self.waits) = (asked, is_homing && !asked);
+        if begins && asked {
+            self.homing = begun(observed, configuration, shared, permitted);
+        }
+        let (wish, homes) = self.home(is_homing, word, observed, configuration, shared);
         shared.set_status(bits | homes | if self.started { STARTED } else { 0 });
         wish
     }
@@ -166,8 +192,6 @@ impl ProfileModes {
         shared: &Shared,
     ) -> (Wish, u16) {
         let motion = &observed.telemetry.motion;
-        let starts = is_mode && word.is_new_set_point() && !self.started;
-        self.started = is_mode && word.is_new_set_point();
         let under_way = matches!(self.homing, Homing::Approaches(_) | Homing::Settles(_));
         if let Homing::Taken(middle, way) = self.homing
             && (motion.position - middle) * way >= 0.0
@@ -180,17 +204,6 @@ impl ProfileModes {
         let limits = &configuration.limits;
         let stands = magnitude(motion.velocity) < STANDING * limits.velocity;
         let offset = 1e-6 * shared.parameter(ProfileParameter::HomeOffset) as i32 as f32;
-        if starts {
-            let method = shared.parameter(ProfileParameter::HomingMethod);
-            self.homing = match method {
-                0 => Homing::Attained,
-                TO_INDEX | TO_INDEX_BACKWARDS => match next_index(motion.position, configuration, method == TO_INDEX) {
-                    Some(index) => Homing::Approaches(index),
-                    None => Homing::Failed,
-                },
-                _ => Homing::Settles(None),
-            };
-        }
         let window = shared.parameter(ProfileParameter::PositionWindow).max(1);
         if let Homing::Approaches(index) = self.homing
             && stands
@@ -237,6 +250,20 @@ impl ProfileModes {
             Err(Abort::DEVICE_STATE) => self.homing,
             Err(_) => Homing::Failed,
         };
+    }
+}
+
+/// State of a homing that begins. Method 0 changes nothing, and is everybody's.
+fn begun(observed: &Observed, configuration: &Configuration, shared: &Shared, permitted: bool) -> Homing {
+    let method = shared.parameter(ProfileParameter::HomingMethod);
+    match method {
+        0 => Homing::Attained,
+        _ if !permitted => Homing::Failed,
+        TO_INDEX | TO_INDEX_BACKWARDS => {
+            next_index(observed.telemetry.motion.position, configuration, method == TO_INDEX)
+                .map_or(Homing::Failed, Homing::Approaches)
+        }
+        _ => Homing::Settles(None),
     }
 }
 

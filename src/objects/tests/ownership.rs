@@ -73,6 +73,8 @@ fn protected() -> Vec<(u16, u8, Vec<u8>)> {
         (0x1011, 1, b"load".to_vec()),
         (0x605A, 0, vec![0, 0]),
         (0x607D, 2, 400_000i32.to_le_bytes().to_vec()),
+        (0x6098, 0, vec![37]),
+        (0x607C, 0, 250_000i32.to_le_bytes().to_vec()),
         (0x6007, 0, vec![3, 0]),
         (0x2212, 1, vec![ROLL_BACK]),
         (0x2303, 4, crate::hardware::chip_options::COMMAND.to_le_bytes().to_vec()),

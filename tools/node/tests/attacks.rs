@@ -110,6 +110,68 @@ fn the_version_floor_stays_on_every_path_of_an_image_but_a_commit_which_raises_i
     assert_eq!(master.number(0x2215, 2), i64::from(key().id()));
 }
 
+/// A joint that is to be homed, with a controlword.
+fn word(master: &mut Master, word: u16) {
+    master.download(0x6040, 0, &word.to_le_bytes()).unwrap();
+    master.wait(20);
+}
+
+/// What homing has come to: bits 10, 12 and 13 of the statusword.
+fn homed(master: &mut Master) -> i64 {
+    master.wait(500);
+    master.number(0x6041, 0) & 0x3400
+}
+
+const DONE: i64 = 0x1400;
+const REFUSED: i64 = 0x2400;
+
+#[test]
+fn homing_moves_the_zero_of_an_owned_joint_in_its_owners_session_alone() {
+    for method in [37u8, 34, 33] {
+        let mut master = Master::new();
+        master.download(0x2215, 6, &key().to_bytes()).unwrap();
+        // The owner leaves a method behind, which the stranger cannot choose.
+        open_session(&mut master);
+        master.download(0x6098, 0, &[method]).unwrap();
+        master.download(0x607C, 0, &250_000i32.to_le_bytes()).unwrap();
+        close_session(&mut master);
+        assert!(master.download(0x6098, 0, &[35]).is_err() && master.download(0x607C, 0, &[0; 4]).is_err());
+        master.command(Command::Start);
+        master.download(0x6060, 0, &[6]).unwrap();
+        for step in [0x06, 0x07, 0x0F] {
+            word(&mut master, step);
+        }
+        let before = |master: &mut Master| {
+            let truth = master.node.joint().actuator().state().joint.position;
+            (master.upload(0x2102, 2), (1e3 * truth).round())
+        };
+        let there = before(&mut master);
+        for _ in 0..3 {
+            word(&mut master, 0x1F);
+            assert_eq!((homed(&mut master), before(&mut master)), (REFUSED, there.clone()), "method {method}");
+            word(&mut master, 0x0F);
+        }
+        // A start that waits for the owner's session is none.
+        word(&mut master, 0x1F);
+        open_session(&mut master);
+        assert_eq!((homed(&mut master), before(&mut master)), (REFUSED, there.clone()), "method {method}");
+        word(&mut master, 0x0F);
+        word(&mut master, 0x1F);
+        master.wait(4_000);
+        assert_eq!(homed(&mut master), DONE, "method {method}");
+        assert_ne!(before(&mut master).0, there.0);
+        close_session(&mut master);
+        // Method 0 changes nothing: a master that homes in its start-up may do so.
+        open_session(&mut master);
+        master.download(0x6098, 0, &[0]).unwrap();
+        close_session(&mut master);
+        let there = before(&mut master);
+        word(&mut master, 0x0F);
+        word(&mut master, 0x1F);
+        assert_eq!((homed(&mut master), before(&mut master).0), (DONE, there.0));
+    }
+}
+
 /// An owned joint that goes to and fro on command.
 struct Moving {
     master: Master,

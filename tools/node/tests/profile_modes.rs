@@ -451,6 +451,35 @@ fn a_zero_that_would_leave_the_joint_beyond_its_limits_is_refused_and_changes_no
 }
 
 #[test]
+fn homing_begins_with_the_edge_of_its_start_and_what_enables_the_joint_or_changes_the_mode_is_none() {
+    for (mode, words) in [(HOMING, [0x06, 0x07, ENABLE | NEW]), (VELOCITY, [0x06, 0x07, ENABLE])] {
+        let mut master = Master::new();
+        master.command(Command::Start);
+        master.download(0x6098, 0, &[37]).unwrap();
+        set32(&mut master, 0x607C, 250_000);
+        master.download(0x6060, 0, &mode.to_le_bytes()).unwrap();
+        for step in words {
+            word(&mut master, step);
+            master.wait(20);
+        }
+        // Into the mode with the bit set.
+        word(&mut master, ENABLE | NEW);
+        master.download(0x6060, 0, &HOMING.to_le_bytes()).unwrap();
+        let zero = master.upload(0x2102, 2);
+        master.wait(500);
+        assert_eq!(master.state(), State::OperationEnabled);
+        assert_eq!(status(&mut master) & (REACHED | TAKEN | ERROR), REACHED, "from mode {mode}: not begun");
+        assert_eq!(master.upload(0x2102, 2), zero);
+        word(&mut master, ENABLE);
+        master.wait(5);
+        word(&mut master, ENABLE | NEW);
+        master.wait(100);
+        assert_eq!(status(&mut master) & (REACHED | TAKEN | ERROR), REACHED | TAKEN, "from mode {mode}");
+        assert_ne!(master.upload(0x2102, 2), zero);
+    }
+}
+
+#[test]
 fn homing_ends_where_its_start_is_taken_back_or_operation_ends() {
     for end in [ENABLE, 0x06, 0x02] {
         let mut master = enabled(HOMING);
