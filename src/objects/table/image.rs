@@ -62,7 +62,7 @@ room! {
         2, "key number", U32, RO, UNMAPPED, O(OwnerField::KeyNumber); "", 1.0, ANY;
             "Tells keys apart; 0 where there is none"
         3, "version floor", U32, RO, UNMAPPED, I(ImageField::Floor); "", 1.0, ANY;
-            "Lowest image version that is taken: with a key the highest that its tag was right for, without one the highest that is stored"
+            "Lowest image version that is taken: with a key the highest that its tag was right for and that was to be stored, and up to it 2212h:1 = 3 is the owner's alone; without a key 0"
         4, "wrong tags", U16, RO, UNMAPPED, I(ImageField::Failures); "", 1.0, ANY;
             "Wrong tags and responses so far; kept over a loss of power at 1, 2, 4, 8 and so on. They keep no right one out"
         5, "challenge", Domain, RO, UNMAPPED, O(OwnerField::Challenge); "", 1.0, ANY;
@@ -72,7 +72,7 @@ room! {
         7, "response", Domain, WO, UNMAPPED, O(OwnerField::Response); "", 1.0, ANY;
             "32 bytes that the key makes of the challenge: opens a session, or has the joint forget its key"
         8, "session time left", U32, RW, UNMAPPED, O(OwnerField::Session); "s", 1e-3, within(0.0, 60.0);
-            "60 s after what was last written in it; 0 where none is open. Writing 0 ends it, nothing else can be written"
+            "60 s after what was last written in it, and 10 minutes after it was opened at the latest; 0 where none is open. Writing 0 ends it, nothing else can be written"
         9, "presence", Bool, RO, UNMAPPED, O(OwnerField::Presence); "", 1.0, ANY;
             "1 while somebody is at the joint: the button is pressed, or where there is none, less than 60 s since its supply came and no master has started it"
         10, "forget key", U32, WO, UNMAPPED, O(OwnerField::Forget); "", 1.0, ANY;

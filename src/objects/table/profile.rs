@@ -11,7 +11,7 @@ use crate::objects::settings::Setting;
 room! {
     0x6007 "abort connection option code" {
         0, "abort connection option code", I16, RW, UNMAPPED, S(Setting::LateCommand); "", 1.0, within(1.0, 3.0);
-            "A command that is late (2103h:11) is 1 a fault (8130h), 3 a quick stop; 2 is not possible. Outside OPERATIONAL the joint makes a quick stop in any case. Acts at once, stored by 1010h, as 605Ah to 605Eh do"
+            "A command that is late (2103h:11) is 1 a fault (8100h), 3 a quick stop; 2 is not possible. Outside OPERATIONAL the joint makes a quick stop in any case. Acts at once, stored by 1010h, as 605Ah to 605Eh do"
     }
     0x603F "error code" {
         0, "error code", U16, RO, TRANSMIT, A(Actual::ErrorCode); "", 1.0, ANY;
@@ -20,13 +20,13 @@ room! {
     0x6040 "controlword" {
         0, "controlword", U16, RW, RECEIVE, Set(SetPoint::Controlword); "", 1.0, ANY;
             "Commands of the state machine, and halt (bit 8): the joint brakes and holds where it came to a stop, in every mode; the open loop applies no voltage. \
-             Mode 1: new set-point (bit 4, by its rising edge), at once (bit 5) or behind the one before, relative to it (bit 6). Mode 6: start (bit 4; homing goes on while it is set)"
+             Mode 1: new set-point (bit 4, by its rising edge), at once (bit 5) or behind the one before, relative to it (bit 6). Mode 6: start (bit 4, by its rising edge; homing goes on while it is set)"
     }
     0x6041 "statusword" {
         0, "statusword", U16, RO, TRANSMIT, A(Actual::Statusword); "", 1.0, ANY;
-            "State of the state machine, voltage present (bit 4), remote (bit 9), a target beyond the joint's limits is clipped (bit 11); operation enabled with bit 14 is the open loop. \
+            "State of the state machine, voltage present (bit 4), remote (bit 9), a target beyond the joint's limits, or of torque beyond 6072h, is clipped (bit 11; in impedance mode where a gain counts it); operation enabled with bit 14 is the open loop. \
              Bit 10: mode 1, 3 and 6 target reached, or the joint stands in halt. Bit 12: mode 1 set-point taken (until bit 4 of the controlword falls), or one waits; mode 3 the joint stands; mode 6 homing done; \
-             other modes the target is followed (not before one has come, nor in halt). Bit 13: mode 1 and 8 following error beyond 6065h; mode 6 homing failed"
+             other modes the target is followed (not before one has come, nor in halt). Bit 13: mode 1 and 8 following error beyond 6065h; mode 6 homing failed, or is the owner's alone"
     }
     0x605A "quick stop option code" {
         0, "quick stop option code", I16, RW, UNMAPPED, S(Setting::QuickStop); "", 1.0, within(0.0, 6.0);
@@ -51,7 +51,7 @@ room! {
     0x6060 "modes of operation" {
         0, "modes of operation", I8, RW, RECEIVE, Set(SetPoint::Mode); "", 1.0, within(-2.0, 10.0);
             "1 profile position, 3 profile velocity, 6 homing, 8 position (CSP), 9 velocity (CSV), 10 torque (CST), 0 none (the joint holds where it is), -1 impedance, -2 open loop (2107h); in a PDO any other number changes nothing. \
-             In every mode but 0, 1 and 6 set-points have to be renewed within 2103h:11. Enabled, or in another mode, the joint holds where it is until a target of the mode comes in a later PDO or by SDO"
+             In every mode but 0, 1 and 6 set-points have to be renewed within 2103h:11, in modes 8, 9, 10 and -1 by what carries 607Ah, 60FFh, 6071h and 2011h:1 themselves. Enabled, or in another mode, the joint holds where it is until a target of the mode comes in a later PDO or by SDO"
     }
     0x6061 "modes of operation display" {
         0, "modes of operation display", I8, RO, TRANSMIT, A(Actual::Mode); "", 1.0, ANY;
@@ -161,7 +161,7 @@ room! {
     }
     0x6098 "homing method" {
         0, "homing method", I8, RW, UNMAPPED, Profile(P::HomingMethod); "", 1.0, within(0.0, 37.0);
-            "35, 37: the joint is where it has the position 607Ch. 33, 34: to the next index of the rotor's encoder below or above, which then has it; an absolute encoder's is where it reads zero. 0: none is wanted, homing is done at once. \
+            "35, 37: the joint is where it has the position 607Ch. 33, 34: to the next index of the rotor's encoder below or above, which then has it; an absolute encoder's is where it reads zero. 0: none is wanted, homing is done at once. With a key it is started in its owner's session alone, but for 0. \
              It sets 2102h:2, which 1010h stores; terms of a friction model that depend on the position belong to the zero that they were recorded with"
     }
     0x6099 "homing speeds" {

@@ -13,9 +13,10 @@ the program of a board as it is flashed, on an emulated core. Nothing of this ha
 Not defended, and not meant to be:
 
 - **Commands in real time.** CAN does not say who sent a frame: whoever can send on the bus can enable, move and stop a joint, owned or not, within the limits that its owner set, and can keep others from sending.
-- **A session that is open.** It serves whoever sends meanwhile. It ends with the command that opened it, or 60 s after what was last written.
+- **A session that is open.** It serves whoever sends meanwhile. It ends with the command that opened it, 60 s after what was last written, or 10 minutes after it was opened.
 - **A heartbeat or a node id that is forged**: a master that is gone can be impersonated, and a node id can be changed until the next reset.
 - **The first key on a bus where somebody listens**: it goes over the bus as it is.
+- **The minute after power-up of a board without a button**: until a master starts the node, whatever is on the bus counts as somebody who is at the joint. It may give a joint of nobody's a key, or have an owned one forget its key; the joint tells (2215h:1, `jointctl info`). Start the nodes early, or switch the supply on without strangers on the bus.
 - **Who has the board in his hands**: the debug port reads and writes everything where the chip's option bytes let it.
 ";
 
@@ -49,7 +50,7 @@ const SECTIONS: [(&str, &[Attack]); 5] = [
     ("The bus and a joint that moves", &BUS),
 ];
 
-const KEYS: [Attack; 9] = [
+const KEYS: [Attack; 10] = [
     row(
         "A setting, an option code, 1010h, 1011h, a roll back or the chip's options without a session",
         "Refused (0800 0021h); nothing is staged or stored. Every setting of the object table is tried",
@@ -57,6 +58,14 @@ const KEYS: [Attack; 9] = [
             (OWNERSHIP, "an_owned_joint_refuses_whatever_changes_what_it_can_do_until_its_owner_opens_a_session"),
             (OWNERSHIP, "every_setting_of_the_table_is_protected"),
             (REMOTE, "what_the_owner_may_do_takes_a_session_that_ends_with_his_work"),
+        ],
+    ),
+    row(
+        "The zero, and the limits with it, moved by homing without a session, again and again",
+        "Homing fails (bit 13 of the statusword), nothing moves; method and offset (6098h, 607Ch) are refused. Method 0, which changes nothing, is done",
+        &[
+            (NODE, "homing_moves_the_zero_of_an_owned_joint_in_its_owners_session_alone"),
+            (OWNERSHIP, "an_owned_joint_refuses_whatever_changes_what_it_can_do_until_its_owner_opens_a_session"),
         ],
     ),
     row(
@@ -123,7 +132,7 @@ const KEYS: [Attack; 9] = [
     ),
 ];
 
-const SESSIONS: [Attack; 8] = [
+const SESSIONS: [Attack; 9] = [
     row(
         "A response of another key, for another joint, another challenge or another purpose; an image's tag as a response",
         "Refused and counted",
@@ -171,15 +180,23 @@ const SESSIONS: [Attack; 8] = [
     ),
     row(
         "A session that its owner left open",
-        "Ends 60 s after what was last written, with a restart, and cannot be lengthened",
+        "Ends 60 s after what was last written, with a restart, and cannot be lengthened by writing its time",
         &[
             (OWNERSHIP, "a_session_lasts_sixty_seconds_after_what_was_written_last"),
             (OWNERSHIP, "a_session_ends_with_the_program"),
         ],
     ),
+    row(
+        "A session of the owner's kept open by a stranger's writes",
+        "Ends 10 minutes after it was opened whatever is written; less compensation, which all may ask for, does not lengthen it",
+        &[
+            (OWNERSHIP, "a_session_ends_ten_minutes_after_it_was_opened_whatever_is_written_in_it"),
+            (OWNERSHIP, "who_lowers_the_compensation_keeps_no_session_open"),
+        ],
+    ),
 ];
 
-const UPLOADS: [Attack; 11] = [
+const UPLOADS: [Attack; 13] = [
     row(
         "An image without a tag, with another key's, with another image's, for another joint",
         "Not verified, so neither run nor stored; the image in use stays",
@@ -210,18 +227,35 @@ const UPLOADS: [Attack; 11] = [
     ),
     row(
         "An image whose tag was right once, of a version below the floor",
-        "Refused; the same version may come again",
+        "Refused",
         &[
             (LIFE, "the_floor_rises_with_right_tags_alone"),
             (NODE, "the_version_floor_stays_on_every_path_of_an_image_but_a_commit_which_raises_it"),
         ],
     ),
     row(
+        "The image that its owner rolled back from, sent again with its tag: of the floor's version, also out of a trial",
+        "Stored in the owner's session alone; tried as long as a trial lasts. A refused commit costs no store",
+        &[
+            (IMAGES, "an_image_that_is_not_newer_is_its_owners_to_store_and_costs_a_stranger_and_the_flash_nothing"),
+            (NODE, "the_version_floor_stays_on_every_path_of_an_image_but_a_commit_which_raises_it"),
+        ],
+    ),
+    row(
+        "The image in use committed again and again, to use up the counted stores or the flash",
+        "Done at once: nothing is written, nothing counted",
+        &[
+            (IMAGES, "a_commit_of_the_image_in_use_is_done_at_once_writes_nothing_and_costs_no_store"),
+            (LIFE, "the_image_in_use_is_not_stored_again_and_raises_the_floor_all_the_same"),
+        ],
+    ),
+    row(
         "The floor raised to FFFFFFFFh by an image that is not the owner's",
-        "Not raised: neither by what is refused, nor by what is verified, in shadow or on trial only, nor by what a joint without a key stored before its key came",
+        "Not raised: neither by what is refused, nor by what is verified, in shadow or on trial only, nor by what a joint without a key stores: it has no floor, and takes any version after",
         &[
             (LIFE, "the_floor_rises_with_right_tags_alone"),
             (NODE, "the_version_floor_stays_on_every_path_of_an_image_but_a_commit_which_raises_it"),
+            (IMAGES, "without_a_key_an_image_of_the_highest_version_shuts_no_other_out"),
         ],
     ),
     row(
@@ -349,7 +383,7 @@ const RECORDS: [Attack; 8] = [
     ),
 ];
 
-const BUS: [Attack; 9] = [
+const BUS: [Attack; 10] = [
     row(
         "NMT frames of another length, for another node or of no command, to a joint that moves",
         "Nothing",
@@ -432,6 +466,14 @@ const BUS: [Attack; 9] = [
         "A master that repeats its last PDO without thinking",
         "Renews nothing where the counter (2010h) is mapped",
         &[("src/objects/tests/process_data.rs", "a_counter_that_is_mapped_and_repeated_does_not_renew_the_deadline")],
+    ),
+    row(
+        "The PDO of a cyclic set-point that has died, while others go on: a controlword, another mode's target",
+        "Late (8100h) after the deadline: the set-point of the mode renews it alone, in whatever PDO it is mapped",
+        &[
+            ("src/objects/tests/process_data.rs", "whatever_the_mapping_the_set_point_of_the_mode_counts_alone"),
+            ("tools/node/tests/on_the_bus.rs", "a_velocity_whose_pdo_has_died_is_late_whatever_else_still_comes"),
+        ],
     ),
 ];
 

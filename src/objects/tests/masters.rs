@@ -20,9 +20,9 @@ python-canopen and dcfgen are run in the tests, and the joint is configured by w
 master, Lely's, could not be had through a package registry: PyPI has the tools alone (dcf-tools), crates.io, npm and Debian 12 nothing of it (PyPI's `lely` is something else). Of its modes the joint has 1 and 3 (profile
 position and velocity), 6 (homing) and 8, 9 and 10 (cyclic synchronous position, velocity, torque), and no velocity (2), profile torque (4) or
 interpolation (7): 6502h says so, and both masters ask it. The B-G431B-ESC1's program has no room for 1, 3 and 6 and their objects: 6062h, 6065h to
-6068h, 606Dh, 606Fh, 6072h, 6075h, 6078h, 6079h, 607Ch to 609Ah, 60B0h, 60B1h, 60C2h and 60F4h; nor for the SYNC counter (1019h, 1800h:6) and date and time of the configuration
+6068h, 606Dh, 606Fh, 6072h, 6075h, 6078h, 6079h, 607Ch to 609Ah, 60B0h, 60B1h, 60C2h and 60F4h; nor for bits 10, 11 and 13 of the statusword, with 11 a target that is clipped; nor for the SYNC counter (1019h, 1800h:6) and date and time of the configuration
 (1020h, by which a master that has configured the joint before finds that it need not again), nor for the load and the external torque (2202h, 2203h). ros2_canopen homes in its start-up where 6502h has mode 6, by the method that it
-reads from 6098h: 0, as it is at first, is none, and nothing moves. None of the three sends the torque offset (60B2h): in torque mode the joint then compensates no more than is certain
+reads from 6098h: 0, as it is at first, is none, and nothing moves. That is done on a joint with a key, too; homing by another method takes its owner's session. In modes 8, 9 and 10 the PDO that carries 607Ah, 60FFh or 6071h has to come within the command deadline: by default RPDO 1, 2 and 1, of ros2_canopen's mapping 1, 2 and 2. None of the three sends the torque offset (60B2h): in torque mode the joint then compensates no more than is certain
 ([energy-guard.md](energy-guard.md)). Where the target torque bears no gravity, write 60B2h = 0 once operation is enabled.
 
 **Identity.** 1018h has vendor 0, because this project has no vendor ID of CiA: no master can insist on a vendor. Product and revision are those of the board. `jointctl eds --bus BUS --node N` and `bus-yml --bus BUS` write
