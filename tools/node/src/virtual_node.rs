@@ -24,6 +24,7 @@ use joint_firmware::objects::{
     FrictionStatistics, Images, JointImage, Objects, Observed, Ownership, Shared, StoredImages,
 };
 use joint_firmware::reset_record::LastReset;
+use plant::actuator::Accessories;
 use plant::virtual_joint::{Setup, VirtualJointError};
 use plant::{ActuatorParameters, VirtualJoint};
 use std::collections::VecDeque;
@@ -225,6 +226,11 @@ impl VirtualNode {
     /// External torque on the link from now on, Nm.
     pub fn push(&mut self, torque: f64) {
         self.external_torque = torque;
+    }
+
+    /// Fits what hangs at the board's outputs, in place of what was there.
+    pub fn fit(&mut self, accessories: Accessories) {
+        self.joint.actuator_mut().fit(accessories);
     }
 
     /// The joint behind the node.

@@ -5,6 +5,7 @@ mod drift;
 mod faults;
 mod field_weakening;
 mod healthy;
+mod heartbeat;
 mod hostile;
 mod limits;
 mod numeric_limits;

@@ -2,6 +2,7 @@
 //! holding brake and without. The table is published in
 //! `docs/stops.md`; `UPDATE_DOCS=1 cargo test -p plant --test joint stops` writes it anew.
 
+use crate::heartbeat::Alive;
 use crate::rig::{Rig, break_down, position, reference, torque, velocity};
 use joint_firmware::joint::active::DERATING;
 use joint_firmware::joint::state_machine::{Controlword, State};
@@ -15,11 +16,12 @@ use std::fmt::Write;
 /// Times in which the holding brake opens and closes, s.
 const BRAKE: (f32, f32) = (0.15, 0.1);
 /// Position of the arm when it is stopped, about, rad: nearly level. And how fast it goes, rad/s.
-const LEVEL: f32 = 1.3;
-const SPEED: f32 = 0.5;
+pub const LEVEL: f32 = 1.3;
+pub const SPEED: f32 = 0.5;
 /// An arm that moves less, rad, holds.
 const HOLDS: f64 = 0.02;
-const MODES: [Operation; 7] = [
+const MODES: [Operation; 8] = [
+    Operation::None,
     Operation::ProfilePosition,
     Operation::ProfileVelocity,
     Operation::Homing,
@@ -29,11 +31,11 @@ const MODES: [Operation; 7] = [
     Operation::Impedance,
 ];
 /// Gain of the master that commands torques, Nm s/rad.
-const TORQUE_GAIN: f32 = 60.0;
+pub const TORQUE_GAIN: f32 = 60.0;
 /// Acceleration of profiles, rad/s².
-const ACCELERATION: f32 = 8.0;
+pub const ACCELERATION: f32 = 8.0;
 /// Distance from where a profile begins to where it ends, rad.
-const FAR: f32 = 0.6;
+pub const FAR: f32 = 0.6;
 /// The same of homing: the next index is less than a turn of the rotor away.
 const INDEX: f32 = 0.12;
 
@@ -42,6 +44,8 @@ const INDEX: f32 = 0.12;
 enum Way {
     QuickStop,
     Nmt,
+    /// The master's heartbeat stays away, with this behaviour (1029h).
+    Heartbeat(u8),
     Shutdown,
     DisableOperation,
     Halt,
@@ -55,7 +59,9 @@ impl Way {
     const fn name(self) -> &'static str {
         match self {
             Self::QuickStop => "quick stop",
-            Self::Nmt => "NMT leaves OPERATIONAL, or a lost heartbeat",
+            Self::Nmt => "NMT leaves OPERATIONAL",
+            Self::Heartbeat(0) => "a lost heartbeat, 1029h = 0",
+            Self::Heartbeat(_) => "a lost heartbeat, 1029h = 2",
             Self::Shutdown => "shutdown",
             Self::DisableOperation => "disable operation",
             Self::Halt => "halt",
@@ -80,7 +86,7 @@ const QUICK_STOPS: [Choice; 5] = [
 
 fn choices(way: Way) -> Vec<Choice> {
     match way {
-        Way::QuickStop | Way::Nmt => QUICK_STOPS.to_vec(),
+        Way::QuickStop | Way::Nmt | Way::Heartbeat(_) => QUICK_STOPS.to_vec(),
         Way::Shutdown => vec![("605Bh = 0", |s| s.shutdown = 0), ("605Bh = 1", |s| s.shutdown = 1)],
         Way::DisableOperation => {
             vec![("605Ch = 0", |s| s.disable_operation = 0), ("605Ch = 1", |s| s.disable_operation = 1)]
@@ -90,7 +96,10 @@ fn choices(way: Way) -> Vec<Choice> {
             ("6007h = 1, 605Eh = 0", |s| s.fault_reaction = 0),
             ("6007h = 1, 605Eh = 1", |s| s.fault_reaction = 1),
             ("6007h = 1, 605Eh = 2", |s| s.fault_reaction = 2),
-            ("6007h = 3, 605Ah = 2", |s| s.late_command = 3),
+            ("6007h = 3, 605Ah = 0", |s| (s.late_command, s.quick_stop) = (3, 0)),
+            ("6007h = 3, 605Ah = 1", |s| (s.late_command, s.quick_stop) = (3, 1)),
+            ("6007h = 3, 605Ah = 2", |s| (s.late_command, s.quick_stop) = (3, 2)),
+            ("6007h = 3, 605Ah = 5", |s| (s.late_command, s.quick_stop) = (3, 5)),
             ("6007h = 3, 605Ah = 6", |s| (s.late_command, s.quick_stop) = (3, 6)),
         ],
         Way::BrakingFault => vec![
@@ -102,9 +111,11 @@ fn choices(way: Way) -> Vec<Choice> {
     }
 }
 
-const WAYS: [Way; 9] = [
+const WAYS: [Way; 11] = [
     Way::QuickStop,
     Way::Nmt,
+    Way::Heartbeat(0),
+    Way::Heartbeat(2),
     Way::LateCommand,
     Way::Halt,
     Way::DisableOperation,
@@ -124,7 +135,7 @@ fn limits(mode: Operation) -> CommandLimits {
     }
 }
 
-/// A loaded arm, nearly level, that rises in a mode.
+/// A loaded arm, nearly level, that rises in a mode; in mode 0 it holds, as nothing moves it.
 ///
 /// Commands are those of `objects::set_points`. Homing moves as a profile does, and the zero that follows changes
 /// nothing of the motion.
@@ -151,6 +162,7 @@ fn rising(mode: Operation, stops: StopConfiguration, brake: bool) -> Rig {
                 let far = if mode == Operation::Homing { INDEX } else { FAR };
                 Command { mode: Mode::Profile, position: at + far, limits: limits(mode), ..Command::NOTHING }
             }
+            Operation::None => Command { mode: Mode::Hold, ..Command::NOTHING },
             Operation::ProfileVelocity | Operation::Velocity => Command { limits: limits(mode), ..velocity(SPEED) },
             // Its master controls the speed.
             Operation::Torque => torque(bears + TORQUE_GAIN * (SPEED - rig.velocity() as f32)),
@@ -168,25 +180,32 @@ fn rising(mode: Operation, stops: StopConfiguration, brake: bool) -> Rig {
         rig.follow(command, 1e-3);
         time += 1e-3;
     }
-    assert!(rig.velocity() > 0.8 * f64::from(SPEED), "{mode:?}: {} rad/s", rig.velocity());
+    match mode {
+        Operation::None => assert!(rig.velocity().abs() < 0.05, "{} rad/s", rig.velocity()),
+        _ => assert!(rig.velocity() > 0.8 * f64::from(SPEED), "{mode:?}: {} rad/s", rig.velocity()),
+    }
     rig
 }
 
 /// Motion of the arm.
 #[derive(Clone, Copy, Debug)]
-struct Stopped {
+pub struct Stopped {
     /// Distance that it went on upwards, rad, and that it then sank, within two seconds.
-    way: f64,
-    sank: f64,
+    pub way: f64,
+    pub sank: f64,
     /// `true` if it still moves.
-    falls: bool,
-    state: State,
+    pub falls: bool,
+    pub state: State,
 }
 
 fn stopped(mode: Operation, way: Way, stops: StopConfiguration, brake: bool) -> Stopped {
+    if let Way::Heartbeat(behaviour) = way {
+        return Alive::rising(mode, behaviour, stops.quick_stop, brake.then_some(BRAKE)).lost();
+    }
     let mut rig = rising(mode, stops, brake);
     let start = rig.position();
     match way {
+        Way::Heartbeat(_) => {}
         Way::QuickStop => rig.demand.controlword = Controlword::QUICK_STOP,
         Way::Nmt => {
             // Request of `objects::process_image`: once, and then no set-point comes.
@@ -223,9 +242,10 @@ fn stopped(mode: Operation, way: Way, stops: StopConfiguration, brake: bool) -> 
     Stopped { way: highest - start, sank: highest - lowest, falls, state: rig.state() }
 }
 
-/// Returns `true` if a mode's set-point has to be renewed; a profile position and homing end by themselves.
+/// Returns `true` if a mode's set-point has to be renewed; a profile position and homing end by themselves, and mode 0
+/// has none.
 fn is_renewed(mode: Operation) -> bool {
-    !matches!(mode, Operation::ProfilePosition | Operation::Homing)
+    !matches!(mode, Operation::ProfilePosition | Operation::Homing | Operation::None)
 }
 
 /// Motion in each mode in which the way is one.
@@ -250,15 +270,16 @@ fn worst(all: &[(Operation, Stopped)]) -> Stopped {
 
 const HEAD: &str = "# What the arm does
 
-A joint that bears 3 kg on 0.3 m, nearly level, rises at 0.5 rad/s and is stopped in every way, with every option code, in seven modes
-(profile position, profile velocity, homing to an index, cyclic synchronous position, velocity and torque, impedance). It is the virtual joint with its friction; its numbers are of this joint alone, and the words hold for every one: `tools/plant/tests/joint/stops.rs`
+A joint that bears 3 kg on 0.3 m, nearly level, rises at 0.5 rad/s and is stopped in every way, with every option code, in eight modes
+(profile position, profile velocity, homing to an index, cyclic synchronous position, velocity and torque, impedance; and mode 0, in which nothing moves it: it holds there and is stopped). It is the virtual joint with its friction; its numbers are of this joint alone, and the words hold for every one: `tools/plant/tests/joint/stops.rs`
 asserts them, and `UPDATE_DOCS=1 cargo test -p plant --test joint stops` writes this page anew. The option codes are those of CiA 402-2 (6007h, 605Ah to 605Eh, [objects](objects.md));
 `[stops]` in joint.toml. The brake opens in 0.15 s and closes in 0.1 s, and both times are configured (2109h).
 
 - way: how far it goes on before it turns or stands, rad; the largest of all modes.
 - sinks: how far it is below that 2 s later, rad; of the mode in which it is most. Whether it holds or falls is the same in all modes. Below 0.02 rad it *holds*; a brake that has to close first lets it sink a little.
 - Before the bridge goes off at once nothing closes a brake: disable voltage, code 0, and faults of the bridge or the current loop have the arm without support for its time.
-- A client that is gone stops nothing in profile position and homing: there no set-point has to be renewed, and the arm goes on to where it was sent, and holds. A lost heartbeat (1016h) stops it there, too.
+- A client that is gone stops nothing in profile position, homing and mode 0: there no set-point has to be renewed, and the arm goes on to where it was sent, and holds. A lost heartbeat stops it there, too.
+- A lost heartbeat is that of a master that falls silent altogether, seen through the objects: 1016h calls it lost after 50 ms, in which the arm goes on. Then 1029h decides: 0 leaves OPERATIONAL for PRE-OPERATIONAL, 2 for STOPPED, and 605Ah holds for both; with 1 it stops nothing, and the set-points that are not renewed do.
 
 | stopped by | option | way | sinks | with a brake: way | sinks |
 |---|---|---|---|---|---|
@@ -314,9 +335,12 @@ fn a_client_that_is_gone_stops_no_motion_that_ends_by_itself() {
             assert_eq!(stopped.state, State::Fault, "{mode:?}");
             continue;
         }
-        let far = if mode == Operation::Homing { INDEX } else { FAR };
         // It began 0.2 s before the client went.
-        let rest = f64::from(far - 0.2 * SPEED);
+        let rest = f64::from(match mode {
+            Operation::None => 0.0,
+            Operation::Homing => INDEX - 0.2 * SPEED,
+            _ => FAR - 0.2 * SPEED,
+        });
         assert!((stopped.way - rest).abs() < 0.03, "{mode:?}: {stopped:?}, {rest} rad were left");
         assert!(stopped.state == State::OperationEnabled && stopped.sank < HOLDS, "{mode:?}: {stopped:?}");
     }
