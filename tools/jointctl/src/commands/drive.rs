@@ -4,7 +4,7 @@ use super::CommandError;
 use super::remote::{Where, catch_interrupts, running};
 use super::terminal::Terminal;
 use crate::remote::RemoteJoint;
-use crate::remote::motion::{Motion, left};
+use crate::remote::motion::{Motion, Observation, left};
 use clap::{Args, ValueEnum};
 use identification::progress::Progress;
 use joint_firmware::joint::{Command, Mode};
@@ -32,7 +32,14 @@ impl Held {
         motion.check(&joint)?;
         let progress = Terminal::new();
         progress.stage("enable");
-        let outcome = motion.run(&joint, &running, &mut |observation| progress.detail(&observation.to_string()))?;
+        let mut is_enabled = false;
+        let mut tell = |observation: &Observation| {
+            if !std::mem::replace(&mut is_enabled, true) {
+                progress.stage("enabled");
+            }
+            progress.detail(&observation.to_string());
+        };
+        let outcome = motion.run(&joint, &running, &mut tell)?;
         progress.finish();
         if let Some(last) = outcome.last {
             println!("{last}");

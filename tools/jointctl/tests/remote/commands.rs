@@ -155,11 +155,17 @@ pub fn what_goes_wrong_ends_in_one_line_and_an_exit_code_that_tells_why() {
     refused(&nonsense, 2, &["--bus can0"], &["bus 'can0': a kind and a colon are missing"]);
 }
 
-/// Waits until the joint is enabled: only then has the program caught interrupts and begun.
+/// The command `enable`, once it says that the joint is enabled: by then it catches interrupts.
 fn enabled(desk: &Desk) -> Child {
     let mut command = desk.command(&["enable"], &NODE.to_string());
-    let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    std::thread::sleep(Duration::from_millis(1_500));
+    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    // Byte by byte: nothing behind the line is taken.
+    let (mut told, mut byte) = (Vec::new(), [0]);
+    while !told.ends_with(b"  enabled\n") {
+        let read = child.stderr.as_mut().unwrap().read(&mut byte).unwrap();
+        assert!(read > 0, "it ended before: {}", String::from_utf8_lossy(&told));
+        told.extend(byte);
+    }
     child
 }
 
