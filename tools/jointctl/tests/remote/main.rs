@@ -81,6 +81,7 @@ fn main() {
         }
         page {
             the_page_on_the_bus_runs_line_by_line,
+            the_page_on_ownership_runs_line_by_line,
         }
         refused {
             a_wrong_node_id_is_told_from_a_bus_where_nobody_is,

@@ -3,6 +3,10 @@
 /// Page on the joint on a bus.
 pub const ON_THE_BUS: &str = include_str!("../../../../docs/on-the-bus.md");
 
+/// Page on the owner of a joint.
+#[allow(dead_code, reason = "of two tests one runs it")]
+pub const OWNERSHIP: &str = include_str!("../../../../docs/ownership.md");
+
 /// Commands of a page, without what explains them.
 pub fn lines(text: &str) -> Vec<String> {
     let mut lines = Vec::new();
