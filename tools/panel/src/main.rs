@@ -13,6 +13,12 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
+/// Lines as one types them.
+const EXAMPLES: &str = "Examples:
+  panel --bus socketcan:can0 --node 5
+  panel --bus udp:239.74.163.2:43113 --key joint.key --port 0
+  panel --bus socketcan:can0 --listen 192.168.1.20:8402";
+
 /// SYNCs a second: least and most.
 const RATES: [f64; 2] = [1.0, 1_000.0];
 
@@ -24,7 +30,7 @@ fn rate(text: &str) -> Result<f64, String> {
 
 /// A live page for a joint on a bus
 #[derive(Debug, Parser)]
-#[command(version)]
+#[command(version, after_help = EXAMPLES)]
 struct Arguments {
     /// The bus: socketcan:can0, slcan:/dev/ttyACM0, slcan:tcp://host:port, udp:239.74.163.2:43113
     #[arg(long, value_name = "BUS", env = "JOINTCTL_BUS")]
@@ -59,14 +65,34 @@ fn announce(address: &str) {
     println!("{address}");
 }
 
-fn begin(arguments: &Arguments) -> Result<Server, String> {
+/// Reason for which the program ends, with the exit codes of `jointctl`.
+#[derive(Debug)]
+enum Ended {
+    /// Wrong arguments.
+    Usage(String),
+    Failed(String),
+}
+
+impl From<String> for Ended {
+    fn from(reason: String) -> Self {
+        Self::Failed(reason)
+    }
+}
+
+impl From<RemoteError> for Ended {
+    fn from(error: RemoteError) -> Self {
+        if error.is_usage() { Self::Usage(error.to_string()) } else { Self::Failed(error.to_string()) }
+    }
+}
+
+fn begin(arguments: &Arguments) -> Result<Server, Ended> {
     let key = read_key(arguments)?;
-    let transport = bus::open(&arguments.bus).map_err(|error| error.to_string())?;
+    let transport = bus::open(&arguments.bus).map_err(RemoteError::from)?;
     let network = Network::new(transport).with_patience(Duration::from_millis(arguments.timeout));
     let node = match arguments.node {
         Some(node) => node,
         None => {
-            let nodes = present(&network, PATIENCE).map_err(|error| RemoteError::from(error).to_string())?;
+            let nodes = present(&network, PATIENCE).map_err(RemoteError::from)?;
             nodes.first().copied().ok_or_else(|| format!("no node answers on {}", arguments.bus))?
         }
     };
@@ -76,7 +102,7 @@ fn begin(arguments: &Arguments) -> Result<Server, String> {
     let guard = Guard::new(address, Instant::now()).map_err(|error| error.to_string())?;
     announce(&guard.address());
     let panel = Panel::new(&network, node, key, arguments.rate, guard, announce);
-    Server::begin(listener, panel).map_err(|error| error.to_string())
+    Server::begin(listener, panel).map_err(|error| Ended::Failed(error.to_string()))
 }
 
 /// Waits for Ctrl-C or termination.
@@ -102,19 +128,32 @@ fn wait() -> Result<(), String> {
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
     // Dropped at the end: pages are disconnected, and the joint is stopped.
-    let ended = begin(&arguments).and_then(|_server| wait());
-    match ended {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    let ended = begin(&arguments).and_then(|_server| Ok(wait()?));
+    let (reason, code) = match ended {
+        Ok(()) => return ExitCode::SUCCESS,
+        Err(Ended::Failed(reason)) => (reason, 1),
+        Err(Ended::Usage(reason)) => (reason, 2),
+    };
+    eprintln!("error: {reason}");
+    ExitCode::from(code)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::rate;
+    use super::{Arguments, EXAMPLES, rate};
+    use clap::{CommandFactory, Parser};
+
+    #[test]
+    fn the_help_ends_with_examples_that_are_valid() {
+        let help = Arguments::command().render_help().to_string();
+        assert!(help.trim_end().ends_with(EXAMPLES), "{help}");
+        let lines: Vec<&str> = EXAMPLES.lines().skip(1).collect();
+        assert!(!lines.is_empty());
+        for line in lines {
+            let words = line.split_whitespace();
+            Arguments::try_parse_from(words).unwrap_or_else(|error| panic!("{line}: {error}"));
+        }
+    }
 
     #[test]
     fn rates_end_where_they_say() {

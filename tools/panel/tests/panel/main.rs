@@ -69,6 +69,7 @@ fn main() {
             every_answer_forbids_other_sources_and_frames,
             beyond_this_machine_a_token_is_wanted_once,
             requests_that_are_not_as_they_should_be_are_refused_and_the_server_goes_on,
+            arguments_that_are_wrong_end_the_program_with_2_and_what_fails_with_1,
         }
     };
     let name = "browser::the_page_shows_values_that_move_and_the_joint_stands_once_the_button_is_let_go";

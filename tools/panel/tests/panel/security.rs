@@ -8,6 +8,7 @@ use panel::message::LONGEST;
 use serde_json::json;
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::process::Command;
 use std::time::{Duration, Instant};
 use tungstenite::Message;
 
@@ -181,4 +182,26 @@ pub fn requests_that_are_not_as_they_should_be_are_refused_and_the_server_goes_o
     let answers = ids.into_iter().map(|id| page.answer_to(id)).collect::<Vec<_>>();
     let refused = answers.iter().filter(|answer| answer.as_ref().is_err_and(|error| error.contains("questions wait")));
     assert!(refused.count() > 0 && answers.iter().any(Result::is_ok));
+}
+
+pub fn arguments_that_are_wrong_end_the_program_with_2_and_what_fails_with_1() {
+    for (arguments, code, told) in [
+        (&["--bus", "can0"][..], 2, "bus 'can0': a kind and a colon are missing"),
+        (&["--bus", "socketcan:none9"], 1, "none9"),
+        (&["--bus", "virtual:panel-code", "--node", "128"], 2, "1..=127"),
+        (&["--bus", "virtual:panel-code", "--key", "nowhere.key"], 1, "nowhere.key"),
+        (&["--bus", "virtual:panel-code"], 1, "no node answers on virtual:panel-code"),
+    ] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_panel"));
+        for variable in ["BUS", "NODE", "KEY", "TIMEOUT"] {
+            command.env_remove(format!("JOINTCTL_{variable}"));
+        }
+        let output = command.args(arguments).output().unwrap();
+        let error = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(
+            output.status.code() == Some(code) && error.contains(told),
+            "{arguments:?}: {:?} {error}",
+            output.status
+        );
+    }
 }
