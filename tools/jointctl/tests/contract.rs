@@ -18,7 +18,7 @@ arguments, and a test fails where it says anything else.
 | 0 | done |
 | 1 | failed: one line on standard error says what, where, and the limit. Whatever was there before still is: files are replaced whole or not at all, settings are taken whole or not at all |
 | 2 | the arguments are wrong: nothing was written, and no set-point or setting was sent |
-| 3 | `retrain`: done, and the new image is no better than the one before, which stays |
+| 3 | `retrain`, `fleet retrain`: done, and no new image is better than the one before, which stays; of a fleet, no joint's |
 
 `move` that is interrupted failed (1), `enable` that is interrupted is done (0): it lasts until somebody ends it. Both disable the joint first.
 

@@ -3,13 +3,18 @@
 
 #[path = "../../fleet/tests/fleet_of_joints/mod.rs"]
 mod fleet_of_joints;
+mod tables;
 
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Output};
 
+fn ran(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_jointctl")).current_dir(folder).args(arguments).output().unwrap()
+}
+
 fn jointctl(folder: &Path, arguments: &[&str]) -> Output {
-    let output = Command::new(env!("CARGO_BIN_EXE_jointctl")).current_dir(folder).args(arguments).output().unwrap();
+    let output = ran(folder, arguments);
     let error = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{arguments:?}: {error}");
     output
@@ -30,7 +35,10 @@ fn the_page_names_what_changed_and_only_better_images_are_kept() {
     let errors = String::from_utf8_lossy(&status.stderr).into_owned();
     assert!(errors.contains("joint=j02/day=2026-01-04 is left out: "), "{errors}");
     let page = std::fs::read_to_string(folder.path().join("fleet.html")).unwrap();
-    let told = json(&jointctl(folder.path(), &["fleet", "status", "fleet", "--json"]));
+    let line = |number: usize| tables::OF_A_FLEET[number].split(' ').collect::<Vec<_>>();
+    let sums = jointctl(folder.path(), &line(0));
+    tables::assert_is_table(tables::OF_A_FLEET[0], &sums);
+    let told = json(&jointctl(folder.path(), &line(1)));
     assert!(told.to_string().contains("j11"), "{told}");
     let named = [("j11", "drifted"), ("j23", "friction fell"), ("j29", "broken"), ("j35", "wrong configuration")];
     for (joint, words) in named {
@@ -41,9 +49,7 @@ fn the_page_names_what_changed_and_only_better_images_are_kept() {
     assert!(page.contains("8 of 40 joints have a finding") && page.contains("color-mix"), "the page");
 
     jointctl(folder.path(), &["key", "new", "fleet.key"]);
-    let retrain =
-        ["fleet", "retrain", "fleet", "--out", "new", "--preset", "coulomb-viscous", "--key", "fleet.key", "--json"];
-    let outcomes = json(&jointctl(folder.path(), &retrain));
+    let outcomes = json(&jointctl(folder.path(), &line(2)));
     let outcome = |outcomes: &Value, joint: &str| {
         let joints = outcomes["joints"].as_array().unwrap();
         joints.iter().find(|outcome| outcome["joint"] == joint).unwrap_or_else(|| panic!("{joint}: {outcomes}")).clone()
@@ -68,7 +74,7 @@ fn the_page_names_what_changed_and_only_better_images_are_kept() {
     let kept: Vec<&Value> =
         outcomes["joints"].as_array().unwrap().iter().filter(|outcome| outcome["kept"] == true).collect();
     let images = |folder: &Path| {
-        let listed = json(&jointctl(folder, &["fleet", "images", "fleet", "--json"]));
+        let listed = json(&jointctl(folder, &line(3)));
         listed["images"].as_array().unwrap().clone()
     };
     let registered = images(folder.path());
@@ -87,12 +93,27 @@ fn the_page_names_what_changed_and_only_better_images_are_kept() {
     // The joints have the new images: another one is no better, and the joints keep what they have.
     let again =
         ["fleet", "retrain", "fleet", "--out", "again", "--images", "new", "--preset", "coulomb-viscous", "--json"];
-    let outcomes = json(&jointctl(folder.path(), &again));
+    let output = ran(folder.path(), &again);
+    let outcomes = json(&output);
+    let kept = outcomes["joints"].as_array().unwrap().iter().filter(|outcome| outcome["kept"] == true).count();
+    let error = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(if kept == 0 { 3 } else { 0 }), "{kept} kept: {error}");
     for joint in ["j11", "j17", "j23"] {
         let found = outcome(&outcomes, joint);
         assert!(found["kept"] == false && found["version"] == 2, "{found}");
         assert!(found["reason"].as_str().unwrap().starts_with("not kept: "), "{found}");
         assert!(!folder.path().join("again").join(joint).exists());
+    }
+
+    // Where none is kept that is the exit code: of a joint that has changed, and of one that has not.
+    for joint in ["j11", "j00"] {
+        let one =
+            format!("fleet retrain fleet --out none-{joint} --images new --preset coulomb-viscous --joint {joint}");
+        let output = ran(folder.path(), &one.split(' ').collect::<Vec<_>>());
+        let error = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(3), "{joint}: {error}");
+        assert!(error.contains("error: no new image is kept") && output.stdout.starts_with(b"joint "), "{error}");
+        assert!(folder.path().join(format!("none-{joint}/retrain.json")).exists());
     }
 
     // One joint alone, by its stored sums: the same image.

@@ -19,6 +19,9 @@ PATIENCE = 3.0
 LOOK = 0.5
 """Time between two looks for the file that ends a night, s."""
 
+NOTHING_KEPT = 3
+"""Exit code of jointctl where it is done and no new image is better."""
+
 
 class Crashed(Exception):
     """A process that a signal ended, for want of memory for example: Ray tries again."""
@@ -82,7 +85,7 @@ def outcome(options, arguments):
     except (FileNotFoundError, PermissionError) as problem:
         place = f"{options['jointctl']} on {socket.gethostname()}"
         return {"error": f"{place}: {problem.strerror}; every node needs jointctl at this path"}
-    if code:
+    if code not in (0, NOTHING_KEPT):
         lines = error.strip().splitlines()
         return {"error": lines[-1].removeprefix("error: ") if lines else f"jointctl ended with {code}"}
     return {"output": output, "warnings": error}

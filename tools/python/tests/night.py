@@ -177,6 +177,11 @@ class Steps(Place):
         unwritten = self.options(jointctl=self.script("true"))
         self.assertIn("was not written", steps.retrain(unwritten, "a")["error"])
 
+    def test_where_nothing_better_came_of_it_a_step_is_done_and_else_its_error_is_told(self):
+        for code, expected in ((0, None), (3, None), (1, "it failed"), (2, "it failed")):
+            options = self.options(jointctl=self.script(f"echo 'error: it failed' >&2; exit {code}"))
+            self.assertEqual(steps.outcome(options, []).get("error"), expected, code)
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -77,6 +77,9 @@ pub struct Commission {
     /// Permission to replace.
     #[command(flatten)]
     force: Force,
+    /// Print the settings that the joint took as a JSON object; what is done meanwhile goes to standard error
+    #[arg(long)]
+    json: bool,
 }
 
 impl Commission {
@@ -109,20 +112,29 @@ impl Commission {
         let node = joint.id();
         joint.require_configuration()?;
         catch_interrupts()?;
-        let mut guide = Terminal { asks };
+        let mut guide = Terminal { asks, aside: self.json };
         if asks && !self.index_only {
             guide.ask_for_what_is_missing(&joint, &mut plan)?;
         }
         let mut bench = Joint::new(RemoteObjects::new(joint, &running));
         if self.index_only {
             find_index(&mut bench, &plan, &mut guide)?;
-            println!("node {node}: the encoder knows its zero until its next loss of power");
+            match self.json {
+                true => println!("{:#}", serde_json::json!({ "node": node, "index_found": true })),
+                false => println!("node {node}: the encoder knows its zero until its next loss of power"),
+            }
             return Ok(());
         }
         let out = self.out.clone().unwrap_or_else(|| PathBuf::from(format!("commission-{node}")));
         self.force.permits_in(&out, &page::FILES)?;
         let found = commission(&mut bench, &plan, &mut guide)?;
         write_directory(&out, &page::files(&found, node)?)?;
+        if self.json {
+            let mut value = page::json(&found, node);
+            value["report"] = serde_json::json!(out.join("commission.html"));
+            println!("{value:#}");
+            return Ok(());
+        }
         println!("node {node}: commissioned. Written: {}", out.join("commission.html").display());
         if found.index.is_some() {
             println!("After each power-up: `jointctl commission --index-only --current {}`", self.current);
@@ -134,9 +146,19 @@ impl Commission {
 /// Someone at a terminal.
 struct Terminal {
     asks: bool,
+    /// Standard output is for a result alone.
+    aside: bool,
 }
 
 impl Terminal {
+    /// Tells what is done.
+    fn tell(&self, text: &str) {
+        match self.aside {
+            true => eprintln!("{text}"),
+            false => println!("{text}"),
+        }
+    }
+
     /// Numbers of gear and motor that no measurement gives, where no option says them.
     fn ask_for_what_is_missing(&self, joint: &RemoteJoint, plan: &mut Plan) -> Result<(), CommandError> {
         for (what, setting, wanted) in [
@@ -159,7 +181,7 @@ impl Terminal {
                     "" => break None,
                     number => match number.parse() {
                         Ok(number) => break Some(number),
-                        Err(_) => println!("'{number}' is no number"),
+                        Err(_) => self.tell(&format!("'{number}' is no number")),
                     },
                 }
             };
@@ -169,9 +191,11 @@ impl Terminal {
 
     /// A line of the user's; an interrupt while it is waited for ends the command.
     fn line(&self, question: &str) -> Result<String, Failure> {
-        print!("{question}");
         // A terminal that cannot be written to cannot be read either.
-        let _ = std::io::stdout().flush();
+        let _ = match self.aside {
+            true => write!(std::io::stderr(), "{question}"),
+            false => write!(std::io::stdout(), "{question}").and_then(|()| std::io::stdout().flush()),
+        };
         let (sender, receiver) = channel();
         std::thread::spawn(move || {
             let mut text = String::new();
@@ -183,7 +207,7 @@ impl Terminal {
                 Ok(Some(text)) => return Ok(text),
                 Ok(None) | Err(RecvTimeoutError::Disconnected) => return Err(Failure::Declined),
                 Err(RecvTimeoutError::Timeout) if !running() => {
-                    println!();
+                    self.tell("");
                     return Err(Stopped::Interrupted.into());
                 }
                 Err(RecvTimeoutError::Timeout) => {}
@@ -194,11 +218,11 @@ impl Terminal {
 
 impl Guide for Terminal {
     fn stage(&mut self, stage: Stage) {
-        println!("{}", page::headline(stage));
+        self.tell(&page::headline(stage));
     }
 
     fn found(&mut self, text: &str) {
-        println!("    {text}");
+        self.tell(&format!("    {text}"));
     }
 
     fn agrees(&mut self, question: &str) -> bool {

@@ -50,6 +50,9 @@ pub struct Excite {
     /// Check this table (or, with the ending .toml, these coefficients) instead: limits and condition number
     #[arg(long, value_name = "FILE", conflicts_with = "out")]
     check: Option<PathBuf>,
+    /// Print JSON instead, in rad and s; of a motion that is refused, too
+    #[arg(long)]
+    json: bool,
 }
 
 impl Excite {
@@ -59,7 +62,10 @@ impl Excite {
         if let Some(path) = &self.check {
             let samples = read(path)?;
             let findings = check(&samples.time, &samples.motion, &bounds);
-            print!("{}", summary(&findings, &bounds));
+            match self.json {
+                true => println!("{:#}", described(&findings, &bounds)),
+                false => print!("{}", summary(&findings, &bounds)),
+            }
             return match findings.defects.is_empty() {
                 true => Ok(()),
                 false => Err(CommandError::Excitation { path: path.clone(), defects: findings.defects.join("; ") }),
@@ -83,6 +89,13 @@ impl Excite {
         }
         write_file(&twin, coefficients(&found)?.as_bytes())?;
         write_file(&self.out, table(&found.excitation).as_bytes())?;
+        if self.json {
+            let mut value = described(&findings, &bounds);
+            value["random_condition_number"] = found.random.into();
+            value["written"] = serde_json::json!([self.out, twin]);
+            println!("{value:#}");
+            return Ok(());
+        }
         print!("{}", summary(&findings, &bounds));
         println!(
             "median of {} series drawn at random: {:.2}; found from the best {}: {:.2}",
@@ -105,6 +118,22 @@ impl Excite {
         bounds.validate()?;
         Ok(bounds)
     }
+}
+
+/// JSON object of the same as [`summary`], and what the motion must not be run for.
+fn described(findings: &Findings, bounds: &Bounds) -> serde_json::Value {
+    serde_json::json!({
+        "position": [findings.position.0, findings.position.1],
+        "velocity": findings.velocity,
+        "acceleration": findings.acceleration,
+        "condition_number": findings.condition_number,
+        "permitted": {
+            "position": [bounds.position.0, bounds.position.1],
+            "velocity": bounds.velocity,
+            "acceleration": bounds.acceleration,
+        },
+        "defects": findings.defects,
+    })
 }
 
 fn summary(findings: &Findings, bounds: &Bounds) -> String {

@@ -33,6 +33,9 @@ pub enum ImageCommand {
         /// The key that its tag must be of
         #[arg(long, value_name = "FILE")]
         key: Option<PathBuf>,
+        /// Print JSON: what was verified, each bound with its limit
+        #[arg(long)]
+        json: bool,
     },
     /// Convert between the binary form and TOML (by the names' endings: .toml is TOML, and so is standard output)
     Convert(Convert),
@@ -64,7 +67,7 @@ impl ImageCommand {
                     _ => print!("{text}"),
                 }
             }
-            Self::Verify { image: path, key } => {
+            Self::Verify { image: path, key, json } => {
                 let key = key.as_deref().map(key_file::read).transpose()?;
                 let upload = stream::read(path)?;
                 if let Some(key) = &key {
@@ -73,6 +76,10 @@ impl ImageCommand {
                 let number = key.map(|key| key.id());
                 let image = decode(&upload, path)?;
                 let certificate = verify(&image, path)?;
+                if *json {
+                    println!("{:#}", verified(&image, &certificate, number));
+                    return Ok(());
+                }
                 print!("{}", summary(&image, &certificate));
                 if let Some(number) = number {
                     println!("tag: that of key {number:08x}");
@@ -130,11 +137,37 @@ pub fn decode(bytes: &[u8], path: &Path) -> Result<Image, CommandError> {
     Ok(image_file::decode(bytes, path, text)?)
 }
 
+fn q16(bits: u32) -> f64 {
+    f64::from(bits) / 65536.0
+}
+
+fn slope(q8: i64) -> f64 {
+    q8 as f64 / 256.0
+}
+
+/// Number of networks.
+fn networks(image: &Image) -> usize {
+    image.friction.sets.iter().filter(|set| set.network.is_some()).count()
+}
+
+/// JSON object of what was verified; a tag is that of the key with this number.
+fn verified(image: &Image, certificate: &Certificate, key: Option<u32>) -> serde_json::Value {
+    let velocity_slope = [certificate.velocity_slope_low, certificate.velocity_slope_high].map(slope);
+    serde_json::json!({
+        "version": image.version,
+        "parameter_sets": image.friction.selector.sets(),
+        "networks": networks(image),
+        "unit": image.effort.symbol(),
+        "friction": { "bound": q16(certificate.output), "limit": q16(image.limits.output) },
+        "torque_gain": { "bound": q16(certificate.torque_gain), "limit": q16(image.limits.torque_gain) },
+        "velocity_slope": { "bounds": velocity_slope, "limit": slope(image.limits.velocity_slope.into()) },
+        "golden_vectors": image.golden.len(),
+        "key": key.map(|number| format!("{number:08x}")),
+    })
+}
+
 fn summary(image: &Image, certificate: &Certificate) -> String {
-    let unit = image.effort.symbol();
-    let q16 = |bits: u32| f64::from(bits) / 65536.0;
-    let slope = |q8: i64| q8 as f64 / 256.0;
-    let networks = image.friction.sets.iter().filter(|set| set.network.is_some()).count();
+    let (unit, networks) = (image.effort.symbol(), networks(image));
     format!(
         "version {}, {} parameter set(s), {networks} network(s), effort in {unit}\n\
          |friction|                         <= {:.4} {unit} (limit {:.4})\n\

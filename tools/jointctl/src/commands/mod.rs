@@ -253,6 +253,13 @@ pub enum CommandError {
         /// The system's answer.
         source: std::io::Error,
     },
+    /// Learning of a fleet's joints after which each keeps the image that it has.
+    #[cfg(feature = "logs")]
+    #[error("no new image is kept: {changed} joints have changed")]
+    NoneKept {
+        /// Number of joints that have changed.
+        changed: usize,
+    },
     /// End by the user of what was under way.
     #[error("{0}")]
     Interrupted(String),
@@ -267,6 +274,8 @@ impl CommandError {
     pub const fn exit_code(&self) -> u8 {
         match self {
             Self::Retrain(crate::remote::retrain::RetrainError::NotBetter { .. }) => 3,
+            #[cfg(feature = "logs")]
+            Self::NoneKept { .. } => 3,
             Self::Arguments(_) => 2,
             Self::Remote(error) if error.is_usage() => 2,
             #[cfg(feature = "logs")]
@@ -280,11 +289,12 @@ impl CommandError {
 mod tests {
     use super::CommandError;
     use crate::remote::RemoteError;
-    use crate::remote::retrain::RetrainError;
+    use crate::remote::retrain::{RetrainError, Shown};
 
     #[test]
     fn exit_codes_tell_failed_from_wrong_arguments_and_from_nothing_better() {
-        let not_better = RetrainError::NotBetter { node: 5, before: 1.0, after: 1.0 };
+        let shown = Shown { residual: 1.0, tracking: 0.0, shadow: 0.0 };
+        let not_better = RetrainError::NotBetter { node: 5, before: shown, after: shown, load: Vec::new() };
         let unknown = RemoteError::UnknownName { name: "x".into(), near: Vec::new() };
         let cases: [(CommandError, u8); 4] = [
             (CommandError::Bus("gone".into()), 1),

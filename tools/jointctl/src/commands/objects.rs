@@ -130,6 +130,9 @@ pub struct Set {
     /// Which joint.
     #[command(flatten)]
     on: Where,
+    /// Print JSON: an object with each value, as the joint has it now, and unit
+    #[arg(long)]
+    json: bool,
 }
 
 impl Set {
@@ -148,6 +151,17 @@ impl Set {
         }
         let joint = self.on.joint()?;
         configuration::set(&joint, &wanted)?;
+        if self.json {
+            let mut list = serde_json::Map::new();
+            for (entry, _) in wanted {
+                // That of an object that cannot be read is null: it is a command.
+                let value = entry.is_readable().then(|| joint.read(entry)).transpose()?;
+                let value = value.map(|value| value.json());
+                list.insert(entry.full_name(), serde_json::json!({ "value": value, "unit": entry.text.unit }));
+            }
+            println!("{:#}", serde_json::Value::Object(list));
+            return Ok(());
+        }
         for (entry, _) in wanted {
             // An object that cannot be read is a command.
             let shown = if entry.is_readable() { info::show_entry(&joint, entry)? } else { "done".into() };

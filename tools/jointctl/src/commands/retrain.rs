@@ -5,12 +5,13 @@ use super::fit::{FILES, write};
 use super::force::Force;
 use super::remote::{Where, catch_interrupts, running};
 use super::terminal::Terminal;
+use crate::remote::load_check::LoadDifference;
 use crate::remote::record::Pace;
 use crate::remote::retrain::{DESCRIPTION, RetrainError, Round, Shown, TABLE};
 use clap::Args;
 use identification::fit::Options;
 use identification::page::verdict;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 /// Arguments of `retrain`.
@@ -79,21 +80,17 @@ impl Retrain {
         let written = |fitted: &_| write(fitted, &out).map_err(|error| RetrainError::Report(error.to_string()));
         let outcome = round.run(&joint, &running, &written, &progress);
         progress.finish();
+        let report = out.join("report.json");
+        if let (true, Err(RetrainError::NotBetter { before, after, load, .. })) = (self.json, &outcome) {
+            let version = joint.image_status()?.active.map(|image| image.version);
+            println!("{:#}", figures(joint.id(), version, (before, after), load, &report, false));
+        }
         let outcome = outcome?;
         let version = outcome.status.active.map_or(0, |image| image.version);
         outcome.load.iter().for_each(|difference| eprintln!("warning: {difference}"));
         if self.json {
-            let judged = |on: &Shown| serde_json::json!({ "residual": on.residual, "tracking": on.tracking });
-            let value = serde_json::json!({
-                "node": joint.id(),
-                "version": version,
-                "before": judged(&outcome.before),
-                "after": judged(&outcome.after),
-                "shadow": outcome.before.shadow,
-                "load": outcome.load,
-                "report": out.join("report.json"),
-            });
-            println!("{value:#}");
+            let shown = (&outcome.before, &outcome.after);
+            println!("{:#}", figures(joint.id(), Some(version), shown, &outcome.load, &report, true));
             return Ok(());
         }
         println!("{} samples recorded, {} SYNCs without one", outcome.samples.0, outcome.samples.1);
@@ -114,4 +111,26 @@ impl Retrain {
         println!("Written: {}", out.join("report.html").display());
         Ok(())
     }
+}
+
+/// JSON object of a round: what the image before and the new one leave, and which version the joint has, if any.
+fn figures(
+    node: u8,
+    version: Option<u32>,
+    (before, after): (&Shown, &Shown),
+    load: &[LoadDifference],
+    report: &Path,
+    kept: bool,
+) -> serde_json::Value {
+    let judged = |on: &Shown| serde_json::json!({ "residual": on.residual, "tracking": on.tracking });
+    serde_json::json!({
+        "node": node,
+        "kept": kept,
+        "version": version,
+        "before": judged(before),
+        "after": judged(after),
+        "shadow": before.shadow,
+        "load": load,
+        "report": report,
+    })
 }

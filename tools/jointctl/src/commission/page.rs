@@ -25,6 +25,27 @@ pub fn files(found: &Found, node: u8) -> Result<Vec<OutputFile>, FigureError> {
     Ok(vec![OutputFile::new(PAGE, page(found, node)?), OutputFile::new(TEXT, text(found, node))])
 }
 
+/// Settings by their objects.
+fn sorted(found: &Found) -> Vec<(Setting, f64)> {
+    let mut settings = found.settings.clone();
+    settings.sort_by_key(|(setting, _)| {
+        let entry = Entry::of(Field::Setting(*setting));
+        (entry.object.index, entry.object.sub_index)
+    });
+    settings
+}
+
+/// The same as [`text`] as a JSON object; where nothing was measured of a setting its standard error is null.
+pub fn json(found: &Found, node: u8) -> serde_json::Value {
+    let settings = sorted(found).into_iter().map(|(setting, value)| {
+        let entry = Entry::of(Field::Setting(setting));
+        let error = estimate(found, setting).map(|estimate| estimate.error);
+        let value = serde_json::json!({ "value": value, "unit": entry.text.unit, "standard_error": error });
+        (entry.full_name(), value)
+    });
+    serde_json::json!({ "node": node, "settings": settings.collect::<serde_json::Map<_, _>>() })
+}
+
 /// The settings that the joint took, each with its unit and what was measured of it.
 pub fn text(found: &Found, node: u8) -> String {
     let mut text = format!(
@@ -32,12 +53,7 @@ pub fn text(found: &Found, node: u8) -> String {
          # `jointctl set NAME VALUE ...` gives them to another joint of the same kind; its electrical zero is its own.\n"
     );
     let mut record = "";
-    let mut settings = found.settings.clone();
-    settings.sort_by_key(|(setting, _)| {
-        let entry = Entry::of(Field::Setting(*setting));
-        (entry.object.index, entry.object.sub_index)
-    });
-    for (setting, value) in settings {
+    for (setting, value) in sorted(found) {
         let entry = Entry::of(Field::Setting(setting));
         if entry.text.object != record {
             record = entry.text.object;

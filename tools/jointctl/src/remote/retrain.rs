@@ -103,17 +103,19 @@ pub enum RetrainError {
     },
     /// The new image is no improvement.
     #[error(
-        "node {node} keeps the image that it had: the new one leaves {after:.4} Nm unexplained, the old state {before:.4} Nm; \
+        "node {node} keeps the image that it had: the new one leaves {:.4} Nm unexplained, the old state {:.4} Nm; \
          at least {:.0} % less is needed",
-        100.0 * LEAST_GAIN
+        after.residual, before.residual, 100.0 * LEAST_GAIN
     )]
     NotBetter {
         /// Node id.
         node: u8,
-        /// Residual torque before, RMS, Nm.
-        before: f64,
-        /// Residual torque with the new image, RMS, Nm.
-        after: f64,
+        /// Results of the image that the joint keeps.
+        before: Shown,
+        /// Those of the new one.
+        after: Shown,
+        /// Differences of the load from what is configured.
+        load: Vec<LoadDifference>,
     },
 }
 
@@ -366,7 +368,7 @@ impl Learned<'_> {
         let after = shown(Use::Trial(time))?;
         let before = first.lower(shown(Use::Shadow(time))?);
         if !after.is_better_than(&before) {
-            return Err(RetrainError::NotBetter { node, before: before.residual, after: after.residual });
+            return Err(RetrainError::NotBetter { node, before, after, load });
         }
         let status = joint.use_image(&upload, Use::Commit, progress)?;
         tidy.staged = false;

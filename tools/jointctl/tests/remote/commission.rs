@@ -1,6 +1,7 @@
 //! A joint is commissioned over a bus.
 
-use crate::served::{NODE, Served};
+use crate::served::{NODE, Served, program};
+use crate::tables::COMMISSION;
 use bus::client::Command;
 use joint_firmware::objects::field::Field;
 use joint_firmware::objects::settings::Setting;
@@ -115,4 +116,37 @@ pub fn a_joint_is_commissioned_with_the_motor_that_it_has_and_stopped_at_once_wh
     assert!(text(0).contains("Commissioning of node 5") && text(0).contains("pole pairs"));
     let values: toml::Table = text(1).parse().unwrap();
     assert_eq!(values["motor"]["pole-pairs"].as_integer(), Some(7), "{}", text(1));
+    let json = page::json(&found, NODE);
+    let settings = json["settings"].as_object().unwrap();
+    assert_eq!((settings.len(), &json["node"]), (found.settings.len(), &5.into()), "{json}");
+    assert_eq!(settings["motor.pole-pairs"]["value"], 7.0, "{json}");
+}
+
+pub fn a_commissioning_prints_json_alone_where_that_is_asked_for() {
+    let served = Served::joints_on_slcan();
+    let folder = tempfile::tempdir().unwrap();
+    let run = |reset: &str| {
+        let line = format!("{COMMISSION}{reset} --bus {} --node {NODE}", served.bus());
+        let output = program().current_dir(&folder).args(line.split(' ')).output().unwrap();
+        (output.status.success(), output.stdout, String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    let (mut done, mut result, mut told) = run("");
+    // This joint lives in real time, and a machine with much else to do may be late: what fails prints no result.
+    for _ in 0..5 {
+        assert!(told.contains("error: ") != done, "{told}");
+        if done {
+            break;
+        }
+        assert!(result.is_empty(), "{told}");
+        (done, result, told) = run(" --reset");
+    }
+    // That it may be late for good is no matter of this test.
+    if !done {
+        assert!(told.contains(&Stopped::Late.to_string()), "{told}");
+        return;
+    }
+    let value: serde_json::Value = serde_json::from_slice(&result).unwrap();
+    assert_eq!((&value["node"], &value["settings"]["motor.pole-pairs"]["value"]), (&5.into(), &7.0.into()), "{value}");
+    let resistance = &value["settings"]["motor.resistance"];
+    assert!(resistance["standard_error"].as_f64().is_some_and(|error| error > 0.0), "{value}");
 }

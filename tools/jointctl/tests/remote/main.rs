@@ -52,6 +52,7 @@ fn main() {
         }
         commission {
             a_joint_is_commissioned_with_the_motor_that_it_has_and_stopped_at_once_when_asked,
+            a_commissioning_prints_json_alone_where_that_is_asked_for,
         }
         configuration {
             settings_are_taken_together_or_not_at_all,
@@ -105,6 +106,7 @@ fn main() {
             an_interrupted_round_leaves_the_joint_disabled_with_the_image_that_it_had,
             a_recording_of_a_motion_is_a_data_set,
             two_producers_of_sync_are_told_of,
+            a_round_after_which_the_joint_keeps_its_image_prints_its_figures_and_ends_with_3,
         }
         telemetry {
             samples_come_with_every_sync_in_si_units_and_the_pdos_are_put_back,

@@ -1,7 +1,7 @@
 //! A recording as a data set, and the whole round on a joint: excite, record, fit, compare, commit.
 
 use crate::punctual;
-use crate::served::{NODE, Served, image};
+use crate::served::{NODE, Served, image, program};
 use friction_compensation::parameters::life_cycle::State as Life;
 use identification::fit::Options;
 use identification::presets::Preset;
@@ -109,4 +109,34 @@ pub fn two_producers_of_sync_are_told_of() {
     let error =
         std::iter::repeat_with(|| recorder.next(Duration::from_secs(1)).map(drop)).take(200).find_map(Result::err);
     assert!(matches!(error, Some(RemoteError::OtherSync { node: NODE })), "{error:?}");
+}
+
+/// The second round learns what the first one has brought into the joint already.
+pub fn a_round_after_which_the_joint_keeps_its_image_prints_its_figures_and_ends_with_3() {
+    let served = Served::joints_on_slcan();
+    let folder = tempfile::tempdir().unwrap();
+    let run = || {
+        let line = format!("retrain --duration 4 --validation 2.5 --restarts 0 --json --force --bus {}", served.bus());
+        let mut command = program();
+        command.current_dir(&folder).args(line.split(' ')).args(["--node", "5"]);
+        let output = command.output().unwrap();
+        let value: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap_or_else(|error| {
+            panic!("{error}: {:?} {}", output.status, String::from_utf8_lossy(&output.stderr));
+        });
+        let kept = value["kept"].as_bool().unwrap();
+        assert_eq!(output.status.code(), Some(if kept { 0 } else { 3 }), "{value}");
+        assert!(value["before"]["residual"].is_number() && value["after"]["tracking"].is_number(), "{value}");
+        (kept, value["version"].clone())
+    };
+    // What one of them brings is at least 2 % better: some rounds on, nothing is.
+    let mut version = serde_json::Value::Null;
+    for _ in 0..8 {
+        let (kept, now) = run();
+        if !kept {
+            assert_eq!(now, version, "the version that the joint keeps");
+            return;
+        }
+        version = now;
+    }
+    panic!("version {version} is still not good enough");
 }

@@ -71,6 +71,14 @@ impl Served {
         Self { bus: bus.into(), stop, threads }
     }
 
+    /// A joint behind an adapter at an address of its own, for a program.
+    pub fn joints_on_slcan() -> Self {
+        let port = bus::free_port().unwrap();
+        let mut served = Self::on(&format!("slcan:listen://127.0.0.1:{port}"), &[NODE]);
+        served.bus = format!("slcan:tcp://127.0.0.1:{port}");
+        served
+    }
+
     /// A joint that lives this many times slower than the clock: what it must hear within a time of its own has so much
     /// longer on a machine that is busy. Who waits for it waits longer, too.
     pub fn slowed(factor: u32) -> Self {

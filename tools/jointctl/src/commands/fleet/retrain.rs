@@ -73,18 +73,21 @@ impl Retrain {
         // Before the files: a process that is killed in between makes the same images once more, which count once.
         self.register(&outcomes, key.as_ref())?;
         write_directory(&self.out, &files)?;
+        let kept = outcomes.iter().filter(|outcome| outcome.kept).count();
         if self.json {
             println!("{json}");
-            return Ok(());
+        } else {
+            print!("{}", table(&outcomes));
+            println!(
+                "{kept} new images of {} joints that have changed. Nothing is uploaded. Written: {}",
+                outcomes.len(),
+                self.out.display()
+            );
         }
-        print!("{}", table(&outcomes));
-        let kept = outcomes.iter().filter(|outcome| outcome.kept).count();
-        println!(
-            "{kept} new images of {} joints that have changed. Nothing is uploaded. Written: {}",
-            outcomes.len(),
-            self.out.display()
-        );
-        Ok(())
+        match kept {
+            0 => Err(CommandError::NoneKept { changed: outcomes.len() }),
+            _ => Ok(()),
+        }
     }
 
     /// Image, its text, and the signed image of a joint whose new image is kept.
