@@ -1,5 +1,5 @@
-//! A joint on a bus that bears a load and rises until its master falls silent: the joint monitors the master's heartbeat
-//! (1016h), and 1029h says what its absence does. All of it is asked for through the objects.
+//! A joint on a bus that bears a load and rises until its master falls silent: it monitors the master's heartbeat
+//! (1016h), and 1029h says what becomes of it without. All of it is asked for through the objects.
 
 #[path = "../../../node/tests/master/mod.rs"]
 mod master;
