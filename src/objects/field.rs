@@ -185,16 +185,14 @@ const _: () = assert!(SET_POINTS <= 16);
 
 impl Several {
     pub(super) const NONE: Self = Self(0);
-    /// Targets, and the torque that is added to them, which count once they have come.
-    pub(super) const TARGETS: Self = Self::one(SetPoint::TargetTorque)
+    /// Everything that is asked of the joint: not choices, the counter and a neighbour's velocity.
+    pub(super) const ASKED: Self = Self::one(SetPoint::Controlword)
+        .and(SetPoint::OpenLoop)
+        .and(SetPoint::TargetTorque)
         .and(SetPoint::TargetPosition)
         .and(SetPoint::TargetVelocity)
         .and(SetPoint::ImpedanceFrame)
-        .and(SetPoint::TorqueOffset);
-    /// Everything that is asked of the joint: not choices, the counter and a neighbour's velocity.
-    pub(super) const ASKED: Self = Self::TARGETS
-        .and(SetPoint::Controlword)
-        .and(SetPoint::OpenLoop)
+        .and(SetPoint::TorqueOffset)
         .and(SetPoint::PositionOffset)
         .and(SetPoint::VelocityOffset);
 

@@ -185,10 +185,11 @@ impl<'a> JointImage<'a> {
         let arrived = core::mem::take(&mut self.arrived);
         let (word, last) = (Controlword(self.arriving.controlword), Controlword(self.points.controlword));
         let own = Several::target(self.arriving.mode);
-        let any = own == Several::NONE || !word.permits_operation() || word.begins_reset(last);
-        let renewing = if any { Several::ASKED } else { own };
-        let repeated = arrived.has(SetPoint::Counter) && self.arriving.counter == self.points.counter;
-        if arrived.among(renewing) != Several::NONE && !repeated {
+        let carries = |several| arrived.among(several) != Several::NONE;
+        let any = || own == Several::NONE || !word.permits_operation() || word.begins_reset(last);
+        let repeated = || arrived.has(SetPoint::Counter) && self.arriving.counter == self.points.counter;
+        // Nearly every PDO has its mode's own.
+        if (carries(own) || any() && carries(Several::ASKED)) && !repeated() {
             self.sequence = self.sequence.wrapping_add(1);
         }
         if arrived.has(SetPoint::CoupledVelocity) {

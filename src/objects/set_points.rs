@@ -23,9 +23,9 @@ pub(super) struct SetPoints {
     /// Set-points of the profile modes, where a program has them: [`SetPoint`]s from [`FIRST_OF_PROFILES`] on, raw.
     more: [u32; PROFILE_SET_POINTS],
     positions: [Positions; PROFILES as usize],
-    /// Targets that count: those that came since operation was enabled in this mode. A joint must not run to zero,
-    /// or to where it was to go an hour ago, because nobody said where to.
-    targets: Several,
+    /// Those that came since operation was enabled in this mode: of targets and the torque that is added to them no
+    /// others count. A joint must not run to zero, or to where it was to go an hour ago, because nobody said where to.
+    come: Several,
     /// mrad/s.
     pub(super) coupled: i32,
     open_loop: Frame,
@@ -61,7 +61,7 @@ impl SetPoints {
         impedance: 0,
         more: more(),
         positions: [Positions::NONE; PROFILES as usize],
-        targets: Several::NONE,
+        come: Several::NONE,
         coupled: 0,
         open_loop: Frame { voltage: 0, speed: 0, along: 0, across: 0 },
     };
@@ -85,7 +85,7 @@ impl SetPoints {
         let (word, last) = (Controlword(self.controlword), Controlword(before.controlword));
         let goes_on = last.enables_operation() && self.mode == before.mode;
         if word.enables_operation() && !goes_on {
-            self.targets = Several::NONE;
+            self.come = Several::NONE;
             self.positions.iter_mut().for_each(Positions::forget);
         } else if position && last.halts() && !word.halts() {
             self.insist(SetPoint::TargetPosition);
@@ -104,18 +104,32 @@ impl SetPoints {
 
     /// Sets one from the low bits of `value`. A mode that does not exist changes nothing.
     pub(super) fn set(&mut self, set_point: SetPoint, value: u64) {
-        if set_point != SetPoint::TargetPosition || self.position != value as i32 {
-            self.insist(set_point);
-        }
         match set_point {
             SetPoint::Controlword => self.controlword = value as u16,
             SetPoint::Mode => self.mode = Operation::of(value as i8).unwrap_or(self.mode),
             SetPoint::Counter => self.counter = Some(value as u8),
-            SetPoint::TargetTorque => self.torque = value as i16,
-            SetPoint::TorqueOffset => self.torque_offset = value as i16,
-            SetPoint::TargetPosition => self.position = value as i32,
-            SetPoint::TargetVelocity => self.velocity = value as i32,
-            SetPoint::ImpedanceFrame => self.impedance = value,
+            SetPoint::TargetTorque => {
+                self.torque = value as i16;
+                self.insist(SetPoint::TargetTorque);
+            }
+            SetPoint::TorqueOffset => {
+                self.torque_offset = value as i16;
+                self.insist(SetPoint::TorqueOffset);
+            }
+            SetPoint::TargetPosition => {
+                if self.position != value as i32 {
+                    self.insist(SetPoint::TargetPosition);
+                }
+                self.position = value as i32;
+            }
+            SetPoint::TargetVelocity => {
+                self.velocity = value as i32;
+                self.insist(SetPoint::TargetVelocity);
+            }
+            SetPoint::ImpedanceFrame => {
+                self.impedance = value;
+                self.insist(SetPoint::ImpedanceFrame);
+            }
             SetPoint::CoupledVelocity => self.coupled = value as i32,
             SetPoint::OpenLoop => self.open_loop = Frame::from_bits(value),
             SetPoint::ProfileVelocity
@@ -137,17 +151,17 @@ impl SetPoints {
         self.more.get(number).copied().unwrap_or(MORE[number])
     }
 
-    /// A target counts. One by SDO is meant, also where it is the position that was there.
+    /// It has come. One by SDO is meant, also where it is the position that was there.
     pub(super) fn insist(&mut self, set_point: SetPoint) {
-        self.targets = self.targets.and(set_point).among(Several::TARGETS);
+        self.come = self.come.and(set_point);
     }
 
     /// Returns `true` if there is a target for the mode, and nothing halts the joint.
     fn follows(&self) -> bool {
         let target = match self.mode {
-            Operation::ProfileVelocity => PROFILES && self.targets.has(SetPoint::TargetVelocity),
+            Operation::ProfileVelocity => PROFILES && self.come.has(SetPoint::TargetVelocity),
             Operation::ProfilePosition => self.positions.iter().any(|positions| positions.target().is_some()),
-            mode => self.targets.among(Several::target(mode)) != Several::NONE,
+            mode => self.come.among(Several::target(mode)) != Several::NONE,
         };
         target && !Controlword(self.controlword).halts()
     }
@@ -220,8 +234,8 @@ impl SetPoints {
         let torque = |counts: bool, value: i16| {
             if counts { f32::from(value) * (1e-3 * shared.rated_torque()) } else { 0.0 }
         };
-        let has_offset = self.targets.has(SetPoint::TorqueOffset);
-        let target = torque(self.targets.has(SetPoint::TargetTorque), self.torque);
+        let has_offset = self.come.has(SetPoint::TorqueOffset);
+        let target = torque(self.come.has(SetPoint::TargetTorque), self.torque);
         let offset = torque(has_offset, self.torque_offset);
         // A master that does not say what holds the joint may mean gravity by the target.
         let push = if has_offset { target } else { 0.0 };
