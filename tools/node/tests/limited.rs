@@ -1,46 +1,20 @@
 //! Set-points of the cyclic modes and of impedance mode beyond a limit: clipped, and shown by bit 11 of the statusword;
 //! simulated time.
 
+mod driven;
 mod master;
 
-use bus::client::Command;
-use joint_firmware::joint::state_machine::State;
+use driven::{ENABLE, position, set32, status, word};
 use joint_firmware::joint::{Command as Asked, Mode};
 use joint_firmware::objects::impedance_frame;
 use master::Master;
 
-const ENABLE: u16 = 0x0F;
 const LIMITED: i64 = 1 << 11;
 /// The target is followed.
 const TAKEN: i64 = 1 << 12;
 
-fn word(master: &mut Master, word: u16) {
-    master.download(0x6040, 0, &word.to_le_bytes()).unwrap();
-}
-
-fn set32(master: &mut Master, index: u16, value: i32) {
-    master.download(index, 0, &value.to_le_bytes()).unwrap();
-}
-
 fn enabled(mode: i8) -> Master {
-    let mut master = Master::new();
-    master.command(Command::Start);
-    master.download(0x6060, 0, &mode.to_le_bytes()).unwrap();
-    for step in [0x06, 0x07, ENABLE] {
-        word(&mut master, step);
-        master.wait(5);
-    }
-    assert_eq!(master.state(), State::OperationEnabled);
-    master
-}
-
-fn status(master: &mut Master) -> i64 {
-    master.number(0x6041, 0)
-}
-
-/// µrad.
-fn position(master: &mut Master) -> i32 {
-    master.number(0x6064, 0) as i32
+    driven::enabled(Master::new(), mode)
 }
 
 #[test]

@@ -1,15 +1,16 @@
 //! Profile position, profile velocity and homing (CiA 402-2), as a master sees them that sends each set-point once;
 //! simulated time.
 
+mod driven;
 mod master;
 
 use bus::Frame;
 use bus::client::Command;
+use driven::{ENABLE, position, set32, status, word};
 use joint_firmware::joint::state_machine::State;
 use master::{ID, Master};
 use plant::ActuatorParameters;
 
-const ENABLE: u16 = 0x0F;
 const NEW: u16 = 1 << 4;
 const AT_ONCE: u16 = 1 << 5;
 const RELATIVE: u16 = 1 << 6;
@@ -26,37 +27,12 @@ const PROFILE_VELOCITY: i8 = 3;
 const HOMING: i8 = 6;
 const VELOCITY: i8 = 9;
 
-fn word(master: &mut Master, word: u16) {
-    master.download(0x6040, 0, &word.to_le_bytes()).unwrap();
-}
-
-fn set32(master: &mut Master, index: u16, value: i32) {
-    master.download(index, 0, &value.to_le_bytes()).unwrap();
-}
-
 fn enabled_as(parameters: ActuatorParameters, mode: i8) -> Master {
-    let mut master = Master::of(parameters);
-    master.command(Command::Start);
-    master.download(0x6060, 0, &mode.to_le_bytes()).unwrap();
-    for step in [0x06, 0x07, ENABLE] {
-        word(&mut master, step);
-        master.wait(5);
-    }
-    assert_eq!(master.state(), State::OperationEnabled);
-    master
+    driven::enabled(Master::of(parameters), mode)
 }
 
 fn enabled(mode: i8) -> Master {
     enabled_as(ActuatorParameters::reference().aligned().without_payload(), mode)
-}
-
-fn status(master: &mut Master) -> i64 {
-    master.number(0x6041, 0)
-}
-
-/// µrad.
-fn position(master: &mut Master) -> i32 {
-    master.number(0x6064, 0) as i32
 }
 
 fn speed(master: &Master) -> f64 {
