@@ -177,7 +177,7 @@ pub struct Conditions<'a> {
     pub key: Option<&'a Key>,
     /// The stored key is damaged.
     pub locked: bool,
-    /// What was verified is the image in use, as it is stored ([`LifeCycle::is_verified`]).
+    /// The verified image is the one in use, as it is stored ([`LifeCycle::is_verified`]).
     pub is_stored: bool,
 }
 
