@@ -116,7 +116,7 @@ fn word(master: &mut Master, word: u16) {
     master.wait(20);
 }
 
-/// What homing has come to: bits 10, 12 and 13 of the statusword.
+/// Homing as the statusword shows it: bits 10, 12 and 13.
 fn homed(master: &mut Master) -> i64 {
     master.wait(500);
     master.number(0x6041, 0) & 0x3400
