@@ -10,7 +10,8 @@
 //! ```
 //!
 //! - [`VirtualNode`]: the whole node; frames and time passed in, so that tests run it faster than real time
-//! - [`serve`]: the node on a bus, in real time
+//! - [`VirtualArm`]: several nodes whose joints turn the links of one arm
+//! - [`serve`]: a node, or an arm, on a bus, in real time
 //! - [`PacedNodes`]: several nodes on one modelled wire, in simulated time
 //! - [`Storage`]: what outlasts a loss of power, in memory or in files
 //! - [`flash`]: a flash with the rules of the STM32G4's
@@ -34,6 +35,7 @@ mod program;
 mod sample_image;
 mod serve;
 mod storage;
+mod virtual_arm;
 mod virtual_node;
 
 #[cfg(feature = "emulator")]
@@ -43,4 +45,5 @@ pub use paced::{PacedEvent, PacedNodes, REACTION, TASK};
 pub use sample_image::SampleImage;
 pub use serve::{ServeError, Served, serve};
 pub use storage::{Storage, StorageError};
+pub use virtual_arm::VirtualArm;
 pub use virtual_node::{NodeError, Options, VirtualNode};

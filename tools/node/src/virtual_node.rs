@@ -19,7 +19,7 @@ use friction_compensation::parameters::slots::SlotError;
 use joint_firmware::joint::configuration::Configuration;
 use joint_firmware::joint::shadow::Shadow;
 use joint_firmware::joint::state_machine::State;
-use joint_firmware::joint::{Joint, Telemetry};
+use joint_firmware::joint::{Demand, Joint, Telemetry};
 use joint_firmware::objects::{
     FrictionStatistics, Images, JointImage, Objects, Observed, Ownership, Shared, StoredImages,
 };
@@ -70,10 +70,20 @@ pub enum NodeError {
     NodeId(u8),
 }
 
+/// What a control step begins with.
+pub(crate) struct Before {
+    /// What the bus asks for.
+    pub demand: Demand,
+    /// Torque that is asked for with the feedforward of the load, Nm.
+    feedforward_torque: f32,
+    /// Collisions so far.
+    collisions: u16,
+}
+
 /// A joint on the bus.
 #[derive(Debug)]
 pub struct VirtualNode {
-    joint: VirtualJoint,
+    pub(crate) joint: VirtualJoint,
     setup: Setup,
     requirements: Requirements,
     rate: u32,
@@ -97,7 +107,7 @@ pub struct VirtualNode {
     /// Control step until which the task has no time.
     busy_until: u64,
     /// External torque on the link, Nm.
-    external_torque: f64,
+    pub(crate) external_torque: f64,
 }
 
 fn text(parameters: &ActuatorParameters) -> String {
@@ -396,21 +406,31 @@ impl VirtualNode {
 
     /// Control steps, with the task's work after each millisecond.
     pub fn advance(&mut self, steps: u64) {
-        let per_work = u64::from(self.rate / 1_000).max(1);
         for _ in 0..steps {
-            let demand = self.image.demand();
-            let feedforward = self.joint.bearing(&demand).command.torque;
-            let before = self.joint.external_torque().collisions;
-            let telemetry = self.joint.step(&demand, self.external_torque);
-            let found = self.joint.external_torque();
-            if found.collisions != before {
-                self.image.collide(found.reaction);
-            }
-            self.steps += 1;
-            if self.steps.is_multiple_of(per_work) {
-                self.observe(&telemetry, feedforward);
-                self.work();
-            }
+            let before = self.before();
+            let telemetry = self.joint.step(&before.demand, self.external_torque);
+            self.after(&before, &telemetry);
+        }
+    }
+
+    /// Demand of the next control step, which the joint makes next.
+    pub(crate) fn before(&self) -> Before {
+        let demand = self.image.demand();
+        let feedforward_torque = self.joint.bearing(&demand).command.torque;
+        Before { demand, feedforward_torque, collisions: self.joint.external_torque().collisions }
+    }
+
+    /// Takes what that control step told, and does the task's work once a millisecond.
+    pub(crate) fn after(&mut self, before: &Before, telemetry: &Telemetry) {
+        let found = self.joint.external_torque();
+        if found.collisions != before.collisions {
+            self.image.collide(found.reaction);
+        }
+        self.steps += 1;
+        let per_work = u64::from(self.rate / 1_000).max(1);
+        if self.steps.is_multiple_of(per_work) {
+            self.observe(telemetry, before.feedforward_torque);
+            self.work();
         }
     }
 

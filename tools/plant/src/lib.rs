@@ -32,7 +32,7 @@
 //! - [`fourier`], [`excitation`]: the motions that are recorded
 //! - [`parameters`], [`randomised`]: everything that describes a joint, and joints drawn at random
 //! - [`virtual_joint`]: the firmware's own control step, closed over the actuator
-//! - [`arm`]: several of them on one tree of links
+//! - [`arm`]: several of them on one tree of links; [`links`]: these links
 //! - [`error`]: what is refused, and the range that would not be
 
 #![forbid(unsafe_code)]
@@ -46,6 +46,7 @@ pub mod fourier;
 pub mod friction;
 pub mod friction_factors;
 pub mod joint;
+pub mod links;
 pub mod load;
 pub mod motor;
 pub mod parameters;
@@ -60,5 +61,6 @@ pub use arm::Arm;
 pub use error::ParameterError;
 pub use excitation::Excitation;
 pub use joint::Joint;
+pub use links::{ArmError, Links};
 pub use parameters::JointParameters;
 pub use virtual_joint::VirtualJoint;

@@ -3,7 +3,8 @@
 use joint_firmware::joint::state_machine::Controlword;
 use joint_firmware::joint::{Command, Demand, Mode};
 use nalgebra::{Matrix3, Unit, Vector3};
-use plant::arm::{Arm, ArmError, EVERY};
+use plant::Arm;
+use plant::links::{ArmError, EVERY, Links};
 use plant::load::{GRAVITY, LoadParameters};
 use plant::virtual_joint::Setup;
 use plant::{ActuatorParameters, VirtualJoint};
@@ -97,6 +98,45 @@ fn accelerations_are_those_of_the_rigid_bodies_under_motor_friction_and_external
     // Links matter: the joints' own inertia alone is a part of it.
     let [q, _] = arm.state();
     assert!(mass_matrix(&tree, &q)[(0, 0)] > 0.2 * rotors[0]);
+}
+
+#[test]
+fn a_joint_that_is_held_stands_and_the_others_move_around_it() {
+    const JOINTS: usize = 3;
+    let tree = tree(Shape { joints: JOINTS, branches: false, prismatic: 0.0, armature: false }, 5);
+    let mut joints: Vec<VirtualJoint> = (0..JOINTS as u64).map(bare).collect();
+    let mut links = Links::new(tree.clone(), &joints.iter().collect::<Vec<_>>()).unwrap();
+    let rotors: Vec<f64> = joints.iter().map(|joint| joint.actuator().parameters().joint.inertia()).collect();
+    // The middle one turns before it is held.
+    let external = [4.0, 9.0, -3.0];
+    let mut step = |joints: &mut Vec<VirtualJoint>, held: &[bool]| {
+        let mut joints: Vec<&mut VirtualJoint> = joints.iter_mut().collect();
+        links.step(&mut joints, &[], &external, held);
+    };
+    (0..EVERY * 100).for_each(|_| step(&mut joints, &[]));
+    let state = |joints: &[VirtualJoint], i: usize| joints[i].actuator().state().joint;
+    assert!(state(&joints, 1).velocity.abs() > 0.01, "{}", state(&joints, 1).velocity);
+    let held = [false, true, false];
+    step(&mut joints, &held);
+    let stood = state(&joints, 1).position;
+    let mut moved = 0.0f64;
+    for _ in 0..EVERY * 100 {
+        let at: [Vec<f64>; 2] = [
+            (0..JOINTS).map(|i| state(&joints, i).position).collect(),
+            (0..JOINTS).map(|i| state(&joints, i).velocity).collect(),
+        ];
+        step(&mut joints, &held);
+        assert!((state(&joints, 1).position - stood).abs() < 1e-9 && state(&joints, 1).velocity.abs() < 1e-9);
+        let a: Vec<f64> = (0..JOINTS).map(|i| state(&joints, i).acceleration).collect();
+        let inertial = inverse_dynamics(&tree, &at[0], &at[1], &a);
+        for i in [0, 2] {
+            let state = state(&joints, i);
+            let left = inertial[i] + rotors[i] * a[i] - (state.motor_torque - state.friction_torque + external[i]);
+            assert!(left.abs() < 0.5, "joint {i}: {left} Nm are left");
+        }
+        moved = moved.max(state(&joints, 0).velocity.abs());
+    }
+    assert!(moved > 0.05, "{moved}");
 }
 
 #[test]
