@@ -17,11 +17,11 @@ use plant::{Arm, VirtualJoint};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
-use rigid_body::mass_matrix::mass_matrix;
 use rigid_body::newton_euler::inverse_dynamics;
 use rigid_body::random_tree::urdf;
-use rigid_body::{Joint, JointKind, LinkInertia, Placement, Tree};
-use robot::{Options, fit, record};
+use rigid_body::{Joint, JointKind, LinkInertia, Placement, Robot, Tree};
+use robot::controller::Share;
+use robot::{Controller, Options, fit, record};
 use std::fmt::Write;
 
 /// Joints.
@@ -154,6 +154,7 @@ fn demand(command: Command, sequence: u32) -> Demand {
 
 /// An identified arm.
 pub struct IdentifiedArm {
+    controller: Controller,
     /// Links, and rotor inertias on the joints' side.
     tree: Tree,
     rotors: Vec<f64>,
@@ -184,7 +185,9 @@ pub fn identified() -> Result<IdentifiedArm, String> {
     tree.joints.iter_mut().zip(&fitted.links).for_each(|(joint, link)| joint.link = *link);
     let rate = actuators()[0].1.bridge.motion_rate();
     let models = fitted.joints.iter().map(|joint| FrictionModel::new(&joint.image.friction, rate)).collect();
-    Ok(IdentifiedArm { tree, rotors: fitted.rotors.clone(), models, percent: fitted.mean_percent() })
+    let robot = Robot { tree: tree.clone(), ..recording.robot };
+    let controller = Controller::new(robot, &fitted.rotors, BANDWIDTH);
+    Ok(IdentifiedArm { controller, tree, rotors: fitted.rotors.clone(), models, percent: fitted.mean_percent() })
 }
 
 /// Links by their data sheet: masses a third too large, centres a fifth too near.
@@ -290,21 +293,16 @@ impl IdentifiedArm {
 
     /// The model's torque of the reference, and gains by the inertia of each joint there.
     fn in_the_joints(&self, [q, v, a]: [Vec<f64>; 3]) -> Vec<Command> {
-        let torque = inverse_dynamics(&self.tree, &q, &v, &a);
-        let mass = mass_matrix(&self.tree, &q);
-        let command = |i: usize| {
-            let inertia = mass[(i, i)] + self.rotors[i];
-            Command {
-                mode: Mode::Impedance,
-                position: q[i] as f32,
-                velocity: v[i] as f32,
-                torque: (torque[i] + self.rotors[i] * a[i]) as f32,
-                stiffness: (inertia * BANDWIDTH * BANDWIDTH) as f32,
-                damping: (2.0 * inertia * BANDWIDTH) as f32,
-                ..Command::NOTHING
-            }
+        let command = |(i, share): (usize, &Share)| Command {
+            mode: Mode::Impedance,
+            position: q[i] as f32,
+            velocity: v[i] as f32,
+            torque: share.torque as f32,
+            stiffness: share.stiffness as f32,
+            damping: share.damping as f32,
+            ..Command::NOTHING
         };
-        (0..JOINTS).map(command).collect()
+        self.controller.at(&q, &v, &a).iter().enumerate().map(command).collect()
     }
 
     /// The torque of what the master wants by what the joints told; what is not gravity is told as a push.

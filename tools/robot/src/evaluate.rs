@@ -14,6 +14,7 @@ use identification::rigid::RigidParameters;
 use identification::samples::Part;
 use nalgebra::DVector;
 use rayon::prelude::*;
+use rigid_body::Robot;
 use rigid_body::inertia::PARAMETERS;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -147,8 +148,11 @@ pub fn evaluate(
     Ok(errors)
 }
 
-/// Rigid parts and images of all joints, in the recording's order.
-fn fitted(folder: &Path, recording: &Recording) -> Result<(Vec<JointBodies>, Vec<Image>), RobotEvaluateError> {
+/// Rigid parts of a fitted robot in `folder`, in the order of the joints of `robot`, which `of` describes.
+///
+/// # Errors
+/// A file that is missing, damaged or of another robot.
+pub fn bodies_of(folder: &Path, robot: &Robot, of: &Path) -> Result<Vec<JointBodies>, RobotEvaluateError> {
     #[derive(Deserialize)]
     struct Summary {
         bodies: Bodies,
@@ -159,17 +163,26 @@ fn fitted(folder: &Path, recording: &Recording) -> Result<(Vec<JointBodies>, Vec
         std::fs::read_to_string(&path).map_err(|source| RobotEvaluateError::Read { path: path.clone(), source })?;
     let Summary { bodies } = serde_json::from_str(&text)
         .map_err(|error| refused(format!("{error}; `jointctl robot fit` of this version writes it")))?;
-    let (mut ordered, mut images) = (Vec::new(), Vec::new());
+    let of_joint = |name: &String| {
+        let names = || bodies.keys().map(String::as_str).collect::<Vec<&str>>().join(", ");
+        let missing = || {
+            refused(format!(
+                "joint {name} of {} is not in it, it has {}; fit a recording of this robot",
+                of.display(),
+                names()
+            ))
+        };
+        bodies.get(name).copied().ok_or_else(missing)
+    };
+    robot.tree.joints.iter().map(|joint| of_joint(&joint.name)).collect()
+}
+
+/// Rigid parts and images of all joints, in the recording's order.
+fn fitted(folder: &Path, recording: &Recording) -> Result<(Vec<JointBodies>, Vec<Image>), RobotEvaluateError> {
+    let bodies = bodies_of(folder, &recording.robot, &recording.path)?;
+    let mut images = Vec::new();
     for (joint, prepared) in recording.robot.tree.joints.iter().zip(&recording.joints) {
         let name = &joint.name;
-        let Some(own) = bodies.get(name) else {
-            let names: Vec<&str> = bodies.keys().map(String::as_str).collect();
-            return Err(refused(format!(
-                "joint {name} of {} is not in it, it has {}; fit a recording of this robot",
-                recording.path.display(),
-                names.join(", ")
-            )));
-        };
         let file = folder.join(name).join("friction.img");
         let image = read(&file)?;
         verify(&image, &file)?;
@@ -182,10 +195,9 @@ fn fitted(folder: &Path, recording: &Recording) -> Result<(Vec<JointBodies>, Vec
             );
             return Err(ImageFileError::Image { path: file, reason }.into());
         }
-        ordered.push(*own);
         images.push(image);
     }
-    Ok((ordered, images))
+    Ok((bodies, images))
 }
 
 /// Effort of the links and rotors for every joint and sample.

@@ -16,9 +16,10 @@
 //! 5. [`mod@fit`] is the whole way, [`files`] its output, [`page`] the page of it; [`mod@evaluate`] judges that output
 //!    on another recording.
 //!
-//! [`excite`] finds the motion of all joints that such a recording should be of.
+//! [`controller`] moves a robot by what came out. [`excite`] finds the motion of all joints that such a recording should be of.
 
 pub mod choose;
+pub mod controller;
 pub mod convex;
 pub mod equations;
 pub mod evaluate;
@@ -32,6 +33,7 @@ pub mod noise;
 pub mod page;
 pub mod recording;
 
+pub use controller::Controller;
 pub use fit::{FittedRobot, Options, fit};
 pub use recording::{Recording, RobotFitError, read_robot, record};
 

@@ -1,13 +1,14 @@
 //! `jointctl sim --bus` and `jointctl scan`: virtual joints on a CAN bus, and who is there.
 
 use super::CommandError;
+use super::arm::Arm;
 use super::remote::Patience;
 use crate::remote::present::{PATIENCE, present};
 use bus::client::{ClientError, Node};
 use canopen_node::NO_NODE_ID;
 use clap::Args;
 use friction_compensation::parameters::image::Image;
-use node::{Options, Storage, VirtualNode, serve};
+use node::{Options, Storage, VirtualArm, VirtualNode, serve};
 use plant::ActuatorParameters;
 use plant::virtual_joint::Setup;
 use serde_json::json;
@@ -25,8 +26,9 @@ pub struct OnBus {
     /// slcan:tcp://host:port, slcan:listen://host:port, udp:239.74.163.2:43113
     #[arg(long, value_name = "BUS")]
     bus: Option<String>,
-    /// Node id on the bus, 1 to 127, or 255 for one that LSS has to give; repeatable, a joint each
-    #[arg(long, value_name = "N", default_values_t = [1], requires = "bus")]
+    /// Node id on the bus, 1 to 127, or 255 for one that LSS has to give; repeatable, a joint each [default: 1; with
+    /// --robot 1, 2 and so on]
+    #[arg(long, value_name = "N", requires = "bus")]
     node: Vec<u8>,
     /// Serial number of the first joint, the others count up [default: the node id; without one, 1000 and up]
     #[arg(long, value_name = "N", requires = "bus")]
@@ -94,20 +96,12 @@ impl OnBus {
         let failed = |error: &dyn std::fmt::Display| CommandError::Bus(error.to_string());
         std::thread::scope(|scope| {
             let mut joints = Vec::new();
-            for (&id, place) in self.node.iter().zip(0..) {
+            let nodes = if self.node.is_empty() { &[1][..] } else { &self.node };
+            for (&id, place) in nodes.iter().zip(0..) {
                 let transport = bus::open(name).map_err(|error| failed(&error))?;
-                // Joints without node ids are told apart by their serial numbers alone.
-                let serial = match self.serial {
-                    Some(first) => first.wrapping_add(place),
-                    None if id == NO_NODE_ID => WITHOUT_ID + place,
-                    None => id.into(),
-                };
-                let options = Options { node_id: id, serial, seed: serial.into() };
+                let options = self.options(id, place);
                 let mut joint = self.joint(plant, setup, &options, image)?;
-                match id {
-                    NO_NODE_ID => eprintln!("{name}: virtual joint without a node id, serial {serial}"),
-                    id => eprintln!("node {id} on {name}: virtual joint, serial {serial}"),
-                }
+                eprintln!("{}", introduced(name, "virtual joint", &options));
                 let stop = &stop;
                 joints.push(scope.spawn(move || {
                     let left = serve(&mut joint, &*transport, stop);
@@ -116,7 +110,7 @@ impl OnBus {
                 }));
             }
             wait(duration, &stop);
-            for (joint, id) in joints.into_iter().zip(&self.node) {
+            for (joint, id) in joints.into_iter().zip(nodes) {
                 match joint.join() {
                     Ok(Ok(lost)) if lost > 0.0 => {
                         eprintln!("node {id}: {lost:.1} s were lost, this machine is too slow for real time");
@@ -132,6 +126,39 @@ impl OnBus {
 }
 
 impl OnBus {
+    /// Runs the joints of an arm in real time, in the order of its tree's.
+    pub fn run_arm(&self, name: &str, arm: Arm) -> Result<(), CommandError> {
+        let nodes = match (self.node.len(), arm.joints.len()) {
+            (0, joints) => (1..=joints as u8).collect(),
+            (nodes, joints) if nodes == joints => self.node.clone(),
+            (nodes, joints) => {
+                let text = format!("the robot has {joints} joints, --node is given {nodes} times");
+                return Err(CommandError::Arguments(text));
+            }
+        };
+        let failed = |error: &dyn std::fmt::Display| CommandError::Bus(error.to_string());
+        let transport = bus::open(name).map_err(|error| failed(&error))?;
+        let mut joints = Vec::new();
+        for ((joint, &id), place) in arm.joints.iter().zip(&nodes).zip(0..) {
+            let options = self.options(id, place);
+            joints.push(self.joint(&joint.plant, &joint.setup, &options, None)?);
+            eprintln!("{}", introduced(name, &joint.name, &options));
+        }
+        let mut arm = VirtualArm::new(arm.tree, joints).map_err(|error| failed(&error))?;
+        self.until_the_end(|stop| serve(&mut arm, &*transport, stop).map_err(|error| failed(&error)))
+    }
+
+    /// Options of the joint at a place.
+    fn options(&self, node_id: u8, place: u32) -> Options {
+        // Joints without node ids are told apart by their serial numbers alone.
+        let serial = match self.serial {
+            Some(first) => first.wrapping_add(place),
+            None if node_id == NO_NODE_ID => WITHOUT_ID + place,
+            None => node_id.into(),
+        };
+        Options { node_id, serial, seed: serial.into() }
+    }
+
     /// A joint with what it has stored before. An image that is given comes first, as if it had been committed.
     fn joint(
         &self,
@@ -155,6 +182,13 @@ impl OnBus {
             storage.store_image(&buffer[..length]).map_err(|error| failed(&error))?;
         }
         VirtualNode::with_storage(*plant, setup, options, storage).map_err(|error| failed(&error))
+    }
+}
+
+fn introduced(bus: &str, joint: &str, options: &Options) -> String {
+    match options.node_id {
+        NO_NODE_ID => format!("{bus}: {joint} without a node id, serial {}", options.serial),
+        id => format!("node {id} on {bus}: {joint}, serial {}", options.serial),
     }
 }
 

@@ -4,7 +4,7 @@ use clap::Command;
 
 /// Names of commands below `jointctl`, and lines as one types them. `JOINTCTL_BUS` and `JOINTCTL_NODE` stand for
 /// `--bus` and `--node`.
-const EXAMPLES: [(&str, &[&str]); 49] = [
+const EXAMPLES: [(&str, &[&str]); 50] = [
     (
         "",
         &[
@@ -34,6 +34,13 @@ const EXAMPLES: [(&str, &[&str]); 49] = [
     (
         "robot evaluate",
         &["jointctl robot evaluate arm second.toml", "jointctl robot evaluate arm recording.toml --test"],
+    ),
+    (
+        "robot move",
+        &[
+            "jointctl robot move robot.toml --motion motion --bus socketcan:can0 --node 5 --node 6 --out recorded",
+            "jointctl robot move robot.toml --motion motion --bus socketcan:can0 --fitted arm --compare",
+        ],
     ),
     (
         "fleet sums",
@@ -71,6 +78,7 @@ const EXAMPLES: [(&str, &[&str]); 49] = [
             "jointctl sim --image demo/friction.img",
             "jointctl sim --config joint.toml --plant plant.toml --scenario slow-reversal",
             "jointctl sim --bus udp:239.74.163.2:43113 --node 5 --node 6",
+            "jointctl sim --robot robot.toml --bus udp:239.74.163.2:43113",
         ],
     ),
     ("scan", &["jointctl scan --bus socketcan:can0"]),

@@ -50,7 +50,8 @@ impl JointChoice {
     }
 }
 
-fn read_plant(path: &Path) -> Result<ActuatorParameters, CommandError> {
+/// Parameters of an actuator in a file, checked.
+pub fn read_plant(path: &Path) -> Result<ActuatorParameters, CommandError> {
     let refused = |reason: String| CommandError::PlantFile { path: path.to_owned(), reason };
     let text = std::fs::read_to_string(path).map_err(|source| CommandError::Read { path: path.to_owned(), source })?;
     let plant: ActuatorParameters =

@@ -1,5 +1,6 @@
 //! The commands of `jointctl`, one file each: arguments in, files and a few lines of text out; host.
 
+mod arm;
 mod bench;
 pub mod bus;
 pub mod bus_yml;

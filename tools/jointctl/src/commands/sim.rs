@@ -1,6 +1,7 @@
 //! `jointctl sim`: the firmware's joint in closed loop with the simulated actuator, without and with compensation.
 
 use super::CommandError;
+use super::arm::ArmChoice;
 use super::bus::OnBus;
 use super::force::Force;
 use super::image::read;
@@ -48,6 +49,9 @@ pub struct Sim {
     /// The bus.
     #[command(flatten)]
     on_bus: OnBus,
+    /// The arm.
+    #[command(flatten)]
+    arm: ArmChoice,
     /// The program of a board.
     #[command(flatten)]
     on_board: OnBoard,
@@ -86,6 +90,9 @@ impl Sim {
         if let (Some(bus), true) = (self.on_bus.bus(), self.on_board.is_named()) {
             let (behind, storage) = (self.joint.behind()?, self.on_bus.storage());
             return self.on_bus.until_the_end(|stop| self.on_board.run(bus, &behind, storage, stop));
+        }
+        if let (Some(bus), Some(arm)) = (self.on_bus.bus(), self.arm.read()?) {
+            return self.on_bus.run_arm(bus, arm);
         }
         let (plant, setup) = self.joint.read()?;
         if let Some(bus) = self.on_bus.bus() {

@@ -15,6 +15,7 @@
 //! - [`commission`]: the objects of a joint for its commissioning
 //! - [`record`]: samples as a data set; [`retrain`]: a joint's friction learned anew, from excitation to commit;
 //!   [`load_check`]: the load that it shows against the configured one
+//! - [`robot_motion`]: all joints of a robot at once
 //! - [`address`]: node ids for new joints; [`info`]: a joint on one page
 
 pub mod address;
@@ -36,6 +37,7 @@ pub mod present;
 pub mod record;
 pub mod refusal;
 pub mod retrain;
+pub mod robot_motion;
 pub mod route;
 mod session;
 pub mod stream;

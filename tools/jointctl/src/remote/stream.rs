@@ -120,6 +120,13 @@ impl Stream {
     /// velocity to the next in a straight line. `acknowledge` resets a fault whose cause is
     /// gone; without it a fault is an error.
     pub fn begin(joint: &RemoteJoint, mode: Mode, rate: f64, acknowledge: bool) -> Result<Self, RemoteError> {
+        let position = joint.number(Field::Actual(Actual::Position))? as f32;
+        Self::begin_with(joint, Command { mode, position, ..Command::default() }, rate, acknowledge)
+    }
+
+    /// As [`Stream::begin`], in the mode of `hold`, which is what is asked of the joint at first.
+    pub fn begin_with(joint: &RemoteJoint, hold: Command, rate: f64, acknowledge: bool) -> Result<Self, RemoteError> {
+        let mode = hold.mode;
         let deadline = joint.number(Field::Setting(Setting::CommandDeadline))?;
         let [low, high] = RATES;
         // Upwards, and a REAL32's 0.1 s as the 0.1 s that it means.
@@ -144,8 +151,6 @@ impl Stream {
                 counter: joint.raw(Field::SetPoint(SetPoint::Counter))? as u8,
             })
         };
-        let position = joint.number(Field::Actual(Actual::Position))? as f32;
-        let hold = Command { mode, position, ..Command::default() };
         let shared = Shared { controlword: AtomicU16::new(Controlword::DISABLE_VOLTAGE.0), failure: Mutex::default() };
         let mut stream = Self {
             joint: joint.clone(),

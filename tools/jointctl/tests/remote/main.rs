@@ -14,6 +14,7 @@ mod punctual;
 mod refused;
 mod registry;
 mod retrain;
+mod robot;
 mod served;
 #[path = "../shown/mod.rs"]
 mod shown;
@@ -107,6 +108,10 @@ fn main() {
             a_recording_of_a_motion_is_a_data_set,
             two_producers_of_sync_are_told_of,
             a_round_after_which_the_joint_keeps_its_image_prints_its_figures_and_ends_with_3,
+        }
+        robot {
+            all_joints_of_an_arm_move_together_and_are_left_disabled,
+            an_arm_of_the_program_is_moved_and_recorded_by_the_program,
         }
         telemetry {
             samples_come_with_every_sync_in_si_units_and_the_pdos_are_put_back,

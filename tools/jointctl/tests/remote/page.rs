@@ -1,10 +1,10 @@
 //! docs/on-the-bus.md and docs/ownership.md, line by line as they stand.
 
 use crate::punctual;
-use crate::served::{DEADLINE, NODE, Served, image, program};
+use crate::served::{DEADLINE, NODE, Running, Served, image, program};
 use crate::shown::{ON_THE_BUS, OWNERSHIP, lines};
 use std::io::{BufRead, BufReader};
-use std::process::{Child, Output, Stdio};
+use std::process::{Output, Stdio};
 
 /// The bus of the page; here each run has a port of its own.
 const BUS: &str = "udp:239.74.163.2:43113";
@@ -19,17 +19,6 @@ const ELSEWHERE: [&str; 6] = [
     "jointctl sim --elf",
     "jointctl address",
 ];
-
-/// A program that is ended with this.
-struct Running(Child);
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        // It may have ended by itself.
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
 
 fn assert_done(line: &str, output: &Output) {
     let told = [&output.stdout[..], &output.stderr].map(String::from_utf8_lossy).concat();

@@ -9,10 +9,11 @@ use friction_compensation::friction::{FrictionModel, FrictionParameters, Paramet
 use friction_compensation::parameters::certificate::Limits;
 use friction_compensation::parameters::image::{Effort, GoldenVector, Image, MAX_LENGTH, Target};
 use jointctl::remote::RemoteJoint;
-use node::{Options, SlotImages, Storage, VirtualNode, serve};
+use node::{Options, SlotImages, Storage, VirtualArm, VirtualNode, serve};
 use plant::ActuatorParameters;
+use plant::load::LoadParameters;
 use plant::virtual_joint::Setup;
-use std::process::Command;
+use std::process::{Child, Command};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::JoinHandle;
@@ -30,6 +31,17 @@ pub fn program() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_jointctl"));
     command.env("JOINTCTL_TIMEOUT", PATIENCE.as_millis().to_string());
     command
+}
+
+/// A program that ends with its test.
+pub struct Running(pub Child);
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        // It may have ended by itself.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
 }
 
 /// Node id of the first joint.
@@ -96,6 +108,29 @@ impl Served {
         Self { bus, stop, threads: vec![thread] }
     }
 
+    /// Joints 1, 2 and so on of the arm that a file describes.
+    pub fn arm(robot: &std::path::Path) -> Self {
+        static BUSES: AtomicU64 = AtomicU64::new(0);
+        let bus = format!("virtual:remote-arm-{}", BUSES.fetch_add(1, Ordering::Relaxed));
+        let transport = bus::open(&bus).unwrap();
+        let stop = Arc::new(AtomicBool::new(false));
+        let (robot, _) = robot::read_robot(robot, &|_| None).unwrap();
+        let mut parameters = ActuatorParameters::reference().aligned();
+        let mut setup = Setup::of(&parameters);
+        setup.configuration.limits.command_deadline = DEADLINE;
+        parameters.joint.load = LoadParameters { inertia: 0.0, mass: 0.0, length: 0.0 };
+        let node = |node_id: u8| {
+            let options = Options { node_id, serial: node_id.into(), seed: node_id.into() };
+            VirtualNode::new(parameters, &setup, &options, SlotImages::empty().unwrap()).unwrap()
+        };
+        let nodes = (1..=robot.tree.len() as u8).map(node).collect();
+        let mut arm = VirtualArm::new(robot.tree, nodes).unwrap();
+        arm.advance(4_000);
+        let stopped = Arc::clone(&stop);
+        let thread = std::thread::spawn(move || drop(serve(&mut arm, &*transport, &stopped)));
+        Self { bus, stop, threads: vec![thread] }
+    }
+
     /// A joint that has this stored.
     pub fn stored(folder: &std::path::Path) -> Self {
         // One test alone has such a joint.
@@ -123,7 +158,12 @@ impl Served {
 
     /// A client of its own for the first joint.
     pub fn joint(&self) -> RemoteJoint {
-        RemoteJoint::open_within(&self.bus, NODE, PATIENCE).unwrap()
+        self.joint_at(NODE)
+    }
+
+    /// The same for another node.
+    pub fn joint_at(&self, node: u8) -> RemoteJoint {
+        RemoteJoint::open_within(&self.bus, node, PATIENCE).unwrap()
     }
 }
 

@@ -3,6 +3,7 @@
 pub mod evaluate;
 pub mod excite;
 pub mod fit;
+pub mod motion;
 
 use super::CommandError;
 use clap::Subcommand;
@@ -16,6 +17,8 @@ pub enum RobotCommand {
     Excite(excite::RobotExcite),
     /// Judge a fitted robot, links and images, on another recording
     Evaluate(evaluate::RobotEvaluate),
+    /// Move all joints at once by computed torque, over a bus, and record them
+    Move(Box<motion::RobotMove>),
 }
 
 impl RobotCommand {
@@ -25,6 +28,7 @@ impl RobotCommand {
             Self::Fit(fit) => fit.run(),
             Self::Excite(excite) => excite.run(),
             Self::Evaluate(evaluate) => evaluate.run(),
+            Self::Move(motion) => motion.run(),
         }
     }
 }

@@ -1,0 +1,123 @@
+//! Arguments of `jointctl sim --robot`: an arm of virtual joints, each with its actuator, on the links of a URDF.
+
+use super::CommandError;
+use super::joint::read_plant;
+use crate::joint_text;
+use clap::Args;
+use plant::ActuatorParameters;
+use plant::load::LoadParameters;
+use plant::virtual_joint::Setup;
+use rigid_body::newton_euler::inverse_dynamics;
+use rigid_body::{JointKind, Robot, Tree};
+use robot::read_robot;
+use std::path::PathBuf;
+
+/// Postures of which the heaviest counts, for each joint.
+const POSTURES: u32 = 1_000;
+
+/// Which arm.
+#[derive(Debug, Args)]
+pub struct ArmChoice {
+    /// Run the joints of this robot, a node each, on the links of its URDF (docs/robot.md). A joint that is not enabled
+    /// is held, as by a brake
+    #[arg(long, value_name = "TOML", requires = "bus",
+        conflicts_with_all = ["config", "plant", "joint", "image", "elf", "scenario", "excitation"])]
+    robot: Option<PathBuf>,
+    /// Folder with JOINT/plant.toml and JOINT/joint.toml for joints that differ from the reference joint
+    #[arg(long, value_name = "DIR", requires = "robot")]
+    actuators: Option<PathBuf>,
+}
+
+/// A joint of an arm.
+#[derive(Debug)]
+pub struct ArmJoint {
+    /// Its name in the URDF.
+    pub name: String,
+    /// Its actuator, without link and payload.
+    pub plant: ActuatorParameters,
+    /// Its board and configuration.
+    pub setup: Setup,
+}
+
+/// An arm that can be run.
+#[derive(Debug)]
+pub struct Arm {
+    /// Its links.
+    pub tree: Tree,
+    /// Its joints, in the order of the tree's.
+    pub joints: Vec<ArmJoint>,
+}
+
+impl ArmChoice {
+    /// The arm, where one is named; says on standard error which actuators are too weak for their links.
+    pub fn read(&self) -> Result<Option<Arm>, CommandError> {
+        let Some(path) = &self.robot else { return Ok(None) };
+        let (robot, _) = read_robot(path, &|name| std::env::var(name).ok())?;
+        let refused = |reason: String| CommandError::Arguments(format!("{}: {reason}", path.display()));
+        for (row, joint) in robot.tree.joints.iter().enumerate() {
+            if joint.kind != JointKind::Revolute {
+                return Err(refused(format!("joint {} slides; virtual joints turn", joint.name)));
+            }
+            if (0..robot.tree.len()).any(|column| column != row && robot.coupling[(row, column)] != 0.0) {
+                return Err(refused(format!("joint {} shares its motor; virtual joints have their own", joint.name)));
+            }
+        }
+        if let Some(folder) = self.actuators.as_deref().filter(|folder| !folder.is_dir()) {
+            return Err(CommandError::Arguments(format!("--actuators {}: there is no such folder", folder.display())));
+        }
+        let joint = |name: &String| self.joint(name);
+        let joints: Vec<ArmJoint> =
+            robot.tree.joints.iter().map(|of| joint(&of.name)).collect::<Result<_, CommandError>>()?;
+        for (joint, weight) in joints.iter().zip(heaviest(&robot)) {
+            let torque = f64::from(joint.setup.configuration.limits.torque);
+            if weight > torque {
+                eprintln!(
+                    "{}: its links weigh up to {weight:.1} Nm, its actuator gives {torque:.1} Nm; --actuators names \
+                     others",
+                    joint.name
+                );
+            }
+        }
+        Ok(Some(Arm { tree: robot.tree, joints }))
+    }
+
+    fn joint(&self, name: &str) -> Result<ArmJoint, CommandError> {
+        let file = |file: &str| {
+            let path = self.actuators.as_ref()?.join(name).join(file);
+            path.exists().then_some(path)
+        };
+        let mut plant = match file("plant.toml") {
+            Some(path) => read_plant(&path)?,
+            None => ActuatorParameters::reference(),
+        }
+        .aligned();
+        // Gains and limits are those of a joint with the link that its actuator is meant for.
+        let mut setup = Setup::of(&plant);
+        if let Some(path) = file("joint.toml") {
+            setup.configuration = joint_text::read(&path, &setup.bridge)?;
+        }
+        plant.joint.load = LoadParameters { inertia: 0.0, mass: 0.0, length: 0.0 };
+        Ok(ArmJoint { name: name.to_owned(), plant, setup })
+    }
+}
+
+/// Largest torque that gravity takes of each joint, Nm, over postures within its travel, or within half a turn either
+/// way where it has none.
+fn heaviest(robot: &Robot) -> Vec<f64> {
+    let still = vec![0.0; robot.tree.len()];
+    let mut most = still.clone();
+    for posture in 0..POSTURES {
+        // Multiples of the roots of primes lie evenly in as many directions as there are joints.
+        let part = |i: usize| (f64::from(posture) * PRIMES[i % PRIMES.len()].sqrt()).fract();
+        let at = |(i, limits): (usize, &rigid_body::limits::Limits)| {
+            let (low, high) = limits.position.unwrap_or((-std::f64::consts::PI, std::f64::consts::PI));
+            low + part(i) * (high - low)
+        };
+        let q: Vec<f64> = robot.limits.iter().enumerate().map(at).collect();
+        let torques = inverse_dynamics(&robot.tree, &q, &still, &still);
+        most.iter_mut().zip(torques).for_each(|(most, torque)| *most = most.max(torque.abs()));
+    }
+    most
+}
+
+const PRIMES: [f64; 8] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0];
