@@ -144,14 +144,26 @@ function save(name, content) {
   URL.revokeObjectURL(link.href);
 }
 
-// A button for each file, whose content is text or bytes.
+function button(text, act) {
+  const made = document.createElement("button");
+  made.type = "button";
+  made.textContent = text;
+  made.onclick = act;
+  return made;
+}
+
+// Buttons for each file, whose content is text or bytes; one with a path is a report, shown in the frame below.
 function offer(id, files) {
-  by(id).replaceChildren(...files.map(({ name, text, bytes }) => {
-    const button = document.createElement("button");
-    button.type = "button";
-    button.textContent = `Save ${name}`;
-    button.onclick = () => save(name, text ?? new Uint8Array(bytes));
-    return button;
+  const frame = by(`${id}-frame`);
+  frame.hidden = true;
+  by(id).replaceChildren(...files.flatMap(({ name, text, bytes, path }) => {
+    const saves = button(`Save ${name}`, () => save(name, text ?? new Uint8Array(bytes)));
+    if (!path) return [saves];
+    const shows = button(`Show ${name}`, () => {
+      frame.hidden = !frame.hidden;
+      if (!frame.hidden) frame.src = path;
+    });
+    return [saves, shows];
   }));
 }
 

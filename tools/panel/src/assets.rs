@@ -12,7 +12,8 @@ pub struct Asset {
     pub text: &'static str,
 }
 
-const HTML: &str = "text/html; charset=utf-8";
+/// Content type of a page.
+pub const HTML: &str = "text/html; charset=utf-8";
 const CSS: &str = "text/css; charset=utf-8";
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 
@@ -30,12 +31,13 @@ pub const ASSETS: [Asset; 10] = [
     Asset { path: "/panel.js", kind: SCRIPT, text: include_str!("../assets/panel.js") },
 ];
 
-/// Headers of every answer: nothing but this server's own files and its WebSocket, in no frame, kept nowhere.
+/// Headers of every answer: nothing but this server's own files and its WebSocket, in no frame, kept nowhere. A report
+/// has a policy of its own.
 pub const HEADERS: [(&str, &str); 5] = [
     (
         "content-security-policy",
-        "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; base-uri 'none'; \
-         form-action 'none'; frame-ancestors 'none'",
+        "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; frame-src 'self'; \
+         base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
     ),
     ("x-content-type-options", "nosniff"),
     ("referrer-policy", "no-referrer"),

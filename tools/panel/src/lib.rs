@@ -5,7 +5,8 @@
 //!          held, 50 ms  ->  hold  ------------------------->  stream's source, owner (200 ms)
 //! ```
 //!
-//! - [`server`]: HTTP and WebSocket on 127.0.0.1; [`guard`]: Host, Origin and token; [`assets`]: the files of the page
+//! - [`server`]: HTTP and WebSocket on 127.0.0.1; [`guard`]: Host, Origin and token; [`assets`]: the files of the page;
+//!   [`reports`]: those that it was made
 //! - [`message`]: what a page may ask
 //! - [`owner`]: the thread that alone talks to a joint: live values, motion, requests in their order
 //! - [`hold`]: the dead man's switch; [`motion`]: jog, sine, steps, impedance, frozen as soon as it is not held
@@ -25,6 +26,7 @@ pub mod live;
 pub mod message;
 pub mod motion;
 pub mod owner;
+pub mod reports;
 pub mod scan;
 pub mod server;
 pub mod settings;

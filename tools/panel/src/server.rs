@@ -1,15 +1,16 @@
 //! HTTP and WebSocket: files of the table, and a socket for each page and joint; host, a thread of its own.
 
-use crate::assets::{HEADERS, find};
+use crate::assets::{HEADERS, HTML, find};
 use crate::guard::Guard;
 use crate::message::{LONGEST, parse};
 use crate::owner::{Owner, Session, Setup, Syncs, Told, UNREAD, Wants};
+use crate::reports::{self, Reports};
 use axum::Router;
 use axum::body::Body;
 use axum::extract::ws::rejection::WebSocketUpgradeRejection;
 use axum::extract::ws::{CloseFrame, Message, WebSocket, WebSocketUpgrade};
 use axum::extract::{Path, State};
-use axum::http::header::{CONTENT_TYPE, COOKIE, HOST, LOCATION, ORIGIN, SET_COOKIE};
+use axum::http::header::{CONTENT_SECURITY_POLICY, CONTENT_TYPE, COOKIE, HOST, LOCATION, ORIGIN, SET_COOKIE};
 use axum::http::{HeaderMap, HeaderName, Method, StatusCode, Uri};
 use axum::response::Response;
 use axum::routing::get;
@@ -38,6 +39,7 @@ pub struct Panel {
     node: u8,
     key: Option<Key>,
     syncs: Arc<Syncs>,
+    reports: Arc<Reports>,
     guard: Guard,
     owners: Mutex<HashMap<u8, Owner>>,
     /// Told where the address of the page has become another one.
@@ -48,13 +50,15 @@ impl Panel {
     /// Joints of a bus, `node` where a page names none, with `rate` SYNCs a second.
     pub fn new(network: &Network, node: u8, key: Option<Key>, rate: f64, guard: Guard, announce: fn(&str)) -> Self {
         let syncs = Arc::new(Syncs::new(network, rate));
-        Self { network: network.clone(), node, key, syncs, guard, owners: Mutex::default(), announce }
+        let (reports, owners) = (Arc::default(), Mutex::default());
+        Self { network: network.clone(), node, key, syncs, reports, guard, owners, announce }
     }
 
     fn attach(&self, node: u8, wants: Wants, tell: mpsc::Sender<Told>) -> Option<Session> {
         let mut owners = self.owners.lock().unwrap_or_else(PoisonError::into_inner);
-        let (network, key, syncs) = (self.network.clone(), self.key.clone(), Arc::clone(&self.syncs));
-        let owner = owners.entry(node).or_insert_with(|| Owner::begin(Setup { network, node, key, syncs }));
+        let (network, key) = (self.network.clone(), self.key.clone());
+        let (syncs, reports) = (Arc::clone(&self.syncs), Arc::clone(&self.reports));
+        let owner = owners.entry(node).or_insert_with(|| Owner::begin(Setup { network, node, key, syncs, reports }));
         owner.attach(wants, tell)
     }
 
@@ -172,6 +176,10 @@ async fn page(State(panel): State<Arc<Panel>>, method: Method, uri: Uri, headers
     }
     if method != Method::GET {
         return refuse(StatusCode::METHOD_NOT_ALLOWED, "this server is read with GET");
+    }
+    if let Some(report) = panel.reports.find(uri.path()) {
+        let headers = [(CONTENT_TYPE, HTML), (CONTENT_SECURITY_POLICY, reports::POLICY)];
+        return answer(StatusCode::OK, &headers, Body::from(report.to_string()));
     }
     match find(uri.path()) {
         Some(asset) => answer(StatusCode::OK, &[(CONTENT_TYPE, asset.kind)], Body::from(asset.text)),

@@ -15,6 +15,7 @@ pub use pages::Wants;
 
 use crate::hold::Hold;
 use crate::message::{Ask, Message};
+use crate::reports::Reports;
 use bus::client::{Network, SyncProducer};
 use friction_compensation::parameters::authentication::Key;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -67,6 +68,8 @@ pub struct Setup {
     pub key: Option<Key>,
     /// SYNC.
     pub syncs: Arc<Syncs>,
+    /// Reports that a page can show.
+    pub reports: Arc<Reports>,
 }
 
 enum Order {

@@ -2,6 +2,7 @@
 //! while; the owner's thread stays with the pages, tells them of it and ends it.
 
 use super::led::{Led, TURN};
+use crate::reports::Reports;
 use identification::page::verdict;
 use identification::progress::Progress;
 use jointctl::commands::fit;
@@ -48,7 +49,7 @@ impl Progress for Talk<'_> {
 ///
 /// # Errors
 /// [`RetrainError`]; the joint is as it was.
-pub fn retrain(joint: &RemoteJoint, round: &Round, led: &Led<'_>) -> Result<Outcome, RetrainError> {
+pub fn retrain(joint: &RemoteJoint, round: &Round, reports: &Reports, led: &Led<'_>) -> Result<Outcome, RetrainError> {
     let (events, told) = channel();
     let (answers, answered) = channel();
     let goes_on = AtomicBool::new(true);
@@ -58,7 +59,10 @@ pub fn retrain(joint: &RemoteJoint, round: &Round, led: &Led<'_>) -> Result<Outc
         loop {
             match told.recv_timeout(TURN) {
                 Ok(Event::Stage(name)) => led.stage(name),
-                Ok(Event::Tell(key, value)) => led.tell(key, value),
+                Ok(Event::Tell(key, mut value)) => {
+                    reports.keep_of(&mut value);
+                    led.tell(key, value);
+                }
                 Ok(Event::Rests) => led.rests(),
                 Ok(Event::Question(text)) => {
                     // A round that has ended asks nothing.

@@ -8,6 +8,7 @@ use super::{Order, Setup};
 use crate::hold::{Hold, LIMIT};
 use crate::message::{Ask, Wanted};
 use crate::motion::{Motion, RATE, Steered};
+use crate::reports::Reports;
 use crate::slow::Slow;
 use crate::{checklist, history, learning, scan, settings};
 use bus::client::{Command as Nmt, NmtState, Target};
@@ -17,6 +18,7 @@ use jointctl::commission::joint::Joint;
 use jointctl::commission::{Found, Plan, commission, find_index, page};
 use jointctl::remote::commission::RemoteObjects;
 use jointctl::remote::{Entry, RemoteError, RemoteJoint, Stream, drive};
+use report::output::OutputFile;
 use serde_json::{Value, json};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -333,14 +335,14 @@ impl Worker {
     fn commission(&mut self, joint: &RemoteJoint, page: u64, plan: &Plan, index_only: bool) -> Result<Value, String> {
         plan.check().map_err(|failure| failure.to_string())?;
         joint.require_configuration().map_err(|error| error.to_string())?;
-        let node = self.setup.node;
+        let (node, reports) = (self.setup.node, Arc::clone(&self.setup.reports));
         self.lead(COMMISSIONING, page, |led| {
             let running = || led.goes_on();
             let mut bench = Joint::new(RemoteObjects::new(joint.clone(), &running));
             let found = match index_only {
                 true => find_index(&mut bench, plan, &mut Guided(led)).map(|_| Value::Null),
                 false => commission(&mut bench, plan, &mut Guided(led))
-                    .map(|found| outcome(&found, node).unwrap_or_else(|error| json!({ "error": error }))),
+                    .map(|found| outcome(&found, node, &reports).unwrap_or_else(|error| json!({ "error": error }))),
             };
             found.map_err(|failure| failure.to_string())
         })
@@ -351,7 +353,8 @@ impl Worker {
         let folder = tempfile::tempdir().map_err(|error| format!("no folder for the recording: {error}"))?;
         let round = learning::round(wanted, self.setup.key.clone(), folder.path())?;
         let _sync = self.setup.syncs.join();
-        self.lead(LEARNING, page, |led| match retrain(joint, &round, led) {
+        let reports = Arc::clone(&self.setup.reports);
+        self.lead(LEARNING, page, |led| match retrain(joint, &round, &reports, led) {
             Ok(outcome) => Ok(learning::outcome(&outcome)),
             Err(error) => Err(error.to_string()),
         })
@@ -418,17 +421,16 @@ impl Worker {
 
 /// A commissioning's outcome, for a page: the settings that the joint took, and the files that `jointctl commission`
 /// writes.
-fn outcome(found: &Found, node: u8) -> Result<Value, String> {
+fn outcome(found: &Found, node: u8, reports: &Reports) -> Result<Value, String> {
     let settings = found.settings.iter().map(|(setting, value)| {
         let entry = Entry::of(Field::Setting(*setting));
         json!({ "name": entry.name(), "value": value, "unit": entry.text.unit })
     });
     let files = page::files(found, node).map_err(|error| error.to_string())?;
-    let files =
-        files.into_iter().map(|file| json!({ "name": file.path, "text": String::from_utf8_lossy(&file.contents) }));
-    Ok(
-        json!({ "settings": settings.collect::<Vec<_>>(), "files": files.collect::<Vec<_>>(), "index": found.index.is_some() }),
-    )
+    let text = |file: &OutputFile| json!({ "name": file.path, "text": String::from_utf8_lossy(&file.contents) });
+    let mut files = files.iter().map(text).collect::<Value>();
+    reports.keep_of(&mut files);
+    Ok(json!({ "settings": settings.collect::<Value>(), "files": files, "index": found.index.is_some() }))
 }
 
 /// Brakes and switches off, whoever commands the joint. Where nothing was under current before, it goes on to send live

@@ -67,6 +67,14 @@ impl Browser {
         self.call("POST", "/execute/sync", &json!({ "script": format!("return {script};"), "args": [] }))
     }
 
+    /// Does something within a frame.
+    fn inside(&self, selector: &str, work: impl FnOnce()) {
+        let frame = self.call("POST", "/element", &json!({ "using": "css selector", "value": selector }));
+        self.call("POST", "/frame", &json!({ "id": frame }));
+        work();
+        self.call("POST", "/frame", &json!({ "id": null }));
+    }
+
     fn until(&self, script: &str) {
         let began = Instant::now();
         while self.value(script) != json!(true) {
@@ -168,7 +176,7 @@ fn commission(browser: &Browser) {
     set(browser, "plan-turn", "checked = false");
     let taken = "document.querySelector('#taken tr:nth-child(8)') !== null";
     lead(browser, "commission", "plan-acknowledge", taken);
-    assert_eq!(browser.value("document.querySelectorAll('#reports button').length"), json!(2));
+    assert_eq!(browser.value("document.querySelectorAll('#reports button').length"), json!(3));
     browser.until("document.querySelector('#commission-log').textContent.includes('7 pole pairs')");
 }
 
@@ -178,8 +186,16 @@ fn retrain(browser: &Browser) {
         set(browser, &format!("retrain-{name}"), &format!("value = '{value}'"));
     }
     lead(browser, "retrain", "retrain-acknowledge", "document.querySelector('#judged tr:nth-child(3)') !== null");
-    assert_eq!(browser.value("document.querySelectorAll('#learned button').length"), json!(6));
+    assert_eq!(browser.value("document.querySelectorAll('#learned button').length"), json!(7));
     browser.until("document.querySelector('#images').textContent.includes('version 1')");
+    // The report stands in a frame of the page, with its own styles.
+    browser.value(
+        "void [...document.querySelectorAll('#learned button')].find((b) => b.textContent.startsWith('Show')).click()",
+    );
+    browser.inside("#learned-frame", || {
+        browser.until("document.querySelector('svg') !== null && document.styleSheets.length > 0");
+    });
+    browser.picture("panel-report.png");
 }
 
 pub fn the_page_shows_values_that_move_and_the_joint_stands_once_the_button_is_let_go() {

@@ -8,6 +8,9 @@ mod page;
 mod parts;
 #[cfg(unix)]
 mod program;
+#[allow(dead_code, reason = "rounds of a library, of which commands have more")]
+#[path = "../../../jointctl/tests/remote/punctual.rs"]
+mod punctual;
 mod retraining;
 mod safety;
 mod security;

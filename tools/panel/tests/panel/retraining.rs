@@ -2,9 +2,12 @@
 
 use crate::led::{Led, Next, TIMES};
 use crate::page::Page;
+use crate::punctual;
+use crate::security::get;
 use crate::served::{NODE, Served};
 use joint_firmware::objects::field::Field;
 use joint_firmware::objects::settings::Setting;
+use panel::reports::POLICY;
 use serde_json::{Value, json};
 
 const KEY: &str = "retrain";
@@ -47,6 +50,11 @@ fn learned(page: &mut Page, acknowledge: bool) -> Result<Value, String> {
 }
 
 pub fn a_joint_learns_and_what_was_let_go_while_it_computed_is_held_again() {
+    punctual::round(|_| a_round_of_a_new_joint(), Result::is_err).unwrap();
+}
+
+/// One whole round; an error where less was learned than a machine in time has it.
+fn a_round_of_a_new_joint() -> Result<(), String> {
     let served = Served::joints(&[NODE]);
     let mut page = Page::open(served.address);
     page.commands();
@@ -60,7 +68,9 @@ pub fn a_joint_learns_and_what_was_let_go_while_it_computed_is_held_again() {
     }
     let told = outcome.unwrap();
     let [before, after] = ["before", "after"].map(|state| told[state]["residual"].as_f64().unwrap());
-    assert!(after < 0.7 * before, "{told}");
+    if after >= 0.7 * before {
+        return Err(told.to_string());
+    }
     assert!(told["verdict"].as_str().unwrap().contains("Compensation removes"), "{told}");
     let images = page.answer(json!("images")).unwrap();
     assert_eq!((&images["active"]["version"], &images["previous"]), (&told["version"], &Value::Null), "{images}");
@@ -74,10 +84,26 @@ pub fn a_joint_learns_and_what_was_let_go_while_it_computed_is_held_again() {
     assert_eq!(joint.active_image().unwrap(), image);
     let table = file("log.csv")["text"].as_str().unwrap();
     assert!(table.starts_with("time_s,position_rad,") && table.lines().count() > 500, "{}", table.lines().count());
-    assert!(file("report.html")["text"].as_str().unwrap().contains("<html"));
+    let report = file("report.html");
+    assert!(report["text"].as_str().unwrap().contains("<html"));
+    is_shown_in_a_box(&served, report);
     joint.require_off("what follows").unwrap();
     // Live values come again.
     page.sees("velocity-actual-value", |velocity| velocity.abs() < 0.05);
+    Ok(())
+}
+
+/// A report is read at its path alone, by this server's page, with a policy that runs nothing.
+fn is_shown_in_a_box(served: &Served, report: &Value) {
+    let (path, own) = (report["path"].as_str().unwrap(), served.address.to_string());
+    let (status, head, body) = get(served.address, path, &own, "");
+    assert!(status == 200 && body == report["text"].as_str().unwrap(), "{status} {head}");
+    let policies = head.lines().filter(|line| line.starts_with("content-security-policy:")).collect::<Vec<_>>();
+    assert_eq!(policies, [format!("content-security-policy: {POLICY}")]);
+    assert!(POLICY.starts_with("sandbox;") && !POLICY.contains("script"), "{POLICY}");
+    assert_eq!(get(served.address, path, "evil.example", "").0, 403);
+    assert_eq!(get(served.address, path, &own, "Origin: http://evil.example\r\n").0, 403);
+    assert_eq!(get(served.address, &format!("{path}0"), &own, "").0, 404);
 }
 
 pub fn what_is_let_go_while_the_joint_moves_ends_a_round_and_keeps_what_it_had() {

@@ -26,7 +26,7 @@ fn exchange(address: SocketAddr, request: &str) -> (u16, String, String) {
     (status, head.to_lowercase(), body.to_owned())
 }
 
-fn get(address: SocketAddr, path: &str, host: &str, more: &str) -> (u16, String, String) {
+pub fn get(address: SocketAddr, path: &str, host: &str, more: &str) -> (u16, String, String) {
     exchange(address, &format!("GET {path} HTTP/1.1\r\nHost: {host}\r\n{more}Connection: close\r\n\r\n"))
 }
 
