@@ -85,7 +85,7 @@ impl Plan {
     }
 
     /// Largest size of a value that a joint is sent.
-    fn most(&self, joint: usize, value: fn(&Command) -> f32) -> f32 {
+    fn most(&self, joint: usize, value: Part) -> f32 {
         let of = self.commands.iter().filter_map(|all| all.get(joint).map(value));
         of.fold(0.0, |most, one| most.max(one.abs()))
     }
@@ -158,7 +158,7 @@ impl RobotMotion<'_> {
     /// [`RemoteError`], with node, value and limit.
     fn check(&self, joints: &[RemoteJoint], plan: &Plan) -> Result<(), RemoteError> {
         for (i, joint) in joints.iter().enumerate() {
-            let most = |value: fn(&Command) -> f32| plan.most(i, value);
+            let most = |value: Part| plan.most(i, value);
             let positions = || plan.commands.iter().filter_map(|all| all.get(i).map(|command| command.position));
             let lowest = positions().fold(f32::INFINITY, f32::min);
             let highest = positions().fold(f32::NEG_INFINITY, f32::max);
@@ -231,6 +231,9 @@ impl RobotMotion<'_> {
     }
 }
 
+/// A value of a command.
+type Part = fn(&Command) -> f32;
+
 /// Ranges of joints' impedance frames (2012h) that a motion does not fit into, wider while this lasts.
 #[derive(Default)]
 struct Ranges {
@@ -240,7 +243,7 @@ struct Ranges {
 impl Ranges {
     /// Widens those of a joint.
     fn bear(&mut self, joint: &RemoteJoint, plan: &Plan, place: usize) -> Result<(), RemoteError> {
-        let values: [(Range, fn(&Command) -> f32); 5] = [
+        let values: [(Range, Part); 5] = [
             (Range::Position, |command| command.position),
             (Range::Velocity, |command| command.velocity),
             (Range::Stiffness, |command| command.stiffness),
