@@ -1,7 +1,7 @@
 //! An arm on a bus, in real time: the lines of docs/robot.md as they stand, and what compensation brings.
 //!
-//! `cargo bench -p jointctl --bench arm` runs them on a bus of its own and fails where the position error along a motion
-//! that the fit has not seen becomes less than [`LEAST`] times smaller.
+//! `cargo bench -p jointctl --bench arm` runs them on a bus of its own and fails where the position error along a
+//! motion that the fit has not seen becomes less than [`LEAST`] times smaller.
 
 use std::process::{Child, Command, Stdio};
 

@@ -16,7 +16,8 @@
 //! 5. [`mod@fit`] is the whole way, [`files`] its output, [`page`] the page of it; [`mod@evaluate`] judges that output
 //!    on another recording.
 //!
-//! [`controller`] moves a robot by what came out. [`excite`] finds the motion of all joints that such a recording should be of.
+//! [`controller`] moves a robot by what came out. [`excite`] finds the motion of all joints that a recording should be
+//! of.
 
 pub mod choose;
 pub mod controller;

@@ -1,8 +1,8 @@
 //! A motion of all joints of a robot at once by computed torque (003, eq. 9), and what is recorded meanwhile; host.
 //!
 //! Each joint closes the loop by itself, in impedance mode: it is sent the reference of its position and velocity, the
-//! model's torque of the whole robot's reference, and stiffness and damping by its inertia there. The ranges of
-//! its impedance frame (2012h) are widened for it, and put back. Joints are enabled one after the other, each holding its
+//! model's torque of the whole robot's reference, and stiffness and damping by its inertia there. The ranges of its
+//! impedance frame (2012h) are widened for it, and put back. Joints are enabled one after the other, each holding its
 //! share of the links where they are; then all are led to the begin of the motion.
 
 use super::entry::Entry;
