@@ -71,7 +71,7 @@ fn no_command_that_prints_json_is_left_out_of_the_tests_that_try_them() {
     below(&jointctl::commands::arguments(), "", &mut paths);
     assert!(paths.len() > 20, "{paths:?}");
     let lines = [&tables::WITHOUT_BUS[..], &tables::OF_A_JOINT, &tables::OF_A_FLEET].concat();
-    let lines = [&lines[..], &[tables::ADDRESS, tables::COMMISSION]].concat();
+    let lines = [&lines[..], &[tables::ADDRESS, tables::COMMISSION, tables::ROBOT_MOVE]].concat();
     assert!(lines.iter().all(|line| line.contains("--json")), "{lines:?}");
     let missing: Vec<_> = paths.iter().filter(|path| !lines.iter().any(|line| line.starts_with(*path))).collect();
     assert!(missing.is_empty(), "not tried: {missing:?}");

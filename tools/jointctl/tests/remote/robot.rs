@@ -1,6 +1,7 @@
 //! All joints of an arm at once: moved and recorded, refused, and stopped.
 
 use crate::served::{DEADLINE, Running, Served, program};
+use crate::tables::ROBOT_MOVE;
 use joint_firmware::joint::state_machine::State;
 use joint_firmware::objects::field::{Field, Range};
 use jointctl::joint_text;
@@ -64,7 +65,7 @@ pub fn all_joints_of_an_arm_move_together_and_are_left_disabled() {
     let ranges = || joints.iter().map(|joint| joint.number(Field::Range(Range::Damping)).unwrap()).collect::<Vec<_>>();
     let before = ranges();
     // More damping than the impedance frame carries as a joint has it.
-    assert!(controller.at(&[0.0; 3], &[0.0; 3], &[0.0; 3])[0].damping > before[0], "{before:?}");
+    assert!(controller.at(&[0.0; 3], &[0.0; 3], &[0.0; 3])[1].damping > before[1], "{before:?}");
     let moved = motion(0.3).run(&joints, &|| true).unwrap().unwrap();
     off(&joints);
     assert_eq!(ranges(), before);
@@ -87,11 +88,9 @@ pub fn all_joints_of_an_arm_move_together_and_are_left_disabled() {
     off(&joints);
 }
 
-fn moved(folder: &Path, bus: &str, arguments: &[&str]) -> Output {
-    let robot = arm();
-    let mut command = program();
-    command.current_dir(folder).args(["robot", "move", robot.to_str().unwrap(), "--bus", bus]).args(arguments);
-    command.output().unwrap()
+/// A line of the program on a bus, with more arguments.
+fn moved(folder: &Path, bus: &str, line: &str, more: &[&str]) -> Output {
+    program().current_dir(folder).args(line.split(' ')).args(["--bus", bus]).args(more).output().unwrap()
 }
 
 pub fn an_arm_of_the_program_is_moved_and_recorded_by_the_program() {
@@ -101,6 +100,9 @@ pub fn an_arm_of_the_program_is_moved_and_recorded_by_the_program() {
     setup.configuration.limits.command_deadline = DEADLINE;
     let configuration = joint_text::to_text(&setup.configuration).unwrap();
     std::fs::create_dir(path.join("motion")).unwrap();
+    for file in ["robot.toml", "arm.urdf"] {
+        std::fs::copy(arm().with_file_name(file), path.join(file)).unwrap();
+    }
     for name in NAMES {
         std::fs::create_dir_all(path.join("actuators").join(name)).unwrap();
         std::fs::write(path.join("actuators").join(name).join("joint.toml"), &configuration).unwrap();
@@ -112,8 +114,7 @@ pub fn an_arm_of_the_program_is_moved_and_recorded_by_the_program() {
         std::fs::write(path.join("motion").join(format!("{name}.csv")), table).unwrap();
     }
     let bus = format!("udp:239.74.163.2:{}", bus::free_port().unwrap());
-    let robot = arm();
-    let arguments = ["sim", "--robot", robot.to_str().unwrap(), "--actuators", "actuators", "--bus", &bus];
+    let arguments = ["sim", "--robot", "robot.toml", "--actuators", "actuators", "--bus", &bus];
     let mut sim = program();
     sim.current_dir(path).args(arguments).args(["--node", "5", "--node", "6", "--node", "7"]);
     let mut sim = Running(sim.stderr(Stdio::piped()).spawn().unwrap());
@@ -123,20 +124,19 @@ pub fn an_arm_of_the_program_is_moved_and_recorded_by_the_program() {
     }
 
     let nodes = ["--node", "5", "--node", "6", "--node", "7"];
-    let error = |arguments: &[&str], code: i32| {
-        let output = moved(path, &bus, arguments);
+    let error = |line: &str, more: &[&str], code: i32| {
+        let output = moved(path, &bus, line, more);
         assert_eq!(output.status.code(), Some(code));
         String::from_utf8(output.stderr).unwrap()
     };
-    let text = error(&["--motion", "motion", "--node", "5"], 2);
+    let text = error("robot move robot.toml --motion motion", &nodes[..2], 2);
     assert!(text.contains("it has 3 joints, --node is given 1 times"), "{text}");
-    let text = error(&[&["--motion", "nowhere"], &nodes[..]].concat(), 1);
+    let text = error("robot move robot.toml --motion nowhere", &nodes, 1);
     assert!(text.contains("yaw.csv: cannot be read"), "{text}");
-    let text = error(&[&["--motion", "motion", "--bandwidth", "101"], &nodes[..]].concat(), 2);
+    let text = error("robot move robot.toml --motion motion --bandwidth 101", &nodes, 2);
     assert!(text.contains("--bandwidth is 101 rad/s, must lie in 1 to 100 rad/s"), "{text}");
 
-    let whole = ["--motion", "motion", "--rate", "100", "--compare", "--out", "recorded", "--json"];
-    let output = moved(path, &bus, &[&whole, &nodes[..]].concat());
+    let output = moved(path, &bus, ROBOT_MOVE, &nodes);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     for (joint, (name, node)) in told.as_array().unwrap().iter().zip(NAMES.iter().zip(5..)) {
@@ -148,7 +148,7 @@ pub fn an_arm_of_the_program_is_moved_and_recorded_by_the_program() {
     }
     let table = std::fs::read_to_string(path.join("recorded/log.csv")).unwrap();
     assert!(table.starts_with("time_s,yaw.position_rad,yaw.velocity_rad_s,yaw.torque_Nm,yaw.temperature_C,shoulder."));
-    let text = error(&[&whole, &nodes[..]].concat(), 2);
+    let text = error(ROBOT_MOVE, &nodes, 2);
     assert!(text.contains("log.csv") && text.contains("--force"), "{text}");
     // What was recorded is a recording of this robot.
     match record(&path.join("recorded/recording.toml"), &|_| None) {

@@ -38,6 +38,10 @@ pub const OF_A_JOINT: [&str; 6] = [
 #[allow(dead_code, reason = "of two tests each runs one half")]
 pub const COMMISSION: &str = "commission --current 8 --travel 0.4 --no-turn --yes --json";
 
+/// An arm moved without compensation and with it, where its description and a motion are in the folder.
+#[allow(dead_code, reason = "of two tests each runs one half")]
+pub const ROBOT_MOVE: &str = "robot move robot.toml --motion motion --rate 100 --compare --out recorded --json";
+
 /// Commands of a fleet, each with what the ones before it wrote.
 #[allow(dead_code, reason = "of two tests each runs one half")]
 pub const OF_A_FLEET: [&str; 4] = [
