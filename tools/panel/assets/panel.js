@@ -4,6 +4,7 @@ import { Commissioning } from "./commissioning.js";
 import { Joint } from "./joint.js";
 import { Plots } from "./plot.js";
 import { Retraining } from "./retraining.js";
+import { Robot } from "./robot.js";
 import { Side } from "./side.js";
 import * as tables from "./tables.js";
 
@@ -22,7 +23,9 @@ const stop = () => {
   joint.stop();
   side.stop();
 };
-const panel = { plots, side, problems: [], latest: (name) => plots.latest(name), isHeld: () => joint.held };
+const POSITION = "position-actual-value";
+const robot = new Robot(by("robot"), (at) => (at === node ? plots.latest(POSITION) : side.latest(at, POSITION)));
+const panel = { plots, side, robot, problems: [], latest: (name) => plots.latest(name), isHeld: () => joint.held };
 let node = null;
 window.panel = panel;
 window.addEventListener("error", (event) => panel.problems.push(event.message));
@@ -65,6 +68,10 @@ const take = {
       option.textContent = name ? `a new ${name}` : "–";
       return option;
     }));
+    if (hello.robot) {
+      robot.begin(hello.robot, node);
+      for (const { node: other } of hello.robot) if (other !== node && !side.shows(other)) side.toggle(other, false);
+    }
     alert(null);
   },
   commission(told) {

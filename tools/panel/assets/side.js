@@ -71,8 +71,8 @@ export class Side {
     return this.cards.has(node);
   }
 
-  // Shows a joint, or no longer.
-  toggle(node) {
+  // Shows a joint, where the user looks for it, or no longer.
+  toggle(node, seen = true) {
     const card = this.cards.get(node);
     if (card) {
       card.joint.socket.close();
@@ -83,7 +83,12 @@ export class Side {
     const opened = new Card(node, () => this.toggle(node));
     this.cards.set(node, opened);
     this.place.append(opened.element);
-    opened.element.scrollIntoView({ block: "nearest" });
+    if (seen) opened.element.scrollIntoView({ block: "nearest" });
+  }
+
+  // Newest value of a joint's signal; not a number where it shows none.
+  latest(node, name) {
+    return this.cards.get(node)?.plots.latest(name) ?? NaN;
   }
 
   stop() {

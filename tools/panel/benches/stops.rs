@@ -16,7 +16,11 @@ mod program;
 mod served;
 
 use bus::Frame;
+use bus::client::Network;
 use joint_firmware::joint::state_machine::State;
+use joint_firmware::joint::{Command, Mode};
+use jointctl::remote::motion::{Motion, Outcome};
+use jointctl::remote::{RemoteError, RemoteJoint};
 use node::{Options, Served, SlotImages, VirtualNode, serve};
 use page::Page;
 use plant::ActuatorParameters;
@@ -26,6 +30,7 @@ use serde_json::json;
 use served::{NODE, PATIENCE};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use tungstenite::Message;
 
@@ -38,6 +43,8 @@ const STANDS: f64 = 0.02;
 const WITHIN: f64 = 0.5;
 /// The joint's command deadline.
 const DEADLINE: Duration = Duration::from_millis(100);
+/// Bits of the controlword that enable operation.
+const ENABLED: u16 = 0x0F;
 /// Time that the server may take to brake the joint once it knows.
 const REACTION: Duration = DEADLINE;
 
@@ -50,12 +57,14 @@ enum Way {
     Cut,
     StopOfAnother,
     NoMessage,
+    /// A command moves the joint as well; the time counts from its first set-point.
+    Command,
     ServerKilled,
 }
 
 impl Way {
-    const ALL: [Self; 6] =
-        [Self::LetGo, Self::Silent, Self::Cut, Self::StopOfAnother, Self::NoMessage, Self::ServerKilled];
+    const ALL: [Self; 7] =
+        [Self::LetGo, Self::Silent, Self::Cut, Self::StopOfAnother, Self::NoMessage, Self::Command, Self::ServerKilled];
 
     const fn name(self) -> &'static str {
         match self {
@@ -64,6 +73,7 @@ impl Way {
             Self::Cut => "the connection is cut",
             Self::StopOfAnother => "STOP of another page",
             Self::NoMessage => "a message that is none",
+            Self::Command => "a command moves it as well",
             Self::ServerKilled => "the server is killed",
         }
     }
@@ -202,9 +212,28 @@ impl Drop for End<'_> {
     }
 }
 
+/// Begins what `jointctl move` does, and waits for its first set-point: that of the page enables, this one does not yet.
+fn command_as_well(bus: &str) -> JoinHandle<Result<Outcome, RemoteError>> {
+    let joint = RemoteJoint::open_within(bus, NODE, PATIENCE).unwrap();
+    let sniffer = Network::new(bus::open(bus).unwrap());
+    let set_points = sniffer.subscribe(|frame| {
+        let first = [0x200, 0x300].map(|base| base + u16::from(NODE)).contains(&frame.id());
+        first && frame.data().first().is_some_and(|word| u16::from(*word) & ENABLED != ENABLED)
+    });
+    let command = Command { mode: Mode::Velocity, velocity: 0.3, ..Command::default() };
+    let motion = Motion { command, duration: 10.0, rate: 100.0, acknowledge: false };
+    let moving = std::thread::spawn(move || motion.run(&joint, &|| true, &mut |_| {}));
+    let began = Instant::now();
+    while set_points.try_next().unwrap().is_none() {
+        assert!(began.elapsed() < PATIENCE && !moving.is_finished(), "no set-point of the command");
+        std::thread::sleep(MS / 2);
+    }
+    moving
+}
+
 /// For each way, the times of its instants until the joint follows no set-points, and until it stands.
-fn measure(bus: &str, instants: usize, seen: &Mutex<Seen>) -> [Vec<[Duration; 2]>; 6] {
-    let mut worst = [const { Vec::new() }; 6];
+fn measure(bus: &str, instants: usize, seen: &Mutex<Seen>) -> [Vec<[Duration; 2]>; 7] {
+    let mut worst = [const { Vec::new() }; 7];
     let mut program = Program::begin(bus);
     for instant in 0..instants {
         let which = instant % Way::ALL.len();
@@ -220,7 +249,9 @@ fn measure(bus: &str, instants: usize, seen: &Mutex<Seen>) -> [Vec<[Duration; 2]
         if !moves(*seen.lock().unwrap()) {
             panic!("the joint stands before {}: this machine is too busy for real time", way.name());
         }
+        let mut command = None;
         match way {
+            Way::Command => command = Some(command_as_well(bus)),
             Way::LetGo => page.let_go(true),
             Way::Silent => page.let_go(false),
             Way::Cut => drop(page),
@@ -233,6 +264,11 @@ fn measure(bus: &str, instants: usize, seen: &Mutex<Seen>) -> [Vec<[Duration; 2]
         let safe = until(seen, |seen| !follows(seen));
         let stands = safe + until(seen, |seen| seen.velocity.abs() < STANDS);
         worst[which].push([safe, stands]);
+        if let Some(command) = command {
+            // Told, as the page is.
+            let told = command.join().unwrap();
+            assert!(told.is_err(), "{told:?}");
+        }
         if way == Way::ServerKilled {
             program = Program::begin(bus);
         }

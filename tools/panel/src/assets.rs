@@ -18,7 +18,7 @@ const CSS: &str = "text/css; charset=utf-8";
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 
 /// All files.
-pub const ASSETS: [Asset; 10] = [
+pub const ASSETS: [Asset; 11] = [
     Asset { path: "/", kind: HTML, text: include_str!("../assets/index.html") },
     Asset { path: "/panel.css", kind: CSS, text: include_str!("../assets/panel.css") },
     Asset { path: "/commissioning.js", kind: SCRIPT, text: include_str!("../assets/commissioning.js") },
@@ -26,6 +26,7 @@ pub const ASSETS: [Asset; 10] = [
     Asset { path: "/led.js", kind: SCRIPT, text: include_str!("../assets/led.js") },
     Asset { path: "/plot.js", kind: SCRIPT, text: include_str!("../assets/plot.js") },
     Asset { path: "/retraining.js", kind: SCRIPT, text: include_str!("../assets/retraining.js") },
+    Asset { path: "/robot.js", kind: SCRIPT, text: include_str!("../assets/robot.js") },
     Asset { path: "/side.js", kind: SCRIPT, text: include_str!("../assets/side.js") },
     Asset { path: "/tables.js", kind: SCRIPT, text: include_str!("../assets/tables.js") },
     Asset { path: "/panel.js", kind: SCRIPT, text: include_str!("../assets/panel.js") },

@@ -8,6 +8,9 @@ use jointctl::remote::RemoteError;
 use jointctl::remote::present::{PATIENCE, present};
 use panel::guard::Guard;
 use panel::server::{Panel, Server};
+use panel::skeleton::skeleton;
+use robot::read_robot;
+use serde_json::Value;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -17,6 +20,7 @@ use std::time::{Duration, Instant};
 const EXAMPLES: &str = "Examples:
   panel --bus socketcan:can0 --node 5
   panel --bus udp:239.74.163.2:43113 --key joint.key --port 0
+  panel --bus socketcan:can0 --robot robot.toml --joints 5,6,7
   panel --bus socketcan:can0 --listen 192.168.1.20:8402";
 
 /// SYNCs a second: least and most.
@@ -38,6 +42,13 @@ struct Arguments {
     /// Node id of the joint that the page begins with, 1 to 127 [default: the lowest that answers]
     #[arg(long, value_name = "N", env = "JOINTCTL_NODE", value_parser = clap::value_parser!(u8).range(1..=127))]
     node: Option<u8>,
+    /// Robot that the joints belong to (docs/robot.md): drawn as it moves, and all of its joints beside the page's own
+    #[arg(long, value_name = "TOML")]
+    robot: Option<PathBuf>,
+    /// Node ids of the robot's joints, in the URDF's order [default: 1, 2 and so on]
+    #[arg(long, value_name = "N,N...", value_delimiter = ',', requires = "robot",
+        value_parser = clap::value_parser!(u8).range(1..=127))]
+    joints: Vec<u8>,
     /// The joint's key, where it has one
     #[arg(long, value_name = "FILE", env = "JOINTCTL_KEY")]
     key: Option<PathBuf>,
@@ -85,8 +96,20 @@ impl From<RemoteError> for Ended {
     }
 }
 
+/// The robot, where one is named.
+fn robot(arguments: &Arguments) -> Result<Option<Value>, Ended> {
+    let Some(path) = &arguments.robot else { return Ok(None) };
+    let (robot, _) = read_robot(path, &|name| std::env::var(name).ok()).map_err(|error| error.to_string())?;
+    let nodes = match arguments.joints.as_slice() {
+        [] => (1..=robot.tree.len().min(127) as u8).collect(),
+        named => named.to_vec(),
+    };
+    skeleton(&robot, &nodes).map(Some).map_err(Ended::Usage)
+}
+
 fn begin(arguments: &Arguments) -> Result<Server, Ended> {
     let key = read_key(arguments)?;
+    let robot = robot(arguments)?;
     let transport = bus::open(&arguments.bus).map_err(RemoteError::from)?;
     let network = Network::new(transport).with_patience(Duration::from_millis(arguments.timeout));
     let node = match arguments.node {
@@ -102,6 +125,10 @@ fn begin(arguments: &Arguments) -> Result<Server, Ended> {
     let guard = Guard::new(address, Instant::now()).map_err(|error| error.to_string())?;
     announce(&guard.address());
     let panel = Panel::new(&network, node, key, arguments.rate, guard, announce);
+    let panel = match robot {
+        Some(robot) => panel.with_robot(robot),
+        None => panel,
+    };
     Server::begin(listener, panel).map_err(|error| Ended::Failed(error.to_string()))
 }
 

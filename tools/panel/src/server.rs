@@ -16,7 +16,7 @@ use axum::response::Response;
 use axum::routing::get;
 use bus::client::Network;
 use friction_compensation::parameters::authentication::Key;
-use serde_json::json;
+use serde_json::{Value, json};
 use std::collections::HashMap;
 use std::net::TcpListener;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -40,6 +40,7 @@ pub struct Panel {
     key: Option<Key>,
     syncs: Arc<Syncs>,
     reports: Arc<Reports>,
+    robot: Option<Arc<Value>>,
     guard: Guard,
     owners: Mutex<HashMap<u8, Owner>>,
     /// Told where the address of the page has become another one.
@@ -51,14 +52,22 @@ impl Panel {
     pub fn new(network: &Network, node: u8, key: Option<Key>, rate: f64, guard: Guard, announce: fn(&str)) -> Self {
         let syncs = Arc::new(Syncs::new(network, rate));
         let (reports, owners) = (Arc::default(), Mutex::default());
-        Self { network: network.clone(), node, key, syncs, reports, guard, owners, announce }
+        Self { network: network.clone(), node, key, syncs, reports, robot: None, guard, owners, announce }
+    }
+
+    /// The same with the robot that the joints belong to, by [`crate::skeleton`].
+    #[must_use]
+    pub fn with_robot(mut self, robot: Value) -> Self {
+        self.robot = Some(Arc::new(robot));
+        self
     }
 
     fn attach(&self, node: u8, wants: Wants, tell: mpsc::Sender<Told>) -> Option<Session> {
         let mut owners = self.owners.lock().unwrap_or_else(PoisonError::into_inner);
         let (network, key) = (self.network.clone(), self.key.clone());
-        let (syncs, reports) = (Arc::clone(&self.syncs), Arc::clone(&self.reports));
-        let owner = owners.entry(node).or_insert_with(|| Owner::begin(Setup { network, node, key, syncs, reports }));
+        let (syncs, reports, robot) = (Arc::clone(&self.syncs), Arc::clone(&self.reports), self.robot.clone());
+        let setup = Setup { network, node, key, syncs, reports, robot };
+        let owner = owners.entry(node).or_insert_with(|| Owner::begin(setup));
         owner.attach(wants, tell)
     }
 

@@ -225,9 +225,14 @@ impl RobotMotion<'_> {
         }
         ended.into_iter().collect::<Result<Vec<_>, _>>()?;
         let recordings = recorders.into_iter().map(Recorder::end).collect::<Result<Vec<_>, _>>()?;
-        Ok(Some(together(&recordings, 0.5 / self.rate, |at| {
-            plan.wanted(at.checked_duration_since(began)?.as_secs_f64())
-        })))
+        let moved =
+            together(&recordings, 0.5 / self.rate, |at| plan.wanted(at.checked_duration_since(began)?.as_secs_f64()));
+        match joints.first() {
+            Some(first) if moved.rows.iter().all(|row| row.wanted.is_none()) => {
+                Err(RemoteError::NoSamples { node: first.id(), within_ms: plan.duration().as_millis() as u64 })
+            }
+            _ => Ok(Some(moved)),
+        }
     }
 }
 

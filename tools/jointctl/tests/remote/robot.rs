@@ -131,6 +131,8 @@ pub fn an_arm_of_the_program_is_moved_and_recorded_by_the_program() {
     };
     let text = error("robot move robot.toml --motion motion", &nodes[..2], 2);
     assert!(text.contains("it has 3 joints, --node is given 1 times"), "{text}");
+    let text = error("robot move robot.toml --motion motion", &["--node", "5", "--node", "6", "--node", "5"], 2);
+    assert!(text.contains("--node 5 is given for two joints"), "{text}");
     let text = error("robot move robot.toml --motion nowhere", &nodes, 1);
     assert!(text.contains("yaw.csv: cannot be read"), "{text}");
     let text = error("robot move robot.toml --motion motion --bandwidth 101", &nodes, 2);

@@ -18,6 +18,7 @@ use crate::message::{Ask, Message};
 use crate::reports::Reports;
 use bus::client::{Network, SyncProducer};
 use friction_compensation::parameters::authentication::Key;
+use serde_json::Value;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
@@ -70,6 +71,8 @@ pub struct Setup {
     pub syncs: Arc<Syncs>,
     /// Reports that a page can show.
     pub reports: Arc<Reports>,
+    /// Robot that the joint belongs to, as a page draws it.
+    pub robot: Option<Arc<Value>>,
 }
 
 enum Order {

@@ -133,9 +133,10 @@ impl Worker {
     fn hello(&self) -> Option<Value> {
         let signals = self.watch.as_ref()?.signals();
         let limit = LIMIT.as_millis() as u64;
-        Some(
-            json!({ "hello": { "node": self.setup.node, "signals": signals, "held_ms": limit, "boards": settings::boards() } }),
-        )
+        let (node, boards, robot) = (self.setup.node, settings::boards(), &self.setup.robot);
+        Some(json!({
+            "hello": { "node": node, "signals": signals, "held_ms": limit, "boards": boards, "robot": robot.as_deref() }
+        }))
     }
 
     /// Finds the joint, takes what it sends, reads a slow value where one is due.

@@ -4,7 +4,7 @@ use crate::page::Page;
 use serde_json::{Value, json};
 
 /// Attempts on a machine that has much else to do.
-pub const TIMES: usize = 20;
+pub const TIMES: usize = 60;
 
 pub enum Next {
     Question(u64),

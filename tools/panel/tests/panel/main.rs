@@ -39,6 +39,7 @@ fn main() {
             live_values_and_states_come_as_the_joint_is_jogged_and_the_table_holds_them,
             every_motion_goes_where_it_was_asked_to_go_and_ends_disabled,
             a_motion_beyond_a_limit_is_refused_by_name,
+            a_robot_is_told_where_it_is_given,
             joints_on_the_bus_and_what_they_miss_are_listed,
             joints_without_a_node_id_get_one,
             a_fault_is_told_with_its_emcy,
@@ -75,12 +76,14 @@ fn main() {
             arguments_that_are_wrong_end_the_program_with_2_and_what_fails_with_1,
         }
     };
-    let name = "browser::the_page_shows_values_that_move_and_the_joint_stands_once_the_button_is_let_go";
-    let browser = Trial::test(name, || {
-        browser::the_page_shows_values_that_move_and_the_joint_stands_once_the_button_is_let_go();
-        Ok(())
-    });
     // A browser is a large package: where there is none it is said by name; with CI set it is required.
-    trials.push(browser.with_ignored_flag(std::env::var_os("CI").is_none() && !browser::is_there()));
+    let ignored = std::env::var_os("CI").is_none() && !browser::is_there();
+    let with_browser = trials! {
+        browser {
+            the_page_shows_values_that_move_and_the_joint_stands_once_the_button_is_let_go,
+            a_robot_is_drawn_where_its_joints_are_and_each_has_its_own_page,
+        }
+    };
+    trials.extend(with_browser.into_iter().map(|trial| trial.with_ignored_flag(ignored)));
     libtest_mimic::run(&arguments, trials).exit();
 }

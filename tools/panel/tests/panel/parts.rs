@@ -96,6 +96,16 @@ pub fn a_motion_beyond_a_limit_is_refused_by_name() {
     assert!(page.seen.iter().all(|message| message.get("motion").is_none()));
 }
 
+pub fn a_robot_is_told_where_it_is_given() {
+    let hello = |served: &Served| {
+        let mut page = Page::connect(served.address, "default");
+        page.until(|message| message.get("hello").cloned())
+    };
+    let robot = &hello(&Served::arm(&[NODE, 6, 7]))["robot"];
+    assert_eq!((&robot[2]["name"], &robot[2]["node"], &robot[2]["parent"]), (&json!("elbow"), &json!(7), &json!(1)));
+    assert!(hello(&Served::joints(&[NODE]))["robot"].is_null());
+}
+
 pub fn joints_on_the_bus_and_what_they_miss_are_listed() {
     let served = Served::joints(&[NODE, 9]);
     let mut page = Page::open(served.address);

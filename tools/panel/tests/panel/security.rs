@@ -12,6 +12,9 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 use tungstenite::Message;
 
+/// Description of an arm of three joints.
+const ARM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../jointctl/robots/arm/robot.toml");
+
 /// Status, headers and body of an answer to these bytes.
 fn exchange(address: SocketAddr, request: &str) -> (u16, String, String) {
     let mut stream = TcpStream::connect(address).unwrap();
@@ -190,6 +193,9 @@ pub fn arguments_that_are_wrong_end_the_program_with_2_and_what_fails_with_1() {
         (&["--bus", "socketcan:none9"], 1, "none9"),
         (&["--bus", "virtual:panel-code", "--node", "128"], 2, "1..=127"),
         (&["--bus", "virtual:panel-code", "--key", "nowhere.key"], 1, "nowhere.key"),
+        (&["--bus", "virtual:panel-code", "--robot", "nowhere.toml"], 1, "nowhere.toml"),
+        (&["--bus", "virtual:panel-code", "--joints", "5"], 2, "--robot"),
+        (&["--bus", "virtual:panel-code", "--robot", ARM, "--joints", "5"], 2, "--joints names 1 nodes"),
         (&["--bus", "virtual:panel-code"], 1, "no node answers on virtual:panel-code"),
     ] {
         let mut command = Command::new(env!("CARGO_BIN_EXE_panel"));

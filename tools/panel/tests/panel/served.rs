@@ -2,11 +2,15 @@
 
 use bus::client::Network;
 use jointctl::remote::RemoteJoint;
-use node::{Options, SlotImages, VirtualNode, serve};
+use node::{Options, SlotImages, VirtualArm, VirtualNode, serve};
 use panel::guard::Guard;
 use panel::server::{Panel, Server};
+use panel::skeleton::skeleton;
 use plant::ActuatorParameters;
+use plant::load::LoadParameters;
 use plant::virtual_joint::Setup;
+use rigid_body::Tree;
+use robot::read_robot;
 use std::net::{SocketAddr, TcpListener};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -20,6 +24,12 @@ pub const NODE: u8 = 5;
 /// Samples a second.
 const RATE: f64 = 200.0;
 
+/// A bus that nobody else has.
+fn own_bus() -> String {
+    static BUSES: AtomicU64 = AtomicU64::new(0);
+    format!("virtual:panel-{}", BUSES.fetch_add(1, Ordering::Relaxed))
+}
+
 /// Joints that run until this is dropped.
 pub struct Joints {
     pub bus: String,
@@ -30,8 +40,26 @@ pub struct Joints {
 impl Joints {
     /// A joint for each node id, on a bus that nobody else has.
     pub fn new(nodes: &[u8]) -> Self {
-        static BUSES: AtomicU64 = AtomicU64::new(0);
-        Self::on(&format!("virtual:panel-{}", BUSES.fetch_add(1, Ordering::Relaxed)), nodes)
+        Self::on(&own_bus(), nodes)
+    }
+
+    /// Joints of an arm, one on another.
+    fn of_arm(tree: Tree, nodes: &[u8]) -> Self {
+        let (bus, stop) = (own_bus(), Arc::new(AtomicBool::new(false)));
+        let transport = bus::open(&bus).unwrap();
+        let mut parameters = ActuatorParameters::reference().aligned();
+        let mut setup = Setup::of(&parameters);
+        setup.configuration.limits.command_deadline = 0.5;
+        parameters.joint.load = LoadParameters { inertia: 0.0, mass: 0.0, length: 0.0 };
+        let node = |(&node_id, serial): (&u8, u32)| {
+            let options = Options { node_id, serial, seed: serial.into() };
+            VirtualNode::new(parameters, &setup, &options, SlotImages::empty().unwrap()).unwrap()
+        };
+        let mut arm = VirtualArm::new(tree, nodes.iter().zip(12..).map(node).collect()).unwrap();
+        arm.advance(4_000);
+        let stopped = Arc::clone(&stop);
+        let thread = std::thread::spawn(move || drop(serve(&mut arm, &*transport, &stopped)));
+        Self { bus, stop, threads: vec![thread] }
     }
 
     pub fn on(bus: &str, nodes: &[u8]) -> Self {
@@ -82,6 +110,20 @@ impl Served {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let guard = Guard::new(listener.local_addr().unwrap(), Instant::now()).unwrap();
         Self::guarded(nodes, listener, guard)
+    }
+
+    /// The arm of `tools/jointctl/robots`, with these nodes.
+    pub fn arm(nodes: &[u8]) -> Self {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../jointctl/robots/arm/robot.toml");
+        let (robot, _) = read_robot(path.as_ref(), &|_| None).unwrap();
+        let told = skeleton(&robot, nodes).unwrap();
+        let joints = Joints::of_arm(robot.tree, nodes);
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = listener.local_addr().unwrap();
+        let guard = Guard::new(address, Instant::now()).unwrap();
+        let network = Network::new(bus::open(&joints.bus).unwrap()).with_patience(PATIENCE);
+        let panel = Panel::new(&network, NODE, None, RATE, guard, |_| {}).with_robot(told);
+        Self { server: Some(Server::begin(listener, panel).unwrap()), address, joints }
     }
 
     pub fn guarded(nodes: &[u8], listener: TcpListener, guard: Guard) -> Self {

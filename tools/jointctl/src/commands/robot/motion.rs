@@ -147,6 +147,9 @@ impl RobotMove {
                 return Err(refused(format!("joint {} shares its motor; a joint on the bus has its own", joint.name)));
             }
         }
+        if let Some(twice) = self.node.iter().enumerate().find(|(i, node)| self.node[..*i].contains(node)) {
+            return Err(refused(format!("--node {} is given for two joints", twice.1)));
+        }
         match self.node.len() {
             0 => Ok((1..=joints as u8).collect()),
             given if given == joints => Ok(self.node.clone()),
