@@ -16,11 +16,7 @@ mod program;
 mod served;
 
 use bus::Frame;
-use bus::client::Network;
 use joint_firmware::joint::state_machine::State;
-use joint_firmware::joint::{Command, Mode};
-use jointctl::remote::motion::{Motion, Outcome};
-use jointctl::remote::{RemoteError, RemoteJoint};
 use node::{Options, Served, SlotImages, VirtualNode, serve};
 use page::Page;
 use plant::ActuatorParameters;
@@ -43,8 +39,6 @@ const STANDS: f64 = 0.02;
 const WITHIN: f64 = 0.5;
 /// The joint's command deadline.
 const DEADLINE: Duration = Duration::from_millis(100);
-/// Bits of the controlword that enable operation.
-const ENABLED: u16 = 0x0F;
 /// Time that the server may take to brake the joint once it knows.
 const REACTION: Duration = DEADLINE;
 
@@ -57,14 +51,20 @@ enum Way {
     Cut,
     StopOfAnother,
     NoMessage,
-    /// A command moves the joint as well; the time counts from its first set-point.
-    Command,
+    OtherMaster,
     ServerKilled,
 }
 
 impl Way {
-    const ALL: [Self; 7] =
-        [Self::LetGo, Self::Silent, Self::Cut, Self::StopOfAnother, Self::NoMessage, Self::Command, Self::ServerKilled];
+    const ALL: [Self; 7] = [
+        Self::LetGo,
+        Self::Silent,
+        Self::Cut,
+        Self::StopOfAnother,
+        Self::NoMessage,
+        Self::OtherMaster,
+        Self::ServerKilled,
+    ];
 
     const fn name(self) -> &'static str {
         match self {
@@ -73,7 +73,7 @@ impl Way {
             Self::Cut => "the connection is cut",
             Self::StopOfAnother => "STOP of another page",
             Self::NoMessage => "a message that is none",
-            Self::Command => "a command moves it as well",
+            Self::OtherMaster => "another master sends, too",
             Self::ServerKilled => "the server is killed",
         }
     }
@@ -212,23 +212,18 @@ impl Drop for End<'_> {
     }
 }
 
-/// Begins what `jointctl move` does, and waits for its first set-point: that of the page enables, this one does not yet.
-fn command_as_well(bus: &str) -> JoinHandle<Result<Outcome, RemoteError>> {
-    let joint = RemoteJoint::open_within(bus, NODE, PATIENCE).unwrap();
-    let sniffer = Network::new(bus::open(bus).unwrap());
-    let set_points = sniffer.subscribe(|frame| {
-        let first = [0x200, 0x300].map(|base| base + u16::from(NODE)).contains(&frame.id());
-        first && frame.data().first().is_some_and(|word| u16::from(*word) & ENABLED != ENABLED)
-    });
-    let command = Command { mode: Mode::Velocity, velocity: 0.3, ..Command::default() };
-    let motion = Motion { command, duration: 10.0, rate: 100.0, acknowledge: false };
-    let moving = std::thread::spawn(move || motion.run(&joint, &|| true, &mut |_| {}));
-    let began = Instant::now();
-    while set_points.try_next().unwrap().is_none() {
-        assert!(began.elapsed() < PATIENCE && !moving.is_finished(), "no set-point of the command");
-        std::thread::sleep(MS / 2);
-    }
-    moving
+/// Sends set-points of another master, which does not listen before, for half a second.
+fn other_master(bus: &str) -> JoinHandle<()> {
+    let transport = bus::open(bus).unwrap();
+    // Controlword, mode and velocity of the page's own PDO.
+    let frame = Frame::new(0x300 + u16::from(NODE), &[0x0F, 0, 9, 0, 0, 0, 0]).unwrap();
+    transport.send(&frame).unwrap();
+    std::thread::spawn(move || {
+        for _ in 0..50 {
+            std::thread::sleep(10 * MS);
+            transport.send(&frame).unwrap();
+        }
+    })
 }
 
 /// For each way, the times of its instants until the joint follows no set-points, and until it stands.
@@ -249,9 +244,9 @@ fn measure(bus: &str, instants: usize, seen: &Mutex<Seen>) -> [Vec<[Duration; 2]
         if !moves(*seen.lock().unwrap()) {
             panic!("the joint stands before {}: this machine is too busy for real time", way.name());
         }
-        let mut command = None;
+        let mut sending = None;
         match way {
-            Way::Command => command = Some(command_as_well(bus)),
+            Way::OtherMaster => sending = Some(other_master(bus)),
             Way::LetGo => page.let_go(true),
             Way::Silent => page.let_go(false),
             Way::Cut => drop(page),
@@ -264,10 +259,9 @@ fn measure(bus: &str, instants: usize, seen: &Mutex<Seen>) -> [Vec<[Duration; 2]
         let safe = until(seen, |seen| !follows(seen));
         let stands = safe + until(seen, |seen| seen.velocity.abs() < STANDS);
         worst[which].push([safe, stands]);
-        if let Some(command) = command {
-            // Told, as the page is.
-            let told = command.join().unwrap();
-            assert!(told.is_err(), "{told:?}");
+        if let Some(sending) = sending {
+            sending.join().unwrap();
+            assert!(!follows(*seen.lock().unwrap()), "the joint follows the other master");
         }
         if way == Way::ServerKilled {
             program = Program::begin(bus);

@@ -11,8 +11,8 @@
 //! - [`owner`]: the thread that alone talks to a joint: live values, motion, requests in their order
 //! - [`hold`]: the dead man's switch; [`motion`]: jog, sine, steps, impedance, frozen as soon as it is not held
 //! - [`live`]: signals at full rate, reduced to minima and maxima for a page; [`slow`]: values that are read one by one
-//! - [`skeleton`]: a robot as the page draws it; [`scan`]: joints on the bus; [`checklist`]: what a board still misses; [`history`]: steps before a fault;
-//!   [`settings`]: objects and joint.toml; [`learning`]: images and compensation
+//! - [`skeleton`]: a robot as the page draws it; [`scan`]: joints on the bus; [`checklist`]: what a board still misses;
+//!   [`history`]: steps before a fault; [`settings`]: objects and joint.toml; [`learning`]: images and compensation
 
 #![forbid(unsafe_code)]
 

@@ -189,6 +189,16 @@ pub enum RemoteError {
         /// Identifier of the foreign frame.
         identifier: u16,
     },
+    /// Another client that commands the joint already.
+    #[error(
+        "another client sends set-points to node {node} (identifier {identifier:03X}h); nothing was commanded. Stop that client first"
+    )]
+    Commanded {
+        /// Node id.
+        node: u8,
+        /// Identifier of the foreign frame.
+        identifier: u16,
+    },
     /// A joint that does not answer SYNC.
     #[error("node {node}: no samples within {within_ms} ms")]
     NoSamples {

@@ -25,6 +25,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+/// Longest time for which other clients are listened for, s.
+const LISTENED: f64 = 0.2;
 /// Set-points a second: least and most.
 pub const RATES: [f64; 2] = [1.0, 1_000.0];
 /// RPDOs of the joint: drive and torque and position; velocity; impedance frame.
@@ -94,6 +96,31 @@ impl Encoder {
     }
 }
 
+/// Set-points of other clients for a joint, from now on.
+struct Others {
+    node: u8,
+    began: Instant,
+    frames: Subscription,
+}
+
+impl Others {
+    /// On the identifiers of a joint's RPDOs as they are at first; its own client's are not heard.
+    fn of(joint: &RemoteJoint) -> Self {
+        let node = joint.id();
+        let identifiers = default_communication(node).receive.map(|pdo| pdo.cob_id as u16 & 0x7FF);
+        let frames = joint.network().subscribe(move |frame| identifiers.contains(&frame.id()));
+        Self { node, began: Instant::now(), frames }
+    }
+
+    /// Listens until so much time is over.
+    fn none_within(&self, time: Duration) -> Result<(), RemoteError> {
+        match self.frames.next(time.saturating_sub(self.began.elapsed()))? {
+            Some(received) => Err(RemoteError::Commanded { node: self.node, identifier: received.frame.id() }),
+            None => Ok(()),
+        }
+    }
+}
+
 /// Set-points on their way to a joint.
 pub struct Stream {
     joint: RemoteJoint,
@@ -115,6 +142,8 @@ impl std::fmt::Debug for Stream {
 }
 
 impl Stream {
+    /// Listens for another client's set-points for as long as the joint's command deadline, 0.2 s at most, and refuses
+    /// where there are some: the joint would follow whoever came last.
     /// Enables the joint in a mode and holds it: no torque, no velocity, or the position where it is. `rate` set-points
     /// a second, at least two within the joint's command deadline; where it can, the joint goes from one position or
     /// velocity to the next in a straight line. `acknowledge` resets a fault whose cause is
@@ -127,6 +156,7 @@ impl Stream {
     /// As [`Stream::begin`], in the mode of `hold`, which is what is asked of the joint at first.
     pub fn begin_with(joint: &RemoteJoint, hold: Command, rate: f64, acknowledge: bool) -> Result<Self, RemoteError> {
         let mode = hold.mode;
+        let others = Others::of(joint);
         let deadline = joint.number(Field::Setting(Setting::CommandDeadline))?;
         let [low, high] = RATES;
         // Upwards, and a REAL32's 0.1 s as the 0.1 s that it means.
@@ -138,6 +168,7 @@ impl Stream {
         if joint.state()? == State::Fault && !acknowledge {
             return Err(RemoteError::Fault { node: joint.id(), faults });
         }
+        others.none_within(Duration::from_secs_f64(deadline.clamp(0.0, LISTENED)))?;
         let encoder_of = |changes: &[Change]| -> Result<Encoder, RemoteError> {
             let mut ranges = [0.0; RANGES];
             for (value, range) in ranges.iter_mut().zip(Range::ALL) {

@@ -96,6 +96,7 @@ fn main() {
             a_bus_that_is_unplugged_at_any_frame_of_an_upload_leaves_the_old_image_or_the_new_one,
             two_clients_at_once_are_told_of_each_other_and_the_image_stays,
             two_masters_of_one_joint_end_in_a_joint_that_is_disabled,
+            a_second_command_is_refused_and_the_first_goes_on,
             a_string_that_is_no_bus_is_answered_with_those_that_are,
         }
         registry {

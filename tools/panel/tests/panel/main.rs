@@ -54,6 +54,7 @@ fn main() {
             a_second_page_looks_and_may_not_change_anything,
             what_is_not_a_message_stops_the_joint_and_is_told_in_words,
             another_master_at_the_same_time_ends_in_a_joint_that_is_disabled,
+            a_command_is_refused_while_a_page_moves_the_joint_and_the_page_goes_on,
             a_button_that_is_let_go_before_the_joint_is_enabled_moves_nothing,
             a_server_that_ends_stops_the_joint,
             #[cfg(unix)] a_program_that_is_terminated_stops_the_joint_and_one_that_is_killed_leaves_it_to_its_deadline,

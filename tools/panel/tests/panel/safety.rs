@@ -2,13 +2,15 @@
 
 use crate::page::Page;
 use crate::served::{Joints, NODE, PATIENCE, Served};
+use bus::Frame;
 use joint_firmware::joint::fault::Fault;
 use joint_firmware::joint::state_machine::State;
 use joint_firmware::joint::{Command, Mode};
-use jointctl::remote::RemoteJoint;
 use jointctl::remote::motion::Motion;
+use jointctl::remote::{RemoteError, RemoteJoint};
 use serde_json::{Value, json};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 use tungstenite::Message;
 
 const VELOCITY: &str = "velocity-actual-value";
@@ -196,28 +198,54 @@ pub fn what_is_not_a_message_stops_the_joint_and_is_told_in_words() {
 pub fn another_master_at_the_same_time_ends_in_a_joint_that_is_disabled() {
     let served = Served::joints(&[NODE]);
     let (mut page, _witness) = moving(&served);
+    let other = bus::open(&served.joints.bus).unwrap();
     let over = AtomicBool::new(false);
-    let command = Command { mode: Mode::Velocity, velocity: -0.6, ..Command::default() };
-    let motion = Motion { command, duration: 1e3, rate: 100.0, acknowledge: true };
     std::thread::scope(|scope| {
-        let joint = served.joints.joint();
-        let running = || !over.load(Ordering::Relaxed);
-        let other = scope.spawn(move || {
-            // A question of the page between two of its own ends it before it commands anything.
-            while running() {
-                let ended = motion.run(&joint, &running, &mut |_| {});
-                assert!(ended.is_err() || !running(), "{ended:?}");
+        // One that does not listen before it sends: controlword, mode and velocity of the page's own PDO.
+        scope.spawn(|| {
+            while !over.load(Ordering::Relaxed) {
+                other.send(&Frame::new(0x300 + u16::from(NODE), &[0x0F, 0, 9, 0, 0, 0, 0]).unwrap()).unwrap();
+                std::thread::sleep(Duration::from_millis(10));
             }
         });
         let (reason, _) = page.ended();
         page.let_go(true);
         over.store(true, Ordering::Relaxed);
         assert_ne!(reason, "not held any more");
-        other.join().unwrap();
     });
     let joint = served.joints.joint();
     joint.disable().unwrap();
     assert!(matches!(joint.state().unwrap(), State::SwitchOnDisabled | State::Fault));
+}
+
+pub fn a_command_is_refused_while_a_page_moves_the_joint_and_the_page_goes_on() {
+    let served = Served::joints(&[NODE]);
+    let (mut page, _witness) = moving(&served);
+    let command = Command { mode: Mode::Velocity, velocity: -0.6, ..Command::default() };
+    let motion = Motion { command, duration: 0.5, rate: 100.0, acknowledge: true };
+    let joint = served.joints.joint();
+    // A busy machine may end the hold, or let a question of the page come between two of the command's.
+    for _ in 0..20 {
+        let refused = std::thread::scope(|scope| {
+            let running = scope.spawn(|| motion.run(&joint, &|| true, &mut |_| {}));
+            while !running.is_finished() {
+                page.look().unwrap();
+            }
+            running.join().unwrap()
+        });
+        if let Err(error @ RemoteError::Commanded { .. }) = refused {
+            assert!(error.to_string().contains("nothing was commanded"), "{error}");
+            page.sees(VELOCITY, fast);
+            page.let_go(true);
+            assert_eq!(page.ended(), ("not held any more".into(), DISABLED.into()));
+            return;
+        }
+        page.let_go(true);
+        page.seen.clear();
+        joint.disable().unwrap();
+        page.move_until(&jog(), VELOCITY, fast);
+    }
+    panic!("a command was never refused");
 }
 
 pub fn a_button_that_is_let_go_before_the_joint_is_enabled_moves_nothing() {
