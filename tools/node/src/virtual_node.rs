@@ -70,9 +70,9 @@ pub enum NodeError {
     NodeId(u8),
 }
 
-/// What a control step begins with.
+/// Begin of a control step.
 pub(crate) struct Before {
-    /// What the bus asks for.
+    /// Demand from the bus.
     pub demand: Demand,
     /// Torque that is asked for with the feedforward of the load, Nm.
     feedforward_torque: f32,

@@ -66,7 +66,7 @@ pub struct RobotMoved {
     pub unanswered: u64,
 }
 
-/// What the joints are sent, from where they are to the end of the motion.
+/// Commands of all joints, from where they are to the end of the motion.
 struct Plan {
     commands: Vec<Vec<Command>>,
     positions: Vec<Vec<f64>>,

@@ -142,12 +142,11 @@ impl std::fmt::Debug for Stream {
 }
 
 impl Stream {
-    /// Listens for another client's set-points for as long as the joint's command deadline, 0.2 s at most, and refuses
-    /// where there are some: the joint would follow whoever came last.
     /// Enables the joint in a mode and holds it: no torque, no velocity, or the position where it is. `rate` set-points
     /// a second, at least two within the joint's command deadline; where it can, the joint goes from one position or
     /// velocity to the next in a straight line. `acknowledge` resets a fault whose cause is
-    /// gone; without it a fault is an error.
+    /// gone; without it a fault is an error. Another client's set-points are listened for first, for as long as the
+    /// joint's command deadline, 0.2 s at most, and refused: the joint would follow whoever came last.
     pub fn begin(joint: &RemoteJoint, mode: Mode, rate: f64, acknowledge: bool) -> Result<Self, RemoteError> {
         let position = joint.number(Field::Actual(Actual::Position))? as f32;
         Self::begin_with(joint, Command { mode, position, ..Command::default() }, rate, acknowledge)

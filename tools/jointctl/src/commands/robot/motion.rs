@@ -46,7 +46,7 @@ pub struct RobotMove {
     /// The joints' key, where they have one
     #[arg(long, value_name = "FILE", env = "JOINTCTL_KEY")]
     key: Option<PathBuf>,
-    /// How long each may take.
+    /// Longest time for an answer.
     #[command(flatten)]
     patience: Patience,
     /// Bandwidth of the joints' controllers around the model's torque, rad/s: low shows what the model lacks
@@ -211,7 +211,7 @@ impl RobotMove {
     }
 }
 
-/// What was requested of the compensation before; put back when this is dropped.
+/// Requests of the compensation as they were before; put back when this is dropped.
 struct Requested<'j> {
     joints: &'j [RemoteJoint],
     before: Vec<u64>,
