@@ -10,7 +10,7 @@ use plant::virtual_joint::Setup;
 use rigid_body::newton_euler::inverse_dynamics;
 use rigid_body::{JointKind, Robot, Tree};
 use robot::read_robot;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Postures of which the heaviest counts, for each joint.
 const POSTURES: u32 = 1_000;
@@ -53,15 +53,7 @@ impl ArmChoice {
     pub fn read(&self) -> Result<Option<Arm>, CommandError> {
         let Some(path) = &self.robot else { return Ok(None) };
         let (robot, _) = read_robot(path, &|name| std::env::var(name).ok())?;
-        let refused = |reason: String| CommandError::Arguments(format!("{}: {reason}", path.display()));
-        for (row, joint) in robot.tree.joints.iter().enumerate() {
-            if joint.kind != JointKind::Revolute {
-                return Err(refused(format!("joint {} slides; virtual joints turn", joint.name)));
-            }
-            if (0..robot.tree.len()).any(|column| column != row && robot.coupling[(row, column)] != 0.0) {
-                return Err(refused(format!("joint {} shares its motor; virtual joints have their own", joint.name)));
-            }
-        }
+        each_turns_alone(&robot, path)?;
         if let Some(folder) = self.actuators.as_deref().filter(|folder| !folder.is_dir()) {
             return Err(CommandError::Arguments(format!("--actuators {}: there is no such folder", folder.display())));
         }
@@ -101,6 +93,20 @@ impl ArmChoice {
     }
 }
 
+/// Refuses robots whose joints slide or share motors: a joint on the bus turns by a motor of its own.
+pub fn each_turns_alone(robot: &Robot, path: &Path) -> Result<(), CommandError> {
+    let refused = |reason: String| CommandError::Arguments(format!("{}: {reason}", path.display()));
+    for (row, joint) in robot.tree.joints.iter().enumerate() {
+        if joint.kind != JointKind::Revolute {
+            return Err(refused(format!("joint {} slides; a joint on the bus turns", joint.name)));
+        }
+        if (0..robot.tree.len()).any(|column| column != row && robot.coupling[(row, column)] != 0.0) {
+            return Err(refused(format!("joint {} shares its motor; a joint on the bus has its own", joint.name)));
+        }
+    }
+    Ok(())
+}
+
 /// Largest torque that gravity takes of each joint, Nm, over postures within its travel, or within half a turn either
 /// way where it has none.
 fn heaviest(robot: &Robot) -> Vec<f64> {
@@ -121,3 +127,43 @@ fn heaviest(robot: &Robot) -> Vec<f64> {
 }
 
 const PRIMES: [f64; 8] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A robot of two joints of a type, described further.
+    fn robot(kind: &str, more: &str) -> Robot {
+        let joint = |name: &str, parent: &str, child: &str| {
+            format!(
+                "<joint name='{name}' type='{kind}'><parent link='{parent}'/><child link='{child}'/><axis xyz='0 1 0'/>\
+                 <limit lower='-1' upper='1' effort='1' velocity='1'/></joint><link name='{child}'><inertial>\
+                 <origin xyz='0.5 0 0'/><mass value='2'/><inertia ixx='0.1' ixy='0' ixz='0' iyy='0.1' iyz='0' izz='0.1'/>\
+                 </inertial></link>"
+            )
+        };
+        let (first, second) = (joint("a", "base", "l"), joint("b", "l", "m"));
+        let urdf = format!("<robot name='r'><link name='base'/>{first}{second}</robot>");
+        let toml = format!("urdf = 'r.urdf'\n[joint.a]\n[joint.b]\n{more}");
+        Robot::new(&toml, "robot.toml", &urdf, "r.urdf").unwrap()
+    }
+
+    #[test]
+    fn joints_that_slide_or_share_a_motor_are_refused_by_name() {
+        let told = |robot: &Robot| each_turns_alone(robot, Path::new("robot.toml")).map_err(|error| error.to_string());
+        assert_eq!(told(&robot("revolute", "")), Ok(()));
+        let sliding = told(&robot("prismatic", "")).unwrap_err();
+        assert!(sliding.contains("robot.toml: joint a slides"), "{sliding}");
+        let coupling = "[coupling]\njoints = ['a', 'b']\nmatrix = [[1.0, 1.0], [1.0, -1.0]]\n";
+        let shared = told(&robot("revolute", coupling)).unwrap_err();
+        assert!(shared.contains("joint a shares its motor"), "{shared}");
+    }
+
+    #[test]
+    fn the_heaviest_posture_is_found() {
+        // Level, 2 kg at 0.5 m each: both links on the first joint, with the second one's frame at the first's.
+        let [first, second] = heaviest(&robot("revolute", ""))[..] else { panic!("two joints") };
+        assert!((second / (2.0 * 9.81 * 0.5) - 1.0).abs() < 0.02, "{second}");
+        assert!((first / (2.0 * second) - 1.0).abs() < 0.02, "{first} {second}");
+    }
+}

@@ -1,6 +1,7 @@
 //! `jointctl robot move`: a motion of all joints at once, by computed torque, over a bus.
 
 use crate::commands::CommandError;
+use crate::commands::arm::each_turns_alone;
 use crate::commands::force::Force;
 use crate::commands::remote::{Patience, catch_interrupts, running};
 use crate::commands::terminal::Terminal;
@@ -16,7 +17,7 @@ use joint_firmware::objects::field::Field;
 use joint_firmware::objects::settings::Setting;
 use plant::excitation::Reference;
 use report::output::{OutputFile, write_directory};
-use rigid_body::{JointKind, Robot};
+use rigid_body::Robot;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -139,14 +140,7 @@ impl RobotMove {
     fn nodes(&self, robot: &Robot) -> Result<Vec<u8>, CommandError> {
         let joints = robot.tree.len();
         let refused = |reason: String| CommandError::Arguments(format!("{}: {reason}", self.robot.display()));
-        for (row, joint) in robot.tree.joints.iter().enumerate() {
-            if joint.kind != JointKind::Revolute {
-                return Err(refused(format!("joint {} slides; a joint on the bus turns", joint.name)));
-            }
-            if (0..joints).any(|column| column != row && robot.coupling[(row, column)] != 0.0) {
-                return Err(refused(format!("joint {} shares its motor; a joint on the bus has its own", joint.name)));
-            }
-        }
+        each_turns_alone(robot, &self.robot)?;
         if let Some(twice) = self.node.iter().enumerate().find(|(i, node)| self.node[..*i].contains(node)) {
             return Err(refused(format!("--node {} is given for two joints", twice.1)));
         }
