@@ -1,9 +1,9 @@
 //! One night's work on a folder: sums of every partition that is new or has changed, and all of them as one table;
 //! host.
 //!
-//! A partition is the unit of work: one thread reads its files in the order of their names. Sums are joined by joint
-//! and day. The bytes of all tables therefore depend on the data alone, not on the number of threads, nor on how often
-//! the work was interrupted.
+//! One thread reads the files of a partition in the order of their names. Sums are joined by joint and day: a table for
+//! each joint, written after some partitions, and one of all. The bytes of all tables therefore depend on the data
+//! alone, not on the number of threads, nor on how often the work was interrupted.
 
 use crate::estimate::estimate;
 use crate::partition::{FolderError, Misplaced, Partition, fingerprint, is_joint, partitions};
@@ -14,6 +14,9 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
+
+/// Partitions of a joint that are summed up between two writings of its table: what a process that is killed loses.
+const PIECE: usize = 32;
 
 /// Part of a fleet that is worked on, and the source of its sums.
 #[derive(Clone, Debug, Default)]
@@ -69,8 +72,8 @@ pub enum NightError {
     },
 }
 
-/// Does the work with `threads` threads, 0 for one a core. `more` is asked before each partition; where it says no, the
-/// rest is left for another time, and the table of all is not written.
+/// Does the work with `threads` threads, 0 for one a core. `more` is asked before each 32 partitions
+/// of a joint; where it says no, the rest is left for another time, and the table of all is not written.
 ///
 /// # Errors
 /// [`NightError`]; bad partitions are none, they are entries with a defect.
@@ -101,20 +104,34 @@ pub fn night(
 /// Stored sums of partitions; a partition without, or with other files since, is misplaced.
 fn as_stored(fleet: &Path, found: &[Partition]) -> Night {
     let mut night = Night { entries: Vec::new(), misplaced: Vec::new(), read: 0, kept: 0 };
-    for partition in found {
-        let reason = match stored::read(&stored::place(fleet, partition)).as_deref() {
-            Ok([known]) if of_these_files(partition, known) => {
-                night.entries.push(known.clone());
-                continue;
-            }
-            Ok(_) => "files have changed since they were summed up: `jointctl fleet sums` does it anew",
-            Err(_) => "not summed up: `jointctl fleet sums` does it",
-        };
-        let path = fleet.join(format!("joint={}", partition.joint)).join(format!("day={}", partition.day));
-        night.misplaced.push(Misplaced { path, reason: reason.into() });
+    for days in of_joints(found) {
+        let mut known = known(&stored::place(fleet, &days[0].joint));
+        for partition in days {
+            let reason = match known.remove(&partition.day) {
+                Some(known) if of_these_files(partition, &known) => {
+                    night.entries.push(known);
+                    continue;
+                }
+                Some(_) => "files have changed since they were summed up: `jointctl fleet sums` does it anew",
+                None => "not summed up: `jointctl fleet sums` does it",
+            };
+            let path = fleet.join(format!("joint={}", partition.joint)).join(format!("day={}", partition.day));
+            night.misplaced.push(Misplaced { path, reason: reason.into() });
+        }
     }
     night.kept = night.entries.len();
     night
+}
+
+/// Partitions of each joint.
+fn of_joints(found: &[Partition]) -> Vec<&[Partition]> {
+    found.chunk_by(|one, other| one.joint == other.joint).collect()
+}
+
+/// Entries of a joint's table by day; none where it is not there, or cannot be read: it is made anew.
+fn known(place: &Path) -> BTreeMap<String, Entry> {
+    let entries = stored::read(place).unwrap_or_default();
+    entries.into_iter().map(|entry| (entry.day.clone(), entry)).collect()
 }
 
 /// True where an entry is of files with these names and sizes. One without sources is of files that are not
@@ -138,22 +155,48 @@ fn summed(
 ) -> Result<Night, NightError> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.map_err(|error| NightError::Threads { threads, reason: error.to_string() })?;
-    let one = |partition: &Partition| more().then(|| entry(fleet, partition)).transpose();
-    let done: Vec<Option<(Entry, bool)>> = pool.install(|| found.par_iter().map(one).collect::<Result<_, _>>())?;
+    let one = |days: &&[Partition]| of_joint(fleet, days, more);
+    let joints = of_joints(found);
+    let done: Vec<Vec<(Entry, bool)>> = pool.install(|| joints.par_iter().map(one).collect::<Result<_, _>>())?;
     let (entries, fresh): (Vec<Entry>, Vec<bool>) = done.into_iter().flatten().unzip();
     let read = fresh.iter().filter(|fresh| **fresh).count();
     Ok(Night { kept: fresh.len() - read, read, entries, misplaced: Vec::new() })
 }
 
+/// Sums of a joint's days, as far as `more` says yes, and whether each was read.
+fn of_joint(
+    fleet: &Path,
+    days: &[Partition],
+    more: &(dyn Fn() -> bool + Sync),
+) -> Result<Vec<(Entry, bool)>, NightError> {
+    let place = stored::place(fleet, &days[0].joint);
+    let mut known = known(&place);
+    let mut done: Vec<(Entry, bool)> = Vec::with_capacity(days.len());
+    for piece in days.chunks(PIECE) {
+        if !more() {
+            return Ok(done);
+        }
+        let summed = piece.par_iter().map(|day| entry(fleet, day, known.get(&day.day)));
+        done.extend(summed.collect::<Vec<_>>());
+        for day in piece {
+            known.remove(&day.day);
+        }
+        let last = done.len() == days.len();
+        // What is known of later days stays until they are reached; days that are no more go with the last piece.
+        if done[done.len() - piece.len()..].iter().any(|(_, fresh)| *fresh) || last && !known.is_empty() {
+            let later = known.values().filter(|_| !last);
+            let all: Vec<Entry> = done.iter().map(|(entry, _)| entry).chain(later).cloned().collect();
+            stored::write(&place, &all).map_err(|source| NightError::Write { path: place.clone(), source })?;
+        }
+    }
+    Ok(done)
+}
+
 /// Sums of a partition, and whether it was read.
-fn entry(fleet: &Path, partition: &Partition) -> Result<(Entry, bool), NightError> {
-    let place = stored::place(fleet, partition);
+fn entry(fleet: &Path, partition: &Partition, known: Option<&Entry>) -> (Entry, bool) {
     let source = source(partition);
-    // Sums that cannot be read are made anew.
-    if let Ok([known]) = stored::read(&place).as_deref()
-        && source.as_ref().is_ok_and(|source| *source == known.source)
-    {
-        return Ok((known.clone(), false));
+    if let Some(known) = known.filter(|known| source.as_ref().is_ok_and(|source| *source == known.source)) {
+        return (known.clone(), false);
     }
     let recorded = source.clone().and_then(|source| copied(partition, &source)).and_then(|()| {
         let read = |file: &PathBuf| windows::read(file).map_err(|error| error.to_string());
@@ -164,10 +207,7 @@ fn entry(fleet: &Path, partition: &Partition) -> Result<(Entry, bool), NightErro
         Err(reason) => (Sums::default(), below(fleet, &reason)),
     };
     let (joint, day) = (partition.joint.clone(), partition.day.clone());
-    let entry = Entry { joint, day, source: source.unwrap_or_default(), defect, sums };
-    stored::write(&place, std::slice::from_ref(&entry))
-        .map_err(|source| NightError::Write { path: place.clone(), source })?;
-    Ok((entry, true))
+    (Entry { joint, day, source: source.unwrap_or_default(), defect, sums }, true)
 }
 
 /// Name, size and SHA-256 of each file, a line each; no name has a slash.

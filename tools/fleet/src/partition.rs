@@ -154,7 +154,7 @@ mod tests {
             "joint=a/day=2026-13-01/1.parquet",
             "joint=a/day=2026-01-11/notes.txt",
             "joint=a/_tmp/1.parquet",
-            "_sums/joint=a/day=2026-01-01.parquet",
+            "_sums/joint=a.parquet",
             "robot=c/day=2026-01-01/1.parquet",
         ] {
             write(name);

@@ -1,9 +1,8 @@
-//! Sums of a partition as a small Parquet table of one row, with what they are of; host.
+//! Sums of a joint's days as a small Parquet table, a row each, with what they are of; host.
 //!
-//! Columns: the numbers of [`Sums::names`]; `joint`, `day`; `source`, name, size and SHA-256 of each file; `defect`,
+//! One table a joint: opening and writing one takes as long as some thousand rows of a recording. Columns: the numbers of [`Sums::names`]; `joint`, `day`; `source`, name, size and SHA-256 of each file; `defect`,
 //! why the partition is not used, or nothing.
 
-use crate::partition::Partition;
 use crate::sums::Sums;
 use logs::{LogError, Table, Texts, Wanted};
 use std::path::{Path, PathBuf};
@@ -29,9 +28,9 @@ pub struct Entry {
     pub sums: Sums,
 }
 
-/// File of a partition's sums.
-pub fn place(fleet: &Path, partition: &Partition) -> PathBuf {
-    fleet.join(FOLDER).join(format!("joint={}", partition.joint)).join(format!("day={}.parquet", partition.day))
+/// File of the sums of a joint's days.
+pub fn place(fleet: &Path, joint: &str) -> PathBuf {
+    fleet.join(FOLDER).join(format!("joint={joint}.parquet"))
 }
 
 /// Entries as a table, a row each.

@@ -79,8 +79,7 @@ pub enum BadFile {
 /// # Errors
 /// [`BadFile`] with file, column and row.
 pub fn read(path: &Path) -> Result<Recorded, BadFile> {
-    let warm = logs::columns(path)?.iter().any(|name| name == TEMPERATURE);
-    let table = logs::read(path, &Wanted::numbers(COLUMNS.into_iter().chain(warm.then_some(TEMPERATURE))))?;
+    let table = logs::parquet_log::read_with(path, &Wanted::numbers(COLUMNS), &[TEMPERATURE])?;
     table.all_finite(path)?;
     let file = path.file_name().unwrap_or_default().to_string_lossy();
     of_table(&table, &file)
@@ -95,6 +94,7 @@ pub fn of_table(table: &Table, file: &str) -> Result<Recorded, BadFile> {
     check_clock(time, file)?;
     let mut recorded =
         Recorded { temperature: mean(table.number(TEMPERATURE).unwrap_or_default()), ..Recorded::default() };
+    let (mut sines, mut cosines) = (Vec::new(), Vec::new());
     let mut first = 0;
     for last in 1..time.len() {
         let period = time[last] - time[last - 1];
@@ -108,26 +108,34 @@ pub fn of_table(table: &Table, file: &str) -> Result<Recorded, BadFile> {
         if duration < WINDOW - 0.5 * period {
             continue;
         }
-        let slowest = velocity[first..=last].iter().fold(f64::INFINITY, |least, v| least.min(v.abs()));
-        let forward = velocity[first] > 0.0;
-        if slowest >= SLOWEST && velocity[first..=last].iter().all(|v| (*v > 0.0) == forward) {
-            let over = |value: &dyn Fn(usize) -> f64| {
-                let trapezium = |at: usize| 0.5 * (value(at) + value(at + 1)) * (time[at + 1] - time[at]);
-                (first..last).map(trapezium).sum::<f64>() / duration
-            };
+        let rows = first..last + 1;
+        let speeds = &velocity[rows.clone()];
+        let slowest = speeds.iter().fold(f64::INFINITY, |least, v| least.min(v.abs()));
+        let forward = speeds[0] > 0.0;
+        if slowest >= SLOWEST && speeds.iter().all(|v| (*v > 0.0) == forward) {
+            let over = |values: &[f64]| integral(values, &time[rows.clone()]) / duration;
+            sines.clear();
+            sines.extend(position[rows.clone()].iter().map(|q| q.sin()));
+            cosines.clear();
+            cosines.extend(position[rows.clone()].iter().map(|q| q.cos()));
             let row = [
                 (velocity[last] - velocity[first]) / duration,
-                over(&|at| position[at].sin()),
-                over(&|at| position[at].cos()),
+                over(&sines),
+                over(&cosines),
                 1.0,
                 if forward { 1.0 } else { -1.0 },
-                over(&|at| velocity[at]),
+                over(speeds),
             ];
-            recorded.windows.push(Window { row, torque: over(&|at| torque[at]), duration });
+            recorded.windows.push(Window { row, torque: over(&torque[rows.clone()]), duration });
         }
         first = last;
     }
     Ok(recorded)
+}
+
+/// Integral over time by the trapezium rule.
+fn integral(values: &[f64], time: &[f64]) -> f64 {
+    values.windows(2).zip(time.windows(2)).map(|(value, time)| 0.5 * (value[0] + value[1]) * (time[1] - time[0])).sum()
 }
 
 fn check_clock(time: &[f64], file: &str) -> Result<(), BadFile> {

@@ -142,19 +142,19 @@ fn one_thread_four_threads_and_an_interrupted_night_give_the_same_bytes() {
     let (one, four, interrupted) = (copy(), copy(), copy());
     assert_eq!(whole(one.path(), 1).read, JOINTS * DAYS);
     whole(four.path(), 4);
-    let left = AtomicUsize::new(150);
+    let left = AtomicUsize::new(15);
     let more = || left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(1)).is_ok();
     let first = night(interrupted.path(), &Scope::default(), 4, &more).unwrap();
-    assert_eq!(first.read, 150);
+    assert_eq!(first.read, 15 * DAYS);
     assert!(!interrupted.path().join("_sums/all.parquet").exists());
     // A process that was killed while it wrote: half of a table, which is made anew, and a file that is none.
-    let half = interrupted.path().join("_sums").join(format!("joint={}", joint(0))).join("day=2026-01-01.parquet");
-    fs::create_dir_all(half.parent().unwrap()).unwrap();
+    let half = interrupted.path().join(format!("_sums/joint={}.parquet", joint(0)));
     fs::write(&half, b"PAR1 half").unwrap();
     let second = whole(interrupted.path(), 4);
-    assert!(second.kept >= 149 && second.kept + second.read == JOINTS * DAYS, "{} {}", second.kept, second.read);
+    let (kept, read) = (second.kept, second.read);
+    assert!(kept >= 14 * DAYS && kept + read == JOINTS * DAYS, "{kept} {read}");
     let expected = sums(one.path());
-    assert_eq!(expected.len(), JOINTS * DAYS + 1);
+    assert_eq!(expected.len(), JOINTS + 1);
     for folder in [&four, &interrupted] {
         let found = sums(folder.path());
         assert!(found.keys().eq(expected.keys()));
@@ -174,6 +174,27 @@ fn what_is_unchanged_is_not_read_again_and_what_changed_is() {
     fs::copy(from, to).unwrap();
     let changed = whole(folder.path(), 0);
     assert_eq!((changed.read, changed.kept), (1, JOINTS * DAYS - 1));
+}
+
+#[test]
+fn a_day_that_is_removed_leaves_the_table_and_one_before_the_others_joins_it() {
+    let (folder, expected) = (copy(), copy());
+    whole(folder.path(), 0);
+    let of = |folder: &Path, at| folder.join(format!("joint={}/day={}", joint(1), day(at)));
+    fs::remove_dir_all(of(folder.path(), 4)).unwrap();
+    fs::rename(of(folder.path(), 7), of(folder.path(), 7).with_file_name("day=2025-12-31")).unwrap();
+    fs::remove_dir_all(of(expected.path(), 4)).unwrap();
+    fs::rename(of(expected.path(), 7), of(expected.path(), 7).with_file_name("day=2025-12-31")).unwrap();
+    let changed = whole(folder.path(), 0);
+    assert_eq!((changed.read, changed.kept), (1, JOINTS * DAYS - 2));
+    whole(expected.path(), 0);
+    assert!(sums(folder.path()) == sums(expected.path()), "the bytes differ");
+    fs::remove_dir_all(of(folder.path(), 2)).unwrap();
+    fs::remove_dir_all(of(expected.path(), 2)).unwrap();
+    assert_eq!(whole(folder.path(), 0).read, 0);
+    fs::remove_dir_all(expected.path().join("_sums")).unwrap();
+    whole(expected.path(), 0);
+    assert!(sums(folder.path()) == sums(expected.path()), "the bytes differ where a day is gone and none is new");
 }
 
 #[test]

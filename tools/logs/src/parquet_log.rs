@@ -49,7 +49,21 @@ enum Values {
 /// # Errors
 /// [`LogError`].
 pub fn read(path: &Path, wanted: &Wanted) -> Result<Table, LogError> {
-    guarded(path, || read_columns(path, wanted))
+    read_with(path, wanted, &[])
+}
+
+/// Reads the wanted columns, and of `others`, columns of numbers, those that are there.
+///
+/// # Errors
+/// [`LogError`].
+pub fn read_with(path: &Path, wanted: &Wanted, others: &[&str]) -> Result<Table, LogError> {
+    guarded(path, || {
+        let reader = open(path)?;
+        let mut all = wanted.clone();
+        let names = names(&*reader);
+        all.numbers.extend(names.into_iter().filter(|name| others.contains(&name.as_str())));
+        read_columns(&*reader, path, &all)
+    })
 }
 
 /// Runs a reader. The crate `parquet` panics at lengths and places in a damaged file that it does not check.
@@ -62,9 +76,8 @@ fn guarded<T>(path: &Path, read: impl FnOnce() -> Result<T, LogError>) -> Result
     })
 }
 
-fn read_columns(path: &Path, wanted: &Wanted) -> Result<Table, LogError> {
-    let reader = open(path)?;
-    let mut targets = targets(&*reader, path, wanted)?;
+fn read_columns(reader: &dyn FileReader, path: &Path, wanted: &Wanted) -> Result<Table, LogError> {
+    let mut targets = targets(reader, path, wanted)?;
     let mut rows = 0;
     for group in 0..reader.num_row_groups() {
         let damaged = |error: &dyn std::fmt::Display| damaged(path, rows, error);
@@ -198,7 +211,10 @@ impl Values {
         let most = descriptor.max_def_level();
         let unsigned = unsigned(descriptor);
         match column {
-            ColumnReader::DoubleColumnReader(column) => pull(column, most, |value| self.number(value.copied())),
+            ColumnReader::DoubleColumnReader(column) => match self {
+                Self::Numbers(all) => doubles(column, most, all),
+                Self::Texts(_) => pull(column, most, |value| self.number(value.copied())),
+            },
             ColumnReader::FloatColumnReader(column) => {
                 pull(column, most, |value| self.number(value.map(|value| f64::from(*value))))
             }
@@ -225,9 +241,37 @@ impl Values {
 
 /// All values of a column chunk in the order of the rows; none for a null. `most` is the definition level of a value.
 fn pull<T: DataType>(
-    mut column: ColumnReaderImpl<T>,
+    column: ColumnReaderImpl<T>,
     most: i16,
     mut each: impl FnMut(Option<&T::T>),
+) -> Result<(), ParquetError> {
+    batches(column, |levels, values| {
+        if most == 0 {
+            values.iter().for_each(|value| each(Some(value)));
+        } else {
+            let mut values = values.iter();
+            levels.iter().for_each(|level| each(if *level == most { values.next() } else { None }));
+        }
+    })
+}
+
+/// The same of doubles, appended to `all`: batches without a null as they are.
+fn doubles(column: ColumnReaderImpl<DoubleType>, most: i16, all: &mut Vec<f64>) -> Result<(), ParquetError> {
+    batches(column, |levels, values| {
+        if values.len() >= levels.len() {
+            all.append(values);
+        } else {
+            let mut values = values.iter();
+            let of = |level: &i16| if *level == most { values.next().copied() } else { None };
+            all.extend(levels.iter().map(of).map(|value| value.unwrap_or(f64::NAN)));
+        }
+    })
+}
+
+/// Definition levels and values of a column chunk, batch by batch; there are no levels where nothing can be missing.
+fn batches<T: DataType>(
+    mut column: ColumnReaderImpl<T>,
+    mut each: impl FnMut(&[i16], &mut Vec<T::T>),
 ) -> Result<(), ParquetError> {
     let (mut levels, mut values) = (Vec::new(), Vec::new());
     loop {
@@ -237,12 +281,7 @@ fn pull<T: DataType>(
         if rows == 0 {
             return Ok(());
         }
-        if most == 0 {
-            values.iter().for_each(|value| each(Some(value)));
-        } else {
-            let mut values = values.iter();
-            levels.iter().for_each(|level| each(if *level == most { values.next() } else { None }));
-        }
+        each(&levels, &mut values);
     }
 }
 

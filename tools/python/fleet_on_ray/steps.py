@@ -33,7 +33,7 @@ class Stopped(Exception):
 
 def sums(options, joint):
     """Sums of a joint's days; `output` has jointctl's counts."""
-    sweep(os.path.join(glob.escape(os.path.join(options["fleet"], "_sums", f"joint={joint}")), "*.partial-*"))
+    sweep(glob.escape(os.path.join(options["fleet"], "_sums", f"joint={joint}")) + ".partial-*")
     return outcome(options, ["fleet", "sums", options["fleet"], f"--joint={joint}", "--threads=1", "--json"])
 
 
@@ -67,7 +67,7 @@ def retrain(options, joint):
 def inputs(options, joint):
     """Digest of all that a joint's new image depends on: sums, which have the recordings' digests, image, key, program."""
     digest = hashlib.sha256(repr([joint, options["presets"], options["network"], options["program"]]).encode())
-    stored = sorted(glob.glob(os.path.join(glob.escape(f"{options['fleet']}/_sums/joint={joint}"), "*.parquet")))
+    stored = [os.path.join(options["fleet"], "_sums", f"joint={joint}.parquet")]
     images = [os.path.join(options["images"], joint, "friction.img")] if options["images"] else []
     for path in stored + images + ([options["key"]] if options["key"] else []):
         if os.path.exists(path):

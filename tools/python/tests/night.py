@@ -120,8 +120,8 @@ class Steps(Place):
         self.assertEqual(found["warnings"], "told\n")
 
     def test_halves_of_processes_that_were_killed_are_removed_first_and_nothing_else(self):
-        halves = ["_sums/joint=a/day=1.partial-7", "_sums/all.partial-7", "page.partial-7"]
-        others = ["_sums/joint=a/day=1.parquet", "_sums/joint=b/day=1.partial-7", "page"]
+        halves = ["_sums/joint=a.partial-7", "_sums/all.partial-7", "page.partial-7"]
+        others = ["_sums/joint=a.parquet", "_sums/joint=b.partial-7", "page"]
         for name in halves + others:
             self.write(name)
         options = self.options(jointctl=self.script("true"), page=os.path.join(self.place, "page"))
@@ -154,7 +154,7 @@ class Steps(Place):
         self.assertTrue(os.path.exists(os.path.join(self.place, "ended")))
 
     def test_an_outcome_is_used_again_until_something_that_it_depends_on_changes(self):
-        self.write("_sums/joint=a/day=1.parquet")
+        self.write("_sums/joint=a.parquet")
         self.write("old/a/friction.img")
         self.write("fleet.key")
         within = lambda name: os.path.join(self.place, name)
@@ -165,7 +165,7 @@ class Steps(Place):
         calls = lambda: len(self.read("calls"))
         self.assertEqual((steps.retrain(options, "a"), calls()), (found, 1))
         changes = [
-            lambda: self.write("_sums/joint=a/day=1.parquet", b"y"), lambda: self.write("_sums/joint=a/day=2.parquet"),
+            lambda: self.write("_sums/joint=a.parquet", b"y"),
             lambda: self.write("old/a/friction.img", b"y"), lambda: self.write("fleet.key", b"y"),
             lambda: options.update(presets=["full"]), lambda: options.update(network=True),
             lambda: options.update(program="q"),
