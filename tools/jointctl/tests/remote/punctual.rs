@@ -54,9 +54,12 @@ pub fn round<T>(run: impl FnMut(usize) -> T, has_failed: impl Fn(&T) -> bool) ->
     })
 }
 
-/// Runs a round of a command, which keeps what a joint has with exit code 3. It is given what a repeated one ends with.
+/// Runs a round of a command, which keeps what a joint has with exit code 3, or learned from such a motion what a joint
+/// refuses. It is given what a repeated one ends with.
 pub fn command(run: impl Fn(&str) -> Output) -> Output {
-    round(|number| run(if number > 0 { " --force" } else { "" }), |output| output.status.code() == Some(3))
+    let refused = |output: &Output| String::from_utf8_lossy(&output.stderr).contains("does not accept the image");
+    let kept = |output: &Output| output.status.code() == Some(3) || refused(output);
+    round(|number| run(if number > 0 { " --force" } else { "" }), kept)
 }
 
 fn repeated<T>(
