@@ -72,8 +72,8 @@ pub enum NightError {
     },
 }
 
-/// Does the work with `threads` threads, 0 for one a core. `more` is asked before each 32 partitions
-/// of a joint; where it says no, the rest is left for another time, and the table of all is not written.
+/// Does the work with `threads` threads, 0 for one a core. `more` is asked before each 32
+/// partitions of a joint; where it says no, the rest is left for another time, and the table of all is not written.
 ///
 /// # Errors
 /// [`NightError`]; bad partitions are none, they are entries with a defect.

@@ -1,8 +1,8 @@
 //! Sums of a joint's days as a small Parquet table, a row each, with what they are of; host.
 //!
-//! One table a joint: opening and writing one takes as long as some thousand rows of a recording. Columns: the numbers
-//! of [`Sums::names`]; `joint`, `day`; `source`, name, size and SHA-256 of each file; `defect`, why the partition is
-//! not used, or nothing.
+//! Opening and writing a table takes longer than what a day adds to it: one table a joint, and not one a day.
+//! Columns: the numbers of [`Sums::names`]; `joint`, `day`; `source`, name, size and SHA-256 of each file; `defect`,
+//! why the partition is not used, or nothing.
 
 use crate::sums::Sums;
 use logs::{LogError, Table, Texts, Wanted};

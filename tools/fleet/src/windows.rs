@@ -188,6 +188,20 @@ mod tests {
     }
 
     #[test]
+    fn a_temperature_is_read_where_there_is_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("log.parquet");
+        let of = |table: &Table| {
+            std::fs::write(&path, logs::encode(table, logs::Format::Parquet, "", 0).unwrap()).unwrap();
+            read(&path).unwrap()
+        };
+        let mut table = exact(100);
+        assert!(of(&table).temperature.is_nan());
+        table.numbers.push((TEMPERATURE.to_owned(), (0..100).map(|row| f64::from(row % 2) + 30.0).collect()));
+        assert_eq!(of(&table).temperature, 30.5);
+    }
+
+    #[test]
     fn no_window_spans_a_gap_a_reversal_or_a_standstill() {
         let mut table = exact(2_500);
         let whole = of_table(&table, "a").unwrap().windows.len();

@@ -176,6 +176,50 @@ fn what_is_unchanged_is_not_read_again_and_what_changed_is() {
     assert_eq!((changed.read, changed.kept), (1, JOINTS * DAYS - 1));
 }
 
+/// A fleet of one joint with so many days, all with the same rows.
+fn one_joint(days: usize) -> tempfile::TempDir {
+    let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
+    let from = data().join(format!("joint={}/day={}/log.parquet", joint(1), day(0)));
+    for number in 0..days {
+        let to = folder.path().join(format!("joint=a/day=20{:02}-01-01", number + 10));
+        fs::create_dir_all(&to).unwrap();
+        fs::copy(&from, to.join("log.parquet")).unwrap();
+    }
+    folder
+}
+
+#[test]
+fn a_joint_s_table_is_written_after_each_32_days_and_an_interruption_loses_none_that_is_in_it() {
+    let asked = |days: usize| {
+        let count = AtomicUsize::new(0);
+        let more = || count.fetch_add(1, Ordering::Relaxed) < usize::MAX;
+        night(one_joint(days).path(), &Scope::default(), 2, &more).unwrap();
+        count.into_inner()
+    };
+    assert_eq!([1, 32, 33, 64, 65].map(asked), [1, 1, 2, 2, 3]);
+
+    let (folder, expected) = (one_joint(70), one_joint(70));
+    whole(expected.path(), 2);
+    let pieces = |pieces: usize| {
+        let left = AtomicUsize::new(pieces);
+        let more = || left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(1)).is_ok();
+        night(folder.path(), &Scope::default(), 2, &more).unwrap()
+    };
+    let stored = || night(folder.path(), &Scope { joints: vec![], stored: true }, 1, &|| true).unwrap();
+    assert_eq!((pieces(2).read, stored().entries.len()), (64, 64));
+    let rest = pieces(3);
+    assert_eq!((rest.kept, rest.read), (64, 6));
+    assert!(sums(folder.path()) == sums(expected.path()), "the bytes differ");
+
+    // A day of the first piece changes, and the night ends behind it: the days after it are not lost.
+    let changed = folder.path().join("joint=a/day=2012-01-01/log.parquet");
+    fs::copy(data().join(format!("joint={}/day={}/log.parquet", joint(1), day(1))), changed).unwrap();
+    assert_eq!(pieces(1).read, 1);
+    let all = stored();
+    assert_eq!((all.entries.len(), all.misplaced.len()), (70, 0));
+    assert_eq!(pieces(3).read, 0);
+}
+
 #[test]
 fn a_day_that_is_removed_leaves_the_table_and_one_before_the_others_joins_it() {
     let (folder, expected) = (copy(), copy());
