@@ -6,10 +6,11 @@
 //! alone, not on the number of threads, nor on how often the work was interrupted.
 
 use crate::estimate::estimate;
-use crate::partition::{FolderError, Misplaced, Partition, fingerprint, is_joint, partitions};
+use crate::partition::{FolderError, Loaded, Misplaced, Partition, is_joint, load, partitions};
 use crate::stored::{self, Entry, FOLDER};
 use crate::sums::Sums;
 use crate::windows;
+use logs::parquet_log::WHOLE;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -194,13 +195,15 @@ fn of_joint(
 
 /// Sums of a partition, and whether it was read.
 fn entry(fleet: &Path, partition: &Partition, known: Option<&Entry>) -> (Entry, bool) {
-    let source = source(partition);
+    let loaded = loaded(partition);
+    let source = loaded.as_ref().map(|files| source(partition, files)).map_err(Clone::clone);
     if let Some(known) = known.filter(|known| source.as_ref().is_ok_and(|source| *source == known.source)) {
         return (known.clone(), false);
     }
-    let recorded = source.clone().and_then(|source| copied(partition, &source)).and_then(|()| {
-        let read = |file: &PathBuf| windows::read(file).map_err(|error| error.to_string());
-        partition.files.iter().map(read).collect::<Result<Vec<_>, _>>()
+    let recorded = loaded.and_then(|files| {
+        copied(partition, source.as_deref().unwrap_or_default())?;
+        let read = |(file, loaded): (&PathBuf, Loaded)| windows::read(file, loaded.bytes).map_err(|e| e.to_string());
+        partition.files.iter().zip(files).map(read).collect::<Result<Vec<_>, _>>()
     });
     let (sums, defect) = match recorded {
         Ok(recorded) => (Sums::of(&recorded, |sums| estimate(sums).map(|found| found.values)), String::new()),
@@ -210,13 +213,23 @@ fn entry(fleet: &Path, partition: &Partition, known: Option<&Entry>) -> (Entry, 
     (Entry { joint, day, source: source.unwrap_or_default(), defect, sums }, true)
 }
 
-/// Name, size and SHA-256 of each file, a line each; no name has a slash.
-fn source(partition: &Partition) -> Result<String, String> {
-    let line = |file: &PathBuf| {
-        let print = fingerprint(file).map_err(|error| format!("{}: cannot be read: {error}", file.display()))?;
-        Ok(format!("{}/{print}", file.file_name().unwrap_or_default().to_string_lossy()))
+/// The files of a partition, with the bytes of those that are short and the first.
+fn loaded(partition: &Partition) -> Result<Vec<Loaded>, String> {
+    let mut left = WHOLE;
+    let load = |file: &PathBuf| {
+        let loaded = load(file, left).map_err(|error| format!("{}: cannot be read: {error}", file.display()))?;
+        left -= loaded.bytes.as_ref().map_or(0, |bytes| bytes.len() as u64);
+        Ok(loaded)
     };
-    Ok(partition.files.iter().map(line).collect::<Result<Vec<_>, String>>()?.join("\n"))
+    partition.files.iter().map(load).collect()
+}
+
+/// Name, size and digest of each file, a line each; no name has a slash.
+fn source(partition: &Partition, files: &[Loaded]) -> String {
+    let line = |(file, loaded): (&PathBuf, &Loaded)| {
+        format!("{}/{}", file.file_name().unwrap_or_default().to_string_lossy(), loaded.fingerprint)
+    };
+    partition.files.iter().zip(files).map(line).collect::<Vec<_>>().join("\n")
 }
 
 /// Refuses a partition with two files of the same bytes.

@@ -2,7 +2,6 @@
 //!
 //! Names that begin with `_` or `.` are not data, as in other programs that read such folders.
 
-use sha2::{Digest, Sha256};
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{self, Read};
@@ -114,23 +113,31 @@ pub fn is_day(text: &str) -> bool {
     digits(year, 4) && within(month, 12) && within(day, 31)
 }
 
-/// Size and SHA-256 of a file, as text.
+/// A file of a partition.
+#[derive(Clone, Debug)]
+pub struct Loaded {
+    /// Size and BLAKE3 of it, as text.
+    pub fingerprint: String,
+    /// Bytes of it; none of one that is longer than was to be kept.
+    pub bytes: Option<Vec<u8>>,
+}
+
+/// Reads a file, and keeps its bytes where they are at most `most`.
 ///
 /// # Errors
 /// Those of the system.
-pub fn fingerprint(path: &Path) -> io::Result<String> {
+pub fn load(path: &Path, most: u64) -> io::Result<Loaded> {
+    let told = |size: u64, hash: blake3::Hash| format!("{size}:{hash}");
     let mut file = File::open(path)?;
-    let (mut digest, mut size) = (Sha256::new(), 0);
-    let mut piece = vec![0; 1 << 16];
-    loop {
-        let length = file.read(&mut piece)?;
-        if length == 0 {
-            let digits: String = digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
-            return Ok(format!("{size}:{digits}"));
-        }
-        size += length;
-        digest.update(&piece[..length]);
+    let size = file.metadata()?.len();
+    if size > most {
+        let mut digest = blake3::Hasher::new();
+        digest.update_reader(&mut file)?;
+        return Ok(Loaded { fingerprint: told(digest.count(), digest.finalize()), bytes: None });
     }
+    let mut bytes = Vec::with_capacity(size.try_into().unwrap_or(0));
+    file.read_to_end(&mut bytes)?;
+    Ok(Loaded { fingerprint: told(bytes.len() as u64, blake3::hash(&bytes)), bytes: Some(bytes) })
 }
 
 #[cfg(test)]
@@ -182,6 +189,22 @@ mod tests {
         for (name, there) in [("a", true), ("b", true), ("c", false), ("", false), ("a/day=2026-01-09", false)] {
             assert_eq!(is_joint(folder.path(), name), there, "{name:?}");
         }
+    }
+
+    #[test]
+    fn a_file_is_known_by_size_and_digest_whether_its_bytes_are_kept_or_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("1.parquet");
+        fs::write(&path, "abc").unwrap();
+        let [kept, passed] = [3, 2].map(|most| load(&path, most).unwrap());
+        assert_eq!((kept.bytes.as_deref(), &passed.bytes), (Some(&b"abc"[..]), &None));
+        // BLAKE3 of "abc", of the algorithm's test vectors as its command-line program prints it.
+        let digest = "6437b3ac38465133ffb63b75273a8db548c558465d79db03fd359c6cd5bd9d85";
+        assert_eq!(kept.fingerprint, format!("3:{digest}"));
+        assert_eq!(passed.fingerprint, kept.fingerprint);
+        fs::write(&path, "abd").unwrap();
+        assert_ne!(load(&path, 3).unwrap().fingerprint, kept.fingerprint);
+        assert!(load(&folder.path().join("2.parquet"), 3).is_err());
     }
 
     #[test]

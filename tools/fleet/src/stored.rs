@@ -1,7 +1,7 @@
 //! Sums of a joint's days as a small Parquet table, a row each, with what they are of; host.
 //!
 //! Opening and writing a table takes longer than what a day adds to it: one table a joint, and not one a day.
-//! Columns: the numbers of [`Sums::names`]; `joint`, `day`; `source`, name, size and SHA-256 of each file; `defect`,
+//! Columns: the numbers of [`Sums::names`]; `joint`, `day`; `source`, name, size and BLAKE3 of each file; `defect`,
 //! why the partition is not used, or nothing.
 
 use crate::sums::Sums;
@@ -21,7 +21,7 @@ pub struct Entry {
     pub joint: String,
     /// The day.
     pub day: String,
-    /// Files with size and SHA-256.
+    /// Files with size and BLAKE3.
     pub source: String,
     /// Reason for which the partition is not used; empty where it is.
     pub defect: String,

@@ -8,8 +8,9 @@
 //! Divided by the window's duration, everything is a mean torque in Nm. Windows in which the joint turns round or is
 //! slower than [`SLOWEST`] are left out: at standstill friction is whatever it has to be.
 
-use logs::{LogError, Table, Wanted};
+use logs::{LogError, Table, Wanted, parquet_log};
 use std::path::Path;
+use wide::f64x4;
 
 /// Unknowns of the model, in this order.
 pub const NAMES: [&str; 6] = ["inertia", "gravity_sine", "gravity_cosine", "offset", "dry", "viscous"];
@@ -74,12 +75,16 @@ pub enum BadFile {
     },
 }
 
-/// Reads the windows of a file.
+/// Reads the windows of a file, from its bytes where they are here already.
 ///
 /// # Errors
 /// [`BadFile`] with file, column and row.
-pub fn read(path: &Path) -> Result<Recorded, BadFile> {
-    let table = logs::parquet_log::read_with(path, &Wanted::numbers(COLUMNS), &[TEMPERATURE])?;
+pub fn read(path: &Path, bytes: Option<Vec<u8>>) -> Result<Recorded, BadFile> {
+    let wanted = Wanted::numbers(COLUMNS);
+    let table = match bytes {
+        Some(bytes) => parquet_log::read_bytes_with(path, bytes, &wanted, &[TEMPERATURE])?,
+        None => parquet_log::read_with(path, &wanted, &[TEMPERATURE])?,
+    };
     table.all_finite(path)?;
     let file = path.file_name().unwrap_or_default().to_string_lossy();
     of_table(&table, &file)
@@ -94,7 +99,7 @@ pub fn of_table(table: &Table, file: &str) -> Result<Recorded, BadFile> {
     check_clock(time, file)?;
     let mut recorded =
         Recorded { temperature: mean(table.number(TEMPERATURE).unwrap_or_default()), ..Recorded::default() };
-    let (mut sines, mut cosines) = (Vec::new(), Vec::new());
+    let [sines, cosines] = sines_and_cosines(position);
     let mut first = 0;
     for last in 1..time.len() {
         let period = time[last] - time[last - 1];
@@ -113,24 +118,36 @@ pub fn of_table(table: &Table, file: &str) -> Result<Recorded, BadFile> {
         let slowest = speeds.iter().fold(f64::INFINITY, |least, v| least.min(v.abs()));
         let forward = speeds[0] > 0.0;
         if slowest >= SLOWEST && speeds.iter().all(|v| (*v > 0.0) == forward) {
-            let over = |values: &[f64]| integral(values, &time[rows.clone()]) / duration;
-            sines.clear();
-            sines.extend(position[rows.clone()].iter().map(|q| q.sin()));
-            cosines.clear();
-            cosines.extend(position[rows.clone()].iter().map(|q| q.cos()));
+            let over = |values: &[f64]| integral(&values[rows.clone()], &time[rows.clone()]) / duration;
             let row = [
                 (velocity[last] - velocity[first]) / duration,
                 over(&sines),
                 over(&cosines),
                 1.0,
                 if forward { 1.0 } else { -1.0 },
-                over(speeds),
+                over(velocity),
             ];
-            recorded.windows.push(Window { row, torque: over(&torque[rows.clone()]), duration });
+            recorded.windows.push(Window { row, torque: over(torque), duration });
         }
         first = last;
     }
     Ok(recorded)
+}
+
+/// Sine and cosine of each angle, four at a time.
+fn sines_and_cosines(angles: &[f64]) -> [Vec<f64>; 2] {
+    let mut both = [(); 2].map(|()| Vec::with_capacity(angles.len() + 3));
+    for four in angles.chunks(4) {
+        let mut lanes = [0.0; 4];
+        lanes[..four.len()].copy_from_slice(four);
+        let (sine, cosine) = f64x4::from(lanes).sin_cos();
+        both[0].extend(sine.to_array());
+        both[1].extend(cosine.to_array());
+    }
+    both.map(|mut values| {
+        values.truncate(angles.len());
+        values
+    })
 }
 
 /// Integral over time by the trapezium rule.
@@ -188,12 +205,30 @@ mod tests {
     }
 
     #[test]
+    fn sines_and_cosines_are_those_of_the_standard_library() {
+        for length in 0..9 {
+            let angles: Vec<f64> = (0..length).map(|i| 1.7 * f64::from(i)).collect();
+            assert_eq!(sines_and_cosines(&angles).map(|values| values.len()), [angles.len(); 2]);
+        }
+        // Turns of a joint, and many of them.
+        let angles: Vec<f64> = (-20_000..20_000).map(|i| 0.037 * f64::from(i)).collect();
+        let [sines, cosines] = sines_and_cosines(&angles);
+        for ((angle, sine), cosine) in angles.iter().zip(sines).zip(cosines) {
+            let errors = [sine - angle.sin(), cosine - angle.cos()];
+            assert!(errors.iter().all(|error| error.abs() < 1e-15), "{angle}: {errors:?}");
+        }
+    }
+
+    #[test]
     fn a_temperature_is_read_where_there_is_one() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("log.parquet");
         let of = |table: &Table| {
             std::fs::write(&path, logs::encode(table, logs::Format::Parquet, "", 0).unwrap()).unwrap();
-            read(&path).unwrap()
+            let bytes = std::fs::read(&path).unwrap();
+            let [whole, by_place] = [Some(bytes), None].map(|bytes| read(&path, bytes).unwrap());
+            assert!(whole.windows == by_place.windows);
+            whole
         };
         let mut table = exact(100);
         assert!(of(&table).temperature.is_nan());

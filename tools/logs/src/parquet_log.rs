@@ -27,7 +27,7 @@ const BATCH: usize = 8_192;
 /// Rows of a row group that is written.
 const GROUP: usize = 1 << 20;
 /// Bytes of a file up to which it is read at once: of a large one the columns that are wanted, each by its place.
-const WHOLE: u64 = 16 << 20;
+pub const WHOLE: u64 = 16 << 20;
 /// Rows of a table up to which it is written without dictionaries and statistics, which are longer than its values.
 const SMALL: usize = 64;
 
@@ -57,13 +57,25 @@ pub fn read(path: &Path, wanted: &Wanted) -> Result<Table, LogError> {
 /// # Errors
 /// [`LogError`].
 pub fn read_with(path: &Path, wanted: &Wanted, others: &[&str]) -> Result<Table, LogError> {
+    guarded(path, || read_with_reader(&*open(path)?, path, wanted, others))
+}
+
+/// The same of a file whose bytes are here already; `path` is told in an error.
+///
+/// # Errors
+/// [`LogError`].
+pub fn read_bytes_with(path: &Path, bytes: Vec<u8>, wanted: &Wanted, others: &[&str]) -> Result<Table, LogError> {
     guarded(path, || {
-        let reader = open(path)?;
-        let mut all = wanted.clone();
-        let names = names(&*reader);
-        all.numbers.extend(names.into_iter().filter(|name| others.contains(&name.as_str())));
-        read_columns(&*reader, path, &all)
+        let reader = SerializedFileReader::new(Bytes::from(bytes)).map_err(|error| foreign(path, &error))?;
+        read_with_reader(&reader, path, wanted, others)
     })
+}
+
+fn read_with_reader(reader: &dyn FileReader, path: &Path, wanted: &Wanted, others: &[&str]) -> Result<Table, LogError> {
+    let mut all = wanted.clone();
+    let names = names(reader);
+    all.numbers.extend(names.into_iter().filter(|name| others.contains(&name.as_str())));
+    read_columns(reader, path, &all)
 }
 
 /// Runs a reader. The crate `parquet` panics at lengths and places in a damaged file that it does not check.
@@ -131,11 +143,11 @@ fn open(path: &Path) -> Result<Box<dyn FileReader>, LogError> {
         }
         false => SerializedFileReader::new(file).map(|reader| Box::new(reader) as _),
     };
-    reader.map_err(|error| LogError::Foreign {
-        file: path.to_owned(),
-        format: Format::Parquet,
-        reason: error.to_string(),
-    })
+    reader.map_err(|error| foreign(path, &error))
+}
+
+fn foreign(path: &Path, error: &ParquetError) -> LogError {
+    LogError::Foreign { file: path.to_owned(), format: Format::Parquet, reason: error.to_string() }
 }
 
 fn damaged(path: &Path, row: usize, error: &dyn std::fmt::Display) -> LogError {
