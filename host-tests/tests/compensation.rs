@@ -91,6 +91,31 @@ fn switched_off_or_without_a_model_the_loop_computes_the_bits_of_one_that_never_
 }
 
 #[test]
+fn the_parts_make_the_full_model_and_pre_sliding_is_that_of_all_sets() {
+    let mut random = ChaCha8Rng::seed_from_u64(7);
+    let (mut networks, mut slides) = (0, 0);
+    for _ in 0..200 {
+        let parameters = tame(&mut random);
+        let model = FrictionModel::new(&parameters, RATE);
+        for request in [Request::Physical, Request::PhysicalAndNetwork, Request::NetworkInShadow] {
+            let (mut compensation, mut bent) = (Compensation::default(), Bent::default());
+            for _ in 0..20 {
+                let state = any_state(&mut random, &parameters);
+                let output = compensation.step(Some(&model), &unlimited(request), &state);
+                let [parts] = output.parts;
+                assert_eq!(parts.physical.saturating_add(parts.network), output.shadow, "{parts:?}");
+                let acts = if request == Request::PhysicalAndNetwork { output.shadow } else { parts.physical };
+                assert_eq!(output.torque, acts, "{request:?} {parts:?}");
+                assert_eq!(parts.pre_sliding.to_bits(), model.common(&mut bent, &state).pre_sliding);
+                networks += usize::from(parts.network != Torque::ZERO);
+                slides += usize::from(parts.pre_sliding != Torque::ZERO);
+            }
+        }
+    }
+    assert!(networks > 1_000 && slides > 1_000, "{networks} with network, {slides} with pre-sliding");
+}
+
+#[test]
 fn the_torque_is_never_beyond_the_clamp_and_never_faster_than_the_slew_limit() {
     let mut random = ChaCha8Rng::seed_from_u64(2);
     let (mut clamped, mut slewed) = (0, 0);

@@ -280,7 +280,7 @@ fn a_pre_sliding_element_is_as_stiff_and_as_strong_as_it_may_be_and_no_more() {
     let parameters = parameters(&mut random, 2, 1, false);
     let bytes = encoded(&image(&mut random, parameters, 1));
     for (offset, name, limit) in
-        [(144, "stiffness of a pre-sliding element", MAX_STIFFNESS), (148, "level of a pre-sliding element", MAX_LEVEL)]
+        [(144, "stiffness of pre-sliding", MAX_STIFFNESS), (148, "level of pre-sliding", MAX_LEVEL)]
     {
         let with = |value: i32| {
             let mut other = bytes.clone();

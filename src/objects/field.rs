@@ -395,6 +395,14 @@ pub enum Actual {
     ImageState,
     /// States of the board's outputs.
     Outputs,
+    /// Torque of the physical friction model.
+    PhysicalTorque,
+    /// Torque of the friction network.
+    NetworkTorque,
+    /// Torque of pre-sliding within the physical model's.
+    PreSlidingTorque,
+    /// Torque that adaptation adds to the image's.
+    AdaptationTorque,
 }
 
 /// Taking the staged configuration.

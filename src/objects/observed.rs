@@ -11,7 +11,8 @@ use crate::joint::fault::Faults;
 use crate::joint::load_feedforward::LOADS;
 use crate::joint::state_machine::State;
 use crate::joint::{PROFILES, Telemetry};
-use friction_compensation::compensation::Reason;
+use friction_compensation::compensation::{Parts, Reason};
+use friction_compensation::quantity::Torque;
 
 /// A copy of what the control step and the slow task know.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,6 +58,11 @@ impl Observed {
         self.telemetry.torque() - self.feedforward_torque - self.telemetry.compensated.torque
     }
 
+    /// A part of the model's torque, Nm.
+    fn part(&self, part: fn(&Parts) -> Torque) -> f32 {
+        self.telemetry.compensated.output.parts.first().map_or(0.0, |parts| nm(part(parts)))
+    }
+
     /// Demanded position at this instant, rad: where nothing demands one, the actual position.
     pub(super) fn position_demand(&self) -> f32 {
         let t = &self.telemetry;
@@ -85,7 +91,18 @@ impl Observed {
             Actual::Velocity => signed(to_i32(1e3 * t.motion.velocity)),
             Actual::Torque => permille(t.torque()),
             Actual::TorqueDemand => permille(t.wanted.torque),
-            Actual::PositionDemand | Actual::FollowingError | Actual::Current | Actual::DcLink if !PROFILES => 0,
+            Actual::PositionDemand
+            | Actual::FollowingError
+            | Actual::Current
+            | Actual::DcLink
+            | Actual::PhysicalTorque
+            | Actual::NetworkTorque
+            | Actual::PreSlidingTorque
+            | Actual::AdaptationTorque
+                if !PROFILES =>
+            {
+                0
+            }
             Actual::PositionDemand => signed(to_i32(1e6 * self.position_demand())),
             Actual::FollowingError => signed(to_i32(1e6 * (self.position_demand() - t.motion.position))),
             Actual::Current => {
@@ -112,6 +129,12 @@ impl Observed {
             Actual::AdaptedFactor => self.adaptation.factors.factor.to_bits().into(),
             Actual::FactorDeviation => self.adaptation.deviation.to_bits().into(),
             Actual::AdaptedViscous => self.adaptation.factors.viscous.to_bits().into(),
+            Actual::PhysicalTorque => milli(self.part(|parts| parts.physical)),
+            Actual::NetworkTorque => milli(self.part(|parts| parts.network)),
+            Actual::PreSlidingTorque => milli(self.part(|parts| parts.pre_sliding)),
+            Actual::AdaptationTorque => {
+                milli(t.compensated.torque - t.compensated.permitted * nm(t.compensated.output.torque))
+            }
             Actual::Outputs => u64::from(!t.outputs.brake_open()) | u64::from(t.outputs.chopper()) << 16,
             Actual::ExternalTorque => self.external.first().map_or(0, |external| permille(external.torque)),
             Actual::ExternalUncertainty => self.external.first().map_or(0, |external| permille(external.uncertainty)),
@@ -120,6 +143,10 @@ impl Observed {
             Actual::ImageState => shared.image_state().into(),
         }
     }
+}
+
+fn nm(torque: Torque) -> f32 {
+    torque.to_bits() as f32 * (1.0 / 65_536.0)
 }
 
 /// Value as an object carries it: the low bytes are the value's, whatever its length.

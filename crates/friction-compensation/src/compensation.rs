@@ -6,7 +6,7 @@
 //! compensation.
 
 use crate::friction::common::CommonTorques;
-use crate::friction::regime::Memory;
+use crate::friction::regime::{MAX_SETS, Memory};
 use crate::friction::state::{JointState, SIGNALS, Signal};
 use crate::friction::{Estimate, FrictionModel};
 use crate::quantity::Torque;
@@ -148,6 +148,25 @@ impl Settings {
     }
 }
 
+/// Number of [`Parts`] of an output: one, and none where a program has no room for regimes.
+pub const PARTS: usize = (MAX_SETS > 1) as usize;
+
+/// The model's torque by its parts, as they fade beyond their box, before gain, clamp and slew limit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Parts {
+    /// Torque of the physical model, pre-sliding included.
+    pub physical: Torque,
+    /// Torque of the network, in shadow too.
+    pub network: Torque,
+    /// Torque of pre-sliding, before the factor of dry friction (temperature, load) and the fade.
+    pub pre_sliding: Torque,
+}
+
+impl Parts {
+    /// No torque.
+    const NOTHING: Self = Self { physical: Torque::ZERO, network: Torque::ZERO, pre_sliding: Torque::ZERO };
+}
+
 /// The outcome of one evaluation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Output {
@@ -162,6 +181,8 @@ pub struct Output {
     pub reason: Reason,
     /// True where the clamp or the slew limit changed the torque.
     pub limited: bool,
+    /// Parts of the model's torque.
+    pub parts: [Parts; PARTS],
 }
 
 impl Output {
@@ -172,6 +193,7 @@ impl Output {
         acting: Acting::Nothing,
         reason: Reason::Off,
         limited: false,
+        parts: [Parts::NOTHING; PARTS],
     };
 }
 
@@ -262,13 +284,15 @@ impl Compensation {
     /// the slew rate, stays there exactly, and the past is forgotten.
     #[inline]
     pub fn finish(&mut self, model: Option<&FrictionModel>, settings: &Settings) -> Output {
-        let (Some(Begun { signals, estimate, .. }), Some(model)) = (&self.begun, model) else {
+        let (Some(Begun { signals, estimate, common }), Some(model)) = (&self.begun, model) else {
             return self.fade_out(settings);
         };
         let weights = model.fade().weights(signals);
         let estimate = model.fade_in(*estimate, &mut self.memory);
         let physical = weigh(estimate.physical.to_bits(), weights.physical);
         let network = weigh(estimate.network.to_bits(), weights.network);
+        let [physical_part, network_part, pre_sliding] = [physical, network, common.pre_sliding].map(Torque::from_bits);
+        let parts = [Parts { physical: physical_part, network: network_part, pre_sliding }; PARTS];
         let full = self.permitted(physical.saturating_add(network), settings);
         let wants_network = settings.request == Request::PhysicalAndNetwork;
         // After a change-over to a set without a network, the old set's still fades out.
@@ -291,7 +315,7 @@ impl Compensation {
             _ => Reason::AsRequested,
         };
         let limited = wanted.limited || torque != wanted.torque;
-        Output { torque: self.last, shadow: Torque::from_bits(full.torque), acting, reason, limited }
+        Output { torque: self.last, shadow: Torque::from_bits(full.torque), acting, reason, limited, parts }
     }
 
     /// Gain, then clamp.

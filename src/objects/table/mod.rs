@@ -150,11 +150,11 @@ pub const fn is_of_the_load(object: &Object) -> bool {
     matches!(object.index, 0x2202 | 0x2203)
 }
 
-/// Returns `true` if an object wants room that not every program has: those of the profile modes, of the load, the SYNC
-/// counter, date and time of the configuration, the log of faults. A program has all of these or none; 6502h tells
-/// which ([`Operation::has_profiles`](super::Operation::has_profiles)).
+/// Returns `true` if an object wants room that not every program has: those of the profile modes, of the load, friction
+/// by its parts, the SYNC counter, date and time of the configuration, the log of faults. A program has all of these or
+/// none; 6502h tells which ([`Operation::has_profiles`](super::Operation::has_profiles)).
 pub const fn wants_room(object: &Object) -> bool {
-    let own = matches!((object.index, object.sub_index), (0x1019 | 0x1020 | 0x2305, _) | (0x1800..=0x19FF, 6));
+    let own = matches!((object.index, object.sub_index), (0x1019 | 0x1020 | 0x2022 | 0x2305, _) | (0x1800..=0x19FF, 6));
     own || is_of_profiles(object) || is_of_the_load(object)
 }
 

@@ -46,6 +46,16 @@ room! {
         5, "gear temperature", I16, RO, TRANSMIT, A(Actual::GearTemperature); "°C", 0.1, ANY;
             "Temperature that friction is computed for"
     }
+    0x2022 "friction by part" {
+        1, "physical torque", I16, RO, TRANSMIT, A(Actual::PhysicalTorque); "Nm", 1e-3, ANY;
+            "Torque of the physical model, pre-sliding included, before gain and clamp; beyond the range that friction was learned in it fades"
+        2, "network torque", I16, RO, TRANSMIT, A(Actual::NetworkTorque); "Nm", 1e-3, ANY;
+            "Torque of the network, likewise; in shadow, too"
+        3, "pre-sliding torque", I16, RO, TRANSMIT, A(Actual::PreSlidingTorque); "Nm", 1e-3, ANY;
+            "Pre-sliding within the physical model, before what temperature and load make of it"
+        4, "adaptation torque", I16, RO, TRANSMIT, A(Actual::AdaptationTorque); "Nm", 1e-3, ANY;
+            "Part of the compensation torque that adaptation adds to the image's"
+    }
     0x2030 "coupled joint" {
         1, "coupled velocity", I32, RW, RECEIVE, Set(SetPoint::CoupledVelocity); "rad/s", 1e-3, ANY;
             "Velocity of the joint that shares this joint's drive: map another joint's TPDO here. Silent for longer than the command deadline it counts as standing"

@@ -62,6 +62,7 @@ const take = {
     document.title = `Joint ${node}`;
     by("title").textContent = `Joint ${node}`;
     plots.begin(hello.signals);
+    by("by-part").setAttribute("aria-pressed", String(hello.signals.some(({ name }) => name === "physical-torque")));
     by("new-board").replaceChildren(...["", ...hello.boards].map((name) => {
       const option = document.createElement("option");
       option.value = name;
@@ -261,6 +262,7 @@ by("window").onchange = () => {
 };
 on("csv", async () => save(`joint-${node}.csv`, await joint.ask("csv")));
 on("look", () => joint.ask("look"));
+on("by-part", () => joint.ask({ draw: { by_part: by("by-part").getAttribute("aria-pressed") === "false" } }));
 
 on("load-checklist", async () => tables.checklist(by("checklist"), await joint.ask("checklist")));
 let history = null;
@@ -303,9 +305,11 @@ function finished(found) {
 }
 
 const show = () => objects.show(by("find").value, by("only-settings").checked);
+const stored = async () => { by("stored").textContent = `What is in use: ${await joint.ask("stored")}.`; };
 const read = async () => {
   objects.set(await joint.ask("objects"));
   show();
+  await stored();
 };
 by("find").oninput = show;
 by("only-settings").onchange = show;
@@ -318,6 +322,7 @@ on("set", async () => {
 on("store", async () => {
   await joint.ask("store");
   log("stored");
+  await stored();
 });
 on("export", async () => save(`joint-${node}.toml`, await joint.ask("export")));
 on("import", async () => {

@@ -3,6 +3,10 @@
 
 // Strokes that are kept: more than a minute at 4 ms.
 const KEPT = 16384;
+// Time between two readings of the numbers beside names, ms: nobody reads faster.
+const READ = 100;
+// Time for which the axis moves on after a message, ms.
+const GOES_ON = 200;
 const LEFT = 58, RIGHT = 8, TOP = 6, BOTTOM = 18;
 const COLOURS = ["--c0", "--c1", "--c2", "--c3", "--c4", "--c5"];
 // Smallest span of an axis, in the unit of the curve: noise of a joint at rest does not fill the plot.
@@ -29,9 +33,15 @@ export class Plots {
     this.frames = 0;
     this.strokes = 0;
     this.due = false;
+    this.colours = new Map();
+    // Times of the last numbers beside names, and of the last strokes, ms.
+    [this.read, this.arrived] = [0, 0];
     this.begin([]);
     new ResizeObserver(() => this.draw()).observe(place);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+      this.colours.clear();
+      this.draw();
+    });
   }
 
   // Signals with name and unit. Those of a unit share a plot.
@@ -128,6 +138,7 @@ export class Plots {
       this.size = Math.min(KEPT, this.size + 1);
     });
     this.strokes += t.length;
+    this.arrived = performance.now();
     if (this.end === null) this.draw();
   }
 
@@ -155,7 +166,9 @@ export class Plots {
 
   right() {
     if (this.end !== null) return this.end;
-    return this.size ? this.time[(this.next + KEPT - 1) % KEPT] : this.span;
+    if (!this.size) return this.span;
+    const since = Math.max(0, Math.min(GOES_ON, performance.now() - this.arrived));
+    return this.time[(this.next + KEPT - 1) % KEPT] + since / 1e3;
   }
 
   // Places in the rings whose times are shown, the oldest first.
@@ -175,12 +188,28 @@ export class Plots {
   draw() {
     if (this.due) return;
     this.due = true;
-    requestAnimationFrame(() => {
-      this.due = false;
-      this.frames += 1;
-      const range = this.range(), style = getComputedStyle(document.documentElement);
-      this.groups.forEach((group, n) => this.paint(group, range, (name) => style.getPropertyValue(name), n === 0));
+    requestAnimationFrame((now) => this.frame(now));
+  }
+
+  frame(now) {
+    this.due = false;
+    this.frames += 1;
+    const range = this.range(), reads = this.cursor !== null || now - this.read >= READ;
+    if (reads) this.read = now;
+    this.groups.forEach((group, n) => {
+      this.paint(group, range, (name) => this.colour(name), n === 0);
+      if (reads) this.values(group.curves, group.unit, range);
     });
+    // Between two messages time goes on.
+    if (this.end === null && now - this.arrived < GOES_ON) this.draw();
+  }
+
+  // A colour of the style sheet; asking for it has the browser compute styles.
+  colour(name) {
+    if (!this.colours.has(name)) {
+      this.colours.set(name, getComputedStyle(document.documentElement).getPropertyValue(name));
+    }
+    return this.colours.get(name);
   }
 
   paint({ unit, curves, canvas }, { left, right, first, after, place }, colour, isFirst) {
@@ -215,14 +244,24 @@ export class Plots {
     for (const curve of curves.filter((curve) => curve.shown)) {
       to.strokeStyle = colour(curve.colour);
       to.lineWidth = 1.4;
+      to.lineJoin = "bevel";
       to.beginPath();
-      let pen = false;
-      for (let n = first; n < after; n += 1) {
-        const low = this.low[curve.number][place(n)], high = this.high[curve.number][place(n)];
-        if (Number.isNaN(low)) { pen = false; continue; }
+      let pen = false, n = first;
+      while (n < after) {
+        let low = this.low[curve.number][place(n)], high = this.high[curve.number][place(n)];
         const at = x(this.time[place(n)]);
+        n += 1;
+        if (Number.isNaN(low)) { pen = false; continue; }
+        // Strokes of one pixel are one: its minimum and maximum are theirs.
+        while (n < after && x(this.time[place(n)]) < at + 1 / scale) {
+          const less = this.low[curve.number][place(n)], more = this.high[curve.number][place(n)];
+          if (Number.isNaN(less)) break;
+          if (less < low) low = less;
+          if (more > high) high = more;
+          n += 1;
+        }
         if (pen) to.lineTo(at, y(high)); else to.moveTo(at, y(high));
-        to.lineTo(at, y(low));
+        if (low !== high) to.lineTo(at, y(low));
         pen = true;
       }
       to.stroke();
@@ -236,7 +275,6 @@ export class Plots {
       to.stroke();
     }
     to.restore();
-    this.values(curves, unit, left, right, first, after, place);
   }
 
   axes(to, { left, right, bottom, top, width, height, x, y, unit }, colour) {
@@ -290,7 +328,7 @@ export class Plots {
   }
 
   // Values under the cursor, or the newest ones, beside the names.
-  values(curves, unit, left, right, first, after, place) {
+  values(curves, unit, { left, right, first, after, place }) {
     let at = after - 1;
     if (this.cursor !== null) {
       const time = left + this.cursor * (right - left);

@@ -5,6 +5,7 @@ use joint_firmware::default_configuration::B_G431B_ESC1;
 use joint_firmware::joint::state_machine::State;
 use joint_firmware::objects::field::{Actual, Field, HardwareField, OwnerField, ResetField, StorageField};
 use joint_firmware::objects::settings::Setting;
+use jointctl::remote::configured::{self, Configured};
 use jointctl::remote::{RemoteError, RemoteJoint, drive, info};
 use serde::Serialize;
 
@@ -54,6 +55,10 @@ pub fn checklist(joint: &RemoteJoint) -> Result<Vec<Item>, RemoteError> {
     let damaged = joint.raw(Field::Storage(StorageField::Damaged))?;
     let found = if damaged == 0 { "whole".into() } else { format!("damaged: bits {damaged:03b} of 2304h:1") };
     item("storage", damaged == 0, found, "check the settings, then Store; or jointctl restore");
+    let stored = configured::read(joint)?;
+    if stored != Configured::Untold {
+        item("configuration", stored != Configured::Differs, stored.to_string(), "Store, below, once it is as wanted");
+    }
     let setting = |setting| joint.number(Field::Setting(setting));
     let (low, high) = (setting(Setting::LowestBusVoltage)?, setting(Setting::HighestBusVoltage)?);
     let supply = joint.number(Field::Actual(Actual::BusVoltage))?;

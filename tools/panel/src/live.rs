@@ -20,6 +20,21 @@ pub const DRAWN: [Actual; 12] = [
     Actual::BusVoltage,
     Actual::Reason,
 ];
+/// The same with friction by its parts in place of current, supply and external torque.
+pub const BY_PART: [Actual; 12] = [
+    Actual::Position,
+    Actual::Velocity,
+    Actual::TorqueDemand,
+    Actual::Torque,
+    Actual::CompensationTorque,
+    Actual::Residual,
+    Actual::Permitted,
+    Actual::PhysicalTorque,
+    Actual::NetworkTorque,
+    Actual::PreSlidingTorque,
+    Actual::AdaptationTorque,
+    Actual::Reason,
+];
 /// Signals that become marks where they change.
 pub const STATE: [Actual; 3] = [Actual::Statusword, Actual::LatchedFaults, Actual::ActingModel];
 

@@ -7,6 +7,7 @@ use jointctl::key_file;
 use jointctl::remote::RemoteError;
 use jointctl::remote::present::{PATIENCE, present};
 use panel::guard::Guard;
+use panel::scan;
 use panel::server::{Panel, Server};
 use panel::skeleton::skeleton;
 use robot::read_robot;
@@ -107,6 +108,18 @@ fn robot(arguments: &Arguments) -> Result<Option<Value>, Ended> {
     skeleton(&robot, &nodes).map(Some).map_err(Ended::Usage)
 }
 
+/// The lowest node that answers; where none does and a joint waits for its node id, the one that the page offers it.
+fn first(network: &Network, bus: &str) -> Result<u8, Ended> {
+    if let Some(node) = present(network, PATIENCE).map_err(RemoteError::from)?.first() {
+        return Ok(*node);
+    }
+    if scan::waits(network).map_err(RemoteError::from)? {
+        eprintln!("no node answers on {bus}, but a joint without a node id does: Board, Give node ids");
+        return Ok(scan::OFFERED);
+    }
+    Err(Ended::Failed(format!("no node answers on {bus}")))
+}
+
 fn begin(arguments: &Arguments) -> Result<Server, Ended> {
     let key = read_key(arguments)?;
     let robot = robot(arguments)?;
@@ -114,10 +127,7 @@ fn begin(arguments: &Arguments) -> Result<Server, Ended> {
     let network = Network::new(transport).with_patience(Duration::from_millis(arguments.timeout));
     let node = match arguments.node {
         Some(node) => node,
-        None => {
-            let nodes = present(&network, PATIENCE).map_err(RemoteError::from)?;
-            nodes.first().copied().ok_or_else(|| format!("no node answers on {}", arguments.bus))?
-        }
+        None => first(&network, &arguments.bus)?,
     };
     let wanted = arguments.listen.unwrap_or_else(|| (Ipv4Addr::LOCALHOST, arguments.port).into());
     let listener = TcpListener::bind(wanted).map_err(|error| format!("{wanted}: {error}"))?;

@@ -110,6 +110,11 @@ pub enum Ask {
     },
     /// Live values anew, after somebody else has put the joint out of OPERATIONAL.
     Look,
+    /// Other live values from now on, for all pages.
+    Draw {
+        /// Friction by its parts in place of current, supply and external torque.
+        by_part: bool,
+    },
     /// The last minute of live values as CSV.
     Csv,
     /// All objects with their values.
@@ -121,6 +126,8 @@ pub enum Ask {
     },
     /// Keeps what is in use over a loss of power.
     Store,
+    /// Words on what is in use against what is stored.
+    Stored,
     /// The configuration as joint.toml.
     Export,
     /// Names what differs in a configuration; nothing is set.
@@ -164,8 +171,10 @@ impl Ask {
             | Self::Checklist
             | Self::History
             | Self::Look
+            | Self::Draw { .. }
             | Self::Csv
             | Self::Objects
+            | Self::Stored
             | Self::Export
             | Self::Compare { .. }
             | Self::Images => false,

@@ -1,6 +1,6 @@
 //! Joints on a bus, each on one line, and node ids for those without one; host.
 
-use bus::client::Network;
+use bus::client::{ClientError, Network};
 use joint_firmware::objects::field::{Actual, Field};
 use jointctl::remote::present::{PATIENCE, present};
 use jointctl::remote::{RemoteError, RemoteJoint, address, drive, info};
@@ -9,6 +9,17 @@ use std::time::Duration;
 
 /// Time that a node may take to answer one of a fastscan's 133 questions.
 const WAIT: Duration = Duration::from_millis(60);
+
+/// Node id from which on the page offers some.
+pub const OFFERED: u8 = 5;
+
+/// Returns `true` if a joint without a node id answers.
+///
+/// # Errors
+/// The bus.
+pub fn waits(network: &Network) -> Result<bool, ClientError> {
+    network.somebody_has_no_id(PATIENCE)
+}
 
 /// Everybody who answers; `over` ends the search.
 ///

@@ -1,11 +1,49 @@
 //! Values that change slowly, read one by one beside the live ones; host.
 
-use bus::client::ClientError;
+use bus::client::{ClientError, Network};
 use joint_firmware::objects::field::{Actual, Field};
 use joint_firmware::objects::settings::Setting;
 use jointctl::remote::refusal::image_state;
 use jointctl::remote::{Entry, RemoteError, RemoteJoint};
 use serde_json::{Value, json};
+use std::time::{Duration, Instant};
+
+/// Bits a second of the bus that its load is told of: that of both boards.
+const BIT_RATE: f64 = 1e6;
+/// Least time over which the load is a mean.
+const LOOK: Duration = Duration::from_secs(1);
+
+/// Load of the bus, as far as this program hears and sends it.
+#[derive(Debug)]
+pub struct Load {
+    since: Instant,
+    bits: u64,
+}
+
+impl Load {
+    /// The load from now on.
+    #[must_use]
+    pub fn of(network: &Network) -> Self {
+        Self { since: Instant::now(), bits: network.bits() }
+    }
+
+    /// The mean since it was told last, for a page; none within a second of that.
+    pub fn next(&mut self, network: &Network) -> Option<Value> {
+        let passed = self.since.elapsed();
+        if passed < LOOK {
+            return None;
+        }
+        let bits = network.bits();
+        let percent = percent(bits - self.bits, passed);
+        *self = Self { since: self.since + passed, bits };
+        let shown = format!("{percent:.1} % of 1 Mbit/s");
+        Some(json!({ "title": "bus load", "name": "bus-load", "value": percent, "shown": shown }))
+    }
+}
+
+fn percent(bits: u64, time: Duration) -> f64 {
+    100.0 * bits as f64 / (BIT_RATE * time.as_secs_f64())
+}
 
 /// Values that are read in turn, each with its title.
 const FIELDS: [(&str, Field); 15] = [
@@ -76,5 +114,17 @@ impl Slow {
             }
             Err(error) => Err(error),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::percent;
+    use std::time::Duration;
+
+    #[test]
+    fn half_a_million_bits_a_second_are_half_of_a_bus() {
+        assert_eq!(percent(500_000, Duration::from_secs(1)), 50.0);
+        assert_eq!(percent(500_000, Duration::from_secs(2)), 25.0);
     }
 }

@@ -134,9 +134,8 @@ pub(super) fn decode_header(reader: &mut Reader) -> Header {
 #[inline(never)]
 fn decode_common(reader: &mut Reader, common: &mut CommonTerms) {
     for element in &mut common.elements {
-        let stiffness = reader.checked_i32("stiffness of a pre-sliding element", 0, MAX_STIFFNESS);
-        *element =
-            MaxwellElement { stiffness, level: reader.checked_i32("level of a pre-sliding element", 0, MAX_LEVEL) };
+        let stiffness = reader.checked_i32("stiffness of pre-sliding", 0, MAX_STIFFNESS);
+        *element = MaxwellElement { stiffness, level: reader.checked_i32("level of pre-sliding", 0, MAX_LEVEL) };
     }
     for ripple in &mut common.ripples {
         *ripple = Ripple {

@@ -400,8 +400,8 @@ impl Image {
             field("lower threshold", criterion.leave as i64, i32::MIN as i64, criterion.enter as i64)?;
         }
         for element in &common.elements {
-            field("stiffness of a pre-sliding element", element.stiffness as i64, 0, MAX_STIFFNESS as i64)?;
-            field("level of a pre-sliding element", element.level as i64, 0, MAX_LEVEL as i64)?;
+            field("stiffness of pre-sliding", element.stiffness as i64, 0, MAX_STIFFNESS as i64)?;
+            field("level of pre-sliding", element.level as i64, 0, MAX_LEVEL as i64)?;
         }
         let last = selector.sets() as i64 - 1;
         for (index, set) in sets.iter().enumerate() {

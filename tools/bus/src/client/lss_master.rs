@@ -44,6 +44,14 @@ impl Network {
         Err(ClientError::Silence { what: "a consistent answer to the LSS fastscan".into(), timeout: wait * ATTEMPTS })
     }
 
+    /// Returns `true` if some node without an id answers within `wait`; it stays as it is.
+    pub fn somebody_has_no_id(&self, wait: Duration) -> Result<bool, ClientError> {
+        let answers = self.subscribe(|frame| frame.id() == cob_id::LSS_SLAVE);
+        let Step::Ask(question) = Fastscan::new().step() else { return Ok(false) };
+        self.lss(&question)?;
+        Ok(wait_for(&answers, IDENTIFIED, wait)?.is_some())
+    }
+
     /// Puts the node with this address into configuration state, whether it has an id or not.
     pub fn select(&self, address: &Address) -> Result<(), ClientError> {
         let answers = self.subscribe(|frame| frame.id() == cob_id::LSS_SLAVE);

@@ -6,6 +6,7 @@ use super::frame::frame;
 use super::nmt::{Command, Target};
 use super::sdo::{Failure, Settings, Transfer};
 use super::{Emergency, NmtState};
+use crate::pacing::bits;
 use crate::{BusError, Frame, Transport};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
@@ -49,6 +50,8 @@ struct Shared {
     /// One SDO transfer at a time and node within this program.
     channels: [Mutex<()>; 128],
     frames: AtomicU64,
+    /// Bits of the frames that were received and sent.
+    bits: AtomicU64,
     syncs: AtomicU64,
 }
 
@@ -103,6 +106,7 @@ impl Shared {
 
     fn distribute(&self, frame: Frame, at: Instant) {
         self.frames.fetch_add(1, Ordering::Relaxed);
+        self.passed(&frame);
         let of_others = u64::from(frame.id() == cob_id::SYNC);
         let syncs = self.syncs.fetch_add(of_others, Ordering::Relaxed) + of_others;
         let received = Received { frame, at, syncs };
@@ -124,6 +128,10 @@ impl Shared {
                 Err(TrySendError::Disconnected(_)) => false,
             }
         });
+    }
+
+    fn passed(&self, frame: &Frame) {
+        self.bits.fetch_add(bits(frame).into(), Ordering::Relaxed);
     }
 
     #[cfg(test)]
@@ -154,6 +162,7 @@ impl Network {
             heard: Default::default(),
             channels: [const { Mutex::new(()) }; 128],
             frames: AtomicU64::new(0),
+            bits: AtomicU64::new(0),
             syncs: AtomicU64::new(0),
         });
         let reader = Arc::clone(&shared);
@@ -186,7 +195,11 @@ impl Network {
     pub fn send(&self, frame: &Frame) -> Result<(), ClientError> {
         match self.shared().failure() {
             Some(error) => Err(error.into()),
-            None => Ok(self.shared().transport.send(frame)?),
+            None => {
+                self.shared().transport.send(frame)?;
+                self.shared().passed(frame);
+                Ok(())
+            }
         }
     }
 
@@ -261,6 +274,12 @@ impl Network {
     /// Frames that were received.
     pub fn frames(&self) -> u64 {
         self.shared().frames.load(Ordering::Relaxed)
+    }
+
+    /// Bits of the frames that were received and sent, as they are on a CAN bus, stuff bits and interframe space
+    /// included. What other programs send counts where the bus delivers it to this one.
+    pub fn bits(&self) -> u64 {
+        self.shared().bits.load(Ordering::Relaxed)
     }
 
     /// Runs an SDO transfer. Those of one node wait for each other.

@@ -28,6 +28,23 @@ fn pair_over(master: Arc<dyn Transport>, bus: &str, id: u8, heartbeat: u16) -> (
     (network, running)
 }
 
+#[test]
+fn bits_are_counted_of_what_is_sent_and_of_what_is_received() {
+    let (one, other) = (Network::new(open("virtual:bits").unwrap()), Network::new(open("virtual:bits").unwrap()));
+    let all = other.subscribe(|_| true);
+    let frames = [Frame::new(0x123, &[1, 2, 3]).unwrap(), Frame::new(0, &[0; 8]).unwrap()];
+    for frame in &frames {
+        one.send(frame).unwrap();
+        assert_eq!(all.next(Duration::from_secs(60)).unwrap().unwrap().frame, *frame);
+    }
+    let sum = frames.iter().map(|frame| u64::from(bus::pacing::bits(frame))).sum::<u64>();
+    one.sync().unwrap();
+    all.next(Duration::from_secs(60)).unwrap().unwrap();
+    let sync = u64::from(bus::pacing::bits(&Frame::new(0x80, &[]).unwrap()));
+    assert_eq!((one.bits(), other.bits()), (sum + sync, sum + sync));
+    assert!(sum > (47 + 24) + (47 + 64) && sync >= 47);
+}
+
 fn quick(node: bus::client::Node) -> bus::client::Node {
     node.with_settings(Settings { timeout: 100 * MS, ..Settings::default() })
 }
@@ -325,6 +342,7 @@ fn identical_new_nodes_get_their_ids_by_fastscan() {
     let serials = [0x8000_0001, 7, 0xFFFF_FFFF];
     let nodes: Vec<_> =
         serials.iter().map(|serial| Running::new(open(bus).unwrap(), Node::new(255, *serial, 0))).collect();
+    assert!(network.somebody_has_no_id(Duration::from_secs(60)).unwrap());
     // Silence is an answer here: on a busy machine the nodes' answers come later than an idle one's.
     let (mut found, mut wait) = (Vec::new(), 20 * MS);
     while found.len() < serials.len() {
@@ -345,6 +363,7 @@ fn identical_new_nodes_get_their_ids_by_fastscan() {
         found.push(address.serial);
     }
     assert_eq!(network.fastscan(wait).unwrap(), None);
+    assert!(!network.somebody_has_no_id(wait).unwrap());
     found.sort_unstable();
     assert_eq!(found, [7, 0x8000_0001, 0xFFFF_FFFF]);
     let id = identity(7);

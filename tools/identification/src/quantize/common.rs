@@ -15,8 +15,8 @@ pub fn quantize(model: &FrictionModel) -> Result<CommonTerms, QuantizeError> {
         let elements = model.element_stiffness.iter().zip(model.element_level);
         for (place, (stiffness, level)) in common.elements.iter_mut().zip(elements.filter(|(_, level)| *level > 0.0)) {
             *place = MaxwellElement {
-                stiffness: to_q16("stiffness of a pre-sliding element", *stiffness)?.min(MAX_STIFFNESS),
-                level: to_q16("level of a pre-sliding element", level)?,
+                stiffness: to_q16("stiffness of pre-sliding", *stiffness)?.min(MAX_STIFFNESS),
+                level: to_q16("level of pre-sliding", level)?,
             };
         }
     }

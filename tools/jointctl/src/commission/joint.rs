@@ -56,6 +56,15 @@ pub trait Objects {
     /// [`Stopped::Bus`].
     fn network(&mut self, command: Command) -> Result<(), Stopped>;
 
+    /// Asks the joint once to store what is in use.
+    ///
+    /// # Errors
+    /// [`Stopped::Refused`] or [`Stopped::Bus`].
+    fn store(&mut self) -> Result<(), Stopped> {
+        let (index, sub_index, signature) = STORE;
+        self.download(index, sub_index, signature)
+    }
+
     /// Lets time pass, s.
     ///
     /// # Errors
@@ -324,9 +333,8 @@ impl<O: Objects> Bench for Joint<O> {
     }
 
     fn store(&mut self, restart: bool) -> Result<(), Stopped> {
-        let (index, sub_index, signature) = STORE;
         for attempt in 1.. {
-            match self.objects.download(index, sub_index, signature) {
+            match self.objects.store() {
                 Err(Stopped::Refused(_)) if attempt < STORES => self.objects.pass(REST)?,
                 stored => {
                     stored?;

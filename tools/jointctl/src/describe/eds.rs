@@ -311,8 +311,8 @@ mod tests {
             [Identity::default(), without].map(|identity| text("joint.eds", Duration::ZERO, identity));
         let sections = |text: &str| text.lines().filter(|line| line.starts_with('[')).count();
         let room = Entry::all().filter(|entry| wants_room(entry.object)).count();
-        // Six records more, and sub-index 0 of three of them: those of 1020h, 2203h and 2305h are among those.
-        assert_eq!(sections(&with) - sections(&without), room + 6 + 3 + 1);
+        // Seven records more, and sub-index 0 of three of them: those of 1020h, 2022h, 2203h and 2305h are among those.
+        assert_eq!(sections(&with) - sections(&without), room + 7 + 3 + 1);
         assert!(with.contains("[1801sub0]\nParameterName=highest sub-index supported\nObjectType=0x7\nDataType=0x0005\nAccessType=ro\nPDOMapping=0\nDefaultValue=0x6"));
         assert!(without.contains("[1801sub0]\nParameterName=highest sub-index supported\nObjectType=0x7\nDataType=0x0005\nAccessType=ro\nPDOMapping=0\nDefaultValue=0x5"));
         for index in ["2202sub5", "6081", "607Dsub0", "6099sub2", "60F4", "6072", "1019", "1020sub2", "1803sub6"] {

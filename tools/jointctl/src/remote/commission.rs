@@ -1,10 +1,13 @@
 //! The objects of a joint on a bus, in real time, for its [commissioning](crate::commission); host.
 
+use super::configured;
+use super::error::RemoteError;
 use super::joint::RemoteJoint;
 use crate::commission::Stopped;
 use crate::commission::joint::Objects;
 use bus::client::{ClientError, Command, Target};
 use std::time::{Duration, Instant};
+use time::UtcDateTime;
 
 /// Longest sleep before the user is asked whether to go on.
 const PART: Duration = Duration::from_millis(10);
@@ -55,6 +58,13 @@ impl Objects for RemoteObjects<'_> {
             }
         };
         sent.map_err(stopped)
+    }
+
+    fn store(&mut self) -> Result<(), Stopped> {
+        configured::store(&self.joint, UtcDateTime::now()).map_err(|error| match error {
+            RemoteError::Client(error) => stopped(error),
+            other => Stopped::Refused(other.to_string()),
+        })
     }
 
     fn pass(&mut self, seconds: f64) -> Result<(), Stopped> {

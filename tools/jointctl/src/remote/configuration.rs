@@ -3,6 +3,7 @@
 //! Settings of the configuration (2101h to 2106h) are staged by being written and taken together by a command. [`set`]
 //! does both, and forgets what it staged where the joint refuses it: a joint never stays half configured.
 
+use super::configured;
 use super::entry::Entry;
 use super::error::RemoteError;
 use super::joint::RemoteJoint;
@@ -11,6 +12,7 @@ use bus::client::{Abort, ClientError};
 use canopen_node::{Access, Group};
 use joint_firmware::motor::setting::Name;
 use joint_firmware::objects::field::{ConfigurationField, Field, ImageField, OwnerField};
+use time::UtcDateTime;
 
 /// Commands of object 2100h:1.
 const TAKE: u64 = 1;
@@ -98,10 +100,14 @@ fn sub_index(group: Group) -> u8 {
     }
 }
 
-/// Keeps what is in use over a loss of power (1010h). The motor has to be off.
+/// Keeps what is in use over a loss of power (1010h); all of it with its date ([`configured`]). The motor has to be
+/// off.
 pub fn store(joint: &RemoteJoint, group: Group) -> Result<(), RemoteError> {
     joint.require_off("storing")?;
-    joint.download(0x1010, sub_index(group), b"save")
+    match group {
+        Group::All => configured::store(joint, UtcDateTime::now()),
+        Group::Communication | Group::Application => joint.download(0x1010, sub_index(group), b"save"),
+    }
 }
 
 /// Forgets what was stored (1011h): the joint has its defaults after the next reset. The motor has to be off.

@@ -1,5 +1,6 @@
 //! A joint on one page: what an engineer looks at first; host.
 
+use super::configured;
 use super::drive;
 use super::entry::Entry;
 use super::error::RemoteError;
@@ -74,6 +75,7 @@ pub fn page(joint: &RemoteJoint) -> Result<String, RemoteError> {
     line("life cycle", life(state, left));
     line("authentication", authentication(joint)?);
     line("storage", storage(joint)?);
+    line("configuration", configured::read(joint)?.to_string());
     let logged = logged(joint)?;
     line("fault log", logged.0);
     logged.1.into_iter().for_each(|fault| line("", fault));

@@ -11,7 +11,7 @@
 //! - [`joint`]: the node; [`drive`]: its state machine and faults, [`history`] the steps before one
 //! - [`pdo`]: what PDOs carry; [`telemetry`]: out of the joint; [`stream`]: into it; [`motion`]: `jointctl move`
 //! - [`image`]: the life of a parameter image, [`refusal`] its numbers in words; [`configuration`]: settings, stored
-//!   and restored
+//!   and restored, [`configured`] since when
 //! - [`commission`]: the objects of a joint for its commissioning
 //! - [`record`]: samples as a data set; [`retrain`]: a joint's friction learned anew, from excitation to commit;
 //!   [`load_check`]: the load that it shows against the configured one
@@ -21,6 +21,7 @@
 pub mod address;
 pub mod commission;
 pub mod configuration;
+pub mod configured;
 pub mod drive;
 pub mod entry;
 pub mod error;

@@ -5,6 +5,7 @@
 //! left disabled, in PRE-OPERATIONAL; where this program is killed or the bus is cut, the joint brakes by itself once
 //! its command deadline is over.
 
+use super::configured;
 use super::drive::{BRAKING, LOOK};
 use super::entry::Entry;
 use super::error::RemoteError;
@@ -126,6 +127,8 @@ pub struct Stream {
     joint: RemoteJoint,
     shared: Arc<Shared>,
     changes: Vec<Change>,
+    /// What was in use had a date.
+    dated: bool,
     interpolation: Option<Interpolation>,
     /// Channel to the thread, which ends when it is dropped.
     sources: Option<Sender<Source>>,
@@ -186,6 +189,7 @@ impl Stream {
             joint: joint.clone(),
             shared: Arc::new(shared),
             changes: Vec::new(),
+            dated: false,
             interpolation: None,
             sources: None,
             thread: None,
@@ -200,15 +204,18 @@ impl Stream {
             Mode::Impedance => &[DRIVE, IMPEDANCE],
             Mode::OpenLoop | Mode::Hold | Mode::Profile => return Err(no_set_points()),
         };
-        for pdo in Pdo::all(Direction::Receive).into_iter().filter(|pdo| needed.contains(&pdo.number)) {
-            if let Some(wanted) = defaults.get(usize::from(pdo.number)) {
-                stream.changes.push(pdo.ensure(joint, wanted)?);
-            }
-        }
         let period = Duration::from_secs_f64(1.0 / rate);
-        if matches!(mode, Mode::Position | Mode::Velocity) {
-            stream.interpolation = Interpolation::begin(joint, period)?;
-        }
+        stream.dated = configured::keep(joint, || {
+            for pdo in Pdo::all(Direction::Receive).into_iter().filter(|pdo| needed.contains(&pdo.number)) {
+                if let Some(wanted) = defaults.get(usize::from(pdo.number)) {
+                    stream.changes.push(pdo.ensure(joint, wanted)?);
+                }
+            }
+            if matches!(mode, Mode::Position | Mode::Velocity) {
+                stream.interpolation = Interpolation::begin(joint, period)?;
+            }
+            Ok(())
+        })?;
         joint.write_raw(Field::SetPoint(SetPoint::Mode), u64::from(operation(mode).number() as u8))?;
         stream.commanding = true;
         joint.nmt(Nmt::Start, NmtState::Operational)?;
@@ -356,8 +363,11 @@ impl Stream {
     }
 
     fn put_back(&self) -> Result<(), RemoteError> {
-        self.interpolation.iter().try_for_each(|interpolation| interpolation.undo(&self.joint))?;
-        self.changes.iter().try_for_each(|change| change.undo(&self.joint))
+        let undo = || {
+            self.interpolation.iter().try_for_each(|interpolation| interpolation.undo(&self.joint))?;
+            self.changes.iter().try_for_each(|change| change.undo(&self.joint))
+        };
+        if self.dated { configured::keep(&self.joint, undo).map(drop) } else { undo() }
     }
 }
 

@@ -5,6 +5,7 @@
 //! [`bus::client::SyncProducer`], once for all joints of a bus. [`Telemetry::end`] puts the PDOs back; dropping it
 //! does too, and says nothing where that fails.
 
+use super::configured;
 use super::entry::Entry;
 use super::error::RemoteError;
 use super::joint::RemoteJoint;
@@ -75,6 +76,8 @@ pub struct Telemetry {
     joint: RemoteJoint,
     signals: Vec<Signal>,
     changes: Vec<Change>,
+    /// What was in use had a date.
+    dated: bool,
     /// Places of each TPDO's signals.
     places: Vec<Vec<usize>>,
     frames: Subscription,
@@ -96,6 +99,7 @@ impl Telemetry {
             joint: joint.clone(),
             signals,
             changes: Vec::new(),
+            dated: false,
             places,
             frames: joint.network().subscribe(|_| false),
             arrived: Vec::new(),
@@ -104,12 +108,15 @@ impl Telemetry {
             ended: false,
         };
         // The PDOs that have been changed are put back if one of them fails.
-        for (pdo, places) in Pdo::all(Direction::Transmit).into_iter().zip(&telemetry.places) {
-            let base = 0x180 + 0x100 * u16::from(pdo.number) + u16::from(joint.id());
-            let mapping: Vec<_> = places.iter().filter_map(|at| telemetry.signals.get(*at)).map(mapped).collect();
-            let wanted = PdoParameters { transmission: EVERY_SYNC, ..PdoParameters::new(base, &mapping) };
-            telemetry.changes.push(pdo.ensure(joint, &wanted)?);
-        }
+        telemetry.dated = configured::keep(joint, || {
+            for (pdo, places) in Pdo::all(Direction::Transmit).into_iter().zip(&telemetry.places) {
+                let base = 0x180 + 0x100 * u16::from(pdo.number) + u16::from(joint.id());
+                let mapping: Vec<_> = places.iter().filter_map(|at| telemetry.signals.get(*at)).map(mapped).collect();
+                let wanted = PdoParameters { transmission: EVERY_SYNC, ..PdoParameters::new(base, &mapping) };
+                telemetry.changes.push(pdo.ensure(joint, &wanted)?);
+            }
+            Ok(())
+        })?;
         let identifiers = telemetry.changes.iter().map(Change::identifier).collect::<Vec<_>>();
         telemetry.arrived = vec![None; identifiers.len()];
         telemetry.frames = joint.network().subscribe(move |frame| identifiers.contains(&frame.id()));
@@ -183,7 +190,8 @@ impl Telemetry {
         if std::mem::replace(&mut self.ended, true) {
             return Ok(());
         }
-        self.changes.iter().try_for_each(|change| change.undo(&self.joint))
+        let undo = || self.changes.iter().try_for_each(|change| change.undo(&self.joint));
+        if self.dated { configured::keep(&self.joint, undo).map(drop) } else { undo() }
     }
 }
 

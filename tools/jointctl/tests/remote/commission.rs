@@ -33,6 +33,10 @@ impl Objects for Slowed<'_> {
         self.0.network(command)
     }
 
+    fn store(&mut self) -> Result<(), Stopped> {
+        self.0.store()
+    }
+
     fn pass(&mut self, seconds: f64) -> Result<(), Stopped> {
         self.0.pass(seconds * f64::from(SLOWER))
     }

@@ -7,8 +7,11 @@ use bus::client::{Command, Network, cob_id};
 use canopen_node::{Group, NO_NODE_ID};
 use joint_firmware::joint::Mode;
 use jointctl::remote::configuration::{restore, set, store};
-use jointctl::remote::{Entry, RemoteError, RemoteJoint, Stream, address, info};
+use jointctl::remote::configured::{self, Configured};
+use jointctl::remote::telemetry::USUAL;
+use jointctl::remote::{Entry, RemoteError, RemoteJoint, Stream, Telemetry, address, info};
 use std::time::Duration;
+use time::UtcDateTime;
 
 fn change(joint: &RemoteJoint, pairs: &[(&str, &str)]) -> Result<(), RemoteError> {
     let pairs = pairs.iter().map(|(name, text)| {
@@ -78,6 +81,54 @@ pub fn what_is_stored_outlasts_a_reset_and_what_is_restored_does_not() {
     let stream = Stream::begin(&joint, Mode::Torque, 100.0, false).unwrap();
     assert!(store(&joint, Group::All).unwrap_err().to_string().contains("storing is possible with the motor off only"));
     stream.end().unwrap();
+}
+
+pub fn what_is_in_use_is_told_to_be_what_was_stored_until_a_value_changes() {
+    let served = Served::joints(&[NODE]);
+    let joint = served.joint();
+    let told = || configured::read(&joint).unwrap();
+    let left = || shown(&joint, "stores-left");
+    let reset = || joint.network().reset_and_wait(Command::ResetNode, NODE, Duration::from_secs(60)).unwrap();
+    let gain = |text: &str| change(&joint, &[("gain", text)]).unwrap();
+    assert_eq!(told(), Configured::Differs);
+    store(&joint, Group::Application).unwrap();
+    assert_eq!(told(), Configured::Differs, "a part has no date");
+
+    let before = UtcDateTime::now() - Duration::from_millis(1);
+    store(&joint, Group::All).unwrap();
+    let Configured::Since(date) = told() else { panic!("{}", told()) };
+    assert!((before..=UtcDateTime::now()).contains(&date), "{date}");
+    reset();
+    assert_eq!(told(), Configured::Since(date));
+    assert!(info::page(&joint).unwrap().contains("configuration   as stored 20"));
+    // Nothing is new: nothing is written.
+    let stores = left();
+    store(&joint, Group::All).unwrap();
+    assert_eq!((told(), left()), (Configured::Since(date), stores));
+
+    // A client's own PDOs are put back, whatever else changes meanwhile.
+    let watched = |change: bool| {
+        let telemetry = Telemetry::begin(&joint, &USUAL[..3]).unwrap();
+        assert_eq!(told(), Configured::Since(date));
+        if change {
+            gain("0.5");
+        }
+        telemetry.end().unwrap();
+    };
+    watched(false);
+    Stream::begin(&joint, Mode::Velocity, 100.0, false).unwrap().end().unwrap();
+    assert_eq!(told(), Configured::Since(date));
+    watched(true);
+    assert_eq!(told(), Configured::Differs);
+    reset();
+    assert_eq!(told(), Configured::Since(date));
+    // What the joint refuses to store is not told to be stored.
+    let refused = (0..100).find_map(|number| {
+        gain(if number % 2 == 0 { "0.5" } else { "0.25" });
+        store(&joint, Group::All).err()
+    });
+    assert!(refused.is_some() && left() == "0", "{refused:?}");
+    assert_eq!(told(), Configured::Differs);
 }
 
 pub fn a_joint_whose_configuration_is_damaged_says_what_to_do_and_is_enabled_once_that_is_done() {
@@ -160,6 +211,7 @@ pub fn the_page_says_what_an_engineer_looks_for_first() {
         "state           disabled (switch on disabled)",
         "faults          none",
         "fault log       0 faults, 1 power-ups",
+        "configuration   changed since it was stored, or never stored with a date",
         " V\n",
         "winding ",
         "image           none",

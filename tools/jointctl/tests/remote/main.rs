@@ -58,6 +58,7 @@ fn main() {
         configuration {
             settings_are_taken_together_or_not_at_all,
             what_is_stored_outlasts_a_reset_and_what_is_restored_does_not,
+            what_is_in_use_is_told_to_be_what_was_stored_until_a_value_changes,
             a_joint_whose_configuration_is_damaged_says_what_to_do_and_is_enabled_once_that_is_done,
             new_joints_get_the_node_ids_that_are_free,
             a_joint_that_was_left_with_an_id_that_it_does_not_use_yet_is_found_again,

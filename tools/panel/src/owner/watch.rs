@@ -1,7 +1,7 @@
 //! Live values of a joint as they come: samples, changes of its state, EMCYs.
 
 use super::{Setup, Syncs};
-use crate::live::{DRAWN, Kept, Reduction, STATE, Stroke, rounded};
+use crate::live::{BY_PART, DRAWN, Kept, Reduction, STATE, Stroke, rounded};
 use bus::client::{Emergency, Subscription, SyncProducer, cob_id};
 use joint_firmware::objects::field::{Actual, Field};
 use joint_firmware::objects::settings::Setting;
@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 /// Samples that are taken at once at most, so that orders and STOP have their turn.
 const AT_ONCE: usize = 2_000;
-/// Time between two messages with strokes.
+/// Time between two messages with strokes; a page draws more often.
 const BATCH: Duration = Duration::from_millis(50);
 /// Time without a sample that a page is told of.
 const SILENCE: Duration = Duration::from_secs(1);
@@ -62,17 +62,18 @@ fn changes_tpdos(data: &[u8]) -> bool {
 }
 
 impl Watch {
-    /// Has the joint send what it has of [`DRAWN`] and [`STATE`] with every SYNC.
-    pub fn begin(setup: &Setup, joint: &RemoteJoint) -> Result<Self, RemoteError> {
+    /// Has the joint send what it has of [`DRAWN`], or of [`BY_PART`], and of [`STATE`] with every SYNC.
+    pub fn begin(setup: &Setup, joint: &RemoteJoint, by_part: bool) -> Result<Self, RemoteError> {
         let mut wanted = Vec::new();
         let mut drawn = 0;
-        for actual in DRAWN.into_iter().chain(STATE) {
+        let all = if by_part { BY_PART } else { DRAWN };
+        for actual in all.into_iter().chain(STATE) {
             match joint.raw(Field::Actual(actual)) {
                 Ok(_) => wanted.push(actual),
                 Err(error) if error.is_absent() => continue,
                 Err(error) => return Err(error),
             }
-            drawn += usize::from(DRAWN.contains(&actual));
+            drawn += usize::from(all.contains(&actual));
         }
         let rated_current = joint.number(Field::Setting(Setting::CurrentLimit))?;
         let (network, node) = (joint.network(), joint.id());

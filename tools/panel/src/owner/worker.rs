@@ -9,7 +9,7 @@ use crate::hold::{Hold, LIMIT};
 use crate::message::{Ask, Wanted};
 use crate::motion::{Motion, RATE, Steered};
 use crate::reports::Reports;
-use crate::slow::Slow;
+use crate::slow::{Load, Slow};
 use crate::{checklist, history, learning, scan, settings};
 use bus::client::{Command as Nmt, NmtState, Target};
 use joint_firmware::joint::state_machine::State;
@@ -17,7 +17,7 @@ use joint_firmware::objects::field::{Actual, Field};
 use jointctl::commission::joint::Joint;
 use jointctl::commission::{Found, Plan, commission, find_index, page};
 use jointctl::remote::commission::RemoteObjects;
-use jointctl::remote::{Entry, RemoteError, RemoteJoint, Stream, drive};
+use jointctl::remote::{Entry, RemoteError, RemoteJoint, Stream, configured, drive};
 use report::output::OutputFile;
 use serde_json::{Value, json};
 use std::sync::Arc;
@@ -58,7 +58,10 @@ pub struct Worker {
     pages: Pages,
     joint: Option<RemoteJoint>,
     watch: Option<Watch>,
+    /// Live values are those of friction by its parts.
+    by_part: bool,
     slow: Slow,
+    load: Load,
     moving: Option<Moving>,
     /// The image that a page uploaded last, for its next steps.
     uploaded: Vec<u8>,
@@ -69,6 +72,7 @@ pub struct Worker {
 impl Worker {
     pub fn new(setup: Setup, orders: Receiver<Order>, stop: Arc<AtomicBool>, over: Arc<AtomicBool>) -> Self {
         Self {
+            load: Load::of(&setup.network),
             setup,
             orders,
             stop,
@@ -76,6 +80,7 @@ impl Worker {
             pages: Pages::default(),
             joint: None,
             watch: None,
+            by_part: false,
             slow: Slow::default(),
             moving: None,
             uploaded: Vec::new(),
@@ -141,6 +146,9 @@ impl Worker {
 
     /// Finds the joint, takes what it sends, reads a slow value where one is due.
     fn look(&mut self) {
+        if let Some(load) = self.load.next(&self.setup.network) {
+            self.pages.tell(&json!({ "slow": load }));
+        }
         let Some(joint) = self.joint.clone() else {
             if Instant::now() >= self.due {
                 self.open();
@@ -193,11 +201,34 @@ impl Worker {
         if let Some(watch) = self.watch.take() {
             watch.end()?;
         }
-        self.watch = Some(Watch::begin(&self.setup, joint)?);
+        self.watch = Some(Watch::begin(&self.setup, joint, self.by_part)?);
         if let Some(hello) = self.hello() {
             self.pages.tell(&hello);
         }
         Ok(())
+    }
+
+    /// Keeps what is in use, without the PDOs that live values come in.
+    fn store(&mut self, joint: &RemoteJoint) -> Result<Value, RemoteError> {
+        if let Some(watch) = self.watch.take() {
+            watch.end()?;
+        }
+        let stored = settings::store(joint);
+        self.watch_anew()?;
+        stored
+    }
+
+    /// Other live values, where the joint has them.
+    fn draw(&mut self, joint: &RemoteJoint, by_part: bool) -> Result<(), String> {
+        match joint.raw(Field::Actual(Actual::PhysicalTorque)) {
+            Err(error) if by_part && error.is_absent() => {
+                return Err("this board's program has no room for friction by its parts (2022h)".into());
+            }
+            Err(error) if !error.is_absent() => return Err(error.to_string()),
+            _ => {}
+        }
+        self.by_part = by_part;
+        self.watch_anew().map_err(|error| error.to_string())
     }
 
     /// STOP of any page: along the same way as the end of a motion, or whoever moves the joint.
@@ -277,17 +308,21 @@ impl Worker {
             return Err("the joint moves: this waits until it stands".into());
         }
         let node = self.setup.node;
-        let Some(joint) = self.joint.clone() else { return Err(format!("node {node} has not answered yet")) };
         let (stop, ended) = (Arc::clone(&self.stop), Arc::clone(&self.over));
         let over = move || stop.load(Ordering::Relaxed) || ended.load(Ordering::Relaxed);
         let words = |error: RemoteError| error.to_string();
+        // A new board has no node id: what finds it and gives it one does not wait for an answer of this node.
         match ask {
-            Ask::Held { .. } | Ask::Release | Ask::Stop => Ok(Value::Null),
+            Ask::Scan => return scan::scan(&self.setup.network, &over).map_err(words),
+            Ask::Address { first } => return self.address(first).map_err(words),
+            _ => {}
+        }
+        let Some(joint) = self.joint.clone() else { return Err(format!("node {node} has not answered yet")) };
+        match ask {
+            Ask::Held { .. } | Ask::Release | Ask::Stop | Ask::Scan | Ask::Address { .. } => Ok(Value::Null),
             Ask::Move { hold, motion, reset } => {
                 self.begin_motion(&joint, page, hold, motion, reset).map(|()| Value::Null)
             }
-            Ask::Scan => scan::scan(&self.setup.network, &over).map_err(words),
-            Ask::Address { first } => self.address(first).map_err(words),
             Ask::Checklist => {
                 let items = checklist::checklist(&joint).map_err(words)?;
                 serde_json::to_value(items).map_err(|error| error.to_string())
@@ -297,13 +332,15 @@ impl Worker {
             Ask::Retrain { wanted } => self.retrain(&joint, page, &wanted),
             Ask::Agree { .. } => Err("no question is open".into()),
             Ask::Look => self.watch_anew().map(|()| Value::Null).map_err(words),
+            Ask::Draw { by_part } => self.draw(&joint, by_part).map(|()| Value::Null),
             Ask::Csv => match &self.watch {
                 Some(watch) => Ok(watch.csv().into()),
                 None => Err("there are no live values; Look begins them".into()),
             },
             Ask::Objects => settings::objects(&joint, &over),
             Ask::Set { values } => settings::set(&joint, &values).map_err(words),
-            Ask::Store => settings::store(&joint).map_err(words),
+            Ask::Store => self.store(&joint).map_err(words),
+            Ask::Stored => configured::read(&joint).map(|told| told.to_string().into()).map_err(words),
             Ask::Export => settings::export(&joint, &over).map(Value::from),
             Ask::Compare { with } => settings::compare(&joint, &with, &over),
             Ask::Import { text } => settings::import(&joint, &text, &over),
@@ -328,6 +365,8 @@ impl Worker {
                 self.obey_stop();
                 std::thread::sleep(TURN);
             }
+            // It may be this page's joint that has one now.
+            self.due = Instant::now();
             giving.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
         })
     }

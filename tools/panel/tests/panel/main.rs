@@ -3,6 +3,7 @@
 
 mod browser;
 mod commissioning;
+mod hands;
 mod led;
 mod page;
 mod parts;
@@ -15,6 +16,8 @@ mod retraining;
 mod safety;
 mod security;
 mod served;
+#[allow(dead_code, reason = "benches do more with a browser")]
+mod webdriver;
 
 use libtest_mimic::{Arguments, Trial};
 
@@ -37,11 +40,13 @@ fn main() {
     let mut trials = trials! {
         parts {
             live_values_and_states_come_as_the_joint_is_jogged_and_the_table_holds_them,
+            friction_is_drawn_by_its_parts_and_as_before,
             every_motion_goes_where_it_was_asked_to_go_and_ends_disabled,
             a_motion_beyond_a_limit_is_refused_by_name,
             a_robot_is_told_where_it_is_given,
             joints_on_the_bus_and_what_they_miss_are_listed,
             joints_without_a_node_id_get_one,
+            #[cfg(unix)] where_nobody_but_a_new_joint_is_the_page_gives_it_its_node_id_and_shows_it,
             a_fault_is_told_with_its_emcy,
             objects_are_read_set_stored_exported_and_imported,
             an_image_is_shadowed_tried_discarded_committed_and_rolled_back,
@@ -78,7 +83,7 @@ fn main() {
         }
     };
     // A browser is a large package: where there is none it is said by name; with CI set it is required.
-    let ignored = std::env::var_os("CI").is_none() && !browser::is_there();
+    let ignored = std::env::var_os("CI").is_none() && !webdriver::is_there();
     let with_browser = trials! {
         browser {
             the_page_shows_values_that_move_and_the_joint_stands_once_the_button_is_let_go,

@@ -1,11 +1,14 @@
 //! Messages of each part of the page, from start to end.
 
 use crate::page::Page;
-use crate::served::{NODE, Served};
+#[cfg(unix)]
+use crate::program::Program;
+use crate::served::{Joints, NODE, Served};
 use jointctl::remote::telemetry::USUAL;
 use jointctl::remote::{Entry, Telemetry};
 use node::SampleImage;
 use serde_json::{Value, json};
+use std::time::Duration;
 
 const POSITION: &str = "position-actual-value";
 const VELOCITY: &str = "velocity-actual-value";
@@ -53,6 +56,33 @@ pub fn live_values_and_states_come_as_the_joint_is_jogged_and_the_table_holds_th
     assert!(fastest > 0.7, "{fastest}");
     // Slow values have come beside them.
     page.until(|message| (message["slow"]["name"] == json!("winding-temperature")).then_some(()));
+    let told =
+        |message: &Value| message["slow"]["value"].as_f64().filter(|_| message["slow"]["name"] == json!("bus-load"));
+    let load = page.seen.iter().find_map(told).unwrap_or_else(|| page.until(told));
+    assert!(load > 0.0 && load < 100.0, "{load} %");
+}
+
+pub fn friction_is_drawn_by_its_parts_and_as_before() {
+    let served = Served::joints(&[NODE]);
+    let mut page = Page::open(served.address);
+    page.commands();
+    page.answer(json!({ "upload": { "image": SampleImage::constant(1, 0.5), "usage": "commit" } })).unwrap();
+    page.answer(json!({ "set": { "values": [["requested-model", "1"]] } })).unwrap();
+    let parts = ["physical-torque", "network-torque", "pre-sliding-torque", "adaptation-torque"];
+    let draw = |page: &mut Page, by_part: bool| {
+        page.answer(json!({ "draw": { "by_part": by_part } })).unwrap();
+        let hello = page.seen.iter().rev().find_map(|message| message.get("hello")).unwrap();
+        let names = hello["signals"].as_array().unwrap().iter();
+        page.signals = names.map(|signal| signal["name"].as_str().unwrap().to_owned()).collect();
+        parts.map(|part| page.signals.iter().any(|signal| signal == part))
+    };
+    assert_eq!(draw(&mut page, true), [true; 4]);
+    assert!(!page.signals.iter().any(|signal| signal == "external-torque"));
+    page.move_until(&jog(0.3), "physical-torque", |torque| (torque - 0.5).abs() < 0.002);
+    page.let_go(true);
+    assert_eq!(page.ended().1, DISABLED);
+    assert_eq!(draw(&mut page, false), [false; 4]);
+    page.sees("external-torque", f64::is_finite);
 }
 
 pub fn every_motion_goes_where_it_was_asked_to_go_and_ends_disabled() {
@@ -155,6 +185,22 @@ pub fn joints_without_a_node_id_get_one() {
     assert_eq!(page.answer(first(9)).unwrap(), json!([]));
 }
 
+#[cfg(unix)]
+pub fn where_nobody_but_a_new_joint_is_the_page_gives_it_its_node_id_and_shows_it() {
+    let bus = format!("udp:239.74.163.9:{}", bus::free_port().unwrap());
+    let _joints = Joints::on(&bus, &[255]);
+    // A node that is not there is waited for as long before each question of the page.
+    let program = Program::within(Duration::from_secs(3), &bus, &[]);
+    let mut page = Page::connect(program.address, "default");
+    page.commands();
+    assert_eq!(page.answer(json!("scan")).unwrap(), json!([]));
+    assert_eq!(page.answer(json!("checklist")).unwrap_err(), "node 5 has not answered yet");
+    let given = page.answer(json!({ "address": { "first": 5 } })).unwrap();
+    assert_eq!((&given[0]["node"], given.as_array().unwrap().len()), (&json!(5), 1), "{given}");
+    assert_eq!(page.until(|message| message["hello"]["node"].as_u64()), 5);
+    assert!(page.answer(json!("checklist")).unwrap().as_array().is_some_and(|items| !items.is_empty()));
+}
+
 pub fn a_fault_is_told_with_its_emcy() {
     let served = Served::joints(&[NODE]);
     let mut page = Page::open(served.address);
@@ -224,7 +270,15 @@ pub fn objects_are_read_set_stored_exported_and_imported() {
         let error = page.answer(set(values)).unwrap_err();
         assert!(error.contains(expected), "{error}");
     }
+    let told = |page: &mut Page| page.answer(json!("stored")).unwrap().as_str().unwrap().to_owned();
+    assert!(told(&mut page).starts_with("changed since it was stored"));
     page.answer(json!("store")).unwrap();
+    assert!(told(&mut page).starts_with("as stored 20"));
+    let kept = |page: &mut Page| {
+        let list = page.answer(json!("checklist")).unwrap();
+        list.as_array().unwrap().iter().find(|item| item["name"] == json!("configuration")).unwrap()["done"].clone()
+    };
+    assert_eq!(kept(&mut page), json!(true));
     // What differs from before is named, and not set.
     let compared = page.answer(json!({ "compare": { "with": { "file": &exported } } })).unwrap();
     let differ = compared.as_array().unwrap().iter().find(|entry| entry["name"] == json!("torque-limit")).unwrap();
@@ -238,6 +292,7 @@ pub fn objects_are_read_set_stored_exported_and_imported() {
     let changed = page.answer(json!({ "import": { "text": &exported } })).unwrap();
     let names = changed.as_array().unwrap().iter().map(|entry| entry["name"].as_str().unwrap()).collect::<Vec<_>>();
     assert!(names.contains(&"torque-limit") && names.len() == 2, "{changed}");
+    assert_eq!(kept(&mut page), json!(false));
     assert_eq!(limit(&page.answer(json!("objects")).unwrap()), before);
     assert_eq!(page.answer(json!("export")).unwrap(), json!(exported));
     let broken = exported.replace("torque = ", "torque = -");

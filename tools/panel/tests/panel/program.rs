@@ -4,6 +4,7 @@ use crate::served::PATIENCE;
 use std::io::{BufRead, BufReader};
 use std::net::SocketAddr;
 use std::process::{Child, Command, Stdio};
+use std::time::Duration;
 
 /// A server before a bus; killed with this.
 pub struct Program {
@@ -12,15 +13,22 @@ pub struct Program {
 }
 
 impl Program {
+    /// The page of node 5.
     pub fn begin(bus: &str) -> Self {
         Self::with(bus, &[])
     }
 
     pub fn with(bus: &str, arguments: &[&str]) -> Self {
-        let patience = PATIENCE.as_millis().to_string();
+        Self::within(PATIENCE, bus, &[&["--node", "5"], arguments].concat())
+    }
+
+    /// The page of whoever is there, who may take so long for an answer.
+    pub fn within(patience: Duration, bus: &str, arguments: &[&str]) -> Self {
+        let patience = patience.as_millis().to_string();
         let mut child = Command::new(env!("CARGO_BIN_EXE_panel"))
-            .args(["--bus", bus, "--node", "5", "--port", "0", "--timeout", &patience])
+            .args(["--bus", bus, "--port", "0", "--timeout", &patience])
             .args(arguments)
+            .env_remove("JOINTCTL_NODE")
             .stdout(Stdio::piped())
             .spawn()
             .unwrap();
