@@ -1,9 +1,9 @@
-//! Both boards' own programs behind the page, in a browser, from a new board to a joint that has learned; real time.
+//! Both boards' own programs behind the page, in a browser, from a new board to one with an image; real time.
 //!
 //! `cargo bench -p panel --bench boards` builds the programs, runs each on an emulated board with the reference motor,
 //! and goes the page's way by its buttons: node id, what is missing, commissioning, configuration, motions, the life of
-//! an image, learning, the image taken back. It fails where a part does not end as it should. Where the machine was
-//! late a part is done again.
+//! an image, the image taken back. It fails where a part does not end as it should. Where the machine was late a part
+//! is done again. Learning is not among the parts: docs/panel.md.
 
 #![allow(dead_code, reason = "hands and browser are those of the tests, which use more of them")]
 
@@ -17,7 +17,7 @@ mod served;
 mod webdriver;
 
 use clap::FromArgMatches;
-use hands::{commission, hold, jog, retrain, set, told};
+use hands::{commission, hold, jog, set, told};
 use host_tests::bare_metal::{BOARDS, build};
 use jointctl::commands::{Arguments, arguments, run};
 use node::SampleImage;
@@ -97,14 +97,14 @@ fn from_unboxing(board: &str) {
     part("it is commissioned");
 
     browser.click("#load-objects");
-    set(&browser, "find", "value = 'velocity-limit'");
+    set(&browser, "find", "value = 'position-margin'");
     set(&browser, "find", "dispatchEvent(new Event('input'))");
     let field = "document.querySelector('#objects input')";
     browser.until(&format!("{field} !== null"));
-    browser.value(&format!("void ({field}.value = '2')"));
+    browser.value(&format!("void ({field}.value = '0.25')"));
     browser.value(&format!("void {field}.dispatchEvent(new Event('input'))"));
     browser.click("#set");
-    browser.until(&told("log", "velocity-limit is 2 "));
+    browser.until(&told("log", "position-margin is 0.25 "));
     browser.click("#store");
     browser.until(&format!("{} || {}", told("stored", "as stored 20"), told("stored", "not told")));
     part("its configuration is set and stored");
@@ -121,30 +121,31 @@ fn from_unboxing(board: &str) {
     browser.mouse("#jog-forward", "pointerUp");
     browser.until(&stands);
     moves("#sine", &format!("Math.abs({}) > 0.1", latest("velocity")));
+    // A spring of the page's default is weaker than the friction of this joint.
+    for (name, value) in [("offset", 0.2), ("stiffness", 200.0), ("damping", 4.0)] {
+        set(&browser, &format!("impedance-{name}"), &format!("value = '{value}'"));
+    }
     for (button, distance) in [("#steps", 0.05), ("#impedance", 0.02)] {
         let before = browser.value(&latest("position")).as_f64().unwrap();
-        set(&browser, "impedance-offset", "value = '0.2'");
         moves(button, &format!("Math.abs({} - {before}) > {distance}", latest("position")));
     }
     browser.picture(&format!("panel-{board}-moved.png"));
     part("it has moved in four ways, and stands");
 
-    let image = std::env::temp_dir().join(format!("panel-{}.img", std::process::id()));
-    std::fs::write(&image, SampleImage::constant(1, 0.01)).unwrap();
-    browser.choose("#image", &image);
-    for (button, life) in
-        [("#shadow", "in shadow"), ("#trial", "on trial"), ("#discard", "nothing staged"), ("#commit", "version 1, ")]
-    {
-        browser.click(button);
-        browser.until(&told("images", life));
-    }
-    std::fs::remove_file(image).unwrap();
-    part("an image was in shadow, on trial, discarded, committed");
-
-    retrain(&browser, 2);
-    let unexplained = browser.value("document.querySelector('#judged tr:nth-child(2)').textContent");
-    part(&format!("it has learned: {unexplained}"));
-    browser.picture(&format!("panel-{board}-learned.png"));
+    let use_image = |version: u32, steps: &[(&str, &str)]| {
+        let image = std::env::temp_dir().join(format!("panel-{}-{version}.img", std::process::id()));
+        std::fs::write(&image, SampleImage::constant(version, 0.01)).unwrap();
+        browser.choose("#image", &image);
+        for (button, life) in steps {
+            browser.click(button);
+            browser.until(&told("images", life));
+        }
+        std::fs::remove_file(image).unwrap();
+    };
+    use_image(1, &[("#shadow", "in shadow"), ("#trial", "on trial"), ("#discard", "nothing staged")]);
+    use_image(1, &[("#commit", "version 1, ")]);
+    use_image(2, &[("#commit", "version 2, ")]);
+    part("an image was in shadow, on trial, discarded; two were committed");
 
     browser.click("#roll-back");
     let rows = "[...document.querySelectorAll('#images tr')].map((row) => row.textContent)";

@@ -76,7 +76,8 @@ pub fn hold(browser: &Browser, button: &str, moved: &str) {
             return;
         }
         browser.mouse(button, "pointerUp");
-        assert!(began.elapsed() < PATIENCE, "the joint does not move");
+        let alert = || browser.value("document.querySelector('#alert').textContent");
+        assert!(began.elapsed() < PATIENCE, "{button}: the joint does not move: {}", alert());
     }
 }
 
