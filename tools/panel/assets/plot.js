@@ -5,8 +5,9 @@
 const KEPT = 16384;
 // Time between two readings of the numbers beside names, ms: nobody reads faster.
 const READ = 100;
-// Time for which the axis moves on after a message, ms.
-const GOES_ON = 200;
+// Mean time between two frames, ms: more of them would leave STOP less of the machine. Time for which the axis moves on
+// after a message, ms.
+const PERIOD = 25, GOES_ON = 200;
 const LEFT = 58, RIGHT = 8, TOP = 6, BOTTOM = 18;
 const COLOURS = ["--c0", "--c1", "--c2", "--c3", "--c4", "--c5"];
 // Smallest span of an axis, in the unit of the curve: noise of a joint at rest does not fill the plot.
@@ -34,8 +35,8 @@ export class Plots {
     this.strokes = 0;
     this.due = false;
     this.colours = new Map();
-    // Times of the last numbers beside names, and of the last strokes, ms.
-    [this.read, this.arrived] = [0, 0];
+    // Times of the next frame, of the last numbers beside names, and of the last strokes, ms.
+    [this.frameDue, this.read, this.arrived] = [0, 0, 0];
     this.begin([]);
     new ResizeObserver(() => this.draw()).observe(place);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
@@ -192,6 +193,11 @@ export class Plots {
   }
 
   frame(now) {
+    if (now < this.frameDue) {
+      requestAnimationFrame((later) => this.frame(later));
+      return;
+    }
+    this.frameDue = Math.max(this.frameDue + PERIOD, now);
     this.due = false;
     this.frames += 1;
     const range = this.range(), reads = this.cursor !== null || now - this.read >= READ;
