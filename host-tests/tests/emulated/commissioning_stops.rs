@@ -112,8 +112,8 @@ const TASK: f64 = 0.0005;
 const DEAD_MAN: f64 = 0.1;
 const DEBOUNCE: f64 = 0.020;
 /// A joint that brakes takes at least so long, s: one that does not is off within two periods, and where the client is
-/// lost the joint may have turned back by then and be slow. Part of its speed that may be left when the bridge goes off;
-/// how often it is looked at, s.
+/// lost the joint may have turned back by then and be slow. Part of its speed that may be left when the bridge goes
+/// off; how often it is looked at, s.
 const BRAKING: f64 = 0.003;
 const LEFT: f64 = 0.2;
 const LOOK: f64 = 0.0005;
