@@ -93,7 +93,7 @@ fn from_unboxing(board: &str) {
         ("torque-constant", reference.joint.motor.torque_constant),
         ("travel", 1.0),
     ];
-    commission(&browser, &plan, true, reference.windings.pole_pairs as usize);
+    commission(&browser, &plan, true, reference.windings.pole_pairs);
     part("it is commissioned");
 
     browser.click("#load-objects");
