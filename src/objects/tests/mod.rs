@@ -5,6 +5,7 @@ mod client;
 mod documentation;
 mod evidence;
 mod fault_log;
+mod friction_by_part;
 mod hardware;
 mod hostile;
 mod images;

@@ -5,8 +5,6 @@ use crate::joint::configuration::CollisionReaction;
 use crate::joint::fault::Fault;
 use crate::joint::state_machine::{Controlword, State};
 use crate::joint::{Command, Demand, Mode};
-use friction_compensation::compensation::Parts;
-use friction_compensation::quantity::Torque;
 
 fn rpdo1(controlword: u16, torque: i16, position: i32) -> Vec<u8> {
     [&controlword.to_le_bytes()[..], &torque.to_le_bytes(), &position.to_le_bytes()].concat()
@@ -470,20 +468,6 @@ fn telemetry_is_scaled_as_the_table_says_and_held_at_the_ends() {
         assert_eq!(node.number(0x6064, 0) as i32, position);
         assert_eq!(node.number(0x2020, 1) as i16, torque);
     }
-}
-
-#[test]
-fn friction_is_told_by_its_parts_and_adaptation_by_what_it_adds() {
-    let mut node = Node::operational();
-    let of = |value: f32| Torque::from_bits((value * 65_536.0) as i32);
-    let compensated = &mut node.observed.telemetry.compensated;
-    compensated.output.parts = [Parts { physical: of(1.5), network: of(-0.25), pre_sliding: of(0.75) }];
-    // Half of the image's 2 Nm is permitted; a quarter more is adaptation's.
-    (compensated.output.torque, compensated.permitted, compensated.torque) = (of(2.0), 0.5, 1.25);
-    let told = [1, 2, 3, 4].map(|sub_index| node.number(0x2022, sub_index) as i16);
-    assert_eq!(told, [1_500, -250, 750, 250]);
-    node.observed.telemetry.compensated.output.parts = [Parts { physical: of(-40.0), ..Parts::default() }];
-    assert_eq!(node.number(0x2022, 1) as i16, i16::MIN);
 }
 
 #[test]

@@ -127,7 +127,7 @@ pub struct Stream {
     joint: RemoteJoint,
     shared: Arc<Shared>,
     changes: Vec<Change>,
-    /// What was in use had a date.
+    /// Presence of a date of the configuration at the beginning.
     dated: bool,
     interpolation: Option<Interpolation>,
     /// Channel to the thread, which ends when it is dropped.

@@ -76,7 +76,7 @@ pub struct Telemetry {
     joint: RemoteJoint,
     signals: Vec<Signal>,
     changes: Vec<Change>,
-    /// What was in use had a date.
+    /// Presence of a date of the configuration at the beginning.
     dated: bool,
     /// Places of each TPDO's signals.
     places: Vec<Vec<usize>>,

@@ -1,4 +1,4 @@
-//! What somebody does at the page.
+//! Hands at the page: its fields, buttons and sequences.
 
 use crate::served::PATIENCE;
 use crate::webdriver::Browser;
