@@ -204,6 +204,37 @@ fn the_exported_table_holds_every_sample_and_gives_the_reported_errors() {
 }
 
 #[test]
+fn an_image_stays_within_the_torque_limit_of_the_joint_that_it_is_for() {
+    let folder = with_demo();
+    let fit = |out: &str, limit: &[&str]| {
+        let fit = ["fit", "demo/dataset.toml", "--out", out, "--trainer", "none", "--preset", "coulomb-viscous"];
+        let output = jointctl(folder.path(), &[&fit[..], limit].concat());
+        let report = std::fs::read(folder.path().join(out).join("report.json"));
+        let report: serde_json::Value =
+            report.map_or_else(|_| "none".into(), |report| serde_json::from_slice(&report).unwrap());
+        let friction = &report["certificate"][0];
+        (output, friction["value"].as_f64(), friction["limit"].as_f64())
+    };
+    let (output, reached, _) = fit("free", &[]);
+    let reached = reached.unwrap_or_else(|| panic!("{}", stderr(&output)));
+    // What it can reach is enough; with a step of the image's numbers less the model counts for slower motion only.
+    for (out, limit) in [("enough", reached), ("less", reached - 1.0 / 65_536.0)] {
+        let (output, value, told) = fit(out, &["--torque-limit", &limit.to_string()]);
+        assert!(output.status.success(), "{}", stderr(&output));
+        assert!(value.unwrap() <= limit && told == Some(limit), "{value:?} {told:?} {limit}");
+        assert_eq!(value == Some(reached), out == "enough", "{value:?} {reached}");
+    }
+    let (output, ..) = fit("none", &["--torque-limit", "0.01"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(stderr(&output).contains("friction can reach"), "{}", stderr(&output));
+    for limit in ["0.009", "2000.1", "NaN"] {
+        let (output, ..) = fit("wrong", &["--torque-limit", limit]);
+        assert_eq!(output.status.code(), Some(2));
+        assert!(stderr(&output).contains("must be 0.01 to 2000"), "{}", stderr(&output));
+    }
+}
+
+#[test]
 fn a_fit_that_fails_says_why_and_leaves_earlier_results_as_they_were() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("joint");

@@ -13,6 +13,7 @@ use socket2::{Domain, Protocol, SockAddr, Socket, Type};
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// python-can's `hop_limit`: the local network.
@@ -31,6 +32,8 @@ pub(super) struct Multicast {
     output: UdpSocket,
     /// Address that this program's own frames come from.
     own: SocketAddr,
+    /// Time for which `input` waits, as the kernel was told last.
+    waits: Mutex<Option<Duration>>,
     lost: AtomicU64,
 }
 
@@ -52,7 +55,24 @@ impl Multicast {
         let input = join(group).map_err(failed)?;
         let output = sender(group).map_err(failed)?;
         let own = output.local_addr().map_err(failed)?;
-        Ok(Self { name: bus.into(), input, output, own, lost: AtomicU64::new(0) })
+        Ok(Self { name: bus.into(), input, output, own, waits: Mutex::default(), lost: AtomicU64::new(0) })
+    }
+
+    /// Has `input` wait for so long. The kernel is told where it was told another time before: being told twice costs
+    /// more than a frame.
+    fn wait(&self, time: Duration) -> io::Result<()> {
+        let mut waits = self.waits.lock().unwrap_or_else(PoisonError::into_inner);
+        if *waits == Some(time) {
+            return Ok(());
+        }
+        *waits = None;
+        // A timeout of zero would mean "for ever", and the kernel makes one of a microsecond some milliseconds.
+        self.input.set_nonblocking(time.is_zero())?;
+        if !time.is_zero() {
+            self.input.set_read_timeout(Some(time))?;
+        }
+        *waits = Some(time);
+        Ok(())
     }
 }
 
@@ -109,17 +129,16 @@ impl Transport for Multicast {
     fn receive(&self, timeout: Duration) -> Result<Option<Frame>, BusError> {
         let deadline = Instant::now() + timeout;
         let gone = |error| BusError::gone(&self.name, error, ADVICE);
+        let mut rest = timeout;
         loop {
-            let rest = deadline.saturating_duration_since(Instant::now());
-            // A timeout of zero would mean "for ever", and the kernel makes one of a microsecond some milliseconds.
-            self.input.set_nonblocking(rest.is_zero()).map_err(gone)?;
-            if !rest.is_zero() {
-                self.input.set_read_timeout(Some(rest)).map_err(gone)?;
-            }
+            self.wait(rest).map_err(gone)?;
             let mut datagram = [0; LONGEST];
             match self.input.recv_from(&mut datagram) {
                 // Not what was asked for, and what waits behind it has come already.
-                Ok((_, from)) if from == self.own => continue,
+                Ok((_, from)) if from == self.own => {
+                    rest = deadline.saturating_duration_since(Instant::now());
+                    continue;
+                }
                 Ok((length, _)) => match decode(datagram.get(..length).unwrap_or_default()) {
                     Message::Frame(frame) => return Ok(Some(frame)),
                     Message::Other => {}
@@ -130,7 +149,8 @@ impl Transport for Multicast {
                 Err(error) if is_timeout(&error) => {}
                 Err(error) => return Err(gone(error)),
             }
-            if Instant::now() >= deadline {
+            rest = deadline.saturating_duration_since(Instant::now());
+            if rest.is_zero() {
                 return Ok(None);
             }
         }

@@ -66,7 +66,7 @@ fn build_to(
     learned: &Learned,
     context: &Context,
 ) -> Result<Built, FitError> {
-    let limit = to_unsigned_q16("limit of the output", OUTPUT_LIMIT * largest_effort(samples))?;
+    let limit = output_limit(largest_effort(samples), context.options.torque_limit)?;
     let mut learned = learned.clone();
     let mut parameters = match quantized(samples, physical, &learned, context.options, reach) {
         Err(FitError::Quantize(error)) if learned.has_network() => {
@@ -127,6 +127,12 @@ fn image(parameters: FrictionParameters, limits: Limits, context: &Context) -> R
     };
     image.encode(&mut [0; MAX_LENGTH])?;
     Ok(image)
+}
+
+/// What the image may give at most, Q16.16: never more than the joint's torque limit, rounded down.
+fn output_limit(largest_effort: f64, torque_limit: Option<f64>) -> Result<u32, FitError> {
+    let limit = to_unsigned_q16("limit of the output", OUTPUT_LIMIT * largest_effort)?;
+    Ok(torque_limit.map_or(limit, |torque| limit.min((torque * 65_536.0) as u32)))
 }
 
 fn largest_effort(samples: &Samples) -> f64 {
@@ -193,6 +199,17 @@ fn quantized(
 mod tests {
     use super::*;
     use crate::friction_model::Terms;
+
+    #[test]
+    fn an_image_may_give_three_times_the_largest_effort_and_never_more_than_the_joint() {
+        let limit = |effort, torque| output_limit(effort, torque).unwrap();
+        assert_eq!(limit(1.0, None), 3 << 16);
+        assert_eq!(limit(1.0, Some(2.0)), 2 << 16);
+        assert_eq!(limit(1.0, Some(4.0)), 3 << 16);
+        // The joint rounds its own limit down: the nearest number would be one more than it takes.
+        assert_eq!(limit(1.0, Some(2.0 - 0.25 / 65_536.0)), (2 << 16) - 1);
+        assert!(output_limit(f64::NAN, Some(2.0)).is_err());
+    }
 
     #[test]
     fn what_is_known_of_one_direction_counts_for_the_other_where_both_were_seen() {

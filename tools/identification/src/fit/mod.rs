@@ -82,6 +82,10 @@ pub struct Options {
     pub reference: bool,
     /// Distance beyond the trained box over which the network fades out, in half widths.
     pub margin: f64,
+    /// Torque limit of the joint that the image is for, in the effort's unit: a joint takes no image whose friction can
+    /// reach more. None: not known.
+    #[serde(skip)]
+    pub torque_limit: Option<f64>,
     /// Version of the image.
     pub version: u32,
     /// Creation time of the image, s since 1970; 0 = not stated.
@@ -108,6 +112,7 @@ impl Default for Options {
             regimes: vec![],
             reference: true,
             margin: 0.5,
+            torque_limit: None,
             version: 1,
             created: 0,
         }

@@ -155,6 +155,10 @@ pub struct Choices {
     /// How far beyond the trained box the network fades out, in half widths of the box
     #[arg(long, value_name = "X", default_value_t = 0.5)]
     margin: f64,
+    /// Torque limit of the joint that the image is for, object 2103h:1, in the effort's unit: it takes no image whose
+    /// friction can reach more [default: three times the largest effort of the recording]
+    #[arg(long, value_name = "X")]
+    torque_limit: Option<f64>,
     /// Version of the image; must rise for a joint that has one
     #[arg(long, value_name = "N", default_value_t = 1)]
     image_version: u32,
@@ -173,6 +177,9 @@ impl Choices {
         if self.regimes.len() > 2 {
             return Err(CommandError::Arguments(format!("--regimes names {} criteria, at most 2", self.regimes.len())));
         }
+        if let Some(limit) = self.torque_limit.filter(|limit| !(0.01..=2000.0).contains(limit)) {
+            return Err(CommandError::Arguments(format!("--torque-limit is {limit}, must be 0.01 to 2000")));
+        }
         let mut options = Options {
             trainer: match self.trainer {
                 TrainerChoice::Lm => Some(Trainer::LevenbergMarquardt),
@@ -190,6 +197,7 @@ impl Choices {
             terms: self.terms.clone(),
             least_gain: fraction("least-gain", self.least_gain, 100.0)? / 100.0,
             margin: fraction("margin", self.margin, 100.0)?,
+            torque_limit: self.torque_limit,
             version: self.image_version,
             created: self.created.or_else(source_date_epoch).unwrap_or(0),
             ..Options::default()

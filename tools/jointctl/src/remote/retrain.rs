@@ -329,7 +329,8 @@ impl<'a> Recorded<'a> {
     /// [`RetrainError`]; the joint is as it was.
     pub fn learn(self, progress: &dyn Progress) -> Result<Learned<'a>, RetrainError> {
         let mut prepared = prepare(&self.round.out.join(DESCRIPTION))?;
-        let options = Options { version: self.version, ..self.round.options.clone() };
+        let torque_limit = Some(self.tidy.joint.number(Field::Setting(Setting::TorqueLimit))?);
+        let options = Options { version: self.version, torque_limit, ..self.round.options.clone() };
         let fitted = fit(&mut prepared, &options, progress)?;
         let load = differences(&configured(self.tidy.joint)?, &fitted.report.parameters);
         Ok(Learned { recorded: self, fitted, load })

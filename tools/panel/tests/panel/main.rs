@@ -49,6 +49,7 @@ fn main() {
             #[cfg(unix)] where_nobody_but_a_new_joint_is_the_page_gives_it_its_node_id_and_shows_it,
             a_fault_is_told_with_its_emcy,
             objects_are_read_set_stored_exported_and_imported,
+            a_store_keeps_what_is_set_and_not_the_tpdos_that_the_page_watches_by,
             an_image_is_shadowed_tried_discarded_committed_and_rolled_back,
             another_client_that_takes_the_tpdos_ends_the_live_values_until_they_are_asked_for,
         }

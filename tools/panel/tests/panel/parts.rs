@@ -3,9 +3,12 @@
 use crate::page::Page;
 #[cfg(unix)]
 use crate::program::Program;
-use crate::served::{Joints, NODE, Served};
+use crate::served::{Joints, NODE, PATIENCE, Served};
+use bus::client::Command;
+use joint_firmware::objects::field::Field;
+use joint_firmware::objects::settings::Setting;
 use jointctl::remote::telemetry::USUAL;
-use jointctl::remote::{Entry, Telemetry};
+use jointctl::remote::{Entry, RemoteJoint, Telemetry};
 use node::SampleImage;
 use serde_json::{Value, json};
 use std::time::Duration;
@@ -300,6 +303,29 @@ pub fn objects_are_read_set_stored_exported_and_imported() {
     assert!(error.contains("joint.toml") && error.contains("torque"), "{error}");
     let error = page.answer(json!({ "import": { "text": "torque" } })).unwrap_err();
     assert!(error.contains("line 1"), "{error}");
+}
+
+pub fn a_store_keeps_what_is_set_and_not_the_tpdos_that_the_page_watches_by() {
+    fn mapped(joint: &RemoteJoint) -> Vec<[u32; 2]> {
+        let number = |index, sub_index| u32::from_le_bytes(joint.node().number(index, sub_index).unwrap());
+        let count = |index| joint.node().number::<1>(index, 0).unwrap()[0].into();
+        let pdo = |pdo: u16| [[number(0x1800 + pdo, 1), count(0x1A00 + pdo)], [number(0x1A00 + pdo, 1), 0]];
+        (0..4).flat_map(pdo).collect()
+    }
+    let new = mapped(&Joints::new(&[NODE]).joint());
+    let mut served = Served::joints(&[NODE]);
+    let mut page = Page::open(served.address);
+    page.sees(VELOCITY, |velocity| velocity.abs() < 0.05);
+    let joint = served.joints.joint();
+    assert_ne!(mapped(&joint), new, "nothing is watched");
+    page.answer(json!({ "set": { "values": [["damping", "3"]] } })).unwrap();
+    page.answer(json!("store")).unwrap();
+    // It goes on.
+    page.sees(VELOCITY, |velocity| velocity.abs() < 0.05);
+    served.end();
+    joint.network().reset_and_wait(Command::ResetNode, NODE, PATIENCE).unwrap();
+    assert_eq!(mapped(&joint), new);
+    assert_eq!(joint.number(Field::Setting(Setting::Damping)).unwrap(), 3.0);
 }
 
 pub fn an_image_is_shadowed_tried_discarded_committed_and_rolled_back() {
