@@ -69,7 +69,7 @@ mod tests {
     #[test]
     fn a_frame_begins_as_the_standard_says_and_its_crc_is_divided_bit_by_bit() {
         let told = stuffed_region(&Frame::new(0x14, &[1]).unwrap());
-        assert_eq!((told.bits >> 15, told.length), (0b00_0000_0101_0000_0001_0000_0001, 42));
+        assert_eq!((told.bits >> 15, told.length), (0b000_0000_1010_0000_0001_0000_0001, 42));
         // x^15 + x^14 + x^10 + x^8 + x^7 + x^4 + x^3 + 1 (ISO 11898-1, CRC sequence).
         let crc = (15..42).rev().map(|at| told.bits >> at & 1 != 0).fold(0u16, |crc, bit| {
             let next = bit != (crc >> 14 & 1 != 0);
