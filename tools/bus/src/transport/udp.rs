@@ -58,8 +58,8 @@ impl Multicast {
         Ok(Self { name: bus.into(), input, output, own, waits: Mutex::default(), lost: AtomicU64::new(0) })
     }
 
-    /// Has `input` wait for so long. The kernel is told where it was told another time before: being told twice costs
-    /// more than a frame.
+    /// Has `input` wait for so long. The kernel is told only where it was told another time before: two calls less for
+    /// each frame of a burst.
     fn wait(&self, time: Duration) -> io::Result<()> {
         let mut waits = self.waits.lock().unwrap_or_else(PoisonError::into_inner);
         if *waits == Some(time) {

@@ -129,7 +129,7 @@ fn image(parameters: FrictionParameters, limits: Limits, context: &Context) -> R
     Ok(image)
 }
 
-/// What the image may give at most, Q16.16: never more than the joint's torque limit, rounded down.
+/// Limit of the image's output, Q16.16: at most the joint's torque limit, rounded down.
 fn output_limit(largest_effort: f64, torque_limit: Option<f64>) -> Result<u32, FitError> {
     let limit = to_unsigned_q16("limit of the output", OUTPUT_LIMIT * largest_effort)?;
     Ok(torque_limit.map_or(limit, |torque| limit.min((torque * 65_536.0) as u32)))
