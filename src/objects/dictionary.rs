@@ -255,7 +255,8 @@ impl<'a, P: Program> Objects<'a, P> {
     }
 
     fn circumstances(&self) -> Circumstances {
-        Circumstances { now: self.now, armed: self.needs_control(), single_bank: self.single_bank }
+        let torque = (self.configuration.limits.torque * 65_536.0) as u32;
+        Circumstances { now: self.now, armed: self.needs_control(), single_bank: self.single_bank, torque }
     }
 
     /// Reports a refusal of the life cycle.

@@ -28,6 +28,8 @@ pub(super) struct Circumstances {
     pub(super) now: u64,
     pub(super) armed: bool,
     pub(super) single_bank: bool,
+    /// Limit of the joint's torque, Q16.16 Nm.
+    pub(super) torque: u32,
 }
 
 /// Life cycle, staging buffer and owner.
@@ -156,9 +158,9 @@ impl<'a> Images<'a> {
 
     /// Carries a command out as far as the life cycle does; `is_stored` as of [`Images::is_stored`].
     pub(super) fn command(&mut self, number: u8, is_stored: bool, circumstances: Circumstances) -> Result<(), Refusal> {
-        let Circumstances { now, armed, single_bank } = circumstances;
+        let Circumstances { now, armed, single_bank, torque } = circumstances;
         let (key, locked) = (self.owner.key(), self.owner.is_locked());
-        let conditions = Conditions { now, armed, single_bank, key, locked, is_stored };
+        let conditions = Conditions { now, armed, single_bank, key, locked, is_stored, torque };
         let action = self.life.command_number(number, self.staging, &conditions)?;
         if action != Action::Nothing {
             self.action = action;

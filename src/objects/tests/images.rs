@@ -10,6 +10,7 @@ use friction_compensation::friction::state::{JointState, SIGNALS};
 use friction_compensation::friction::{FrictionModel, FrictionParameters, ParameterSet};
 use friction_compensation::parameters::Summary;
 use friction_compensation::parameters::authentication::{Challenge, Key, Purpose};
+use friction_compensation::parameters::certificate::{self, Limits};
 use friction_compensation::parameters::image::{GoldenVector, Image, MAX_LENGTH};
 use friction_compensation::parameters::life_cycle::{Action, Mode};
 use friction_compensation::parameters::slots::Slot;
@@ -17,20 +18,25 @@ use friction_compensation::parameters::slots::Slot;
 const VERIFY: u8 = 1;
 const TRIAL: u8 = 2;
 const COMMIT: u8 = 3;
+const SHADOW: u8 = 6;
 const ROLL_BACK: u8 = 4;
 const DISCARD: u8 = 5;
 
-/// An image with a constant friction of half a newton metre.
-fn image(version: u32) -> Vec<u8> {
-    let coefficients = Coefficients::from_array(core::array::from_fn(|i| if i == 0 { 1 << 15 } else { 0 }));
+/// A constant friction of a 64th of a newton metre, less than what the joint may do.
+fn friction() -> FrictionParameters {
+    let coefficients = Coefficients::from_array(core::array::from_fn(|i| if i == 0 { 1 << 10 } else { 0 }));
     let set = ParameterSet { physical: PhysicalParameters { terms: Terms::ALL, coefficients }, network: None };
     let range = Range { low: -(1 << 16), high: 1 << 16 };
-    let friction = FrictionParameters {
+    FrictionParameters {
         domain: Domain { ranges: [range; SIGNALS], margin: 0, reference_temperature: 0 },
         selector: Selector::default(),
         common: CommonTerms::NONE,
         sets: [set, ParameterSet::default(), ParameterSet::default(), ParameterSet::default()],
-    };
+    }
+}
+
+fn image(version: u32) -> Vec<u8> {
+    let friction = friction();
     let expected = FrictionModel::new(&friction, 20_000).evaluate(0, &JointState::from_signals([7; SIGNALS]));
     let image = Image {
         version,
@@ -92,6 +98,49 @@ fn what_is_staged_can_be_read_back_until_it_is_forgotten() {
     assert_eq!(node.upload(0x2210, 0), Ok(b"123456789".to_vec()));
     command(&mut node, 5).unwrap();
     assert_eq!(node.upload(0x2210, 0), Ok(vec![]));
+}
+
+/// Limits of torque just below what is proved of the image, and at it, Nm.
+fn around_the_bound() -> (f32, f32) {
+    let bound = certificate::prove(&friction()).unwrap().output;
+    assert!((1 << 10..(1 << 10) + 8).contains(&bound), "{bound}");
+    ((bound - 1) as f32 / 65_536.0, bound as f32 / 65_536.0)
+}
+
+/// Configures the limit of the joint's torque, Nm.
+fn limit(node: &mut Node, torque: f32) {
+    node.set_real(0x2103, 1, torque).unwrap();
+    node.download(0x2100, 1, &[1]).unwrap();
+}
+
+#[test]
+fn an_image_is_judged_by_the_limit_of_torque_that_is_in_use() {
+    let (below, bound) = around_the_bound();
+    let mut node = Node::operational();
+    node.download(0x2210, 0, &image(1)).unwrap();
+    limit(&mut node, below);
+    command(&mut node, VERIFY).unwrap_err();
+    assert_eq!((node.number(0x2212, 2), node.number(0x2212, 3)), (1, 0x0603));
+    // What is only staged in the dictionary limits nothing yet.
+    node.set_real(0x2103, 1, bound).unwrap();
+    command(&mut node, VERIFY).unwrap_err();
+    limit(&mut node, bound);
+    command(&mut node, VERIFY).unwrap();
+    assert_eq!((node.number(0x2212, 2), node.number(0x2212, 3)), (2, 0));
+}
+
+#[test]
+fn a_verified_image_neither_runs_nor_is_stored_once_the_limit_of_torque_is_lower() {
+    let (below, bound) = around_the_bound();
+    for number in [TRIAL, COMMIT, SHADOW] {
+        let mut node = verified(&image(1));
+        limit(&mut node, below);
+        command(&mut node, number).unwrap_err();
+        assert_eq!((node.number(0x2212, 2), node.number(0x2212, 3)), (2, 0x0603));
+        assert_eq!(node.objects.take_action(), Action::Nothing);
+        limit(&mut node, bound);
+        command(&mut node, number).unwrap();
+    }
 }
 
 #[test]
@@ -399,15 +448,7 @@ fn what_is_stored_and_damaged_is_announced_and_stays_in_the_error_register() {
     let mut node = Node::new();
     node.objects.program().damaged = 2;
     node.objects.restart(
-        LifeCycle::new(
-            Requirements {
-                target: Target { product: 2, serial: 4 },
-                effort: Effort::NewtonMetre,
-                limits: Limits { output: u32::MAX, torque_gain: u32::MAX, velocity_slope: u32::MAX },
-            },
-            0,
-            0,
-        ),
+        LifeCycle::new(Target { product: 2, serial: 4 }, 0, 0),
         StoredImages::default(),
         &Start { single_bank: false, ..Start::new(None, false, &BOARD.joint, &BOARD.bridge) },
     );

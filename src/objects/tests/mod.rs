@@ -27,11 +27,10 @@ use crate::motor::open_loop::Window;
 use crate::reset_record::{Cause, LastReset, Record};
 use canopen_node::{Event, Frame, Identity, NmtState, Receiver, Route, SdoSettings, Server};
 use friction_compensation::parameters::authentication::{CHALLENGE, STAGING};
-use friction_compensation::parameters::certificate::Limits;
 use friction_compensation::parameters::fault_log::LoggedFault;
 use friction_compensation::parameters::guard::Guard;
 use friction_compensation::parameters::image::{Effort, Target};
-use friction_compensation::parameters::life_cycle::{LifeCycle, Requirements};
+use friction_compensation::parameters::life_cycle::LifeCycle;
 use friction_compensation::parameters::slots::SlotError;
 use std::collections::VecDeque;
 
@@ -241,13 +240,9 @@ impl Node {
     pub fn starting(program: Memory, start: &Start, guard: &Guard) -> Self {
         let bus: &canopen_node::Shared = Box::leak(Box::new(canopen_node::Shared::new()));
         let shared: &Shared = Box::leak(Box::new(Shared::new()));
-        let requirements = Requirements {
-            target: Target { product: 2, serial: 4 },
-            effort: Effort::NewtonMetre,
-            limits: Limits { output: u32::MAX, torque_gain: u32::MAX, velocity_slope: u32::MAX },
-        };
+        let target = Target { product: 2, serial: 4 };
         let staging = Box::leak(Box::new([0; STAGING]));
-        let life = LifeCycle::new(requirements, guard.floor, guard.failures);
+        let life = LifeCycle::new(target, guard.floor, guard.failures);
         let images = Images::new(staging, life, Ownership::new(guard), StoredImages::default());
         let mut node = Self {
             shared,

@@ -454,12 +454,8 @@ fn a_change_of_the_owner_that_cannot_be_kept_is_none() {
 fn a_session_ends_with_the_program() {
     let mut node = owned();
     node.respond(&key(1), Purpose::Session).unwrap();
-    let requirements = Requirements {
-        target: Target { product: 2, serial: 4 },
-        effort: Effort::NewtonMetre,
-        limits: Limits { output: u32::MAX, torque_gain: u32::MAX, velocity_slope: u32::MAX },
-    };
+    let target = Target { product: 2, serial: 4 };
     let start = Start { single_bank: false, ..Start::new(None, false, &BOARD.joint, &BOARD.bridge) };
-    node.objects.restart(LifeCycle::new(requirements, 3, 0), StoredImages::default(), &start);
+    node.objects.restart(LifeCycle::new(target, 3, 0), StoredImages::default(), &start);
     assert_eq!((node.number(0x2215, 8), node.owner()), (0, key(1).id()));
 }

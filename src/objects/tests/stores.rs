@@ -77,15 +77,7 @@ fn whoever_stores_in_a_loop_is_stopped_and_no_reset_over_the_bus_gives_anything_
         node.task();
         refused(&mut node, 101);
     }
-    let life = LifeCycle::new(
-        Requirements {
-            target: Target { product: 2, serial: 4 },
-            effort: Effort::NewtonMetre,
-            limits: Limits { output: u32::MAX, torque_gain: u32::MAX, velocity_slope: u32::MAX },
-        },
-        0,
-        0,
-    );
+    let life = LifeCycle::new(Target { product: 2, serial: 4 }, 0, 0);
     let start = Start { stores_left: STORES, ..Start::new(None, false, &BOARD.joint, &BOARD.bridge) };
     node.objects.restart(life, StoredImages::default(), &start);
     refused(&mut node, 102);

@@ -6,9 +6,8 @@ use crate::board::{self, Publisher, can};
 use canopen_node::{Identity, SdoSettings, Server};
 use embassy_stm32::can::CanConfigurator;
 use friction_compensation::parameters::authentication::STAGING;
-use friction_compensation::parameters::certificate::Limits;
 use friction_compensation::parameters::image::{Effort, Target};
-use friction_compensation::parameters::life_cycle::{LifeCycle, Requirements};
+use friction_compensation::parameters::life_cycle::LifeCycle;
 use joint_firmware::joint::Demand;
 use joint_firmware::objects::{Images, JointImage, Objects, Ownership, Shared, Start, StoredImages};
 use static_cell::{ConstStaticCell, StaticCell};
@@ -32,7 +31,7 @@ pub fn start(
 ) -> &'static mut Node {
     let identity = identity();
     let stored = program.store.stored_images();
-    let images = images(&program, &stored, identity, start);
+    let images = images(&program, &stored, identity);
     let objects = objects(program, images, start);
     let node = node(identity, start.configuration.node_id, objects, stored);
     can::start(controller, &BUS, JointImage::new(&OBJECTS), demand);
@@ -57,20 +56,11 @@ fn identity() -> &'static Identity<'static> {
 
 /// The life of images.
 #[inline(never)]
-fn images(program: &BoardProgram, stored: &StoredImages, identity: &Identity, start: &Start) -> Images<'static> {
+fn images(program: &BoardProgram, stored: &StoredImages, identity: &Identity) -> Images<'static> {
     static BUFFER: ConstStaticCell<[u8; STAGING]> = ConstStaticCell::new([0; STAGING]);
 
-    let requirements = Requirements {
-        target: Target { product: identity.product, serial: identity.serial },
-        effort: Effort::NewtonMetre,
-        // The image's own limits hold as well.
-        limits: Limits {
-            output: (start.configuration.limits.torque * 65_536.0) as u32,
-            torque_gain: 1 << 16,
-            velocity_slope: u32::MAX,
-        },
-    };
-    let life = LifeCycle::new(requirements, program.guard.floor, program.guard.failures);
+    let target = Target { product: board::PRODUCT, serial: identity.serial };
+    let life = LifeCycle::new(target, program.guard.floor, program.guard.failures);
     Images::new(BUFFER.take(), life, Ownership::new(&program.guard), *stored)
 }
 

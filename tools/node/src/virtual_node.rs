@@ -12,9 +12,8 @@ use canopen_node::{
     self, Buffers, Identity, NO_NODE_ID, NmtState, PDOS, Receiver, Route, SdoSettings, Server, TransmitQueue,
 };
 use friction_compensation::parameters::authentication::STAGING;
-use friction_compensation::parameters::certificate::Limits;
-use friction_compensation::parameters::image::{Effort, Target};
-use friction_compensation::parameters::life_cycle::{Action, LifeCycle, Mode, Requirements};
+use friction_compensation::parameters::image::Target;
+use friction_compensation::parameters::life_cycle::{Action, LifeCycle, Mode};
 use friction_compensation::parameters::slots::SlotError;
 use joint_firmware::joint::configuration::Configuration;
 use joint_firmware::joint::shadow::Shadow;
@@ -85,7 +84,7 @@ pub(crate) struct Before {
 pub struct VirtualNode {
     pub(crate) joint: VirtualJoint,
     setup: Setup,
-    requirements: Requirements,
+    target: Target,
     rate: u32,
     /// Rounds of the motion loop a second, Hz.
     motion_rate: u32,
@@ -163,17 +162,8 @@ impl VirtualNode {
             revision: 1,
             serial: options.serial,
         }));
-        let requirements = Requirements {
-            target: Target { product: PRODUCT, serial: options.serial },
-            effort: Effort::NewtonMetre,
-            // The image's own limits hold as well.
-            limits: Limits {
-                output: (setup.configuration.limits.torque * 65_536.0) as u32,
-                torque_gain: 1 << 16,
-                velocity_slope: u32::MAX,
-            },
-        };
-        let (life, stored_images) = life(requirements, &mut program.storage);
+        let target = Target { product: PRODUCT, serial: options.serial };
+        let (life, stored_images) = life(target, &mut program.storage);
         let owner = Ownership::new(&program.storage.guard());
         let images = Images::new(Box::leak(Box::new([0; STAGING])), life, owner, stored_images);
         let stored = start.configuration.node_id;
@@ -181,7 +171,7 @@ impl VirtualNode {
         Ok(Self {
             joint,
             setup: *setup,
-            requirements,
+            target,
             rate,
             motion_rate,
             bus,
@@ -373,7 +363,7 @@ impl VirtualNode {
         let program = self.objects.program();
         program.last_reset = LastReset::REQUESTED;
         let start = program.power_on(&defaults);
-        let (life, stored_images) = life(self.requirements, &mut program.storage);
+        let (life, stored_images) = life(self.target, &mut program.storage);
         let model = program.storage.images.model(self.motion_rate);
         // Refused only where even the defaults are, with which the joint began.
         program.next = start.configuration.prepare(&self.setup.bridge).ok();
@@ -508,8 +498,8 @@ impl VirtualNode {
 }
 
 /// The life cycle of a joint that starts, and what its slots hold.
-fn life(requirements: Requirements, storage: &mut Storage) -> (LifeCycle, StoredImages) {
+fn life(target: Target, storage: &mut Storage) -> (LifeCycle, StoredImages) {
     let stored = storage.images.stored();
     let guard = storage.guard();
-    (LifeCycle::new(requirements, guard.floor, guard.failures), stored)
+    (LifeCycle::new(target, guard.floor, guard.failures), stored)
 }

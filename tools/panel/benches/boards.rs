@@ -1,9 +1,9 @@
 //! Both boards' own programs behind the page, in a browser, from a new board to one with an image; real time.
 //!
 //! `cargo bench -p panel --bench boards` builds the programs, runs each on an emulated board with the reference motor,
-//! and goes the page's way by its buttons: node id, what is missing, commissioning, configuration, motions, the life of
-//! an image, the image taken back. It fails where a part does not end as it should. Where the machine was late a part
-//! is done again. Learning is not among the parts: docs/panel.md.
+//! and goes the page's way by its buttons: node id, what is missing, commissioning, configuration, motions, learning, the
+//! life of an image, the image taken back. It fails where a part does not end as it should. Where the machine was late a
+//! part is done again.
 
 #![allow(dead_code, reason = "hands and browser are those of the tests, which use more of them")]
 
@@ -17,7 +17,7 @@ mod served;
 mod webdriver;
 
 use clap::FromArgMatches;
-use hands::{commission, hold, jog, set, told};
+use hands::{commission, hold, jog, retrain, set, told};
 use host_tests::bare_metal::{BOARDS, build};
 use jointctl::commands::{Arguments, arguments, run};
 use node::SampleImage;
@@ -132,6 +132,9 @@ fn from_unboxing(board: &str) {
     browser.picture(&format!("panel-{board}-moved.png"));
     part("it has moved in four ways, and stands");
 
+    retrain(&browser, 1);
+    part("it has learned");
+
     let use_image = |version: u32, steps: &[(&str, &str)]| {
         let image = std::env::temp_dir().join(format!("panel-{}-{version}.img", std::process::id()));
         std::fs::write(&image, SampleImage::constant(version, 0.01)).unwrap();
@@ -142,14 +145,14 @@ fn from_unboxing(board: &str) {
         }
         std::fs::remove_file(image).unwrap();
     };
-    use_image(1, &[("#shadow", "in shadow"), ("#trial", "on trial"), ("#discard", "nothing staged")]);
-    use_image(1, &[("#commit", "version 1, ")]);
+    use_image(2, &[("#shadow", "in shadow"), ("#trial", "on trial"), ("#discard", "nothing staged")]);
     use_image(2, &[("#commit", "version 2, ")]);
+    use_image(3, &[("#commit", "version 3, ")]);
     part("an image was in shadow, on trial, discarded; two were committed");
 
     browser.click("#roll-back");
     let rows = "[...document.querySelectorAll('#images tr')].map((row) => row.textContent)";
-    browser.until(&format!("{rows}.some((row) => row.startsWith('in useversion 1, '))"));
+    browser.until(&format!("{rows}.some((row) => row.startsWith('in useversion 2, '))"));
     assert_eq!(browser.value("panel.problems"), json!([]));
     part("its image is taken back");
 }

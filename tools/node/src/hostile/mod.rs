@@ -25,10 +25,9 @@ use bus::Frame;
 use canopen_node::{Identity, NO_NODE_ID, NmtState, Receiver, Route, SdoSettings, Server};
 use friction_compensation::parameters::Summary;
 use friction_compensation::parameters::authentication::{Key, STAGING, TAG};
-use friction_compensation::parameters::certificate::Limits;
 use friction_compensation::parameters::guard::Guard;
-use friction_compensation::parameters::image::{Effort, Image, Target};
-use friction_compensation::parameters::life_cycle::{Action, LifeCycle, Requirements};
+use friction_compensation::parameters::image::{Image, Target};
+use friction_compensation::parameters::life_cycle::{Action, LifeCycle};
 use friction_compensation::parameters::slots::SlotError;
 use joint_firmware::default_configuration::B_G431B_ESC1;
 use joint_firmware::joint::configuration::Configuration;
@@ -153,17 +152,15 @@ impl<'a> HostileNode<'a> {
         storage.images.store(&crate::SampleImage::constant(3, 0.2))?;
         let stored_images = storage.images.stored();
         let board = B_G431B_ESC1;
-        let requirements = Requirements {
-            target: Target { product: IDENTITY.product, serial: IDENTITY.serial },
-            effort: Effort::NewtonMetre,
-            limits: Limits { output: u32::MAX, torque_gain: u32::MAX, velocity_slope: u32::MAX },
-        };
+        let target = Target { product: IDENTITY.product, serial: IDENTITY.serial };
         let Statics { bus, shared, staging } = statics;
         let (bus, shared) = (&*bus, &*shared);
         let guard = Guard { floor: 3, key: key.cloned(), ..Guard::default() };
         storage.store_guard(&guard)?;
-        let images = Images::new(staging, LifeCycle::new(requirements, 3, 0), Ownership::new(&guard), stored_images);
-        let start = Start { stores_left: STORES, ..Start::new(None, false, &board.joint, &board.bridge) };
+        let images = Images::new(staging, LifeCycle::new(target, 3, 0), Ownership::new(&guard), stored_images);
+        let mut start = Start { stores_left: STORES, ..Start::new(None, false, &board.joint, &board.bridge) };
+        // Room for what the images command.
+        start.configuration.limits.torque = 1.0;
         let mut node = Self {
             bus,
             receiver: Receiver::new(bus),

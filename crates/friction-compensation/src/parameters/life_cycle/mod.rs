@@ -28,10 +28,11 @@ mod tests;
 mod verification;
 
 use super::authentication::{Key, STAGING};
+use super::certificate;
 use super::image::Target;
 use super::slots::SlotError;
 pub use refusal::Refusal;
-pub use verification::{Requirements, Verified};
+pub use verification::Verified;
 
 /// Longest trial, ms: an hour.
 pub const MAX_TRIAL_MS: u32 = 3_600_000;
@@ -179,6 +180,8 @@ pub struct Conditions<'a> {
     pub locked: bool,
     /// The verified image is the one in use, as it is stored ([`LifeCycle::is_verified`]).
     pub is_stored: bool,
+    /// Limit of the joint's torque, Q16.16 Nm: no image that can exceed it is verified, runs or is stored.
+    pub torque: u32,
 }
 
 /// Results of verification.
@@ -194,7 +197,8 @@ struct Checked {
 /// The state machine.
 #[derive(Clone, Debug)]
 pub struct LifeCycle {
-    requirements: Requirements,
+    /// Joint that images have to be for: one states the same or 0, any.
+    target: Target,
     state: State,
     /// Action that the caller has been told to do and has not finished, with the state to go back to.
     pending: Option<(Action, State)>,
@@ -214,10 +218,10 @@ pub struct LifeCycle {
 impl LifeCycle {
     /// Life cycle at start: nothing is staged.
     ///
-    /// `floor`: as it was kept. `failures`: the kept count of wrong tags.
-    pub const fn new(requirements: Requirements, floor: u32, failures: u16) -> Self {
+    /// `target`: identity of the joint. `floor`: as it was kept. `failures`: the kept count of wrong tags.
+    pub const fn new(target: Target, floor: u32, failures: u16) -> Self {
         Self {
-            requirements,
+            target,
             state: State::Empty,
             pending: None,
             length: 0,
@@ -254,7 +258,7 @@ impl LifeCycle {
 
     /// Joint that images have to be for.
     pub const fn target(&self) -> Target {
-        self.requirements.target
+        self.target
     }
 
     /// Highest version with a right tag that was to be stored. To be kept when it has risen, before the image is
@@ -498,13 +502,15 @@ impl LifeCycle {
             self.count_failure();
             return Err(Refusal::TagWrong { failures: self.failures });
         }
-        let verified = verification::verify(upload, &self.requirements, self.lowest(conditions.key.is_some()))?;
+        let floor = self.lowest(conditions.key.is_some());
+        let verified = verification::verify(upload, self.target, conditions.torque, floor)?;
         self.verified = Some(Checked { verified, checksum: CRC.checksum(upload), key: conditions.key.map(Key::id) });
         self.state = State::Verified;
         Ok(Action::Nothing)
     }
 
-    /// The verified image, if the staging buffer still holds it and the joint has not got a key since.
+    /// The verified image, if the staging buffer still holds it, and the joint has got neither a key nor a lower limit
+    /// of its torque since.
     fn unchanged(
         &self,
         command: Command,
@@ -513,18 +519,22 @@ impl LifeCycle {
     ) -> Result<Verified, Refusal> {
         let refused = Refusal::State { command: Some(command), state: self.state };
         let (true, Some(Checked { verified, checksum, key })) =
-            (matches!(self.state, State::Verified | State::Shadow | State::Trial), self.verified)
+            (matches!(self.state, State::Verified | State::Shadow | State::Trial), &self.verified)
         else {
             return Err(refused);
         };
+        let (bound, limit) = (verified.certificate.output, conditions.torque);
+        if bound > limit {
+            return Err(Refusal::Certificate(certificate::Refusal::Output { bound, limit }));
+        }
         let upload = staging.get(..self.length).ok_or(refused)?;
-        if CRC.checksum(upload) != checksum {
+        if CRC.checksum(upload) != *checksum {
             return Err(Refusal::Changed);
         }
-        if key != conditions.key.map(Key::id) {
+        if *key != conditions.key.map(Key::id) {
             return Err(Refusal::TagMissing);
         }
-        Ok(verified)
+        Ok(*verified)
     }
 
     fn run(&mut self, mode: Mode, staging: &[u8; STAGING], conditions: &Conditions) -> Result<Action, Refusal> {

@@ -14,8 +14,7 @@ use crate::friction::{FrictionModel, FrictionParameters, ParameterSet};
 
 const RATE: u32 = 20_000;
 const GENEROUS: Limits = Limits { output: u32::MAX, torque_gain: u32::MAX - 1, velocity_slope: u32::MAX };
-const REQUIREMENTS: Requirements =
-    Requirements { target: Target { product: 7, serial: 1234 }, effort: Effort::NewtonMetre, limits: GENEROUS };
+const TARGET: Target = Target { product: 7, serial: 1234 };
 
 /// An image with a constant friction of half a newton metre.
 fn image(version: u32) -> Image {
@@ -62,6 +61,7 @@ struct Joint {
     key: Option<Key>,
     locked: bool,
     stored: Option<u32>,
+    torque: u32,
 }
 
 /// The image's own checksum.
@@ -71,9 +71,10 @@ fn checksum(bytes: &[u8]) -> u32 {
 
 impl Joint {
     fn new() -> Self {
-        let life = LifeCycle::new(REQUIREMENTS, 0, 0);
+        let life = LifeCycle::new(TARGET, 0, 0);
         let staging = [0; STAGING];
-        Self { life, staging, now: 0, armed: false, single_bank: true, key: None, locked: false, stored: None }
+        let torque = u32::MAX;
+        Self { life, staging, now: 0, armed: false, single_bank: true, key: None, locked: false, stored: None, torque }
     }
 
     fn upload(&mut self, bytes: &[u8]) {
@@ -86,7 +87,8 @@ impl Joint {
     fn command(&mut self, command: Command) -> Result<Action, Refusal> {
         let Self { now, armed, single_bank, locked, .. } = *self;
         let is_stored = self.life.is_verified(self.stored);
-        let conditions = Conditions { now, armed, single_bank, key: self.key.as_ref(), locked, is_stored };
+        let conditions =
+            Conditions { now, armed, single_bank, key: self.key.as_ref(), locked, is_stored, torque: self.torque };
         let result = self.life.command(command, &self.staging, &conditions);
         assert_eq!(self.life.result(), result.err());
         result
@@ -248,7 +250,7 @@ fn the_floor_rises_with_right_tags_alone() {
     }
     // The owner of a key begins anew, also after a loss of power.
     joint.key = Some(key());
-    for life in [joint.life.clone(), LifeCycle::new(REQUIREMENTS, 0, 0)] {
+    for life in [joint.life.clone(), LifeCycle::new(TARGET, 0, 0)] {
         joint.life = life;
         assert_eq!(store(&mut joint, &signed(&image(5))), 5);
         joint.upload(&signed(&image(4)));
@@ -263,7 +265,7 @@ fn an_image_is_newer_than_the_floor_from_the_next_version_on() {
     let mut joint = Joint::new();
     joint.key = Some(key());
     assert!(joint.life.is_newer(), "nothing is verified, so nothing is old");
-    joint.life = LifeCycle::new(REQUIREMENTS, 5, 0);
+    joint.life = LifeCycle::new(TARGET, 5, 0);
     for (version, newer) in [(5, false), (6, true)] {
         joint.upload(&signed(&image(version)));
         joint.command(Command::Verify).expect("verified");
@@ -324,7 +326,7 @@ fn a_damaged_key_takes_nothing_and_leaves_what_there_is() {
 fn rolling_back_goes_past_the_floor_and_leaves_it() {
     let mut joint = Joint::new();
     joint.key = Some(key());
-    joint.life = LifeCycle::new(REQUIREMENTS, 9, 0);
+    joint.life = LifeCycle::new(TARGET, 9, 0);
     assert_eq!(joint.command(Command::RollBack), Ok(Action::RollBack));
     assert_eq!(joint.life.finished(Ok(())), Action::Activate);
     assert_eq!(joint.life.finished(Ok(())), Action::Nothing);
@@ -415,7 +417,7 @@ fn images_for_others_are_refused() {
     assert_eq!(refused(|image| image.target.serial = 1), Refusal::Serial { image: 1, joint: 1234 });
     let effort = Refusal::Effort { image: Effort::Ampere, joint: Effort::NewtonMetre };
     assert_eq!(refused(|image| image.effort = Effort::Ampere), effort);
-    Joint::verified(&with(|image| image.target = REQUIREMENTS.target));
+    Joint::verified(&with(|image| image.target = TARGET));
 }
 
 #[test]
@@ -427,10 +429,17 @@ fn the_certificate_is_held_to_the_images_limits_and_the_joints() {
     };
     assert!(bound >= 1 << 15 && limit == 1 << 14);
     let mut joint = Joint::new();
-    let limits = Limits { output: 1 << 13, ..GENEROUS };
-    joint.life = LifeCycle::new(Requirements { limits, ..REQUIREMENTS }, 0, 0);
     joint.upload(&encoded(&image(1)));
-    assert_eq!(joint.refuses_to_verify().code(), 0x0603);
+    joint.torque = bound - 1;
+    let refused = Refusal::Certificate(certificate::Refusal::Output { bound, limit: bound - 1 });
+    assert_eq!((joint.refuses_to_verify(), refused.code()), (refused, 0x0603));
+    joint.torque = bound;
+    assert_eq!(joint.command(Command::Verify), Ok(Action::Nothing));
+    joint.life.set_trial_time(5_000).expect("a time");
+    joint.torque = bound - 1;
+    for command in [Command::Shadow, Command::Trial, Command::Commit] {
+        assert_eq!(joint.command(command), Err(refused));
+    }
 }
 
 #[test]
@@ -493,7 +502,7 @@ fn wrong_tags_are_counted_and_a_right_one_is_always_taken() {
         joint.upload(&right);
         assert_eq!(joint.command(Command::Verify), Ok(Action::Nothing));
     }
-    joint.life = LifeCycle::new(REQUIREMENTS, 0, u16::MAX);
+    joint.life = LifeCycle::new(TARGET, 0, u16::MAX);
     joint.upload(&wrong);
     assert_eq!(joint.refuses_to_verify(), Refusal::TagWrong { failures: u16::MAX });
     joint.upload(&right);

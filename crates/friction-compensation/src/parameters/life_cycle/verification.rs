@@ -11,16 +11,9 @@ use crate::parameters::certificate::{self, Certificate, Limits};
 use crate::parameters::image::{Effort, Image, Target};
 use crate::parameters::pieces::Pieces;
 
-/// Requirements of this joint on an image.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Requirements {
-    /// Identity of this joint: an image states the same or 0, any.
-    pub target: Target,
-    /// Effort that it commands.
-    pub effort: Effort,
-    /// Limits that an image's own certificate must stay within, whatever the image permits itself.
-    pub limits: Limits,
-}
+/// |d(network) / d(measured torque)| that a joint permits whatever the image permits itself, Q16.16: less than the torque
+/// that it was measured in.
+const TORQUE_GAIN: u32 = 1 << 16;
 
 /// An upload that everything holds of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,12 +40,11 @@ pub(super) fn authentic(upload: &[u8], key: Option<&Key>) -> Result<bool, Refusa
     }
 }
 
-/// Checks the rest of an authentic upload, one parameter set at a time.
+/// Checks the rest of an authentic upload, one parameter set at a time; `torque`: limit of the joint, Q16.16 Nm.
 #[inline(never)]
-pub(super) fn verify(upload: &[u8], requirements: &Requirements, floor: u32) -> Result<Verified, Refusal> {
+pub(super) fn verify(upload: &[u8], target: Target, torque: u32, floor: u32) -> Result<Verified, Refusal> {
     let (bytes, _) = split(upload);
     let image = Pieces::of(bytes)?;
-    let Requirements { target, effort, limits } = *requirements;
     let header = &image.header;
     if header.version < floor {
         return Err(Refusal::Version { version: header.version, floor });
@@ -63,13 +55,13 @@ pub(super) fn verify(upload: &[u8], requirements: &Requirements, floor: u32) -> 
     if header.target.serial != 0 && header.target.serial != target.serial {
         return Err(Refusal::Serial { image: header.target.serial, joint: target.serial });
     }
-    if header.effort != effort {
-        return Err(Refusal::Effort { image: header.effort, joint: effort });
+    if header.effort != Effort::NewtonMetre {
+        return Err(Refusal::Effort { image: header.effort, joint: Effort::NewtonMetre });
     }
     let limits = Limits {
-        output: header.limits.output.min(limits.output),
-        torque_gain: header.limits.torque_gain.min(limits.torque_gain),
-        velocity_slope: header.limits.velocity_slope.min(limits.velocity_slope),
+        output: header.limits.output.min(torque),
+        torque_gain: header.limits.torque_gain.min(TORQUE_GAIN),
+        velocity_slope: header.limits.velocity_slope,
     };
     let certificate = certified(&image, &limits).map_err(Refusal::Certificate)?;
     image.verify_golden().map_err(Refusal::Golden)?;
