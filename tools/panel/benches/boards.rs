@@ -1,9 +1,9 @@
 //! Both boards' own programs behind the page, in a browser, from a new board to one with an image; real time.
 //!
 //! `cargo bench -p panel --bench boards` builds the programs, runs each on an emulated board with the reference motor,
-//! and goes the page's way by its buttons: node id, what is missing, commissioning, configuration, motions, learning, the
-//! life of an image, the image taken back. It fails where a part does not end as it should. Where the machine was late a
-//! part is done again.
+//! and goes the page's way by its buttons: node id, what is missing, commissioning, configuration, motions, learning,
+//! the life of an image, the image taken back. It fails where a part does not end as it should. Where the machine was
+//! late a part is done again.
 
 #![allow(dead_code, reason = "hands and browser are those of the tests, which use more of them")]
 

@@ -83,6 +83,10 @@ pub fn checklist(joint: &RemoteJoint) -> Result<Vec<Item>, RemoteError> {
     let version = joint.raw(Field::Actual(Actual::ImageVersion))?;
     let found = if version == 0 { "no image".into() } else { format!("version {version}") };
     item("friction image", version != 0, found, "jointctl retrain, or Upload below");
+    let (gain, clamp) = (Field::AtOnce(Setting::CompensationGain), Field::AtOnce(Setting::Clamp));
+    let some = joint.number(gain)? > 0.0 && joint.number(clamp)? > 0.0;
+    let found = format!("gain {}, at most {}", info::show(joint, gain)?, info::show(joint, clamp)?);
+    item("compensation permitted", some, found, "gain and clamp of friction-compensation, below");
     let request = joint.raw(Field::AtOnce(Setting::Request))?;
     let found = info::show(joint, Field::AtOnce(Setting::Request))?;
     item("compensation requested", request != 0, found, "requested-model 1 or 2, below");

@@ -175,15 +175,30 @@ impl<O: Objects> Joint<O> {
         begun
     }
 
+    fn write_setting(&mut self, entry: Entry, value: f64) -> Result<(), Stopped> {
+        let refused = |error: crate::remote::RemoteError| Stopped::Refused(error.to_string());
+        let whole = entry.text.scale == 1.0 && crate::remote::value::integer(entry.object.data_type).is_some();
+        let value = if whole { Value::Integer(value.round() as i128) } else { Value::Real(value) };
+        let bytes = entry.encode(&value).map_err(refused)?;
+        self.objects.download(entry.object.index, entry.object.sub_index, &bytes)
+    }
+
+    /// Settings that act at once come last: the others have to permit them.
     fn offer(&mut self, settings: &[(Setting, f64)]) -> Result<(), Stopped> {
-        for (setting, value) in settings {
-            let entry = Entry::of(Field::Setting(*setting));
-            let refused = |error: crate::remote::RemoteError| Stopped::Refused(error.to_string());
-            let whole = entry.text.scale == 1.0 && crate::remote::value::integer(entry.object.data_type).is_some();
-            let value = if whole { Value::Integer(value.round() as i128) } else { Value::Real(*value) };
-            let bytes = entry.encode(&value).map_err(refused)?;
-            self.objects.download(entry.object.index, entry.object.sub_index, &bytes)?;
+        let entries = settings.iter().map(|(setting, value)| (Entry::of_setting(*setting), *value));
+        let (at_once, staged): (Vec<_>, Vec<_>) =
+            entries.partition(|(entry, _)| matches!(entry.object.field, Field::AtOnce(_)));
+        for (entry, value) in staged {
+            self.write_setting(entry, value)?;
         }
+        self.take_staged()?;
+        for (entry, value) in at_once {
+            self.write_setting(entry, value)?;
+        }
+        Ok(())
+    }
+
+    fn take_staged(&mut self) -> Result<(), Stopped> {
         for _ in 0..OFFERS {
             let taken = self.write_raw(Field::Configuration(ConfigurationField::Command), TAKE);
             let Err(Stopped::Refused(words)) = taken else { return taken };
@@ -320,7 +335,7 @@ impl<O: Objects> Bench for Joint<O> {
     }
 
     fn setting(&mut self, setting: Setting) -> Result<f64, Stopped> {
-        self.number(Field::Setting(setting))
+        self.number(Entry::of_setting(setting).object.field)
     }
 
     fn set(&mut self, settings: &[(Setting, f64)]) -> Result<(), Stopped> {

@@ -3,7 +3,6 @@
 use super::estimate::Estimate;
 use super::{Found, Stage};
 use crate::remote::Entry;
-use joint_firmware::objects::field::Field;
 use joint_firmware::objects::settings::Setting;
 use maud::{Markup, html};
 use report::figures::{Curve, FigureError, Ink, Plot, over_time};
@@ -29,7 +28,7 @@ pub fn files(found: &Found, node: u8) -> Result<Vec<OutputFile>, FigureError> {
 fn sorted(found: &Found) -> Vec<(Setting, f64)> {
     let mut settings = found.settings.clone();
     settings.sort_by_key(|(setting, _)| {
-        let entry = Entry::of(Field::Setting(*setting));
+        let entry = Entry::of_setting(*setting);
         (entry.object.index, entry.object.sub_index)
     });
     settings
@@ -38,7 +37,7 @@ fn sorted(found: &Found) -> Vec<(Setting, f64)> {
 /// The same as [`text`] as a JSON object; where nothing was measured of a setting its standard error is null.
 pub fn json(found: &Found, node: u8) -> serde_json::Value {
     let settings = sorted(found).into_iter().map(|(setting, value)| {
-        let entry = Entry::of(Field::Setting(setting));
+        let entry = Entry::of_setting(setting);
         let error = estimate(found, setting).map(|estimate| estimate.error);
         let value = serde_json::json!({ "value": value, "unit": entry.text.unit, "standard_error": error });
         (entry.full_name(), value)
@@ -54,7 +53,7 @@ pub fn text(found: &Found, node: u8) -> String {
     );
     let mut record = "";
     for (setting, value) in sorted(found) {
-        let entry = Entry::of(Field::Setting(setting));
+        let entry = Entry::of_setting(setting);
         if entry.text.object != record {
             record = entry.text.object;
             let _ = write!(text, "\n[{}]\n", crate::remote::entry::slug(record));

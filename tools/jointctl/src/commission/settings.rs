@@ -27,6 +27,14 @@ const LIMIT_DAMPING: f64 = 5.05;
 const CURRENT_BANDWIDTH: f64 = 500.0;
 const OBSERVER_BANDWIDTH: f64 = 200.0;
 
+/// Compensation that a new joint permits an image, which none uses before it is requested: share of the estimate, part
+/// of the torque limit, torque limits per second within what the joint takes, and the part of the velocity limit below
+/// which it fades out.
+const COMPENSATION_GAIN: f64 = 0.98;
+const CLAMP: f64 = 0.5;
+const SLEW: f64 = 50.0;
+const STANDSTILL: f64 = 0.01;
+
 /// Returns `true` if motor and torque constant are the placeholders of a board's program.
 pub(super) fn is_new<B: Bench>(bench: &mut B) -> Result<bool, Stopped> {
     // The same placeholders on every board.
@@ -88,6 +96,10 @@ pub(super) fn of(plan: &Plan, found: &Found, gear: f64, fastest: f64) -> Vec<(Se
         (Setting::Stiffness, (STIFFNESS * damping).min(1e5)),
         (Setting::CurrentBandwidth, CURRENT_BANDWIDTH),
         (Setting::ObserverBandwidth, OBSERVER_BANDWIDTH),
+        (Setting::CompensationGain, COMPENSATION_GAIN),
+        (Setting::Clamp, CLAMP * torque),
+        (Setting::Slew, (SLEW * torque).clamp(0.5, 32e3)),
+        (Setting::StandstillVelocity, (STANDSTILL * velocity).clamp(1e-4, 10.0)),
     ]);
     settings
 }

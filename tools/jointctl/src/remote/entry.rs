@@ -6,6 +6,7 @@
 use super::error::RemoteError;
 use canopen_node::Access;
 use joint_firmware::objects::field::Field;
+use joint_firmware::objects::settings::Setting;
 use joint_firmware::objects::table::{Object, Text, communication, described};
 
 /// Suggestions for a name that does not exist.
@@ -38,6 +39,16 @@ impl Entry {
     pub fn of(field: Field) -> Self {
         let found = Self::all().find(|entry| entry.object.field == field);
         found.unwrap_or_else(|| unreachable!("{field:?} has no object in the table"))
+    }
+
+    /// The entry of a setting, whether it is staged or acts at once.
+    ///
+    /// # Panics
+    /// For a setting that has no object of its own.
+    pub fn of_setting(setting: Setting) -> Self {
+        let found = Self::all()
+            .find(|entry| matches!(entry.object.field, Field::Setting(own) | Field::AtOnce(own) if own == setting));
+        found.unwrap_or_else(|| unreachable!("{setting:?} has no object in the table"))
     }
 
     /// The entries that a person means: one, or all of a record but its sub-index 0.

@@ -85,6 +85,14 @@ pub enum RetrainError {
         /// Missing part.
         problem: String,
     },
+    /// Compensation that can do nothing, whatever the image.
+    #[error("node {node}: {setting} is 0, so no image compensates anything: set it above 0, and store it")]
+    NoCompensation {
+        /// Node id.
+        node: u8,
+        /// Name of the setting that is 0.
+        setting: String,
+    },
     /// Image of somebody that is on its way.
     #[error("node {node}: {}; `jointctl discard` ends it", super::info::life(*state, *left))]
     Busy {
@@ -306,6 +314,13 @@ impl Round {
         let status = joint.image_status()?;
         if matches!(status.state, State::Shadow | State::Trial | State::Storing) {
             return Err(RetrainError::Busy { node, state: status.state, left: status.left });
+        }
+        for setting in [Setting::CompensationGain, Setting::Clamp] {
+            let entry = Entry::of(Field::AtOnce(setting));
+            if joint.number(entry.object.field)? == 0.0 {
+                let setting = format!("{} ({})", entry.name(), entry.place());
+                return Err(RetrainError::NoCompensation { node, setting });
+            }
         }
         let refuse = |problem| Err(RetrainError::Key { node, problem });
         let number = joint.raw(Field::Owner(OwnerField::KeyNumber))?;

@@ -107,6 +107,7 @@ fn main() {
         retrain {
             a_round_lowers_what_is_unexplained_and_commits_a_newer_version,
             an_interrupted_round_leaves_the_joint_disabled_with_the_image_that_it_had,
+            a_round_that_could_change_nothing_is_refused_before_the_joint_moves,
             a_recording_of_a_motion_is_a_data_set,
             two_producers_of_sync_are_told_of,
             a_round_after_which_the_joint_keeps_its_image_prints_its_figures_and_ends_with_3,

@@ -75,6 +75,26 @@ pub fn an_interrupted_round_leaves_the_joint_disabled_with_the_image_that_it_had
     assert_eq!(joint.active_image().unwrap(), stored);
 }
 
+pub fn a_round_that_could_change_nothing_is_refused_before_the_joint_moves() {
+    let served = Served::joints(&[NODE]);
+    let joint = served.joint();
+    let folder = tempfile::tempdir().unwrap();
+    for (setting, name) in [(Setting::CompensationGain, "gain (2200h:3)"), (Setting::Clamp, "clamp (2200h:4)")] {
+        let entry = Entry::of(Field::AtOnce(setting));
+        let before = joint.read(entry).unwrap();
+        set(&joint, &[(entry, Value::Real(0.0))]).unwrap();
+        let refused = round(folder.path()).run(&joint, &|| true, &|_| Ok(()), &Silent).unwrap_err();
+        assert_eq!(
+            refused.to_string(),
+            format!("node {NODE}: {name} is 0, so no image compensates anything: set it above 0, and store it")
+        );
+        assert_eq!(joint.state().unwrap(), State::SwitchOnDisabled);
+        set(&joint, &[(entry, Value::Real(0.001))]).unwrap();
+        assert_eq!(round(folder.path()).check(&joint).unwrap(), 1);
+        set(&joint, &[(entry, before)]).unwrap();
+    }
+}
+
 pub fn a_recording_of_a_motion_is_a_data_set() {
     let served = Served::joints(&[NODE]);
     let joint = served.joint();

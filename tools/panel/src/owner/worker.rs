@@ -463,7 +463,7 @@ impl Worker {
 /// writes.
 fn outcome(found: &Found, node: u8, reports: &Reports) -> Result<Value, String> {
     let settings = found.settings.iter().map(|(setting, value)| {
-        let entry = Entry::of(Field::Setting(*setting));
+        let entry = Entry::of_setting(*setting);
         json!({ "name": entry.name(), "value": value, "unit": entry.text.unit })
     });
     let files = page::files(found, node).map_err(|error| error.to_string())?;

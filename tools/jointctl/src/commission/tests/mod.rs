@@ -392,6 +392,20 @@ fn an_inertia_that_the_torque_does_not_tell_is_no_result() {
 }
 
 #[test]
+fn a_new_joint_permits_compensation_and_a_commissioned_one_keeps_what_it_permits() {
+    let mut bench = Simulated::new(parameters());
+    found(&mut bench, &Plan { turn: false, ..plan() });
+    let [torque, velocity] = [Setting::TorqueLimit, Setting::VelocityLimit].map(|limit| bench.setting(limit).unwrap());
+    let permitted = [Setting::CompensationGain, Setting::Clamp, Setting::Slew, Setting::StandstillVelocity]
+        .map(|setting| bench.setting(setting).unwrap());
+    assert_eq!(permitted, [0.98, 0.5 * torque, 50.0 * torque, 0.01 * velocity]);
+    let mut bench = Simulated::new(parameters());
+    bench.set(&[(Setting::TorqueConstant, 0.09), (Setting::Clamp, 0.7)]).unwrap();
+    found(&mut bench, &Plan { turn: false, ..plan() });
+    assert_eq!(bench.setting(Setting::Clamp), Ok(0.7));
+}
+
+#[test]
 fn the_present_position_becomes_what_the_user_says_and_zero_on_a_new_joint() {
     let mut bench = Simulated::new(parameters());
     found(&mut bench, &Plan { zero: Some(0.2), turn: false, ..plan() });
