@@ -84,7 +84,7 @@ pub struct Options {
     pub margin: f64,
     /// Torque limit of the joint that the image is for, in the effort's unit: a joint takes no image whose friction can
     /// reach more. None: not known.
-    #[serde(skip)]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub torque_limit: Option<f64>,
     /// Version of the image.
     pub version: u32,
