@@ -6,7 +6,7 @@ use crate::board::{self, Publisher, can};
 use canopen_node::{Identity, SdoSettings, Server};
 use embassy_stm32::can::CanConfigurator;
 use friction_compensation::parameters::authentication::STAGING;
-use friction_compensation::parameters::image::{Effort, Target};
+use friction_compensation::parameters::image::Target;
 use friction_compensation::parameters::life_cycle::LifeCycle;
 use joint_firmware::joint::Demand;
 use joint_firmware::objects::{Images, JointImage, Objects, Ownership, Shared, Start, StoredImages};
