@@ -1,4 +1,4 @@
-//! What the program says of itself and of its arguments: help, manual, completions, standard output, refusals.
+//! Words of the program about itself and its arguments: help, manual, completions, standard output, refusals.
 
 use crate::{jointctl, stderr};
 use std::process::Command;

@@ -11,8 +11,8 @@ use crate::parameters::certificate::{self, Certificate, Limits};
 use crate::parameters::image::{Effort, Image, Target};
 use crate::parameters::pieces::Pieces;
 
-/// |d(network) / d(measured torque)| that a joint permits whatever the image permits itself, Q16.16: less than the torque
-/// that it was measured in.
+/// |d(network) / d(measured torque)| that a joint permits whatever the image permits itself, Q16.16: a newton metre for
+/// each that is measured.
 const TORQUE_GAIN: u32 = 1 << 16;
 
 /// An upload that everything holds of.
