@@ -343,7 +343,7 @@ export class Plots {
     }
     for (const { number, value } of curves) {
       const mean = at < first ? NaN : (this.low[number][place(at)] + this.high[number][place(at)]) / 2;
-      value.textContent = Number.isFinite(mean) ? `${mean.toFixed(3)} ${unit}` : "–";
+      value.textContent = Number.isFinite(mean) ? `${mean.toFixed(this.signals[number].worded ? 0 : 3)} ${unit}` : "–";
     }
   }
 }

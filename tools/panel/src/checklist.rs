@@ -6,7 +6,7 @@ use joint_firmware::joint::state_machine::State;
 use joint_firmware::objects::field::{Actual, Field, HardwareField, OwnerField, ResetField, StorageField};
 use joint_firmware::objects::settings::Setting;
 use jointctl::remote::configured::{self, Configured};
-use jointctl::remote::{RemoteError, RemoteJoint, drive, info};
+use jointctl::remote::{RemoteError, RemoteJoint, drive, info, words};
 use serde::Serialize;
 
 /// One thing to look at.
@@ -82,14 +82,13 @@ pub fn checklist(joint: &RemoteJoint) -> Result<Vec<Item>, RemoteError> {
     item("motor and encoder", !new, found.into(), "jointctl commission --current A");
     let version = joint.raw(Field::Actual(Actual::ImageVersion))?;
     let found = if version == 0 { "no image".into() } else { format!("version {version}") };
-    item("friction image", version != 0, found, "jointctl retrain, or Upload below");
+    item("friction image", version != 0, found, "Learning, below; or jointctl retrain");
     let (gain, clamp) = (Field::AtOnce(Setting::CompensationGain), Field::AtOnce(Setting::Clamp));
     let some = joint.number(gain)? > 0.0 && joint.number(clamp)? > 0.0;
     let found = format!("gain {}, at most {}", info::show(joint, gain)?, info::show(joint, clamp)?);
     item("compensation permitted", some, found, "gain and clamp of friction-compensation, below");
     let request = joint.raw(Field::AtOnce(Setting::Request))?;
-    let found = info::show(joint, Field::AtOnce(Setting::Request))?;
-    item("compensation requested", request != 0, found, "requested-model 1 or 2, below");
+    item("compensation requested", request != 0, words::model(request).into(), "Compensation in Learning, below");
     if let Some(present) = optional(joint, Field::Owner(OwnerField::KeyPresent))? {
         let found = if present == 0 { "belongs to nobody" } else { "has a key" };
         item("owner", present != 0, found.into(), "jointctl key; see docs/ownership.md");

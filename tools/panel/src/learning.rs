@@ -11,7 +11,7 @@ use jointctl::remote::image::{ImageStatus, StoredImage, Use};
 use jointctl::remote::info::{life, show};
 use jointctl::remote::record::Pace;
 use jointctl::remote::retrain::{Outcome, Round, Shown};
-use jointctl::remote::{RemoteError, RemoteJoint};
+use jointctl::remote::{RemoteError, RemoteJoint, words};
 use serde_json::{Value, json};
 use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -50,7 +50,7 @@ fn told(joint: &RemoteJoint, status: &ImageStatus) -> Result<Value, RemoteError>
         "active": stored(status.active),
         "previous": stored(status.previous),
         "requested": joint.raw(Field::AtOnce(Setting::Request))?,
-        "acting": show(joint, Field::Actual(Actual::ActingModel))?,
+        "acting": words::model(joint.raw(Field::Actual(Actual::ActingModel))?),
         "shadow": show(joint, Field::Actual(Actual::ShadowRms))?,
     }))
 }

@@ -3,7 +3,7 @@
 use bus::client::{ClientError, Network};
 use joint_firmware::objects::field::{Actual, Field};
 use joint_firmware::objects::settings::Setting;
-use jointctl::remote::refusal::image_state;
+use jointctl::remote::words::words;
 use jointctl::remote::{Entry, RemoteError, RemoteJoint};
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
@@ -77,15 +77,6 @@ impl Default for Slow {
     }
 }
 
-/// Numbers that stand for words.
-fn words(field: Field, number: Option<f64>) -> Option<String> {
-    let number = number? as u64;
-    match field {
-        Field::Actual(Actual::ImageState) => image_state(number as u8).map(|state| format!("{state:?}").to_lowercase()),
-        _ => None,
-    }
-}
-
 impl Slow {
     /// The next value, for a page; none where the joint has no such object, which is not asked for again.
     ///
@@ -100,7 +91,8 @@ impl Slow {
             Ok(value) => {
                 self.next += 1;
                 let known = (!entry.is_unknown(&value)).then(|| value.json());
-                let shown = words(entry.object.field, value.number()).unwrap_or_else(|| entry.show(&value));
+                let worded = value.number().and_then(|number| words(entry.object.field, number as u64));
+                let shown = worded.unwrap_or_else(|| entry.show(&value));
                 Ok(Some(json!({ "title": title, "name": entry.name(), "value": known, "shown": shown })))
             }
             Err(error) if error.is_absent() => {

@@ -8,6 +8,7 @@ use super::image::{ImageStatus, StoredImage};
 use super::joint::RemoteJoint;
 use super::motion;
 use super::value::Value;
+use super::words;
 use bus::client::{Abort, ClientError};
 use friction_compensation::parameters::life_cycle::State;
 use joint_firmware::joint::adaptation::{Factors, Learning, Report};
@@ -18,10 +19,6 @@ use joint_firmware::objects::field::{
 use joint_firmware::objects::settings::Setting;
 use joint_firmware::objects::{emergency, fault_log};
 use std::fmt::Write;
-
-/// Signals by the number that a reason has for them, object 2200h:8.
-const SIGNALS: [&str; 6] =
-    ["position", "velocity", "theoretical torque", "measured torque", "temperature", "acceleration"];
 
 /// Columns of a line's title.
 pub const TITLE: usize = 16;
@@ -87,10 +84,10 @@ pub fn page(joint: &RemoteJoint) -> Result<String, RemoteError> {
             "requested {}, acting {}: {}",
             match joint.raw(Field::AtOnce(Setting::Request))? {
                 0 => "off",
-                request => model(request),
+                request => words::model(request),
             },
-            model(joint.raw(Field::Actual(Actual::ActingModel))?),
-            reason(joint.raw(Field::Actual(Actual::Reason))? as u8)
+            words::model(joint.raw(Field::Actual(Actual::ActingModel))?),
+            words::reason(joint.raw(Field::Actual(Actual::Reason))?)
         ),
     );
     line(
@@ -138,19 +135,6 @@ pub fn page(joint: &RemoteJoint) -> Result<String, RemoteError> {
     Ok(page)
 }
 
-/// Reasons for which a joint does not learn, by the number of object 2201h:2.
-const LEARNING: [&str; 9] = [
-    "learns",
-    "off",
-    "no image acts",
-    "operation is not enabled",
-    "outside the trained range",
-    "the joint stands",
-    "its command does not move it",
-    "torque or compensation at a limit",
-    "something touches the joint",
-];
-
 /// Object 2201h in words.
 fn adaptation(joint: &RemoteJoint) -> Result<String, RemoteError> {
     let request = match joint.raw(Field::AtOnce(Setting::Adaptation))? {
@@ -168,7 +152,7 @@ fn adaptation(joint: &RemoteJoint) -> Result<String, RemoteError> {
     };
     Ok(format!(
         "{request}: {}; friction {factor:.2} times the image's, deviation {deviation:.2}, and {} more{}",
-        LEARNING.get(learning as usize).copied().unwrap_or("unknown"),
+        words::learning(learning),
         show(joint, Field::Actual(Actual::AdaptedViscous))?,
         if found.misfits() { ": make a new image (retrain)" } else { "" }
     ))
@@ -332,28 +316,4 @@ fn logged(joint: &RemoteJoint) -> Result<(String, Vec<String>), RemoteError> {
         format!("{name}, {} s after the start, power-up {}", logged.time, logged.power_up)
     });
     Ok((text, shown.collect()))
-}
-
-fn model(number: u64) -> &'static str {
-    match number {
-        0 => "nothing",
-        1 => "the physical model",
-        2 => "the physical model and the network",
-        3 => "the physical model, the network in shadow",
-        _ => "a model that this program does not know",
-    }
-}
-
-/// Object 2200h:8 in words.
-fn reason(number: u8) -> String {
-    let signal = |at: u8| SIGNALS.get(usize::from(at)).copied().unwrap_or("a signal");
-    match number {
-        0 => "as requested".into(),
-        1 => "switched off".into(),
-        2 => "there is no image".into(),
-        3 => "the image has no network here".into(),
-        16..=31 => format!("{} is outside the trained range", signal(number - 16)),
-        32..=47 => format!("{} is far outside the trained range", signal(number - 32)),
-        _ => format!("reason {number}"),
-    }
 }

@@ -10,8 +10,8 @@
 //! - [`entry`], [`value`]: objects by name, and their values as people write and read them
 //! - [`joint`]: the node; [`drive`]: its state machine and faults, [`history`] the steps before one
 //! - [`pdo`]: what PDOs carry; [`telemetry`]: out of the joint; [`stream`]: into it; [`motion`]: `jointctl move`
-//! - [`image`]: the life of a parameter image, [`refusal`] its numbers in words; [`configuration`]: settings, stored
-//!   and restored, [`configured`] since when
+//! - [`image`]: the life of a parameter image, [`refusal`] its numbers in words, [`words`] those of other objects;
+//!   [`configuration`]: settings, stored and restored, [`configured`] since when
 //! - [`commission`]: the objects of a joint for its commissioning
 //! - [`record`]: samples as a data set; [`retrain`]: a joint's friction learned anew, from excitation to commit;
 //!   [`load_check`]: the load that it shows against the configured one
@@ -44,6 +44,7 @@ mod session;
 pub mod stream;
 pub mod telemetry;
 pub mod value;
+pub mod words;
 
 pub use entry::Entry;
 pub use error::RemoteError;

@@ -6,6 +6,7 @@ use bus::client::{Emergency, Subscription, SyncProducer, cob_id};
 use joint_firmware::objects::field::{Actual, Field};
 use joint_firmware::objects::settings::Setting;
 use jointctl::remote::drive::{self, faults_of, state_of};
+use jointctl::remote::words::words;
 use jointctl::remote::{RemoteError, RemoteJoint, Signal, Telemetry};
 use serde_json::{Value, json};
 use std::sync::Arc;
@@ -106,9 +107,13 @@ impl Watch {
         self.telemetry.signals().iter().take(self.drawn)
     }
 
-    /// Names and units, for a page.
+    /// Names and units, and whether a signal's numbers stand for words, for a page.
     pub fn signals(&self) -> Value {
-        self.drawn().map(|signal| json!({ "name": signal.entry.name(), "unit": unit(signal) })).collect()
+        let told = |signal: &Signal| {
+            let worded = words(signal.entry.object.field, 0).is_some();
+            json!({ "name": signal.entry.name(), "unit": unit(signal), "worded": worded })
+        };
+        self.drawn().map(told).collect()
     }
 
     /// The last minute as a table.

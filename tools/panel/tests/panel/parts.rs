@@ -162,6 +162,8 @@ pub fn joints_on_the_bus_and_what_they_miss_are_listed() {
     for name in ["friction image", "compensation requested", "owner"] {
         assert!(!done(name), "{name}: {list}");
     }
+    let slow = |message: &Value| Some(&message["slow"]).filter(|slow| slow["name"] == json!("reason")).cloned();
+    assert_eq!(page.until(slow)["shown"], json!("switched off"));
     // The other joint can be looked at without a page that commands it, which may come later.
     let mut card = Page::connect(served.address, "9/look");
     assert_eq!(card.until(|message| message["hello"]["node"].as_u64()), 9);
