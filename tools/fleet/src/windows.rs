@@ -114,20 +114,20 @@ pub fn of_table(table: &Table, file: &str) -> Result<Recorded, BadFile> {
             continue;
         }
         let rows = first..last + 1;
-        let speeds = &velocity[rows.clone()];
-        let slowest = speeds.iter().fold(f64::INFINITY, |least, v| least.min(v.abs()));
-        let forward = speeds[0] > 0.0;
-        if slowest >= SLOWEST && speeds.iter().all(|v| (*v > 0.0) == forward) {
-            let over = |values: &[f64]| integral(&values[rows.clone()], &time[rows.clone()]) / duration;
+        let forward = velocity[first] > 0.0;
+        let moves = |v: &f64| if forward { *v >= SLOWEST } else { *v <= -SLOWEST };
+        if velocity[rows.clone()].iter().all(moves) {
+            let columns = [&sines, &cosines, velocity, torque].map(|values| &values[rows.clone()]);
+            let [sine, cosine, speed, torque] = means(columns, &time[rows.clone()]);
             let row = [
                 (velocity[last] - velocity[first]) / duration,
-                over(&sines),
-                over(&cosines),
+                sine,
+                cosine,
                 1.0,
                 if forward { 1.0 } else { -1.0 },
-                over(velocity),
+                speed,
             ];
-            recorded.windows.push(Window { row, torque: over(torque), duration });
+            recorded.windows.push(Window { row, torque, duration });
         }
         first = last;
     }
@@ -150,9 +150,16 @@ fn sines_and_cosines(angles: &[f64]) -> [Vec<f64>; 2] {
     })
 }
 
-/// Integral over time by the trapezium rule.
-fn integral(values: &[f64], time: &[f64]) -> f64 {
-    values.windows(2).zip(time.windows(2)).map(|(value, time)| 0.5 * (value[0] + value[1]) * (time[1] - time[0])).sum()
+/// Means over time by the trapezium rule, of columns as long as `time`.
+fn means<const N: usize>(columns: [&[f64]; N], time: &[f64]) -> [f64; N] {
+    let mut integrals = [0.0; N];
+    for row in 1..time.len() {
+        let half = 0.5 * (time[row] - time[row - 1]);
+        for (integral, values) in integrals.iter_mut().zip(columns) {
+            *integral += half * (values[row - 1] + values[row]);
+        }
+    }
+    integrals.map(|integral| integral / (time[time.len() - 1] - time[0]))
 }
 
 fn check_clock(time: &[f64], file: &str) -> Result<(), BadFile> {

@@ -267,17 +267,22 @@ fn pull<T: DataType>(
     })
 }
 
-/// The same of doubles, appended to `all`: batches without a null as they are.
-fn doubles(column: ColumnReaderImpl<DoubleType>, most: i16, all: &mut Vec<f64>) -> Result<(), ParquetError> {
-    batches(column, |levels, values| {
-        if values.len() >= levels.len() {
-            all.append(values);
-        } else {
-            let mut values = values.iter();
-            let of = |level: &i16| if *level == most { values.next().copied() } else { None };
+/// The same of doubles, decoded to where they stay: a batch with a null is spread out afterwards.
+fn doubles(mut column: ColumnReaderImpl<DoubleType>, most: i16, all: &mut Vec<f64>) -> Result<(), ParquetError> {
+    let mut levels = Vec::new();
+    loop {
+        levels.clear();
+        let first = all.len();
+        let (rows, values, _) = column.read_records(BATCH, Some(&mut levels), None, all)?;
+        if rows == 0 {
+            return Ok(());
+        }
+        if values < rows {
+            let mut present = all.split_off(first).into_iter();
+            let of = |level: &i16| if *level == most { present.next() } else { None };
             all.extend(levels.iter().map(of).map(|value| value.unwrap_or(f64::NAN)));
         }
-    })
+    }
 }
 
 /// Definition levels and values of a column chunk, batch by batch; there are no levels where nothing can be missing.
