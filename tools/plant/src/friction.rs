@@ -1,8 +1,8 @@
 //! Bristle friction (LuGre), seen from the link.
 //!
 //! Source: Canudas de Wit, Olsson, Åström, Lischinsky 1995, eq. 1-3 and 6. Added here: both torque levels and the
-//! viscous coefficient differ per direction; the level of the dry friction depends on temperature, on position and
-//! on the torque that the gear transmits.
+//! viscous coefficient differ per direction; the level of the dry friction depends on temperature, on position, on
+//! the torque that the gear transmits and on a joint that shares the drive ([`crate::pair`]).
 //!
 //! The bristle is stiff (sigma0 v / g reaches 1e5 per second), so it is stepped by the backward Euler rule: stable
 //! for every step, and passive in every step. With z' = (z1 - z0)/h = v - lambda z1 and lambda = sigma0 |v| / g,
@@ -119,7 +119,7 @@ impl FrictionParameters {
         for r in &self.ripple {
             ripple += r.amplitude * libm::sin(r.periods_per_revolution * surroundings.position + r.phase);
         }
-        stribeck * temperature * load * ripple
+        stribeck * temperature * load * ripple * surroundings.relief
     }
 
     /// Viscous coefficient for the direction of `velocity` (rad/s) at `temperature` (°C), Nm s/rad.
@@ -138,12 +138,14 @@ pub struct Surroundings {
     pub gear_torque: f64,
     /// Temperature of the gear, °C.
     pub temperature: f64,
+    /// Factor of the dry friction, above 0; 1 but for a joint whose partner leads.
+    pub relief: f64,
 }
 
 impl Default for Surroundings {
-    /// State at position zero, unloaded, at [`REFERENCE_TEMPERATURE`].
+    /// State at position zero, unloaded, at [`REFERENCE_TEMPERATURE`], of a joint that shares its drive with none.
     fn default() -> Self {
-        Self { position: 0.0, gear_torque: 0.0, temperature: REFERENCE_TEMPERATURE }
+        Self { position: 0.0, gear_torque: 0.0, temperature: REFERENCE_TEMPERATURE, relief: 1.0 }
     }
 }
 

@@ -58,6 +58,7 @@ pub struct Joint {
     parameters: JointParameters,
     bristles: Bristles,
     contact: Option<Contact>,
+    relief: f64,
     state: State,
 }
 
@@ -80,7 +81,7 @@ impl Joint {
             friction_loss: 0.0,
             heat: Heat::uniform(temperature),
         };
-        Ok(Self { parameters, bristles: Bristles::default(), contact: None, state })
+        Ok(Self { parameters, bristles: Bristles::default(), contact: None, relief: 1.0, state })
     }
 
     /// The same joint at `position` (rad) and `velocity` (rad/s), with unbent bristles.
@@ -117,6 +118,11 @@ impl Joint {
     /// Counterpart of [`Self::set_contact`] for a contact that is known to be valid.
     pub(crate) fn hold(&mut self, contact: Option<Contact>) {
         self.contact = contact;
+    }
+
+    /// Factor of the dry friction from the next step on, above 0 to 1: what a joint that shares the drive leaves of it.
+    pub(crate) fn relieve(&mut self, relief: f64) {
+        self.relief = relief;
     }
 
     /// Contact in the link's way.
@@ -173,7 +179,7 @@ impl Joint {
     /// The friction of the next step.
     fn next_friction(&self, step: f64) -> FrictionStep {
         let State { position, velocity, gear_torque, heat, .. } = self.state;
-        let surroundings = Surroundings { position, gear_torque, temperature: heat.housing };
+        let surroundings = Surroundings { position, gear_torque, temperature: heat.housing, relief: self.relief };
         self.bristles.prepare(&self.parameters.friction, velocity, &surroundings, step)
     }
 

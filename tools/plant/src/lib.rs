@@ -32,7 +32,7 @@
 //! - [`fourier`], [`excitation`]: the motions that are recorded
 //! - [`parameters`], [`randomised`]: everything that describes a joint, and joints drawn at random
 //! - [`virtual_joint`]: the firmware's own control step, closed over the actuator
-//! - [`arm`]: several of them on one tree of links; [`links`]: these links
+//! - [`arm`]: several of them on one tree of links; [`links`]: these links; [`pair`]: two joints that share a drive
 //! - [`error`]: what is refused, and the range that would not be
 
 #![forbid(unsafe_code)]
@@ -49,6 +49,7 @@ pub mod joint;
 pub mod links;
 pub mod load;
 pub mod motor;
+pub mod pair;
 pub mod parameters;
 pub mod randomised;
 pub mod thermal;
@@ -62,5 +63,6 @@ pub use error::ParameterError;
 pub use excitation::Excitation;
 pub use joint::Joint;
 pub use links::{ArmError, Links};
+pub use pair::Pair;
 pub use parameters::JointParameters;
 pub use virtual_joint::VirtualJoint;

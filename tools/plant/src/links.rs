@@ -12,6 +12,7 @@
 //! A joint that is held, as by a closed brake, stands at once, and the others move around it.
 
 use crate::joint::{Answer, MAXIMUM_STEP};
+use crate::pair::PairError;
 use crate::virtual_joint::VirtualJoint;
 use joint_firmware::joint::state_machine::State;
 use joint_firmware::joint::{Demand, Telemetry};
@@ -34,6 +35,8 @@ pub enum ArmError {
     Loaded(usize),
     /// Index of a joint whose control period is not that of the first, or longer than [`MAXIMUM_STEP`].
     Period(usize),
+    /// Number of the pair, and reason for which two joints cannot share a drive.
+    Pair(usize, PairError),
     /// Index of a joint that did not reach "operation enabled", and the state that it stayed in.
     NotEnabled(usize, State),
 }
@@ -48,6 +51,7 @@ impl std::fmt::Display for ArmError {
                 f,
                 "the control period of joint {i} is not that of the first joint, or longer than {MAXIMUM_STEP} s"
             ),
+            Self::Pair(number, error) => write!(f, "pair {number}: {error}"),
             Self::NotEnabled(i, state) => write!(f, "joint {i} cannot be enabled: it stays in {state:?}"),
         }
     }

@@ -203,6 +203,11 @@ impl Actuator {
         &self.fitted
     }
 
+    /// Factor of the dry friction from the next step on: what a joint that shares the drive leaves of it.
+    pub(crate) fn relieve(&mut self, relief: f64) {
+        self.joint.relieve(relief);
+    }
+
     /// Sets what holds the link: a broken gear, a brake, or what is in its way.
     fn grip_again(&mut self) {
         if !self.faults.blocked {

@@ -6,8 +6,9 @@ use nalgebra::{Matrix3, Unit, Vector3};
 use plant::Arm;
 use plant::links::{ArmError, EVERY, Links};
 use plant::load::{GRAVITY, LoadParameters};
+use plant::pair::PairError;
 use plant::virtual_joint::Setup;
-use plant::{ActuatorParameters, VirtualJoint};
+use plant::{ActuatorParameters, Pair, VirtualJoint};
 use rigid_body::mass_matrix::mass_matrix;
 use rigid_body::newton_euler::inverse_dynamics;
 use rigid_body::random_tree::{Shape, tree};
@@ -98,6 +99,47 @@ fn accelerations_are_those_of_the_rigid_bodies_under_motor_friction_and_external
     // Links matter: the joints' own inertia alone is a part of it.
     let [q, _] = arm.state();
     assert!(mass_matrix(&tree, &q)[(0, 0)] > 0.2 * rotors[0]);
+}
+
+#[test]
+fn a_joint_that_its_partner_outruns_by_the_band_loses_dry_friction_and_no_other_joint_does() {
+    let tree = tree(Shape { joints: 3, branches: false, prismatic: 0.0, armature: false }, 5);
+    let made = || Arm::new(tree.clone(), (0..3).map(bare).collect()).unwrap();
+    let band = 0.05;
+    let mut arms = [made(), made().with_pairs(vec![Pair::new([0, 2], band, 0.4)]).unwrap()];
+    arms.iter_mut().for_each(|arm| arm.enable().unwrap());
+    // Until the last joint leads, the two arms are one.
+    let (mut alike, mut apart) = (0, 0);
+    for n in 0..4_000u32 {
+        let demands = [torque(7.0, n), torque(0.0, n), torque(9.0, n)];
+        let speeds = arms[1].state()[1].clone();
+        arms.iter_mut().for_each(|arm| _ = arm.step(&demands, &[]));
+        let leads = speeds[2].abs() >= speeds[0].abs() + band;
+        if apart == 0 {
+            assert_eq!(arms[1].pairs()[0].leader(), leads.then_some(2), "step {n}: {speeds:?} rad/s");
+        }
+        if leads || apart > 0 {
+            apart += 1;
+        } else {
+            assert_eq!(arms[0].state(), arms[1].state(), "step {n}");
+            alike += 1;
+        }
+        if apart == 400 {
+            break;
+        }
+    }
+    assert!(alike > 10 && apart == 400, "{alike} steps alike, {apart} apart");
+    let friction = |arm: &Arm, i: usize| arm.joints()[i].actuator().state().joint.friction_torque;
+    let [whole, relieved] = &arms;
+    // The first joint is hardly moved: its bristles hold a part of what they could, less than without the relief.
+    for (joint, part) in [(0, 0.4..0.9), (1, 0.9..1.1), (2, 0.9..1.1)] {
+        let found = friction(relieved, joint) / friction(whole, joint);
+        assert!(part.contains(&found), "joint {joint}: {found} of {} Nm", friction(whole, joint));
+    }
+    assert_eq!(
+        made().with_pairs(vec![Pair::new([0, 3], band, 0.4)]).err(),
+        Some(ArmError::Pair(0, PairError::Absent(3)))
+    );
 }
 
 #[test]

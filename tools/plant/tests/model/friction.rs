@@ -138,6 +138,18 @@ fn a_loaded_gear_has_more_dry_friction_whatever_the_sign_of_the_load() {
 }
 
 #[test]
+fn a_relieved_joint_has_less_dry_friction_load_included_and_all_of_its_viscous_friction() {
+    let friction = FrictionParameters { gear_loss: 0.05, ..plain() };
+    let at = |velocity, relief| {
+        steady(&friction, velocity, &Surroundings { gear_torque: 20.0, relief, ..Default::default() })
+    };
+    let viscous = friction.viscous.forward;
+    for velocity in [1e-3, 1.0] {
+        assert_near(at(velocity, 0.4) - viscous * velocity, 0.4 * (at(velocity, 1.0) - viscous * velocity), 1e-3);
+    }
+}
+
+#[test]
 fn warmth_thins_the_grease_and_lowers_the_dry_friction_a_little() {
     let reference = JointParameters::reference().friction;
     let friction =
@@ -200,8 +212,12 @@ fn friction_never_gives_back_more_energy_than_the_bristles_hold() {
         for _ in 0..100_000 {
             velocity += 0.2 * (speed * random() - velocity);
             position += velocity * STEP;
-            let surroundings =
-                Surroundings { position, gear_torque: 40.0 * random(), temperature: 25.0 + 30.0 * random() };
+            let surroundings = Surroundings {
+                position,
+                gear_torque: 40.0 * random(),
+                temperature: 25.0 + 30.0 * random(),
+                relief: 0.55 + 0.45 * random(),
+            };
             let stored = bristles.energy(&friction);
             let done = bristles.drag(&friction, velocity, &surroundings, STEP) * velocity * STEP;
             work += done;
