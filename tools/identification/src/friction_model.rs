@@ -7,17 +7,20 @@
 //!          + f_v (1 + k_v th) v + f_2 v |v| + f_a |v|                       viscous
 //!          + (1 + k_c th + k_l |tau_t|) (1 + w (1 - tanh(v / v_w)^2)) dry
 //!    w     = w+ (1 + d)/2 + w- (1 - d)/2                                    weakening
-//!    dry   = (F_c(+/-) + sum_k A_k sin(h_k q) + B_k cos(h_k q)) d           Coulomb     (002 eq. 6, asymmetric), ripple
+//!    dry   = (p F_c(+/-) + sum_k A_k sin(h_k q) + B_k cos(h_k q)) d         Coulomb (002 eq. 6, asymmetric), ripple
 //!          + sum_n L_n z_n                                                  pre-sliding (Maxwell-slip elements)
 //!          + sum_k C_k sin(h_k q) + D_k cos(h_k q)                          ripple
-//!          + sqrt(2e) (F_brk(+/-) - F_c(+/-)) exp(-u^2) u,  u = v / v_st    Stribeck    (001 eq. 6)
-//!          + b_h atan(s v + z clamp(k_a a, -1, 1))                          hysteresis  (003 eq. 4)
+//!          + p sqrt(2e) (F_brk(+/-) - F_c(+/-)) exp(-u^2) u,  u = v / v_st  Stribeck    (001 eq. 6)
+//!          + p b_h atan(s v + z clamp(k_a a, -1, 1))                        hysteresis  (003 eq. 4)
 //!          + sum_j (b_j+ (1 + d)/2 + b_j- (1 - d)/2) 4 sin((2j-1) h q) / (pi (2j-1))    (003 eq. 5)
 //!          + I_a a                                                          rotor       (002)
 //! ```
 //!
 //! (+/-) is one value per direction of v. Where 003 switches the harmonics with sign(v), which jumps at standstill, the
 //! two directions are blended by d; its sign(a) is a ramp of slope k_a, so that noise around a = 0 does not chatter.
+//!
+//! p = 1 - r with the relief r where a joint that shares the drive leads, and 1 elsewhere (003, section II-C). In an
+//! image these are two parameter sets; what all sets have in common, elements and ripple, is the same in both.
 
 use crate::friction_parameter::{FrictionParameter, HARMONICS};
 use friction_compensation::friction::maxwell_slip::ELEMENTS;
@@ -74,11 +77,13 @@ pub enum Term {
     Ripple,
     /// The second ripple over the position.
     SecondRipple,
+    /// The relief of dry friction while the joint that shares the drive leads.
+    Relief,
 }
 
 impl Term {
     /// All terms, in the order of the formula.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 20] = [
         Self::Constant,
         Self::Position,
         Self::Temperature,
@@ -98,8 +103,10 @@ impl Term {
         Self::PreSliding,
         Self::Ripple,
         Self::SecondRipple,
+        Self::Relief,
     ];
-    /// The terms that each parameter set of an image has for itself; the others are common to all.
+    /// The terms that each parameter set of an image has for itself; of the others, elements and ripples are common to
+    /// all sets, and the relief is the difference between two.
     pub const OF_A_SET: usize = 16;
 }
 
@@ -162,6 +169,8 @@ pub struct JointState {
     pub temperature: f64,
     /// Deflection of the pre-sliding elements.
     pub bent: Bent,
+    /// The joint that shares the drive leads.
+    pub following: bool,
 }
 
 /// One value for each direction of the velocity.
@@ -265,6 +274,14 @@ pub struct FrictionModel {
     /// Ripples over the position; their frequencies are not identified, but chosen.
     #[serde(default)]
     pub ripples: [Ripple; RIPPLES],
+    /// r: part of the dry friction that a joint loses while the one that shares its drive leads.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub relief: f64,
+}
+
+/// True for what a joint with a drive of its own has.
+fn is_zero(relief: &f64) -> bool {
+    *relief == 0.0
 }
 
 /// Velocity weakening in one state.
@@ -278,6 +295,27 @@ struct Weakening {
 }
 
 impl FrictionModel {
+    /// Part of the dry friction that is there in a state: p of the formula.
+    fn part(&self, s: &JointState) -> f64 {
+        if s.following && self.terms.contains(Term::Relief) { 1.0 - self.relief } else { 1.0 }
+    }
+
+    /// The friction of a joint that shares its drive, with and without the other one leading, as a model without
+    /// relief.
+    #[must_use]
+    pub fn of_regime(&self, following: bool) -> Self {
+        let part = self.part(&JointState { following, ..JointState::default() });
+        let both = |both: Directional| Directional { positive: part * both.positive, negative: part * both.negative };
+        Self {
+            terms: self.terms.without(Term::Relief),
+            coulomb: both(self.coulomb),
+            breakaway: both(self.breakaway),
+            hysteresis: part * self.hysteresis,
+            relief: 0.0,
+            ..self.clone()
+        }
+    }
+
     /// The friction: the effort that is lost in this state, in the data set's unit of effort.
     pub fn friction(&self, state: &JointState) -> f64 {
         self.friction_and_derivatives(state, |_, _| ())
@@ -329,6 +367,7 @@ impl FrictionModel {
             sum += self.rotor_inertia * a;
             derivative(P::RotorInertia, a);
         }
+        let (part, mut whole) = (self.part(s), 0.0);
         let mut level = 0.0;
         let mut shapes = [(0.0, 0.0); RIPPLES];
         for (k, (ripple, shape)) in self.ripples.iter().zip(&mut shapes).enumerate() {
@@ -352,7 +391,7 @@ impl FrictionModel {
                     warming,
                     (direction, steepness),
                     ripple,
-                    &mut by_slope,
+                    (part, &mut whole, &mut by_slope),
                     &mut derivative,
                 );
             }
@@ -364,11 +403,15 @@ impl FrictionModel {
         if on(Term::Hysteresis) {
             let side = (self.hysteresis_acceleration_slope * a).clamp(-1.0, 1.0);
             let w = self.hysteresis_velocity_slope * v + self.hysteresis_width * side;
-            let by_w = self.hysteresis / (1.0 + w * w);
-            sum += self.hysteresis * w.atan();
-            derivative(P::Hysteresis, w.atan());
+            let by_w = part * self.hysteresis / (1.0 + w * w);
+            whole += self.hysteresis * w.atan();
+            sum += part * self.hysteresis * w.atan();
+            derivative(P::Hysteresis, part * w.atan());
             derivative(P::HysteresisVelocitySlope, by_w * v);
             derivative(P::HysteresisWidth, by_w * side);
+        }
+        if s.following && on(Term::Relief) {
+            derivative(P::Relief, -whole);
         }
         sum
     }
@@ -380,7 +423,7 @@ impl FrictionModel {
         warming: f64,
         (direction, steepness): (f64, f64),
         (ripple, shapes): (f64, [(f64, f64); RIPPLES]),
-        by_slope: &mut f64,
+        (part, whole, by_slope): (f64, &mut f64, &mut f64),
         derivative: &mut impl FnMut(FrictionParameter, f64),
     ) -> f64 {
         use FrictionParameter as P;
@@ -391,7 +434,7 @@ impl FrictionModel {
             (P::CoulombPositive, P::BreakawayPositive)
         };
         let pre_slides = self.terms.contains(Term::PreSliding);
-        let mut dry = (coulomb + ripple) * direction;
+        let mut dry = (part * coulomb + ripple) * direction;
         if pre_slides {
             dry += self.element_level.iter().zip(s.bent).map(|(level, bent)| level * bent).sum::<f64>();
         }
@@ -421,18 +464,20 @@ impl FrictionModel {
                 derivative(P::RippleLevelCosine(k), gain * direction * cosine);
             }
         }
-        *by_slope += (coulomb + ripple) * gain * steepness;
+        *by_slope += (part * coulomb + ripple) * gain * steepness;
+        *whole += coulomb * gain * direction;
         if !self.terms.contains(Term::Stribeck) {
-            derivative(of_coulomb, gain * direction);
+            derivative(of_coulomb, part * gain * direction);
             return gain * dry;
         }
         let u = v * self.stribeck_slope;
         let bell = STRIBECK_PEAK * (-u * u).exp();
         let excess = self.breakaway.at(v) - coulomb;
-        derivative(of_coulomb, gain * direction - bell * u);
-        derivative(of_breakaway, bell * u);
-        derivative(P::StribeckSlope, excess * bell * (1.0 - 2.0 * u * u) * v);
-        gain * dry + excess * bell * u
+        *whole += excess * bell * u;
+        derivative(of_coulomb, part * (gain * direction - bell * u));
+        derivative(of_breakaway, part * bell * u);
+        derivative(P::StribeckSlope, part * excess * bell * (1.0 - 2.0 * u * u) * v);
+        gain * dry + part * excess * bell * u
     }
 
     fn weakening_difference(&self) -> f64 {
@@ -524,6 +569,7 @@ impl FrictionModel {
             P::RippleTorqueCosine(k) => &mut self.ripples[k].torque_cosine,
             P::HarmonicPositive(n) => &mut self.harmonic_positive[n],
             P::HarmonicNegative(n) => &mut self.harmonic_negative[n],
+            P::Relief => &mut self.relief,
         }
     }
 }

@@ -37,6 +37,7 @@ fn everything() -> FrictionModel {
             Ripple { frequency: 4.0, level_sine: 0.1, level_cosine: 0.05, torque_sine: -0.02, torque_cosine: 0.03 },
             Ripple { frequency: 50.0, level_sine: -0.04, level_cosine: 0.02, torque_sine: 0.06, torque_cosine: 0.01 },
         ],
+        relief: 0.35,
     }
 }
 
@@ -54,6 +55,7 @@ fn states() -> Vec<JointState> {
         load,
         temperature,
         bent: [1.0, 0.7, -0.4, 0.0],
+        following: load > 1.0 || load < 0.0,
     })
     .to_vec()
 }
@@ -74,7 +76,8 @@ fn it_is_the_sum_that_the_design_writes() {
             })
             .sum();
         let ripple = |h: f64, a: f64, b: f64| a * (h * q).sin() + b * (h * q).cos();
-        let level = fc + ripple(4.0, 0.1, 0.05) + ripple(50.0, -0.04, 0.02);
+        let p = if s.following { 0.65 } else { 1.0 };
+        let level = p * fc + ripple(4.0, 0.1, 0.05) + ripple(50.0, -0.04, 0.02);
         let weakening = 1.0 + (0.4 * (1.0 + d) / 2.0 + 0.7 * (1.0 - d) / 2.0) * (1.0 - (9.0 * v).tanh().powi(2));
         let pre_sliding = 0.3 * 1.0 + 0.2 * 0.7 - 0.15 * 0.4;
         let by_hand = 0.11 - 0.07 * q + 0.013 * th + 0.05 * tau + 0.9 * (1.0 - 0.011 * th) * v - 0.08 * v * v.abs()
@@ -82,8 +85,8 @@ fn it_is_the_sum_that_the_design_writes() {
             + (1.0 - 0.006 * th + 0.04 * tau.abs()) * weakening * (level * d + pre_sliding)
             + ripple(4.0, -0.02, 0.03)
             + ripple(50.0, 0.06, 0.01)
-            + (2.0 * 1f64.exp()).sqrt() * (fb - fc) * (-u * u).exp() * u
-            + 0.21 * (3.0 * v + 0.8 * (0.7 * a).clamp(-1.0, 1.0)).atan()
+            + p * (2.0 * 1f64.exp()).sqrt() * (fb - fc) * (-u * u).exp() * u
+            + p * 0.21 * (3.0 * v + 0.8 * (0.7 * a).clamp(-1.0, 1.0)).atan()
             + harmonics
             + 0.17 * a;
         assert!((m.friction(&s) - by_hand).abs() < 1e-13, "{} {by_hand}", m.friction(&s));

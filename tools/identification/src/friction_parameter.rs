@@ -76,6 +76,8 @@ pub enum FrictionParameter {
     RippleTorqueSine(usize),
     /// Cosine of it.
     RippleTorqueCosine(usize),
+    /// Part of the dry friction that is lost while the joint that shares the drive leads.
+    Relief,
 }
 
 /// Units of a data set's position and effort, in which those of all parameters are expressed.
@@ -95,7 +97,7 @@ impl Default for Units {
 
 impl FrictionParameter {
     /// Number of different parameters.
-    pub const COUNT: usize = 24 + 2 * HARMONICS + ELEMENTS + 4 * RIPPLES;
+    pub const COUNT: usize = 25 + 2 * HARMONICS + ELEMENTS + 4 * RIPPLES;
 
     /// Position in a table of all parameters, 0..COUNT.
     pub const fn index(self) -> usize {
@@ -131,6 +133,7 @@ impl FrictionParameter {
             Self::RippleLevelCosine(k) => Self::RippleLevelSine(k).index() + 1,
             Self::RippleTorqueSine(k) => Self::RippleLevelSine(k).index() + 2,
             Self::RippleTorqueCosine(k) => Self::RippleLevelSine(k).index() + 3,
+            Self::Relief => Self::COUNT - 1,
         }
     }
 
@@ -173,6 +176,7 @@ impl FrictionParameter {
             Self::WeakeningPositive,
             Self::WeakeningNegative,
             Self::WeakeningSlope,
+            Self::Relief,
         ]);
         for parameter in single.into_iter().chain(harmonics).chain(others) {
             all[parameter.index()] = parameter;
@@ -214,6 +218,7 @@ impl FrictionParameter {
             Self::RippleLevelCosine(k) => format!("B_{}", k + 1),
             Self::RippleTorqueSine(k) => format!("C_{}", k + 1),
             Self::RippleTorqueCosine(k) => format!("D_{}", k + 1),
+            Self::Relief => "r".into(),
         }
     }
 
@@ -223,7 +228,11 @@ impl FrictionParameter {
         match self {
             Self::PositionSlope => format!("{effort}/{position}"),
             Self::TemperatureSlope => format!("{effort}/K"),
-            Self::LoadSlope | Self::HysteresisWidth | Self::WeakeningPositive | Self::WeakeningNegative => "1".into(),
+            Self::LoadSlope
+            | Self::HysteresisWidth
+            | Self::WeakeningPositive
+            | Self::WeakeningNegative
+            | Self::Relief => "1".into(),
             Self::Viscous | Self::ViscousAsymmetry => format!("{effort} s/{position}"),
             Self::ViscousTemperature | Self::CoulombTemperature => "1/K".into(),
             Self::Quadratic => format!("{effort} s^2/{position}^2"),
@@ -285,6 +294,7 @@ impl fmt::Display for FrictionParameter {
             Self::RippleLevelCosine(k) => write!(f, "ripple {} of the Coulomb friction, cosine", k + 1),
             Self::RippleTorqueSine(k) => write!(f, "ripple {} of both directions, sine", k + 1),
             Self::RippleTorqueCosine(k) => write!(f, "ripple {} of both directions, cosine", k + 1),
+            Self::Relief => f.write_str("relief by the joint that shares the drive"),
         }
     }
 }

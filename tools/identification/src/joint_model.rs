@@ -68,6 +68,7 @@ pub fn float_state(samples: &Samples, index: usize) -> FloatState {
         load: load(samples, index),
         temperature: samples.temperature[index],
         bent: samples.bent.get(index).copied().unwrap_or_default(),
+        following: samples.partner.as_ref().is_some_and(|partner| partner.leads[index]),
     }
 }
 
@@ -112,7 +113,10 @@ pub fn firmware_states(samples: &Samples) -> Result<Vec<JointState>, StateError>
             theoretical_torque: Torque::from_f64(load(samples, index)).map_err(located("theoretical torque"))?,
             measured_torque: Torque::from_f64(samples.effort[index]).map_err(located("effort"))?,
             temperature: Temperature::from_f64(samples.temperature[index]).map_err(located("temperature"))?,
-            coupled_velocity: Velocity::ZERO,
+            coupled_velocity: match &samples.partner {
+                Some(partner) => Velocity::from_f64(partner.velocity[index]).map_err(located("partner's velocity"))?,
+                None => Velocity::ZERO,
+            },
         })
     };
     (0..samples.len()).into_par_iter().map(state).collect()

@@ -34,6 +34,31 @@ pub struct Track {
     pub velocity: Vec<f64>,
 }
 
+/// The joint that shares this joint's drive (003, section II-C).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Partner {
+    /// Its velocity at each sample, rad/s or m/s.
+    pub velocity: Vec<f64>,
+    /// Speed by which one of both has to be the faster one to lead.
+    pub band: f64,
+    /// True where it leads: from `band` of speed above this joint's own on, until this joint is faster by as much. It
+    /// leads at the beginning of each run, as a joint takes it at its start.
+    pub leads: Vec<bool>,
+}
+
+impl Partner {
+    /// A partner with this velocity, beside the samples of a joint.
+    pub fn new(velocity: Vec<f64>, band: f64, samples: &Samples) -> Self {
+        let mut leads = Vec::with_capacity(velocity.len());
+        for (i, other) in velocity.iter().enumerate() {
+            let ahead = samples.velocity[i].abs() - other.abs();
+            let before = i == 0 || samples.run[i] != samples.run[i - 1] || leads[i - 1];
+            leads.push(ahead < band && (ahead <= -band || before));
+        }
+        Self { velocity, band, leads }
+    }
+}
+
 /// One joint's recording. All columns have the same length; rows of one `run` are contiguous and ordered in time.
 ///
 /// Units are those of the joint: rad (or m), Nm (or N, A, V); the data set's description names them.
@@ -61,6 +86,8 @@ pub struct Samples {
     pub state: Vec<MotionState>,
     /// Use of each sample.
     pub part: Vec<Part>,
+    /// The joint that shares this joint's drive; None for a joint with a drive of its own.
+    pub partner: Option<Partner>,
     /// Values that are constant over a run and enter the rigid-body model (mass, length), by column name.
     pub extra: BTreeMap<String, Vec<f64>>,
 }
@@ -103,6 +130,15 @@ impl Samples {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_partner_leads_from_the_band_on_until_the_joint_leads_by_the_band() {
+        let velocity = vec![0.0, 1.24, -1.25, 1.0, 0.76, 0.75, 1.0, 1.25, 1.0];
+        let samples = Samples { velocity, run: vec![0, 0, 0, 0, 0, 0, 0, 0, 1], ..Samples::default() };
+        let others = vec![0.0, 1.0, 1.0, -1.0, 1.0, -1.0, 1.0, 1.0, 1.0];
+        let partner = Partner::new(others, 0.25, &samples);
+        assert_eq!(partner.leads, [true, true, false, false, false, true, true, false, true]);
+    }
 
     #[test]
     fn a_sample_that_is_later_or_earlier_is_the_nearest_of_the_same_run() {

@@ -70,7 +70,8 @@ fn build_to(
     let mut learned = learned.clone();
     let mut parameters = match quantized(samples, physical, &learned, context.options, reach) {
         Err(FitError::Quantize(error)) if learned.has_network() => {
-            learned = learned.rejected(format!("an image cannot hold it: {error}"));
+            let reason = format!("an image cannot hold it: {error}");
+            learned = learned.rejected(samples, physical, reason);
             quantized(samples, physical, &learned, context.options, reach)?
         }
         other => other?,
@@ -85,7 +86,7 @@ fn build_to(
         Ok(_) => None,
     };
     if let Some(refusal) = refusal.filter(|_| learned.has_network()) {
-        learned = learned.rejected(format!("the certificate refuses it: {refusal}"));
+        learned = learned.rejected(samples, physical, format!("the certificate refuses it: {refusal}"));
         parameters = quantized(samples, physical, &learned, context.options, reach)?;
         proved = prove(&parameters);
     }

@@ -2,12 +2,12 @@
 
 use super::FitError;
 use super::problem::{MINIMUM_SAMPLES, Problem};
+use super::regimes::Regimes;
 use super::trainer::{Trainer, curves};
 use super::uncovered::with_uncovered;
 use super::unseen::{self, Verdict};
 use crate::augment::augment;
 use crate::choice::Decision;
-use crate::classify::Thresholds;
 use crate::equalise::{Equalise, draw};
 use crate::identify::{Identified, overall};
 use crate::joint_model::{FloatFriction, regimes};
@@ -15,12 +15,10 @@ use crate::network::{InputBox, Network};
 use crate::page::{NetworkOutcome, TrainingCurve};
 use crate::samples::{Part, Samples};
 use crate::train::TrainError;
-use friction_compensation::friction::regime::{Criterion, MAX_CRITERIA, Measure, Selector};
+use friction_compensation::friction::regime::Selector;
 
 /// A temperature that varies less than this in training is no input, K: over a few kelvins it stands for time.
 const TEMPERATURE_RANGE: f64 = 10.0;
-/// Cross-fade between regimes, s.
-const FADE_TIME: f64 = 0.02;
 
 /// The friction after training: with networks where they help.
 #[derive(Clone, Debug)]
@@ -47,10 +45,11 @@ pub struct Learned {
 
 impl Learned {
     /// The physical model alone.
-    pub(super) fn physical(physical: &Identified, outcome: NetworkOutcome) -> Self {
+    pub(super) fn physical(samples: &Samples, physical: &Identified, outcome: NetworkOutcome) -> Self {
+        let Regimes { selector, friction } = Regimes::of(&physical.friction, samples);
         Self {
-            float: FloatFriction { sets: vec![(physical.friction.clone(), None)] },
-            selector: Selector::default(),
+            float: FloatFriction { sets: friction.into_iter().map(|friction| (friction, None)).collect() },
+            selector,
             input_box: None,
             outcome,
             unseen_rmse: None,
@@ -62,13 +61,10 @@ impl Learned {
     }
 
     /// The same without networks, for the stated reason.
-    pub fn rejected(mut self, reason: String) -> Self {
-        self.float.sets.truncate(1);
-        self.float.sets.iter_mut().for_each(|(_, network)| *network = None);
-        self.selector = Selector::default();
-        self.input_box = None;
-        self.outcome = NetworkOutcome::Rejected { reason };
-        self
+    pub fn rejected(self, samples: &Samples, physical: &Identified, reason: String) -> Self {
+        let Self { float, selector, input_box, outcome, .. } =
+            Self::physical(samples, physical, NetworkOutcome::Rejected { reason });
+        Self { float, selector, input_box, outcome, ..self }
     }
 
     /// True where a network is part of the model.
@@ -89,7 +85,7 @@ pub fn inputs(samples: &Samples, static_load: bool) -> [bool; 5] {
 /// Decides on left-out motions whether a network is taken and with which inputs, and trains it.
 pub(super) fn learn(problem: &Problem) -> Result<Learned, FitError> {
     let Problem { samples, physical, options, progress, .. } = *problem;
-    let alone = |outcome| Ok(Learned::physical(physical, outcome));
+    let alone = |outcome| Ok(Learned::physical(samples, physical, outcome));
     let Some(trainer) = options.trainer.filter(|_| options.network != Decision::Never) else {
         return alone(NetworkOutcome::NotTrained);
     };
@@ -116,7 +112,7 @@ pub(super) fn learn(problem: &Problem) -> Result<Learned, FitError> {
     match &refusal {
         Some(reason) if !kept => {
             let outcome = NetworkOutcome::Rejected { reason: reason.clone() };
-            return Ok(Learned { unseen_rmse, notes, ..Learned::physical(physical, outcome) });
+            return Ok(Learned { unseen_rmse, notes, ..Learned::physical(samples, physical, outcome) });
         }
         Some(reason) => notes.push(format!("the network is kept by request; the rule refuses it: {reason}")),
         None => {}
@@ -137,22 +133,22 @@ fn train_sets(
     let Problem { samples, physical, options, progress, .. } = *problem;
     let (low, high) = super::coverage::trained(samples);
     let input_box = InputBox::new(low, high, inputs).map_err(TrainError::from)?;
-    let selector = selector(&options.regimes, problem.thresholds);
+    let Regimes { selector, friction } = Regimes::by(&physical.friction, samples, &options.regimes, problem.thresholds);
     let sets = regimes(&selector, problem.states, samples);
     let of_set = |indices: &[usize], set: usize| {
         let members: Vec<usize> = indices.iter().copied().filter(|&i| sets[i] == set).collect();
         problem.targets(&members)
     };
-    let mut learned = Learned::physical(physical, NetworkOutcome::NotTrained);
+    let mut learned = Learned::physical(samples, physical, NetworkOutcome::NotTrained);
     learned.float.sets.clear();
     learned.selector = selector;
     learned.input_box = Some(input_box);
-    for set in 0..selector.sets() {
+    for (set, friction) in friction.into_iter().enumerate() {
         let (inputs, targets) = of_set(train, set);
         let (inputs, targets) = augment(&inputs, &targets, &options.augment);
         let (checks, checked) = of_set(validation, set);
         if inputs.len().min(checks.len()) < MINIMUM_SAMPLES {
-            learned.float.sets.push((physical.friction.clone(), None));
+            learned.float.sets.push((friction, None));
             continue;
         }
         let train = with_uncovered(inputs, targets, &input_box, options.seed);
@@ -165,21 +161,7 @@ fn train_sets(
             progress.detail("reference network");
             learned.reference = Some(task.reference()?.network);
         }
-        learned.float.sets.push((physical.friction.clone(), Some(trained.network)));
+        learned.float.sets.push((friction, Some(trained.network)));
     }
     Ok(learned)
-}
-
-fn selector(measures: &[Measure], thresholds: &Thresholds) -> Selector {
-    let mut criteria = [None; MAX_CRITERIA];
-    for (criterion, measure) in criteria.iter_mut().zip(measures) {
-        let threshold = match measure {
-            Measure::Acceleration => thresholds.acceleration,
-            Measure::Speed | Measure::Coupled => thresholds.speed,
-        };
-        // A tenth of hysteresis either way.
-        let bits = |factor: f64| (threshold * factor * 65536.0).clamp(1.0, f64::from(i32::MAX)) as i32;
-        *criterion = Some(Criterion { measure: *measure, enter: bits(1.1), leave: bits(0.9) });
-    }
-    Selector { criteria, fade_time: if measures.is_empty() { 0 } else { (FADE_TIME * 65536.0) as u32 } }
 }

@@ -8,6 +8,7 @@ mod assemble;
 mod coverage;
 mod learn;
 mod problem;
+mod regimes;
 mod summary;
 mod trainer;
 mod uncertainty;
@@ -336,7 +337,7 @@ fn choose_physical(
     let mut refused = Vec::new();
     let mut last = FitError::NoPreset;
     for i in order {
-        let alone = Learned::physical(&identified[i], NetworkOutcome::NotTrained);
+        let alone = Learned::physical(samples, &identified[i], NetworkOutcome::NotTrained);
         match build_image(samples, &identified[i], &alone, context) {
             Ok(_) => return Ok((i, refused)),
             Err(error @ (FitError::Refused(_) | FitError::Quantize(_))) => {

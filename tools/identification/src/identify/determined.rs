@@ -64,6 +64,7 @@ fn size(freedom: Freedom) -> Option<P> {
         Freedom::Term(Term::RotorInertia) => P::RotorInertia,
         Freedom::Term(Term::ViscousAsymmetry) => P::ViscousAsymmetry,
         Freedom::Term(Term::VelocityWeakening) => P::WeakeningPositive,
+        Freedom::Term(Term::Relief) => P::Relief,
         Freedom::Term(
             Term::Viscous | Term::Coulomb | Term::Harmonics | Term::PreSliding | Term::Ripple | Term::SecondRipple,
         ) => return None,

@@ -26,6 +26,8 @@ const STRIBECK_VELOCITY: (f64, f64) = (2e-3, 0.5);
 const WEAKENING: f64 = 1.0;
 /// Largest relative change of a friction over the temperatures of the train rows.
 const TEMPERATURE_EFFECT: f64 = 0.9;
+/// Largest part of the dry friction that the joint that shares the drive can take off.
+const RELIEF: f64 = 0.95;
 /// Largest relative change of the Coulomb friction over the loads of the train rows.
 const LOAD_EFFECT: f64 = 20.0;
 /// Largest |z|: the arctangent is saturated beyond.
@@ -162,6 +164,7 @@ impl Layout {
             (Term::ViscousTemperature, P::ViscousTemperature, (-by_temperature, by_temperature)),
             (Term::CoulombTemperature, P::CoulombTemperature, (-by_temperature, by_temperature)),
             (Term::CoulombLoad, P::CoulombLoad, (0.0, LOAD_EFFECT / limits.load.max(f64::MIN_POSITIVE))),
+            (Term::Relief, P::Relief, (0.0, RELIEF)),
         ] {
             if on(term) {
                 layout.own(parameter, Role::Factor, bounds);

@@ -258,7 +258,10 @@ fn theoretical_torque(
         template,
     };
     let mut notes = vec![];
-    if let Some(structure) = Preset::CoulombViscous.structure(rigid) {
+    if let Some(mut structure) = Preset::CoulombViscous.structure(rigid) {
+        if limits.both_lead {
+            structure.terms = structure.terms.with(Term::Relief);
+        }
         let fitted =
             |problem: &Problem| -> Fit { grid::search(problem, &problem.determined(structure)).polished(problem) };
         let mut first = fitted(&problem);

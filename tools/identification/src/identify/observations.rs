@@ -13,6 +13,9 @@ const POSITION_COVERAGE: f64 = 0.8;
 /// Samples that make an interval visited.
 const POSITION_VISITS: usize = 5;
 
+/// Least part of the rows in which each joint of a pair leads for a relief to be considered.
+const LEADS: f64 = 0.05;
+
 /// One sample, ready for evaluation.
 #[derive(Clone, Copy, Debug)]
 pub struct Row {
@@ -49,6 +52,8 @@ pub struct Limits {
     pub ripples: usize,
     /// `true` for those of them that may have a part whatever the direction.
     pub ripple_torques: [bool; RIPPLES],
+    /// The joint shares its drive, and each of the two leads in a part of the rows.
+    pub both_lead: bool,
 }
 
 /// Checks that all columns the model needs exist, are of one length and finite in the train and validation rows.
@@ -129,8 +134,14 @@ impl Limits {
             elements: 0,
             ripples: 0,
             ripple_torques: [false; RIPPLES],
+            both_lead: both_lead(rows),
         }
     }
+}
+
+fn both_lead(rows: &[Row]) -> bool {
+    let following = rows.iter().filter(|row| row.joint.following).count() as f64 / rows.len() as f64;
+    (LEADS..=1.0 - LEADS).contains(&following)
 }
 
 fn covers_positions(rows: &[Row], lowest: f64, highest: f64) -> bool {

@@ -2,7 +2,7 @@
 
 use super::estimates::{Estimated, estimates};
 use super::grid::search;
-use super::synthetic::{RIGID, drive, friction, motion, problem, rigid};
+use super::synthetic::{RIGID, drive, friction, motion, problem, rigid, shared};
 use crate::friction_model::{FrictionModel, Term, Terms};
 use crate::friction_parameter::{FrictionParameter, Units};
 use crate::presets::Structure;
@@ -12,7 +12,7 @@ const NOISE: f64 = 0.02;
 
 /// Fits the structure to a joint that has exactly it, and returns all parameters with their true values.
 fn recovered(structure: &Structure, model: &RigidModel, truth: &FrictionModel, seed: u64) -> Vec<(Estimated, f64)> {
-    let mut samples = motion(8_000);
+    let mut samples = shared(motion(8_000));
     drive(&mut samples, &rigid(), truth, NOISE, seed);
     let problem = problem(&samples, model, rigid(), truth);
     let fit = search(&problem, structure).polished(&problem);
@@ -58,7 +58,8 @@ fn every_term_alone_is_recovered_within_three_standard_errors() {
             | Term::VelocityWeakening
             | Term::PreSliding
             | Term::Ripple
-            | Term::SecondRipple => terms.push(Term::Coulomb),
+            | Term::SecondRipple
+            | Term::Relief => terms.push(Term::Coulomb),
             _ => {}
         }
         let structure = asymmetric(&terms);

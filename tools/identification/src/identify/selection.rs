@@ -37,9 +37,12 @@ fn supported(problem: &Problem, rigid: &RigidModel) -> (Structure, Vec<String>) 
     let mut terms = Terms::of(&[Constant, Position, Viscous, Quadratic, Coulomb, CoulombLoad, Stribeck, Hysteresis]);
     terms = terms.with(ViscousAsymmetry).with(VelocityWeakening);
     let limits = &problem.limits;
-    for (term, found) in
-        [(PreSliding, limits.elements > 0), (Ripple, limits.ripples > 0), (SecondRipple, limits.ripples > 1)]
-    {
+    for (term, found) in [
+        (PreSliding, limits.elements > 0),
+        (Ripple, limits.ripples > 0),
+        (SecondRipple, limits.ripples > 1),
+        (Relief, limits.both_lead),
+    ] {
         terms = if found { terms.with(term) } else { terms };
     }
     let mut notes = Vec::new();
@@ -162,7 +165,8 @@ fn changed(structure: &Structure, freedom: Freedom, on: bool) -> Option<Structur
             | Term::VelocityWeakening
             | Term::PreSliding
             | Term::Ripple
-            | Term::SecondRipple,
+            | Term::SecondRipple
+            | Term::Relief,
         ) => has(Term::Coulomb),
         _ => true,
     };

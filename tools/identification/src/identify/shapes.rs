@@ -40,7 +40,7 @@ const PERIODS: f64 = 2.0;
 const TORQUE_PERIODS: f64 = 8.0;
 
 /// Columns of the regression that the elements are offered beside: the rigid part's and those of [`friction_columns`].
-const BASE: usize = RIGID + 11;
+const BASE: usize = RIGID + 12;
 /// Columns of the rigid part.
 const RIGID: usize = RigidRegressor::ALL.len();
 
@@ -93,6 +93,7 @@ fn columns(problem: &Problem, row: &Row) -> [f64; BASE] {
         weakening(0.02),
         weakening(0.1),
         weakening(0.4),
+        if row.joint.following { direction } else { 0.0 },
     ];
     columns[RIGID..].copy_from_slice(&friction);
     columns

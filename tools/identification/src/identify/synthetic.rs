@@ -6,7 +6,7 @@ use crate::friction_model::{Directional, FrictionModel, Ripple, Terms};
 use crate::joint_model::{float_state, rigid_efforts};
 use crate::pre_sliding;
 use crate::rigid::{Given, Gravity, RigidModel, RigidParameters};
-use crate::samples::{MotionState, Part, Samples};
+use crate::samples::{MotionState, Part, Partner, Samples};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, Normal};
@@ -55,6 +55,7 @@ pub fn friction(terms: Terms) -> FrictionModel {
             Ripple { frequency: 7.1, level_sine: 0.1, level_cosine: -0.2, torque_sine: 0.05, torque_cosine: 0.1 },
             Ripple { frequency: 17.0, level_sine: 0.2, level_cosine: 0.1, torque_sine: -0.1, torque_cosine: 0.1 },
         ],
+        relief: 0.4,
     }
 }
 
@@ -81,6 +82,12 @@ pub fn motion(count: usize) -> Samples {
         });
     }
     samples
+}
+
+/// The same motion of a joint that shares its drive.
+pub fn shared(samples: Samples) -> Samples {
+    let other = samples.time.iter().map(|t| 0.6 * (0.83 * t).sin()).collect();
+    Samples { partner: Some(Partner::new(other, 0.05, &samples)), ..samples }
 }
 
 /// Gives the samples the effort of a joint, with noise; load-dependent friction sees the true rigid part.

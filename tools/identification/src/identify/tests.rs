@@ -1,6 +1,6 @@
 //! Tests of the identification as a whole.
 
-use super::synthetic::{RIGID, drive, friction, motion, rigid};
+use super::synthetic::{RIGID, drive, friction, motion, rigid, shared};
 use super::*;
 use crate::choice::{LEAST_WORTH, compare};
 use crate::friction_model::{Term, Terms};
@@ -99,6 +99,21 @@ fn full_finds_the_terms_of_the_joint_and_their_values_and_no_others() {
             (found.friction.viscous, truth().viscous),
         ] {
             assert!((value / truth - 1.0).abs() < 0.1, "{value}, true {truth}: {:?}", found.notes);
+        }
+    }
+}
+
+#[test]
+fn full_finds_a_relief_where_there_is_one_and_nowhere_else() {
+    let relieved = FrictionModel { terms: truth().terms.with(Term::Relief), ..truth() };
+    for (joint, is) in [(&relieved, true), (&truth(), false)] {
+        let mut samples = shared(motion(6_000));
+        drive(&mut samples, &rigid(), joint, 0.02, 42);
+        let found = identify(&mut samples, &RIGID, Preset::Full, &Options::default()).unwrap();
+        assert_eq!(found.friction.terms, joint.terms, "{:?}", found.notes);
+        if is {
+            let relief = found.friction.relief;
+            assert!((relief / joint.relief - 1.0).abs() < 0.05, "{relief}, true {}", joint.relief);
         }
     }
 }
