@@ -17,6 +17,10 @@
 //! [coupling]                          # belts and differentials; absent: each motor drives its joint alone
 //! joints = ["wrist_1", "wrist_2"]
 //! matrix = [[50.0, 50.0], [50.0, -50.0]]   # motor velocities = matrix * joint velocities, in place of the ratios
+//!
+//! [[pair]]                            # joints that share a drive: friction of one is less while the other is faster
+//! joints = ["shoulder", "elbow"]
+//! band = 0.05                         # speed by which one has to be the faster one to lead, rad/s or m/s (0.05)
 //! ```
 
 use serde::Deserialize;
@@ -40,6 +44,9 @@ pub struct RobotDescription {
     pub joint: BTreeMap<String, Drive>,
     /// Motors that move several joints.
     pub coupling: Option<Coupling>,
+    /// Joints that share a drive.
+    #[serde(default)]
+    pub pair: Vec<PairDescription>,
 }
 
 /// Drive of one joint.
@@ -69,6 +76,17 @@ impl Default for Drive {
     }
 }
 
+/// Two joints that share a drive.
+#[derive(Clone, Debug, Deserialize, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct PairDescription {
+    /// Their names.
+    pub joints: [String; 2],
+    /// Speed by which one of them has to be the faster one to lead, rad/s or m/s.
+    #[serde(default = "band")]
+    pub band: f64,
+}
+
 /// Motors that move several joints.
 #[derive(Clone, Debug, Deserialize, PartialEq)]
 #[serde(deny_unknown_fields)]
@@ -81,6 +99,10 @@ pub struct Coupling {
 
 fn gravity() -> [f64; 3] {
     [0.0, 0.0, -9.81]
+}
+
+fn band() -> f64 {
+    0.05
 }
 
 fn one() -> f64 {

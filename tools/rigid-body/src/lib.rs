@@ -26,6 +26,7 @@ pub mod limits;
 pub mod mass_matrix;
 pub mod mjcf;
 pub mod newton_euler;
+pub mod pairs;
 pub mod placement;
 pub mod random_tree;
 pub mod regressor;

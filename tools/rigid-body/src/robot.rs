@@ -6,6 +6,7 @@ use crate::inertia::LinkInertia;
 use crate::limits::{Frame, Limits};
 use crate::mass_matrix::mass_matrix;
 use crate::newton_euler::inverse_dynamics;
+use crate::pairs::{Pair, PairDefect, pairs};
 use crate::placement::Placement;
 use crate::tree::{Joint, JointKind, Tree};
 use crate::urdf::{Allowed, Urdf, UrdfJoint, parse};
@@ -189,6 +190,9 @@ pub enum Defect {
         /// Reason for which it cannot be used.
         reason: String,
     },
+    /// Two joints that cannot share a drive.
+    #[error(transparent)]
+    Pair(#[from] PairDefect),
     /// No joint moves.
     #[error("no joint moves; describe at least one drive")]
     NothingMoves,
@@ -207,6 +211,8 @@ pub struct Robot {
     pub drives: Vec<Drive>,
     /// Motor velocities = coupling * joint velocities.
     pub coupling: DMatrix<f64>,
+    /// Joints that share a drive.
+    pub pairs: Vec<Pair>,
     /// Limits of each joint's motion.
     pub limits: Vec<Limits>,
     /// Frames of all moving links, those that are fixed to another included.
@@ -233,7 +239,8 @@ impl Robot {
             })?;
         let drives: Vec<Drive> = tree.joints.iter().map(|joint| description.joint[&joint.name]).collect();
         let coupling = coupling(&description, &tree, &drives).map_err(in_toml)?;
-        Ok(Self { name: urdf.name, tree, links, drives, coupling, limits, frames, floor: description.floor })
+        let pairs = pairs(&description, &tree).map_err(|defect| in_toml(defect.into()))?;
+        Ok(Self { name: urdf.name, tree, links, drives, coupling, pairs, limits, frames, floor: description.floor })
     }
 
     /// Height of each of [`Self::frames`] above the base's origin at positions `q`, against gravity (along z without

@@ -1,5 +1,6 @@
 //! Bad files: each error names file, joint or link, and what to do.
 
+use rigid_body::pairs::Pair;
 use rigid_body::{LinkInertia, Robot};
 
 const LINK: &str = r#"<inertial><origin xyz="0 0 0.1"/><mass value="2"/>
@@ -44,6 +45,7 @@ fn each_defect_names_its_file_its_joint_and_a_remedy() {
     let with = |from: &str, to: &str| (TOML.to_owned(), good.replacen(from, to, 1));
     let toml = |text: &str| (text.to_owned(), good.clone());
     let coupled = |rest: &str| (format!("{}[coupling]\n{rest}", TOML.replace("ratio = 50.0\n", "")), good.clone());
+    let pair = |rest: &str| (format!("{TOML}[[pair]]\n{rest}"), good.clone());
     let cases = [
         (with("</robot>", ""), "two.urdf", "no URDF"),
         (with("<origin xyz=\"0 0 0.1\"/>", "<origin xyz=\"0 0 0.1 m\"/>"), "two.urdf:", "xyz is \"0 0 0.1 m\""),
@@ -160,6 +162,32 @@ fn each_defect_names_its_file_its_joint_and_a_remedy() {
             "robot.toml",
             "coupling of elbow: elbow has a ratio of 50 as well; leave it out",
         ),
+        (
+            pair("joints = ['shoulder', 'wrist']"),
+            "robot.toml",
+            "pair of shoulder and wrist: there is no moving joint wrist; correct its name, or remove the pair",
+        ),
+        (
+            pair("joints = ['elbow', 'elbow']"),
+            "robot.toml",
+            "pair of elbow and elbow: elbow cannot share a drive with itself; name the other joint",
+        ),
+        (
+            pair("joints = ['shoulder', 'elbow']\n[[pair]]\njoints = ['elbow', 'shoulder']"),
+            "robot.toml",
+            "pair of elbow and shoulder: elbow is in another pair as well; a joint has one partner",
+        ),
+        (
+            toml("urdf = 'two.urdf'\nlocked = ['elbow']\n[joint.shoulder]\n[[pair]]\njoints = ['shoulder', 'elbow']"),
+            "robot.toml",
+            "elbow is listed under `locked` and does not move; remove one of the two",
+        ),
+        (pair("joints = ['shoulder']"), "robot.toml", "length 2"),
+        (
+            pair("joints = ['shoulder', 'elbow']\nband = 0.0"),
+            "robot.toml",
+            "pair of shoulder and elbow: band is 0, expected a number above 0, at most 10",
+        ),
         (toml(&TOML.replace("gain = 2.0", "gain = 0.0")), "robot.toml", "joint shoulder: gain is 0, expected"),
         (toml(&TOML.replace("1e-4", "-1e-9")), "robot.toml", "joint elbow: rotor_inertia is -0.000000001, expected"),
         (toml(&TOML.replace("gain = 2.0", "velocity = 0.0")), "robot.toml", "joint shoulder: velocity is 0, expected"),
@@ -179,6 +207,14 @@ fn each_defect_names_its_file_its_joint_and_a_remedy() {
         let error = robot(&toml, &urdf).expect_err(text);
         assert!(error.starts_with(file) && error.contains(text), "{error:?}, expected {file}: {text}");
     }
+}
+
+#[test]
+fn a_joint_of_a_pair_has_the_other_one_as_its_partner() {
+    let found = robot(&format!("{TOML}[[pair]]\njoints = ['elbow', 'shoulder']\n"), &urdf()).unwrap();
+    assert_eq!(found.pairs, [Pair { joints: [1, 0], band: 0.05 }]);
+    assert_eq!([0, 1, 2].map(|joint| found.pairs[0].partner(joint)), [Some(1), Some(0), None]);
+    assert!(robot(TOML, &urdf()).unwrap().pairs.is_empty());
 }
 
 #[test]

@@ -63,7 +63,7 @@ pub fn bodies(recording: &Recording) -> Result<Bodies, RobotFitError> {
         })
         .collect();
     let all: Vec<Vec<f64>> = candidates.iter().map(|candidate| candidate.errors.clone()).collect();
-    let widths: Vec<usize> = Friction::ALL.map(Friction::width).into();
+    let widths: Vec<usize> = Friction::ALL.map(|friction| friction.width(first.layout.shared)).into();
     let friction = candidates[rank(&all, &widths)[0]].friction;
     for Candidate { friction, gamma, errors } in &candidates {
         let change = compare(&all[0], errors).percent();

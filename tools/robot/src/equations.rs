@@ -25,6 +25,8 @@ pub struct Layout {
     pub joints: usize,
     /// Friction columns of each joint.
     pub friction: Friction,
+    /// Joints share drives in pairs.
+    pub shared: bool,
 }
 
 impl Layout {
@@ -40,7 +42,12 @@ impl Layout {
 
     /// Number of all unknowns.
     pub const fn unknowns(self) -> usize {
-        self.rigid() + self.joints * self.friction.width()
+        self.rigid() + self.joints * self.width()
+    }
+
+    /// Number of friction columns of each joint.
+    pub const fn width(self) -> usize {
+        self.friction.width(self.shared)
     }
 }
 
@@ -78,7 +85,7 @@ impl Rows {
     /// The rows of a recording. `load` has the theoretical effort of each joint, where it is known already.
     pub fn of(recording: &Recording, friction: Friction, load: Option<&[Vec<f64>]>) -> Self {
         let robot = &recording.robot;
-        let layout = Layout { joints: robot.tree.len(), friction };
+        let layout = Layout { joints: robot.tree.len(), friction, shared: !robot.pairs.is_empty() };
         let rigid: Vec<DMatrix<f64>> = (0..recording.len())
             .into_par_iter()
             .map(|i| {
@@ -138,8 +145,8 @@ impl Rows {
 
     /// The values of all unknowns' columns that joint `j` has at a sample.
     pub fn row(&self, j: usize, sample: usize) -> DVector<f64> {
-        let Layout { joints, friction } = self.layout;
-        let (rigid, width) = (self.layout.rigid(), friction.width());
+        let joints = self.layout.joints;
+        let (rigid, width) = (self.layout.rigid(), self.layout.width());
         let mut row = DVector::zeros(self.layout.unknowns());
         row.rows_mut(0, rigid).copy_from(&self.rigid[sample].row(j).transpose());
         let own = &self.friction[j][width * sample..width * (sample + 1)];
@@ -157,7 +164,7 @@ impl Rows {
 
     /// Residual of the effort of joint `j` at a sample.
     pub fn residual(&self, unknowns: &DVector<f64>, j: usize, sample: usize) -> f64 {
-        let (rigid, width) = (self.layout.rigid(), self.layout.friction.width());
+        let (rigid, width) = (self.layout.rigid(), self.layout.width());
         let body: f64 = self.rigid[sample].row(j).iter().zip(unknowns.iter()).map(|(c, x)| c * x).sum();
         let own = &self.friction[j][width * sample..width * (sample + 1)];
         let friction: f64 = own.iter().zip(unknowns.iter().skip(rigid + width * j)).map(|(c, x)| c * x).sum();
@@ -196,7 +203,7 @@ impl Rows {
 
     /// Unknowns that the effort of joint `j` can depend on.
     pub fn active(&self, j: usize) -> Vec<usize> {
-        let (rigid, width) = (self.layout.rigid(), self.layout.friction.width());
+        let (rigid, width) = (self.layout.rigid(), self.layout.width());
         let mut active: Vec<usize> =
             (0..rigid).filter(|&k| self.rigid.iter().step_by(7).any(|columns| columns[(j, k)] != 0.0)).collect();
         active.extend(rigid + width * j..rigid + width * (j + 1));
@@ -207,7 +214,8 @@ impl Rows {
 /// Friction columns of every joint.
 fn friction_columns(recording: &Recording, friction: Friction, load: Option<&[Vec<f64>]>) -> Vec<Vec<f64>> {
     let joints = recording.joints.iter().enumerate();
-    joints.map(|(j, one)| friction.columns(&one.samples, load.map(|load| &load[j][..]))).collect()
+    let shared = !recording.robot.pairs.is_empty();
+    joints.map(|(j, one)| friction.columns(&one.samples, load.map(|load| &load[j][..]), shared)).collect()
 }
 
 /// Groups of the samples for training and validation: runs, or parts of them where there are fewer than [`GROUPS`].

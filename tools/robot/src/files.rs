@@ -67,7 +67,7 @@ fn friction(recording: &Recording, fitted: &FittedRobot) -> Vec<JointFriction> {
     let (solution, rows) = &fitted.bodies.simplest;
     let gains = recording.robot.gains();
     let joint = |j: usize| {
-        let at = rows.layout.rigid() + rows.layout.friction.width() * j;
+        let at = rows.layout.rigid() + rows.layout.width() * j;
         let of_joint = |effort: f64| (effort * gains[(j, j)]).max(0.0);
         JointFriction { damping: of_joint(solution.unknowns[at]), frictionloss: of_joint(solution.unknowns[at + 1]) }
     };

@@ -13,6 +13,9 @@ const STRIBECK: [f64; 3] = [0.02, 0.1, 0.3];
 /// Distances of the pre-sliding columns, parts of the position range.
 const DISTANCES: [f64; 5] = [0.001, 0.004, 0.015, 0.06, 0.2];
 
+/// Columns of the relief where joints share drives: Coulomb friction and its load's, while the other joint leads.
+const RELIEF: usize = 2;
+
 /// Friction columns of every joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Friction {
@@ -43,20 +46,22 @@ impl Friction {
         }
     }
 
-    /// Number of columns.
-    pub const fn width(self) -> usize {
+    /// Number of columns of a joint; `shared`: joints of the robot share drives in pairs.
+    pub const fn width(self, shared: bool) -> usize {
+        let relief = if shared { RELIEF } else { 0 };
         match self {
             Self::None => 0,
             Self::Simple => 3,
-            Self::Load => 5,
-            Self::Stribeck => 5 + STRIBECK.len(),
-            Self::PreSliding => 5 + DISTANCES.len(),
+            Self::Load => 5 + relief,
+            Self::Stribeck => 5 + STRIBECK.len() + relief,
+            Self::PreSliding => 5 + DISTANCES.len() + relief,
         }
     }
 
     /// The columns of all samples of a joint, sample by sample; `load` is the magnitude of the theoretical torque, per
-    /// sample, with which friction grows; without it that column is 0.
-    pub fn columns(self, samples: &Samples, load: Option<&[f64]>) -> Vec<f64> {
+    /// sample, with which friction grows; without it that column is 0, as are those of a relief for a joint that shares
+    /// its drive with none.
+    pub fn columns(self, samples: &Samples, load: Option<&[f64]>, shared: bool) -> Vec<f64> {
         let (mut lowest, mut highest, mut fastest) = (f64::INFINITY, f64::NEG_INFINITY, f64::MIN_POSITIVE);
         for (q, v) in samples.position.iter().zip(&samples.velocity) {
             (lowest, highest, fastest) = (lowest.min(*q), highest.max(*q), fastest.max(v.abs()));
@@ -68,7 +73,7 @@ impl Friction {
             }
             _ => vec![],
         };
-        let mut all = Vec::with_capacity(self.width() * samples.len());
+        let mut all = Vec::with_capacity(self.width(shared) * samples.len());
         for (i, &v) in samples.velocity.iter().enumerate() {
             if self == Self::None {
                 break;
@@ -85,6 +90,11 @@ impl Friction {
                 }));
             }
             all.extend(bent.iter().map(|bent| bent[i]));
+            if shared && self != Self::Simple {
+                let follows = samples.partner.as_ref().is_some_and(|partner| partner.leads[i]);
+                let relieved = if follows { direction } else { 0.0 };
+                all.extend([relieved, load.map_or(0.0, |load| load[i].abs() * relieved)]);
+            }
         }
         all
     }

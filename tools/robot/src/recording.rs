@@ -23,7 +23,7 @@ use identification::choice::Folds;
 use identification::dataset::description::{PositionColumn, PositionUnit};
 use identification::dataset::load::Environment;
 use identification::dataset::{DatasetError, Prepared, prepare_text};
-use identification::samples::Part;
+use identification::samples::{Part, Partner};
 use rigid_body::{JointKind, Robot, RobotError};
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
@@ -182,6 +182,17 @@ impl Recording {
         [of(|s| &s.position), of(|s| &s.velocity), of(|s| &s.acceleration)]
     }
 
+    /// Gives the samples of a joint that shares its drive the velocity of the other.
+    fn join_pairs(&mut self) {
+        for pair in self.robot.pairs.clone() {
+            let velocity = pair.joints.map(|joint| self.joints[joint].samples.velocity.clone());
+            for (joint, other) in pair.joints.into_iter().zip(velocity.into_iter().rev()) {
+                let samples = &mut self.joints[joint].samples;
+                samples.partner = Some(Partner::new(other, pair.band, samples));
+            }
+        }
+    }
+
     /// Leaves the first `seconds` of samples for training and validation, in the order of the runs; those of tests
     /// stay.
     pub fn keep_first(&mut self, seconds: f64) {
@@ -246,8 +257,9 @@ pub fn record(path: &Path, environment: Environment) -> Result<Recording, RobotF
             robot_file.display()
         )));
     }
-    let recording = Recording { robot, urdf, joints: prepared, name, path: path.to_owned() };
+    let mut recording = Recording { robot, urdf, joints: prepared, name, path: path.to_owned() };
     check(&recording, path)?;
+    recording.join_pairs();
     Ok(recording)
 }
 

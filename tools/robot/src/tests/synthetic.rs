@@ -56,6 +56,7 @@ pub fn robot(seed: u64) -> Truth {
         links: (0..joints).map(|j| format!("link_{j}")).collect(),
         limits: vec![Limits::default(); joints],
         frames: vec![],
+        pairs: vec![],
         floor: None,
         drives: drives.collect(),
         tree,
@@ -75,7 +76,7 @@ impl Truth {
         if friction != Friction::None {
             all.extend(self.friction.iter().flatten());
         }
-        assert_eq!(all.len(), 11 * n + n * friction.width());
+        assert_eq!(all.len(), 11 * n + n * friction.width(false));
         DVector::from_vec(all)
     }
 
@@ -186,7 +187,7 @@ pub fn rows(truth: &Truth, motion: &[Vec<Reference>], columns: Friction, measure
             rigid_columns(&truth.robot, &of(|s| &s.position), &of(|s| &s.velocity), &of(|s| &s.acceleration))
         })
         .collect();
-    let layout = Layout { joints: n, friction: columns };
+    let layout = Layout { joints: n, friction: columns, shared: false };
     let mut effort: Vec<Vec<f64>> = samples.iter().map(|samples| samples.effort.clone()).collect();
     for (k, drive) in truth.robot.drives.iter().enumerate() {
         let Some(rotor) = drive.rotor_inertia else { continue };
@@ -195,7 +196,7 @@ pub fn rows(truth: &Truth, motion: &[Vec<Reference>], columns: Friction, measure
             columns.column_mut(10 * n + k).fill(0.0);
         }
     }
-    let friction = samples.iter().map(|samples| columns.columns(samples, None)).collect();
+    let friction = samples.iter().map(|samples| columns.columns(samples, None, false)).collect();
     let group = (0..used).map(|i| Some(i * GROUPS / used)).collect();
     Rows { layout, rigid, friction, effort, group, run: vec![0; used] }
 }
