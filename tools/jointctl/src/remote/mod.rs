@@ -33,6 +33,7 @@ pub mod joint;
 pub mod load_check;
 pub mod motion;
 mod owner;
+mod partners;
 pub mod pdo;
 pub mod present;
 pub mod record;

@@ -98,7 +98,7 @@ impl Pdo {
     /// stays.
     pub fn ensure(self, joint: &RemoteJoint, wanted: &PdoParameters) -> Result<Change, RemoteError> {
         let before = self.read(joint)?;
-        let cob_id = if before.cob_id & INVALID == 0 { before.cob_id } else { wanted.cob_id };
+        let cob_id = if in_service(&before) { before.cob_id } else { wanted.cob_id };
         let wanted = PdoParameters { cob_id, ..*wanted };
         if !same(&before, &wanted)
             && let Err(error) = self.write(joint, &wanted)
@@ -109,6 +109,11 @@ impl Pdo {
         }
         Ok(Change { pdo: self, before, now: wanted })
     }
+}
+
+/// True for a PDO that exists.
+pub fn in_service(parameters: &PdoParameters) -> bool {
+    parameters.cob_id & INVALID == 0
 }
 
 fn same(a: &PdoParameters, b: &PdoParameters) -> bool {

@@ -3,12 +3,14 @@
 //! Each joint closes the loop by itself, in impedance mode: it is sent the reference of its position and velocity, the
 //! model's torque of the whole robot's reference, and stiffness and damping by its inertia there. The ranges of its
 //! impedance frame (2012h) are widened for it, and put back. Joints are enabled one after the other, each holding its
-//! share of the links where they are; then all are led to the begin of the motion.
+//! share of the links where they are; then all are led to the begin of the motion. From there on a joint that shares its
+//! drive is told the other one's reference velocity, too.
 
 use super::entry::Entry;
 use super::error::RemoteError;
 use super::joint::RemoteJoint;
 use super::motion::Motion;
+use super::partners::Partner;
 use super::record::{Pace, Recorder, Recording, SIGNALS};
 use super::stream::Stream;
 use super::value::Value;
@@ -193,6 +195,16 @@ impl RobotMotion<'_> {
             ranges.bear(joint, &plan, i)?;
         }
         self.check(joints, &plan)?;
+        // Put back likewise, once no stream uses it.
+        let mut partners = Vec::new();
+        for (i, joint) in joints.iter().enumerate() {
+            let other = self.controller.robot().pairs.iter().find_map(|pair| pair.partner(i));
+            let told = match other {
+                Some(other) => Partner::begin(joint)?.map(|partner| Arc::new((partner, other))),
+                None => None,
+            };
+            partners.push(told);
+        }
         let mut recorders = Vec::new();
         for (i, joint) in joints.iter().enumerate() {
             let pace = if i == 0 { Pace::Send(self.rate) } else { Pace::Sent };
@@ -205,9 +217,12 @@ impl RobotMotion<'_> {
         }
         let began = Instant::now();
         for (i, stream) in streams.iter().enumerate() {
-            let plan = Arc::clone(&plan);
+            let (plan, told) = (Arc::clone(&plan), partners.get(i).cloned().flatten());
             stream.play(move |_| {
                 let now = plan.place(began.elapsed().as_secs_f64());
+                if let Some((partner, other)) = told.as_deref() {
+                    partner.tell(plan.commands.get(now).and_then(|all| all.get(*other)).map_or(0.0, |of| of.velocity));
+                }
                 plan.commands.get(now).and_then(|all| all.get(i).copied()).unwrap_or(Command::NOTHING)
             });
         }

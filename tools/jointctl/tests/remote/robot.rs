@@ -2,6 +2,7 @@
 
 use crate::served::{DEADLINE, Running, Served, program};
 use crate::tables::ROBOT_MOVE;
+use bus::client::{Network, Subscription};
 use joint_firmware::joint::state_machine::State;
 use joint_firmware::objects::field::{Field, Range};
 use jointctl::joint_text;
@@ -10,6 +11,7 @@ use jointctl::remote::robot_motion::RobotMotion;
 use plant::ActuatorParameters;
 use plant::excitation::Reference;
 use plant::virtual_joint::Setup;
+use rigid_body::pairs::Pair;
 use robot::{Controller, read_robot, record};
 use std::fmt::Write;
 use std::io::{BufRead, BufReader};
@@ -17,6 +19,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Output, Stdio};
 use std::time::Instant;
 
+/// Joints that share a drive.
+const SHARING: [usize; 2] = [1, 2];
 const NAMES: [&str; 3] = ["yaw", "shoulder", "elbow"];
 
 fn arm() -> PathBuf {
@@ -53,6 +57,19 @@ fn joints(served: &Served) -> Vec<RemoteJoint> {
     vec![first.clone(), on(2), on(3)]
 }
 
+/// Checks that each joint of the pair, and no other one, was told the velocity of its partner's swing.
+fn told(coupled: &Subscription) {
+    let mut fastest = [None; 3];
+    while let Some(received) = coupled.try_next().unwrap() {
+        let velocity = i32::from_le_bytes(received.frame.data()[..4].try_into().unwrap());
+        let place = &mut fastest[usize::from(received.frame.id() - 0x501)];
+        *place = (*place).max(Some(velocity));
+    }
+    // The swing's is 471 mrad/s at the most; a machine that is busy leaves set-points out.
+    let is = fastest.map(|most| most.is_some_and(|most| (200..=472).contains(&most)));
+    assert_eq!(is, [0, 1, 2].map(|joint| SHARING.contains(&joint)), "{fastest:?} mrad/s");
+}
+
 fn off(joints: &[RemoteJoint]) {
     for joint in joints {
         assert_eq!(joint.state().unwrap(), State::SwitchOnDisabled, "node {}", joint.id());
@@ -63,7 +80,8 @@ fn off(joints: &[RemoteJoint]) {
 pub fn all_joints_of_an_arm_move_together_and_are_left_disabled() {
     let served = Served::arm(&arm());
     let joints = joints(&served);
-    let (robot, _) = read_robot(&arm(), &|_| None).unwrap();
+    let (mut robot, _) = read_robot(&arm(), &|_| None).unwrap();
+    robot.pairs = vec![Pair { joints: SHARING, band: 0.05 }];
     let controller = Controller::of_urdf(robot, 30.0);
     let motion = |reach| RobotMotion {
         controller: &controller,
@@ -73,11 +91,19 @@ pub fn all_joints_of_an_arm_move_together_and_are_left_disabled() {
     };
     let ranges = || joints.iter().map(|joint| joint.number(Field::Range(Range::Damping)).unwrap()).collect::<Vec<_>>();
     let before = ranges();
+    // Somebody else's ears: one's own frames are not heard.
+    let others = Network::new(bus::open(served.bus()).unwrap());
+    let coupled = others.subscribe(|frame| (0x501..0x504).contains(&frame.id()));
     // More damping than the impedance frame carries as a joint has it.
     assert!(controller.at(&[0.0; 3], &[0.0; 3], &[0.0; 3])[1].damping > before[1], "{before:?}");
     let moved = motion(0.3).run(&joints, &|| true).unwrap().unwrap();
     off(&joints);
     assert_eq!(ranges(), before);
+    told(&coupled);
+    for joint in &joints {
+        let cob_id = u32::from_le_bytes(joint.node().number(0x1403, 1).unwrap());
+        assert!(cob_id >> 31 == 1, "node {}: {cob_id:08x}", joint.id());
+    }
     let tracked = moved.tracked();
     // A machine that is busy is late with all of it: what is followed how closely is measured by a benchmark. That all
     // joints make the swing is not about time.
