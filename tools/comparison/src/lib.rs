@@ -1,2 +1,6 @@
 //! Methods of the papers that this project stands on, as the papers describe them, so that they can be put beside ours
 //! on the same motions; host. Nothing that a joint or a user runs depends on it.
+
+#![forbid(unsafe_code)]
+
+pub mod hysteresis;
