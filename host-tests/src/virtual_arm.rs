@@ -1,19 +1,21 @@
 //! A virtual arm as its owner would identify it: moved by its joints' own position control, recorded, fitted by
-//! `jointctl robot fit`'s pipeline; then moved by computed torque with what came out.
+//! `jointctl robot fit`'s pipeline; then moved by computed torque with what came out. Its joints may share drives.
 
 use crate::driving::COMMAND_STEPS;
 use friction_compensation::compensation::Request;
 use friction_compensation::friction::FrictionModel;
+use friction_compensation::parameters::image::Image;
 use identification::fit::Options as JointOptions;
+use identification::joint_model::{firmware_states, fixed_point, regimes};
 use identification::progress::Silent;
 use joint_firmware::joint::state_machine::{Controlword, State};
-use joint_firmware::joint::{Command, Demand, Mode, Telemetry};
+use joint_firmware::joint::{Command, Coupled, Demand, Mode, Telemetry};
 use nalgebra::{Matrix3, Unit, Vector3};
 use plant::actuator::ActuatorParameters;
 use plant::fourier::FourierSeries;
 use plant::load::LoadParameters;
 use plant::virtual_joint::Setup;
-use plant::{Arm, VirtualJoint};
+use plant::{Arm, Pair, VirtualJoint};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
@@ -21,7 +23,7 @@ use rigid_body::newton_euler::inverse_dynamics;
 use rigid_body::random_tree::urdf;
 use rigid_body::{Joint, JointKind, LinkInertia, Placement, Robot, Tree};
 use robot::controller::Share;
-use robot::{Controller, Options, fit, record};
+use robot::{Controller, Options, Recording, fit, record};
 use std::fmt::Write;
 
 /// Joints.
@@ -109,7 +111,7 @@ fn actuators() -> [(ActuatorParameters, Setup); JOINTS] {
 }
 
 /// The arm, enabled, compensating as asked for.
-fn arm(request: Request, models: &[FrictionModel], seed: u64) -> Result<Arm, String> {
+fn arm(request: Request, models: &[FrictionModel], seed: u64, pairs: &[Pair]) -> Result<Arm, String> {
     let joint = |(i, (parameters, setup)): (usize, &(ActuatorParameters, Setup))| {
         let setup = setup.compensating(request);
         let mut joint = VirtualJoint::new(*parameters, &setup, TEMPERATURE, seed + i as u64)?;
@@ -117,13 +119,15 @@ fn arm(request: Request, models: &[FrictionModel], seed: u64) -> Result<Arm, Str
         Ok::<_, plant::virtual_joint::VirtualJointError>(joint)
     };
     let joints = actuators().iter().enumerate().map(joint).collect::<Result<_, _>>().map_err(|e| e.to_string())?;
-    let mut arm = Arm::new(links(), joints).map_err(|error| error.to_string())?;
+    let arm = Arm::new(links(), joints).and_then(|arm| arm.with_pairs(pairs.to_vec()));
+    let mut arm = arm.map_err(|error| error.to_string())?;
     arm.enable().map_err(|error| error.to_string())?;
     Ok(arm)
 }
 
 /// Moves the arm; `command` gives the commands of all joints every millisecond, from the time and what the joints told,
-/// and `look` sees every control step.
+/// and `look` sees every control step. With its command a joint that shares its drive is told the velocity that the
+/// other one told, as by object 2030h:1.
 fn drive(
     arm: &mut Arm,
     duration: f64,
@@ -131,14 +135,19 @@ fn drive(
     mut look: impl FnMut(f64, &Arm, &[Telemetry]),
 ) -> Result<(), String> {
     let mut told = arm.step(&vec![demand(Command::NOTHING, 1); JOINTS], &[]);
-    let mut commands = Vec::new();
+    let partners: Vec<Option<usize>> = (0..JOINTS).map(|joint| partner(arm.pairs(), joint)).collect();
+    let mut demands = Vec::new();
     for n in 0..(duration / arm.period()) as u64 {
         let time = n as f64 * arm.period();
         if n % COMMAND_STEPS == 0 {
-            commands = command(time, &told);
+            let sequence = (n / COMMAND_STEPS) as u32 + 2;
+            let coupled = |other: usize| Coupled { velocity: told[other].motion.velocity, sequence };
+            let one = |(command, partner): (&Command, &Option<usize>)| Demand {
+                coupled: partner.map_or_else(Coupled::default, coupled),
+                ..demand(*command, sequence)
+            };
+            demands = command(time, &told).iter().zip(&partners).map(one).collect();
         }
-        let sequence = (n / COMMAND_STEPS) as u32 + 2;
-        let demands: Vec<Demand> = commands.iter().map(|command| demand(*command, sequence)).collect();
         told = arm.step(&demands, &[]);
         if let Some(i) = told.iter().position(|telemetry| telemetry.state != State::OperationEnabled) {
             return Err(format!("joint {i} at {time:.3} s: {:?}, {:?}", told[i].state, told[i].faults));
@@ -146,6 +155,14 @@ fn drive(
         look(time, arm, &told);
     }
     Ok(())
+}
+
+/// The joint that shares the drive of another.
+pub fn partner(pairs: &[Pair], joint: usize) -> Option<usize> {
+    pairs.iter().find_map(|pair| {
+        let own = pair.joints.iter().position(|one| *one == joint)?;
+        Some(pair.joints[1 - own])
+    })
 }
 
 fn demand(command: Command, sequence: u32) -> Demand {
@@ -159,6 +176,13 @@ pub struct IdentifiedArm {
     tree: Tree,
     rotors: Vec<f64>,
     models: Vec<FrictionModel>,
+    pairs: Vec<Pair>,
+    /// The recording that it was identified from.
+    pub recording: Recording,
+    /// Image of each joint.
+    pub images: Vec<Image>,
+    /// Relief of each joint's dry friction by the one that shares its drive; None where the model has none.
+    pub reliefs: Vec<Option<f64>>,
     /// Means over the joints of the errors on the test run, % of the effort's RMS: simplest, bodies, images.
     pub percent: [f64; 3],
 }
@@ -168,12 +192,22 @@ pub struct IdentifiedArm {
 /// # Errors
 /// Refusals of plant, firmware or fit.
 pub fn identified() -> Result<IdentifiedArm, String> {
+    identified_from(&recorded(&[])?, &[], false)
+}
+
+/// Identifies the arm from its recording, whose joints share drives in `pairs`; `described`: the robot's file says so.
+///
+/// # Errors
+/// Refusals of plant, firmware or fit.
+pub fn identified_from(log: &str, pairs: &[Pair], described: bool) -> Result<IdentifiedArm, String> {
     let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
     let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).map_err(|e| e.to_string());
-    write("log.csv", &recorded()?)?;
+    write("log.csv", log)?;
     write("arm.urdf", &urdf(&prior(), (-3.0, 3.0), 10.0))?;
     let each = |text: &dyn Fn(usize) -> String| (0..JOINTS).map(text).collect::<String>();
-    write("robot.toml", &format!("urdf = 'arm.urdf'\n{}", each(&|i| format!("[joint.joint_{i}]\n"))))?;
+    let named = |pair: &Pair| format!("[[pair]]\njoints = ['joint_{}', 'joint_{}']\n", pair.joints[0], pair.joints[1]);
+    let shared = pairs.iter().filter(|_| described).map(named).collect::<String>();
+    write("robot.toml", &format!("urdf = 'arm.urdf'\n{}{shared}", each(&|i| format!("[joint.joint_{i}]\n"))))?;
     let columns = |i: usize| {
         format!("[joints.joint_{i}]\nposition = {{ column = 'q{i}' }}\neffort = {{ column = 't{i}', unit = 'Nm' }}\n")
     };
@@ -185,9 +219,23 @@ pub fn identified() -> Result<IdentifiedArm, String> {
     tree.joints.iter_mut().zip(&fitted.links).for_each(|(joint, link)| joint.link = *link);
     let rate = actuators()[0].1.bridge.motion_rate();
     let models = fitted.joints.iter().map(|joint| FrictionModel::new(&joint.image.friction, rate)).collect();
-    let robot = Robot { tree: tree.clone(), ..recording.robot };
+    let robot = Robot { tree: tree.clone(), ..recording.robot.clone() };
     let controller = Controller::new(robot, &fitted.rotors, BANDWIDTH);
-    Ok(IdentifiedArm { controller, tree, rotors: fitted.rotors.clone(), models, percent: fitted.mean_percent() })
+    let relief = |joint: &identification::fit::Fitted| {
+        let found = joint.report.parameters.iter().find(|parameter| parameter.symbol == "r");
+        found.map(|parameter| parameter.value)
+    };
+    Ok(IdentifiedArm {
+        controller,
+        tree,
+        rotors: fitted.rotors.clone(),
+        models,
+        pairs: pairs.to_vec(),
+        recording,
+        reliefs: fitted.joints.iter().map(relief).collect(),
+        percent: fitted.mean_percent(),
+        images: fitted.joints.into_iter().map(|joint| joint.image).collect(),
+    })
 }
 
 /// Links by their data sheet: masses a third too large, centres a fifth too near.
@@ -215,14 +263,18 @@ test = [{ name = 'another motion', where = [{ column = 'run', equals = 2 }] }]
 validation = { fraction = { of = 0.2, length = 0.75, seed = 1 } }
 ";
 
-/// The recording: means of what the joints measure over each sample's time.
-fn recorded() -> Result<String, String> {
+/// The recording of an arm whose joints share drives in `pairs`: means of what the joints measure over each sample's
+/// time.
+///
+/// # Errors
+/// Refusals of plant or firmware.
+pub fn recorded(pairs: &[Pair]) -> Result<String, String> {
     let mut text = "run,t".to_owned();
     (0..JOINTS).for_each(|i| text += &format!(",q{i},t{i}"));
     text.push('\n');
     for (run, duration) in RUNS.into_iter().enumerate() {
         let motion = ArmMotion::random(duration, 10 + run as u64);
-        let mut arm = arm(Request::Off, &[], 100 * run as u64)?;
+        let mut arm = arm(Request::Off, &[], 100 * run as u64, pairs)?;
         let gains: Vec<_> = arm.joints().iter().map(|joint| joint.active().motion).collect();
         let per_row = (1.0 / (RATE as f64 * arm.period())).round() as u64;
         let mut sums = [[0.0; 2]; JOINTS];
@@ -270,6 +322,35 @@ pub enum Loop {
 }
 
 impl IdentifiedArm {
+    /// Friction of each joint and sample by equation (2) of 003: the effort less that of the true links and rotors, Nm.
+    pub fn measured_friction(&self) -> Vec<Vec<f64>> {
+        let (links, rotors) = (links(), actuators().map(|(parameters, _)| parameters.joint.inertia()));
+        let mut friction = vec![Vec::new(); JOINTS];
+        for i in 0..self.recording.len() {
+            let [q, v, a] = self.recording.state(i);
+            let rigid = inverse_dynamics(&links, &q, &v, &a);
+            for (j, all) in friction.iter_mut().enumerate() {
+                all.push(self.recording.joints[j].samples.effort[i] - rigid[j] - rotors[j] * a[j]);
+            }
+        }
+        friction
+    }
+
+    /// Friction of each joint and sample as its image says, in the firmware's arithmetic, Nm.
+    ///
+    /// # Errors
+    /// A sample that does not fit the firmware's quantities.
+    pub fn image_friction(&self) -> Result<Vec<Vec<f64>>, String> {
+        let of = |(image, joint): (&Image, &identification::dataset::Prepared)| {
+            let samples = &joint.samples;
+            let states = firmware_states(samples).map_err(|error| error.to_string())?;
+            let sets = regimes(&image.friction.selector, &states, samples);
+            let friction = fixed_point(&image.friction, &states, &sets, samples);
+            Ok(friction.into_iter().map(|(physical, network)| physical + network).collect())
+        };
+        self.images.iter().zip(&self.recording.joints).map(of).collect()
+    }
+
     /// RMS position error of each joint along a motion by computed torque (003, eq. 9), rad: the identified links and
     /// rotors, and a controller of low bandwidth. With the images, or without compensation.
     ///
@@ -277,7 +358,7 @@ impl IdentifiedArm {
     /// A fault on the way.
     pub fn tracked(&self, request: Request, by: Loop) -> Result<Vec<f64>, String> {
         let motion = ArmMotion::random(MOTION, 20);
-        let mut arm = arm(request, &self.models, 900)?;
+        let mut arm = arm(request, &self.models, 900, &self.pairs)?;
         let (mut squares, mut count) = (vec![0.0; JOINTS], 0.0);
         let commands = |time: f64, told: &[Telemetry]| match by {
             Loop::Joints => self.in_the_joints(motion.at(time)),

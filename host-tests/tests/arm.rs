@@ -2,11 +2,15 @@
 //! with the friction images it follows several times as closely.
 
 use friction_compensation::compensation::Request;
-use host_tests::virtual_arm::{Loop, identified};
+use host_tests::virtual_arm::{Loop, identified, identified_from, recorded};
+use plant::Pair;
 
 /// Least factor by which the position error falls, RMS over the joints, where joints close the loop, and where the
 /// master does in torque mode: docs/robot.md's, less a tenth.
 const GAINS: [(Loop, f64); 2] = [(Loop::Joints, 16.3), (Loop::Master, 1.7)];
+
+/// The same of an arm with a pair, where joints close the loop: docs/coupled-joints.md's, less a tenth.
+const PAIR_GAIN: f64 = 13.5;
 
 #[test]
 fn computed_torque_at_low_gains_follows_several_times_as_closely_with_the_friction_images() {
@@ -24,4 +28,20 @@ fn computed_torque_at_low_gains_follows_several_times_as_closely_with_the_fricti
         (gain, least)
     });
     assert!(gains.iter().all(|(gain, least)| gain >= least), "{gains:?}");
+}
+
+#[test]
+fn joints_that_share_a_drive_have_a_set_for_each_leader_and_follow_several_times_as_closely() {
+    let pairs = [Pair::new([1, 2], 0.04, 0.5)];
+    let arm = identified_from(&recorded(&pairs).unwrap(), &pairs, true).unwrap();
+    println!("reliefs {:?}, true 0.5", arm.reliefs);
+    let sets: Vec<usize> = arm.images.iter().map(|image| image.friction.selector.sets()).collect();
+    assert_eq!((arm.reliefs[0], sets), (None, vec![1, 2, 2]));
+    let rms = |request: Request| {
+        let errors = arm.tracked(request, Loop::Joints).unwrap();
+        (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt()
+    };
+    let [without, with] = [Request::Off, Request::PhysicalAndNetwork].map(rms);
+    println!("{:.1} -> {:.1} mrad RMS, {:.1} times", 1e3 * without, 1e3 * with, without / with);
+    assert!(with < without / PAIR_GAIN, "{without} rad without images, {with} rad with them");
 }

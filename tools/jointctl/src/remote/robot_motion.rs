@@ -3,8 +3,8 @@
 //! Each joint closes the loop by itself, in impedance mode: it is sent the reference of its position and velocity, the
 //! model's torque of the whole robot's reference, and stiffness and damping by its inertia there. The ranges of its
 //! impedance frame (2012h) are widened for it, and put back. Joints are enabled one after the other, each holding its
-//! share of the links where they are; then all are led to the begin of the motion. From there on a joint that shares its
-//! drive is told the other one's reference velocity, too.
+//! share of the links where they are; then all are led to the begin of the motion. From there on a joint that shares
+//! its drive is told the other one's reference velocity, too.
 
 use super::entry::Entry;
 use super::error::RemoteError;
