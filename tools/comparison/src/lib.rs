@@ -4,3 +4,8 @@
 #![forbid(unsafe_code)]
 
 pub mod hysteresis;
+pub mod model_detail;
+pub mod motions;
+pub mod network_protocols;
+pub mod residual_network;
+pub mod simulated_leg;
