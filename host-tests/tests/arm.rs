@@ -7,7 +7,7 @@ use plant::Pair;
 
 /// Least factor by which the position error falls, RMS over the joints, where joints close the loop, and where the
 /// master does in torque mode: docs/robot.md's, less a tenth.
-const GAINS: [(Loop, f64); 2] = [(Loop::Joints, 16.3), (Loop::Master, 1.7)];
+const GAINS: [(Loop, f64); 2] = [(Loop::Joints, 19.2), (Loop::Master, 1.7)];
 
 /// The same of an arm with a pair, where joints close the loop: docs/coupled-joints.md's, less a tenth.
 const PAIR_GAIN: f64 = 13.5;
