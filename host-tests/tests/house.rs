@@ -11,12 +11,13 @@ use syn::visit::{self, Visit};
 use syn::{Attribute, Item, UseTree};
 
 /// Sources of each crate.
-const CRATES: [&str; 18] = [
+const CRATES: [&str; 19] = [
     "src",
     "crates/canopen-node/src",
     "crates/friction-compensation/src",
     "host-tests/src",
     "tools/bus/src",
+    "tools/comparison/src",
     "tools/emulator/src",
     "tools/excitation/src",
     "tools/fleet/src",

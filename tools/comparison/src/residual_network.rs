@@ -166,7 +166,7 @@ impl LeastSquares for Task {
         }
         sensitivity.columns_mut(hidden, NEURONS + 1).copy_from(&neurons);
         let sums = sensitivity.transpose() * &sensitivity;
-        let products = &own * own.transpose();
+        let products = own * own.transpose();
         let mut hessian = DMatrix::zeros(self.weights(), self.weights());
         for column in 0..hidden {
             for row in 0..hidden {

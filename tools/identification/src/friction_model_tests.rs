@@ -55,7 +55,7 @@ fn states() -> Vec<JointState> {
         load,
         temperature,
         bent: [1.0, 0.7, -0.4, 0.0],
-        following: load > 1.0 || load < 0.0,
+        following: !(0.0..=1.0).contains(&load),
     })
     .to_vec()
 }

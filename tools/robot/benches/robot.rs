@@ -37,7 +37,7 @@ fn rows(robot: &Robot, samples: usize) -> Rows {
         rigid.iter().zip(&states).map(of).collect()
     };
     Rows {
-        layout: Layout { joints: n, friction: Friction::None },
+        layout: Layout { joints: n, friction: Friction::None, shared: false },
         effort: (0..n).map(effort).collect(),
         friction: vec![vec![]; n],
         group: (0..samples).map(|i| Some(i * GROUPS / samples)).collect(),
