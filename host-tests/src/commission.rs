@@ -16,6 +16,8 @@ pub struct Commissioned {
     pub network: bool,
     /// Part of its friction that the joint may not have, as the fit states it.
     pub uncertainty: Option<f32>,
+    /// Lowest and highest temperature in its recording, °C, by the board's sensor.
+    pub recorded: [f64; 2],
 }
 
 /// Excites, records, fits.
@@ -30,5 +32,7 @@ pub fn commission(parameters: &ActuatorParameters, setup: &Setup, seed: u64) -> 
     let model = FrictionModel::new(&fitted.image.friction, setup.bridge.motion_rate());
     let network = fitted.image.friction.sets.iter().any(|set| set.network.is_some());
     let uncertainty = fitted.report.uncertainty.map(|uncertainty| uncertainty.value as f32);
-    Ok(Commissioned { model, network, uncertainty })
+    let temperatures = prepared.samples.temperature.iter();
+    let recorded = temperatures.fold([f64::MAX, f64::MIN], |[low, high], t| [low.min(*t), high.max(*t)]);
+    Ok(Commissioned { model, network, uncertainty, recorded })
 }

@@ -137,14 +137,26 @@ impl RandomJoint {
         self.run(&on, variant, Some(&self.found.model))
     }
 
-    /// Torque errors of moves that begin at 0 °C, without compensation and with it, %.
+    /// Torque errors of moves that begin with the whole joint at this temperature, °C, in a room at the ambient one;
+    /// without compensation and with it, %.
     ///
     /// # Errors
     /// A fault on the way.
-    pub fn in_the_cold(&self, variant: &Variant) -> Result<[f64; 2], String> {
+    pub fn begun_at(&self, variant: &Variant, temperature: f64) -> Result<[f64; 2], String> {
+        self.without_and_with(variant, &self.moves, temperature - self.parameters.joint.thermal.ambient)
+    }
+
+    /// Torque errors along a motion of its own, without compensation and with it, %.
+    ///
+    /// # Errors
+    /// A fault on the way.
+    pub fn along(&self, trajectory: &Trajectory) -> Result<[f64; 2], String> {
+        self.without_and_with(&DEFAULT, trajectory, WARMTH)
+    }
+
+    fn without_and_with(&self, variant: &Variant, trajectory: &Trajectory, warmth: f64) -> Result<[f64; 2], String> {
         let on = self.off.compensating(Request::PhysicalAndNetwork);
-        let warmth = -self.parameters.joint.thermal.ambient;
-        let torque = |setup, model| Ok::<_, String>(self.errors(setup, variant, model, &self.moves, warmth)?.torque);
+        let torque = |setup, model| Ok::<_, String>(self.errors(setup, variant, model, trajectory, warmth)?.torque);
         Ok([torque(&self.off, None)?, torque(&on, Some(&self.found.model))?])
     }
 

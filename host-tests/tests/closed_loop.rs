@@ -90,7 +90,7 @@ fn found(seed: u64) -> Result<Found, String> {
         torque_mode: joint.in_torque_mode(&DEFAULT)?,
         uncertainty: joint.found.uncertainty,
         moved_by_itself: judged(seed, &Alone::ALL, &DEFAULT, Knowledge::Image(&joint.found)).1,
-        cold: joint.in_the_cold(&DEFAULT)?,
+        cold: joint.begun_at(&DEFAULT, 0.0)?,
     })
 }
 
