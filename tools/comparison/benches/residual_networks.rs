@@ -166,7 +166,7 @@ fn gains(studies: &[&Study]) {
     println!();
 }
 
-/// What the recorded robot says of the protocols, at the first level of detail.
+/// Findings about the protocols on the recorded robot, at the first level of detail.
 fn findings(recorded: &Study) {
     let percent = |method: Method, protocol: Protocol| mean(&recorded.percents(0, method, protocol));
     let left = |protocol: Protocol| percent(Method::Network, protocol);

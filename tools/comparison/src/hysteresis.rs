@@ -104,7 +104,7 @@ pub struct Model {
     x: DVector<f64>,
 }
 
-/// What a coefficient is multiplied by, and derivatives of the friction by ln s, z and h.
+/// Factors of the coefficients, and derivatives of the friction by ln s, z and h.
 struct Row {
     columns: [f64; MOST],
     by_shape: [f64; 3],

@@ -1,8 +1,8 @@
 //! Two joints that share a drive: dry friction of one is less while the other moves faster.
 //!
 //! Source: 003, section II-C. With the speeds of both and a band e, a joint's friction is the reduced one from
-//! |v_other| >= |v_own| + e on, the whole one from |v_own| >= |v_other| + e on, and unchanged between. The paper reduces
-//! it by other parameters of the same formula; here its level, load included, is multiplied by a factor.
+//! |v_other| >= |v_own| + e on, the whole one from |v_own| >= |v_other| + e on, and unchanged between. The paper
+//! reduces it by other parameters of the same formula; here its level, load included, is multiplied by a factor.
 
 use crate::error::{ParameterError, within};
 use std::fmt;

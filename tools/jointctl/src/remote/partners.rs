@@ -14,7 +14,7 @@ use joint_firmware::objects::field::{Field, SetPoint};
 /// RPDO of the joint that takes another one's velocity.
 const COUPLED: u8 = 3;
 
-/// What a joint is told of the one that shares its drive. RPDO 4 is put back when this is dropped.
+/// Messages to a joint about the one that shares its drive. RPDO 4 is put back when this is dropped.
 pub(super) struct Partner {
     joint: RemoteJoint,
     change: Change,
