@@ -23,7 +23,7 @@ pub const NEURONS: usize = 16;
 /// Shares of training and validation; the rest judges.
 pub const SHARES: [f64; 2] = [0.5, 0.2];
 /// Epochs without a lower validation error after which training stops.
-pub const PATIENCE: usize = 6;
+const PATIENCE: usize = 6;
 
 /// Samples for training, validation and test.
 #[derive(Clone, Debug, PartialEq, Eq)]
