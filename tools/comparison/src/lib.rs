@@ -4,6 +4,7 @@
 #![forbid(unsafe_code)]
 
 pub mod hysteresis;
+pub mod lagrangian;
 pub mod model_detail;
 pub mod motions;
 pub mod network_protocols;
