@@ -2,7 +2,9 @@
 //!
 //! `cargo bench -p panel --bench browsers` has Chromium hold the button of a jog, and ends that at 100 instants, or
 //! `PANEL_INSTANTS`, by each way in turn. What is told, and where it fails, is as of `stops`, which does the same with
-//! a client that is no browser. Times begin as the browser is asked to do it.
+//! a client that is no browser. Times begin as the browser is asked to do it; those of the mouse begin as its event
+//! came about, by the event's own time (W3C, "High Resolution Time", section 4), for the driver takes its own time
+//! until then, which is told beside.
 
 #![allow(dead_code, reason = "browser and joint are those of the tests, which use more of them")]
 
@@ -42,7 +44,7 @@ mod at_instants {
     use jointctl::remote::{RemoteError, RemoteJoint};
     use serde_json::{Value, json};
     use std::sync::Mutex;
-    use std::time::{Duration, Instant};
+    use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
     /// A way in which a browser ceases to hold.
     #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,6 +74,18 @@ mod at_instants {
                 Self::Command => "let go after a command",
             }
         }
+    }
+
+    /// Has the page keep when the last event of a kind of its mouse came about, ms since 1970.
+    fn keeps(browser: &Browser, event: &str) {
+        let kept = "happened = performance.timeOrigin + event.timeStamp";
+        browser.value(&format!("void addEventListener('{event}', (event) => {{ {kept}; }}, true)"));
+    }
+
+    /// Time that the driver took until the event that a page kept, from when it was asked.
+    fn driver(browser: &Browser, asked: SystemTime) -> Duration {
+        let happened = Duration::from_secs_f64(browser.value("happened").as_f64().unwrap() / 1e3);
+        (UNIX_EPOCH + happened).duration_since(asked).expect("the event came about after it was asked for")
     }
 
     /// Longest time until the joint no longer follows set-points: that of a page that is silent.
@@ -119,7 +133,7 @@ mod at_instants {
     /// For each way, the times of its instants until the joint follows no set-points, and until it stands.
     fn measure(bus: &str, seen: &Mutex<Seen>) -> [Vec<[Duration; 2]>; 6] {
         let mut times = [const { Vec::new() }; 6];
-        let program = Program::begin(bus);
+        let (program, mut slowest) = (Program::begin(bus), Duration::ZERO);
         for instant in 0..instants() {
             let which = instant % Way::ALL.len();
             let way = Way::ALL[which];
@@ -127,13 +141,21 @@ mod at_instants {
             let elsewhere = (way == Way::StopElsewhere).then(|| looking(&program));
             press(&browser, seen, instant > 0);
             std::thread::sleep(wait(instant));
+            let mouse = match way {
+                Way::StopElsewhere => elsewhere.as_ref().map(|elsewhere| (elsewhere, "pointerdown")),
+                Way::Command => Some((&browser, "pointerup")),
+                _ => None,
+            };
+            if let Some((browser, event)) = mouse {
+                keeps(browser, event);
+            }
             if way == Way::Command {
                 command(bus);
             }
             if !moves(*seen.lock().unwrap()) {
                 panic!("the joint stands before {}: this machine is too busy for real time", way.name());
             }
-            let began = Instant::now();
+            let (began, asked) = (Instant::now(), SystemTime::now());
             let done = std::thread::scope(|scope| {
                 scope.spawn(|| match way {
                     Way::TabClosed => drop(browser.call("DELETE", "/window", &Value::Null)),
@@ -155,7 +177,9 @@ mod at_instants {
                 until(seen, |seen| seen.velocity.abs() < STANDS);
                 [safe, began.elapsed()]
             });
-            times[which].push(done);
+            let driver = mouse.map_or(Duration::ZERO, |(browser, _)| driver(browser, asked));
+            slowest = slowest.max(driver);
+            times[which].push(done.map(|time| time.checked_sub(driver).expect("the joint is safe after the event")));
             if way == Way::Asleep {
                 browser.signal("-KILL");
             }
@@ -163,6 +187,7 @@ mod at_instants {
             until(seen, |seen| matches!(seen.state, State::SwitchOnDisabled | State::Fault));
             std::thread::sleep(MS);
         }
+        println!("The driver took at most {:.0} ms until an event of the mouse.", 1e3 * slowest.as_secs_f64());
         times
     }
 
