@@ -32,27 +32,28 @@ pub struct Candidate {
     pub inputs: Inputs,
     /// Hidden layers of both networks.
     pub hidden: &'static [(usize, Activation)],
-    /// Weight decay.
-    pub decay: f64,
+    /// Weight decay, of inertia and potential energy.
+    pub decay: [f64; 2],
 }
 
 /// Candidates, of which the one is taken that is best where a model learns from one training motion and is judged on
 /// the other.
 pub const CANDIDATES: [Candidate; 8] = [
-    Candidate { inputs: Inputs::Angles, hidden: SOFTPLUS, decay: 1.0 },
-    Candidate { inputs: Inputs::SinesAndCosines, hidden: SOFTPLUS, decay: 1.0 },
-    Candidate { inputs: Inputs::SinesAndCosines, hidden: SOFTPLUS, decay: 3.0 },
-    Candidate { inputs: Inputs::SinesAndCosines, hidden: SOFTPLUS, decay: 10.0 },
-    Candidate { inputs: Inputs::SinesAndCosines, hidden: TANH, decay: 3.0 },
-    Candidate { inputs: Inputs::Angles, hidden: SINE, decay: 1.0 },
-    Candidate { inputs: Inputs::Angles, hidden: SINE, decay: 3.0 },
-    Candidate { inputs: Inputs::Angles, hidden: SINE, decay: 10.0 },
+    Candidate { inputs: Inputs::Angles, hidden: SINE, decay: [0.3, 0.3] },
+    Candidate { inputs: Inputs::Angles, hidden: SINE, decay: [1.0, 0.1] },
+    Candidate { inputs: Inputs::Angles, hidden: SINE, decay: [1.0, 0.3] },
+    Candidate { inputs: Inputs::Angles, hidden: SINE, decay: [3.0, 0.3] },
+    Candidate { inputs: Inputs::Angles, hidden: SINE, decay: [1.0, 1.0] },
+    Candidate { inputs: Inputs::Angles, hidden: SINES, decay: [1.0, 0.3] },
+    Candidate { inputs: Inputs::SinesAndCosines, hidden: SOFTPLUS, decay: [0.3, 0.3] },
+    Candidate { inputs: Inputs::SinesAndCosines, hidden: TANH, decay: [1.0, 0.3] },
 ];
 
 /// Hidden layers of the candidates.
 const SOFTPLUS: &[(usize, Activation)] = &[(32, Activation::Softplus), (32, Activation::Softplus)];
 const TANH: &[(usize, Activation)] = &[(32, Activation::Tanh), (32, Activation::Tanh)];
 const SINE: &[(usize, Activation)] = &[(64, Activation::Sine)];
+const SINES: &[(usize, Activation)] = &[(32, Activation::Sine), (32, Activation::Sine)];
 
 impl Candidate {
     /// A trained model.
@@ -60,7 +61,7 @@ impl Candidate {
         let shape = Shape { inputs: self.inputs, hidden: self.hidden.to_vec(), friction: job.friction, upper: false };
         let mut model = Model::new(&shape, train, *gain, job.seed);
         let training =
-            Training { epochs: 80, batch: 128, rate: 0.005, decay: self.decay, every: 4, power: 1.0, seed: job.seed };
+            Training { epochs: 80, batch: 128, rate: 0.02, decay: self.decay, every: 4, power: 1.0, seed: job.seed };
         training.run(&mut model, train, validation);
         model
     }
@@ -220,7 +221,7 @@ fn least_squares(recording: &Recording, weighting: Weighting) -> (SVector<f64, J
     let error = |j: usize| test.iter().map(|&i| rows.residual(&unknowns, j, i).powi(2)).sum::<f64>();
     let errors = SVector::from_fn(|j, _| error(j) / test.len() as f64);
     let coefficients = |j: usize| {
-        let own = rows.layout.rigid() + Columns::Simple.width() * j;
+        let own = rows.layout.rigid() + Columns::Simple.width(false) * j;
         let (viscous, coulomb, offset) = (unknowns[own], unknowns[own + 1], unknowns[own + 2]);
         let rotor = rows.layout.inertial() + j;
         let alone = base.independent.iter().position(|&column| column == rotor);

@@ -15,6 +15,9 @@ use rand_chacha::rand_core::SeedableRng;
 /// Slope of the Coulomb friction at standstill, s/rad (002, section III-A).
 const SLOPE: f64 = 100.0;
 
+/// Place of the rotor inertia among a joint's coefficients.
+const ROTOR: usize = 3;
+
 /// All joints at one time.
 #[derive(Clone, Copy, Debug)]
 pub struct Sample<const N: usize> {
@@ -142,6 +145,24 @@ impl<const N: usize> Model<N> {
         self.inertia.len() + self.potential.len()
     }
 
+    /// Weight decay of each weight, of those of the networks' matrices alone: inertia and potential energy.
+    pub fn decays(&self, [inertia, potential]: [f64; 2]) -> Vec<f64> {
+        let of = |network: &Network, decay: f64| {
+            network.matrices().map(move |of_matrix| if of_matrix { decay } else { 0.0 })
+        };
+        let mut decays: Vec<f64> = of(&self.inertia, inertia).chain(of(&self.potential, potential)).collect();
+        decays.resize(self.weights.len(), 0.0);
+        decays
+    }
+
+    /// Takes rotor inertias that are negative to 0: no rotor has one, and M(q) would grow by as much.
+    pub fn bound_rotors(&mut self) {
+        let (width, begin) = (self.shape.friction.width(), self.networks());
+        for own in self.weights[begin..].chunks_exact_mut(width).filter(|own| own.len() > ROTOR) {
+            own[ROTOR] = own[ROTOR].max(0.0);
+        }
+    }
+
     /// Coefficients of a joint's linear layers, in units of effort.
     pub fn linear(&self, joint: usize) -> [f64; 4] {
         let (width, begin) = (self.shape.friction.width(), self.networks());
@@ -151,7 +172,7 @@ impl<const N: usize> Model<N> {
 
     /// Rotor inertia of a joint, on the joint's side.
     pub fn rotor(&self, joint: usize) -> f64 {
-        self.linear(joint)[3] * self.scales.gain[joint]
+        self.linear(joint)[ROTOR] * self.scales.gain[joint]
     }
 
     /// Mass matrix without rotors of the linear layer.

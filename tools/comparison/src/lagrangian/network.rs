@@ -91,6 +91,11 @@ impl Network {
         self.len() == 0
     }
 
+    /// True for each weight of a matrix, false for a bias.
+    pub fn matrices(&self) -> impl Iterator<Item = bool> + use<> {
+        self.layers().flat_map(|(from, to, _)| (0..(from + 1) * to).map(move |i| i < from * to))
+    }
+
     /// Random weights: normal with variance 1 / inputs of the layer; biases likewise with variance 1.
     pub fn random(&self, random: &mut impl Rng) -> Vec<f64> {
         let mut weights = Vec::with_capacity(self.len());

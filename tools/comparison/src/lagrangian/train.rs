@@ -21,8 +21,9 @@ pub struct Training {
     pub batch: usize,
     /// Learning rate at the begin; it falls to 0 along half a cosine.
     pub rate: f64,
-    /// Weight decay of the networks: part of a weight that a step at rate 1 takes away.
-    pub decay: f64,
+    /// Weight decay of the networks' matrices, inertia and potential energy: part of a weight that a step at rate 1
+    /// takes away.
+    pub decay: [f64; 2],
     /// Epochs from one validation to the next.
     pub every: usize,
     /// Power of the effort's RMS by which a joint's squared errors are divided; 2 makes all joints alike.
@@ -64,6 +65,7 @@ impl Training {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
         let mut order: Vec<usize> = (0..samples.len()).collect();
         let mut moments = vec![[0.0; 2]; model.weights.len()];
+        let decays = model.decays(self.decay);
         let (mut step, mut best) = (0, model.weights.clone());
         let mut outcome = Outcome { epoch: 0, validation: mean_square(model, validation).dot(&importance) };
         let steps = self.epochs * samples.len().div_ceil(self.batch);
@@ -75,7 +77,8 @@ impl Training {
                 model.error(&batch, &importance, &mut gradient);
                 let rate = 0.5 * self.rate * (1.0 + (std::f64::consts::PI * step as f64 / steps as f64).cos());
                 step += 1;
-                self.step(model, &gradient, &mut moments, step, rate);
+                adam(model, &gradient, &mut moments, &decays, step, rate);
+                model.bound_rotors();
             }
             if epoch % self.every == 0 || epoch == self.epochs {
                 let error = mean_square(model, validation).dot(&importance);
@@ -88,23 +91,22 @@ impl Training {
         model.weights = best;
         outcome
     }
+}
 
-    fn step<const N: usize>(
-        &self,
-        model: &mut Model<N>,
-        gradient: &[f64],
-        moments: &mut [[f64; 2]],
-        step: i32,
-        rate: f64,
-    ) {
-        let networks = model.networks();
-        let corrections = MOMENTS.map(|decay| 1.0 - decay.powi(step));
-        for (i, (weight, moment)) in model.weights.iter_mut().zip(moments).enumerate() {
-            moment[0] += (1.0 - MOMENTS[0]) * (gradient[i] - moment[0]);
-            moment[1] += (1.0 - MOMENTS[1]) * (gradient[i] * gradient[i] - moment[1]);
-            let decay = if i < networks { self.decay * *weight } else { 0.0 };
-            let [mean, square] = [moment[0] / corrections[0], moment[1] / corrections[1]];
-            *weight -= rate * (mean / (square.sqrt() + 1e-8) + decay);
-        }
+/// One step of Adam.
+fn adam<const N: usize>(
+    model: &mut Model<N>,
+    gradient: &[f64],
+    moments: &mut [[f64; 2]],
+    decays: &[f64],
+    step: i32,
+    rate: f64,
+) {
+    let corrections = MOMENTS.map(|decay| 1.0 - decay.powi(step));
+    for (i, (weight, moment)) in model.weights.iter_mut().zip(moments).enumerate() {
+        moment[0] += (1.0 - MOMENTS[0]) * (gradient[i] - moment[0]);
+        moment[1] += (1.0 - MOMENTS[1]) * (gradient[i] * gradient[i] - moment[1]);
+        let [mean, square] = [moment[0] / corrections[0], moment[1] / corrections[1]];
+        *weight -= rate * (mean / (square.sqrt() + 1e-8) + decays[i] * *weight);
     }
 }
