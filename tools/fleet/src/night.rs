@@ -87,10 +87,12 @@ pub fn night(
     if let Some(joint) = scope.joints.iter().find(|joint| !is_joint(fleet, joint)) {
         return Err(NightError::NoJoint { fleet: fleet.to_owned(), joint: joint.clone() });
     }
-    let (found, misplaced) = partitions(fleet, &scope.joints)?;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool = pool.map_err(|error| NightError::Threads { threads, reason: error.to_string() })?;
+    let (found, misplaced) = pool.install(|| partitions(fleet, &scope.joints))?;
     let mut night = match scope.stored {
         true => as_stored(fleet, &found),
-        false => summed(fleet, &found, threads, more)?,
+        false => pool.install(|| summed(fleet, &found, more))?,
     };
     night.misplaced.extend(misplaced);
     night.misplaced.sort_by(|one, other| one.path.cmp(&other.path));
@@ -148,17 +150,10 @@ fn of_these_files(partition: &Partition, known: &Entry) -> bool {
 }
 
 /// Sums of partitions, read where they are new or have changed.
-fn summed(
-    fleet: &Path,
-    found: &[Partition],
-    threads: usize,
-    more: &(dyn Fn() -> bool + Sync),
-) -> Result<Night, NightError> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    let pool = pool.map_err(|error| NightError::Threads { threads, reason: error.to_string() })?;
+fn summed(fleet: &Path, found: &[Partition], more: &(dyn Fn() -> bool + Sync)) -> Result<Night, NightError> {
     let one = |days: &&[Partition]| of_joint(fleet, days, more);
     let joints = of_joints(found);
-    let done: Vec<Vec<(Entry, bool)>> = pool.install(|| joints.par_iter().map(one).collect::<Result<_, _>>())?;
+    let done: Vec<Vec<(Entry, bool)>> = joints.par_iter().map(one).collect::<Result<_, _>>()?;
     let (entries, fresh): (Vec<Entry>, Vec<bool>) = done.into_iter().flatten().unzip();
     let read = fresh.iter().filter(|fresh| **fresh).count();
     Ok(Night { kept: fresh.len() - read, read, entries, misplaced: Vec::new() })

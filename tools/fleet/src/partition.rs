@@ -2,8 +2,9 @@
 //!
 //! Names that begin with `_` or `.` are not data, as in other programs that read such folders.
 
+use rayon::prelude::*;
 use std::collections::BTreeSet;
-use std::fs::File;
+use std::fs::{DirEntry, File, FileType};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
@@ -43,65 +44,115 @@ pub struct FolderError {
 /// # Errors
 /// [`FolderError`], of the folder itself; what cannot be read below is misplaced.
 pub fn partitions(folder: &Path, joints: &[String]) -> Result<(Vec<Partition>, Vec<Misplaced>), FolderError> {
-    let (mut found, mut misplaced) = (Vec::new(), Vec::new());
-    let wrong = |path: PathBuf, reason: &str| Misplaced { path, reason: reason.into() };
-    let joint_folders = match joints {
+    let folders = match joints {
         [] => entries(folder)?,
         // A joint that is named twice is one joint.
         named => named.iter().collect::<BTreeSet<_>>().into_iter().map(|name| joint_folder(folder, name)).collect(),
     };
-    for joint_folder in joint_folders {
-        let Some(joint) = value(&joint_folder, "joint=") else {
-            misplaced.push(wrong(joint_folder, "expected a folder joint=NAME"));
-            continue;
-        };
-        for day_folder in entries(&joint_folder).unwrap_or_default() {
-            let Some(day) = value(&day_folder, "day=").filter(|day| is_day(day)) else {
-                misplaced.push(wrong(day_folder, "expected a folder day=YYYY-MM-DD"));
-                continue;
-            };
-            let (files, other): (Vec<PathBuf>, Vec<PathBuf>) = entries(&day_folder)
-                .unwrap_or_default()
-                .into_iter()
-                .partition(|file| file.is_file() && file.extension().is_some_and(|ending| ending == "parquet"));
-            misplaced.extend(other.into_iter().map(|path| wrong(path, "expected a file *.parquet")));
-            if files.is_empty() {
-                misplaced.push(wrong(day_folder, "no file *.parquet"));
-            } else {
-                found.push(Partition { joint: joint.clone(), day, files });
-            }
-        }
-    }
+    let parts: Vec<_> = folders.par_iter().map(of_joint).collect();
+    let (found, misplaced): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
+    let (mut found, mut misplaced) = (found.concat(), misplaced.concat());
     found.sort();
     misplaced.sort_by(|one, other| one.path.cmp(&other.path));
     Ok((found, misplaced))
 }
 
-/// True where a fleet has a folder of this joint.
-pub fn is_joint(folder: &Path, name: &str) -> bool {
-    value(&joint_folder(folder, name), "joint=").is_some_and(|value| value == name)
+/// Partitions of one joint's folder, and what is none.
+fn of_joint(folder: &Found) -> (Vec<Partition>, Vec<Misplaced>) {
+    let (mut found, mut misplaced) = (Vec::new(), Vec::new());
+    let wrong = |path: PathBuf, reason: &str| Misplaced { path, reason: reason.into() };
+    let Some(joint) = folder.value("joint=") else {
+        return (found, vec![wrong(folder.path.clone(), "expected a folder joint=NAME")]);
+    };
+    for day_folder in entries(&folder.path).unwrap_or_default() {
+        let Some(day) = day_folder.value("day=").filter(|day| is_day(day)) else {
+            misplaced.push(wrong(day_folder.path, "expected a folder day=YYYY-MM-DD"));
+            continue;
+        };
+        let (files, other): (Vec<Found>, Vec<Found>) = entries(&day_folder.path)
+            .unwrap_or_default()
+            .into_iter()
+            .partition(|file| file.kind == Kind::File && file.path.extension().is_some_and(|end| end == "parquet"));
+        misplaced.extend(other.into_iter().map(|other| wrong(other.path, "expected a file *.parquet")));
+        if files.is_empty() {
+            misplaced.push(wrong(day_folder.path, "no file *.parquet"));
+        } else {
+            let files = files.into_iter().map(|file| file.path).collect();
+            found.push(Partition { joint: joint.clone(), day, files });
+        }
+    }
+    (found, misplaced)
 }
 
-fn joint_folder(folder: &Path, name: &str) -> PathBuf {
-    folder.join(format!("joint={name}"))
+/// True where a fleet has a folder of this joint.
+pub fn is_joint(folder: &Path, name: &str) -> bool {
+    joint_folder(folder, name).value("joint=").is_some_and(|value| value == name)
+}
+
+fn joint_folder(folder: &Path, name: &str) -> Found {
+    let path = folder.join(format!("joint={name}"));
+    Found { kind: Kind::of(&path), path }
+}
+
+/// A path below a fleet's folder.
+#[derive(Clone, Debug)]
+struct Found {
+    path: PathBuf,
+    kind: Kind,
+}
+
+/// Kind of a path; of a link that of its target.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Kind {
+    Folder,
+    File,
+    Other,
+}
+
+impl Kind {
+    fn of(path: &Path) -> Self {
+        path.metadata().map_or(Self::Other, |data| data.file_type().into())
+    }
+}
+
+impl From<FileType> for Kind {
+    fn from(found: FileType) -> Self {
+        match found {
+            found if found.is_dir() => Self::Folder,
+            found if found.is_file() => Self::File,
+            _ => Self::Other,
+        }
+    }
+}
+
+impl Found {
+    /// What a folder's listing tells is taken from there: asking for each path by itself takes longer than its name.
+    fn of(entry: &DirEntry) -> Self {
+        let path = entry.path();
+        let kind = match entry.file_type() {
+            Ok(found) if !found.is_symlink() => found.into(),
+            _ => Kind::of(&path),
+        };
+        Self { path, kind }
+    }
+
+    /// The value of a folder whose name is `key` and a value that is one plain name.
+    fn value(&self, key: &str) -> Option<String> {
+        let value = self.path.file_name()?.to_str()?.strip_prefix(key)?;
+        (self.kind == Kind::Folder && !value.is_empty()).then(|| value.to_owned())
+    }
 }
 
 /// Paths in a folder that are data, by name.
-fn entries(folder: &Path) -> Result<Vec<PathBuf>, FolderError> {
+fn entries(folder: &Path) -> Result<Vec<Found>, FolderError> {
     let unreadable = |source| FolderError { path: folder.to_owned(), source };
     let entries = std::fs::read_dir(folder).and_then(Iterator::collect::<io::Result<Vec<_>>>).map_err(unreadable)?;
     let data = |path: &PathBuf| {
         !path.file_name().and_then(|name| name.to_str()).is_some_and(|name| name.starts_with(['_', '.']))
     };
-    let mut paths: Vec<PathBuf> = entries.into_iter().map(|entry| entry.path()).filter(data).collect();
-    paths.sort();
-    Ok(paths)
-}
-
-/// The value of a folder whose name is `key` and a value that is one plain name.
-fn value(path: &Path, key: &str) -> Option<String> {
-    let value = path.file_name()?.to_str()?.strip_prefix(key)?;
-    (path.is_dir() && !value.is_empty()).then(|| value.to_owned())
+    let mut found: Vec<Found> = entries.iter().map(Found::of).filter(|found| data(&found.path)).collect();
+    found.sort_by(|one, other| one.path.cmp(&other.path));
+    Ok(found)
 }
 
 /// True for YYYY-MM-DD with a month and a day that exist in some year.
@@ -189,6 +240,23 @@ mod tests {
         for (name, there) in [("a", true), ("b", true), ("c", false), ("", false), ("a/day=2026-01-09", false)] {
             assert_eq!(is_joint(folder.path(), name), there, "{name:?}");
         }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_is_what_it_leads_to() {
+        use std::os::unix::fs::symlink;
+        let [fleet, elsewhere] = [(); 2].map(|()| tempfile::tempdir().unwrap());
+        let day = elsewhere.path().join("day=2026-01-01");
+        fs::create_dir(&day).unwrap();
+        fs::write(elsewhere.path().join("log"), "x").unwrap();
+        symlink(elsewhere.path().join("log"), day.join("1.parquet")).unwrap();
+        symlink(elsewhere.path().join("nowhere"), day.join("2.parquet")).unwrap();
+        symlink(elsewhere.path(), fleet.path().join("joint=a")).unwrap();
+        let (found, misplaced) = partitions(fleet.path(), &[]).unwrap();
+        assert_eq!((found.len(), &found[0].joint, found[0].files.len()), (1, &"a".to_owned(), 1));
+        assert_eq!(misplaced.len(), 2, "{misplaced:?}");
+        assert!(is_joint(fleet.path(), "a"));
     }
 
     #[test]

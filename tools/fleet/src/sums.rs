@@ -51,9 +51,10 @@ impl Sums {
 
     fn add_window(&mut self, window: &Window) {
         self.windows += 1.0;
-        let pairs =
-            window.row.iter().enumerate().flat_map(|(i, left)| window.row[i..].iter().map(move |right| left * right));
-        self.products.iter_mut().zip(pairs).for_each(|(sum, product)| *sum += product);
+        let mut products = self.products.iter_mut();
+        for (i, left) in window.row.iter().enumerate() {
+            window.row[i..].iter().zip(&mut products).for_each(|(right, sum)| *sum += left * right);
+        }
         self.with_torque.iter_mut().zip(window.row).for_each(|(sum, factor)| *sum += factor * window.torque);
         self.torque_squares += window.torque * window.torque;
         self.speeds[bin(&SPEEDS, window.row[UNKNOWNS - 1].abs())] += 1.0;

@@ -10,7 +10,6 @@
 
 use logs::{LogError, Table, Wanted, parquet_log};
 use std::path::Path;
-use wide::f64x4;
 
 /// Unknowns of the model, in this order.
 pub const NAMES: [&str; 6] = ["inertia", "gravity_sine", "gravity_cosine", "offset", "dry", "viscous"];
@@ -28,6 +27,18 @@ pub const WINDOW: f64 = 0.04;
 pub const SLOWEST: f64 = 0.03;
 /// Longest time between two rows of a window, s; a longer one is a gap.
 pub const LONGEST_PERIOD: f64 = 0.01;
+/// Angle up to which sine and cosine are summed up as their series, rad: 20 rad/s for half a window.
+const SMALL: f64 = 0.4;
+/// Series of sine, divided by the angle, and of cosine, by powers of the angle's square.
+const SERIES: [[f64; 2]; 7] = [
+    [1.0, 1.0],
+    [-1.0 / 6.0, -1.0 / 2.0],
+    [1.0 / 120.0, 1.0 / 24.0],
+    [-1.0 / 5_040.0, -1.0 / 720.0],
+    [1.0 / 362_880.0, 1.0 / 40_320.0],
+    [-1.0 / 39_916_800.0, -1.0 / 3_628_800.0],
+    [1.0 / 6_227_020_800.0, 1.0 / 479_001_600.0],
+];
 /// Longest time within one file, s: a file is of one day.
 pub const LONGEST_FILE: f64 = 86_400.0;
 
@@ -99,67 +110,71 @@ pub fn of_table(table: &Table, file: &str) -> Result<Recorded, BadFile> {
     check_clock(time, file)?;
     let mut recorded =
         Recorded { temperature: mean(table.number(TEMPERATURE).unwrap_or_default()), ..Recorded::default() };
-    let [sines, cosines] = sines_and_cosines(position);
-    let mut first = 0;
-    for last in 1..time.len() {
-        let period = time[last] - time[last - 1];
-        if period > LONGEST_PERIOD {
-            first = last;
-            continue;
-        }
-        recorded.seconds += period;
-        let duration = time[last] - time[first];
-        // Rows whose times are rounded: the window ends at the row that is nearest.
-        if duration < WINDOW - 0.5 * period {
-            continue;
-        }
-        let rows = first..last + 1;
-        let forward = velocity[first] > 0.0;
-        let moves = |v: &f64| if forward { *v >= SLOWEST } else { *v <= -SLOWEST };
-        if velocity[rows.clone()].iter().all(moves) {
-            let columns = [&sines, &cosines, velocity, torque].map(|values| &values[rows.clone()]);
-            let [sine, cosine, speed, torque] = means(columns, &time[rows.clone()]);
-            let row = [
-                (velocity[last] - velocity[first]) / duration,
-                sine,
-                cosine,
-                1.0,
-                if forward { 1.0 } else { -1.0 },
-                speed,
-            ];
-            recorded.windows.push(Window { row, torque, duration });
-        }
-        first = last;
+    let gap = |one: &f64, next: &f64| next - one > LONGEST_PERIOD;
+    let mut begin = 0;
+    for run in time.chunk_by(|one, next| !gap(one, next)) {
+        let rows = begin..begin + run.len();
+        begin = rows.end;
+        recorded.seconds += run[run.len() - 1] - run[0];
+        windows_of(run, [position, velocity, torque].map(|values| &values[rows.clone()]), &mut recorded.windows);
     }
     Ok(recorded)
 }
 
-/// Sine and cosine of each angle, four at a time.
-fn sines_and_cosines(angles: &[f64]) -> [Vec<f64>; 2] {
-    let mut both = [(); 2].map(|()| Vec::with_capacity(angles.len() + 3));
-    for four in angles.chunks(4) {
-        let mut lanes = [0.0; 4];
-        lanes[..four.len()].copy_from_slice(four);
-        let (sine, cosine) = f64x4::from(lanes).sin_cos();
-        both[0].extend(sine.to_array());
-        both[1].extend(cosine.to_array());
+/// Windows of a run without a gap: its times; position, velocity and torque.
+fn windows_of(time: &[f64], [position, velocity, torque]: [&[f64]; 3], windows: &mut Vec<Window>) {
+    let mut first = 0;
+    for last in 1..time.len() {
+        let duration = time[last] - time[first];
+        // Rows whose times are rounded: the window ends at the row that is nearest.
+        if duration < WINDOW - 0.5 * (time[last] - time[last - 1]) {
+            continue;
+        }
+        let rows = first..last + 1;
+        first = last;
+        let [slowest, fastest] = extremes(&velocity[rows.clone()]);
+        let direction = match () {
+            () if slowest >= SLOWEST => 1.0,
+            () if fastest <= -SLOWEST => -1.0,
+            () => continue,
+        };
+        let [q, v, torque] = [position, velocity, torque].map(|values| &values[rows.clone()]);
+        let [sine, cosine, speed, torque] = means(&time[rows], q, v, torque);
+        let row = [(v[v.len() - 1] - v[0]) / duration, sine, cosine, 1.0, direction, speed];
+        windows.push(Window { row, torque, duration });
     }
-    both.map(|mut values| {
-        values.truncate(angles.len());
-        values
-    })
 }
 
-/// Means over time by the trapezium rule, of columns as long as `time`.
-fn means<const N: usize>(columns: [&[f64]; N], time: &[f64]) -> [f64; N] {
-    let mut integrals = [0.0; N];
-    for row in 1..time.len() {
-        let half = 0.5 * (time[row] - time[row - 1]);
-        for (integral, values) in integrals.iter_mut().zip(columns) {
-            *integral += half * (values[row - 1] + values[row]);
-        }
+/// Least and greatest of some values.
+fn extremes(values: &[f64]) -> [f64; 2] {
+    values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], value| [least.min(*value), most.max(*value)])
+}
+
+/// Means over time by the trapezium rule: of sine and cosine of the position, of velocity and of torque.
+fn means(time: &[f64], position: &[f64], velocity: &[f64], torque: &[f64]) -> [f64; 4] {
+    // About the middle row, an angle whose sine and cosine are known: the others are small, and few terms are exact.
+    let middle = position[position.len() / 2];
+    let (sine, cosine) = middle.sin_cos();
+    let mut sums = [0.0; 4];
+    for row in 0..time.len() {
+        let weight = 0.5 * (time[(row + 1).min(time.len() - 1)] - time[row.saturating_sub(1)]);
+        let [small_sine, small_cosine] = sine_and_cosine(position[row] - middle);
+        let values = [small_sine, small_cosine, velocity[row], torque[row]];
+        sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += weight * value);
     }
-    integrals.map(|integral| integral / (time[time.len() - 1] - time[0]))
+    let [small_sine, small_cosine, velocity, torque] = sums.map(|sum| sum / (time[time.len() - 1] - time[0]));
+    [sine * small_cosine + cosine * small_sine, cosine * small_cosine - sine * small_sine, velocity, torque]
+}
+
+/// Sine and cosine of an angle; within [`SMALL`] by their series, up to the terms that a double cannot tell.
+fn sine_and_cosine(angle: f64) -> [f64; 2] {
+    if angle.abs() > SMALL {
+        let (sine, cosine) = angle.sin_cos();
+        return [sine, cosine];
+    }
+    let square = angle * angle;
+    let [sine, cosine] = SERIES.iter().rev().fold([0.0; 2], |[a, b], [c, d]| [a * square + c, b * square + d]);
+    [angle * sine, cosine]
 }
 
 fn check_clock(time: &[f64], file: &str) -> Result<(), BadFile> {
@@ -212,17 +227,34 @@ mod tests {
     }
 
     #[test]
-    fn sines_and_cosines_are_those_of_the_standard_library() {
-        for length in 0..9 {
-            let angles: Vec<f64> = (0..length).map(|i| 1.7 * f64::from(i)).collect();
-            assert_eq!(sines_and_cosines(&angles).map(|values| values.len()), [angles.len(); 2]);
-        }
-        // Turns of a joint, and many of them.
-        let angles: Vec<f64> = (-20_000..20_000).map(|i| 0.037 * f64::from(i)).collect();
-        let [sines, cosines] = sines_and_cosines(&angles);
-        for ((angle, sine), cosine) in angles.iter().zip(sines).zip(cosines) {
+    fn sine_and_cosine_are_those_of_the_standard_library() {
+        let close = |angle: f64, [sine, cosine]: [f64; 2]| {
             let errors = [sine - angle.sin(), cosine - angle.cos()];
             assert!(errors.iter().all(|error| error.abs() < 1e-15), "{angle}: {errors:?}");
+        };
+        // All of the series, both of its ends, and beyond them.
+        for angle in (-5_000..=5_000).map(|i| 1e-4 * f64::from(i)) {
+            close(angle, sine_and_cosine(angle));
+        }
+        // Means over a window in which a joint does not move, after many turns.
+        for middle in (-20_000..20_000).map(|i| 0.037 * f64::from(i)) {
+            let [sine, cosine, ..] = means(&[0.0, 0.1, 0.2], &[middle; 3], &[0.0; 3], &[0.0; 3]);
+            close(middle, [sine, cosine]);
+        }
+    }
+
+    #[test]
+    fn means_are_of_the_trapezium_rule_for_a_slow_joint_and_a_fast_one() {
+        let time = [1.0, 1.003, 1.01, 1.012, 1.02];
+        for speed in [0.1, 30.0, 60.0] {
+            let position = time.map(|t| 0.3 + speed * (t - 1.0));
+            let trapezia = |of: fn(f64) -> f64| {
+                let pairs = time.windows(2).zip(position.windows(2));
+                pairs.map(|(t, q)| 0.5 * (t[1] - t[0]) * (of(q[0]) + of(q[1]))).sum::<f64>() / (time[4] - time[0])
+            };
+            let [sine, cosine, mean, torque] = means(&time, &position, &[speed; 5], &[0.0, 1.0, 0.0, 0.0, 0.0]);
+            let errors = [sine - trapezia(f64::sin), cosine - trapezia(f64::cos), mean - speed, torque - 0.25];
+            assert!(errors.iter().all(|error| error.abs() < 1e-13), "{speed}: {errors:?}");
         }
     }
 
