@@ -10,6 +10,8 @@ use rigid_body::Robot;
 
 /// Robots of a test: every number of joints from 2 to 12 twice.
 const ROBOTS: u64 = 22;
+/// Robots whose parameters are counted: so many that the part within an interval is told to half a per cent.
+const COUNTED: u64 = 110;
 /// Noise of effort and position: 2 % of the effort's RMS, and an encoder of 18 bits.
 const NOISE: Measured = Measured { friction: 0.0, effort: EffortNoise::Part(0.02), position: 7e-6 };
 
@@ -33,13 +35,13 @@ fn coverage(departures: &[f64]) -> (f64, f64) {
 }
 
 #[test]
-fn unknowns_lie_within_their_95_percent_intervals_in_93_percent_of_cases_and_intervals_are_no_wider_than_they_must_be()
+fn unknowns_lie_within_their_95_percent_intervals_in_95_percent_of_cases_and_intervals_are_no_wider_than_they_must_be()
 {
     for (name, friction, seconds, harmonics) in
         [("short, rich motion", Friction::None, 10.0, 8), ("long motion", Friction::None, 20.0, 5)]
     {
         let part = if friction == Friction::None { 0.0 } else { 1.0 };
-        let all: Vec<f64> = (0..ROBOTS)
+        let all: Vec<f64> = (0..COUNTED)
             .into_par_iter()
             .flat_map(|seed| {
                 let truth = robot(seed);
@@ -49,8 +51,8 @@ fn unknowns_lie_within_their_95_percent_intervals_in_93_percent_of_cases_and_int
             .collect();
         let (within, rms) = coverage(&all);
         println!("{name}: {:.1} % of {} within, errors over standard errors {rms:.2} RMS", 100.0 * within, all.len());
-        assert!(within >= 0.93, "{name}: {within}");
-        assert!((0.6..1.05).contains(&rms), "{name}: {rms}");
+        assert!(within >= 0.95, "{name}: {within}");
+        assert!((0.9..1.05).contains(&rms), "{name}: {rms}");
     }
 }
 
