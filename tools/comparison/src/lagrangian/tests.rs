@@ -136,7 +136,7 @@ fn a_pendulum_of_two_links_and_its_friction_are_learned() {
             assert!((found - expected).abs() < 0.1 * expected, "{found} {expected}");
         }
     }
-    // Coulomb friction that differs by direction is not in the earlier model; its potential energy stands in for a part.
+    // Coulomb friction that differs by direction is not in the earlier model; potential energy stands in for a part.
     let (_, symmetric) = learned(Friction::Symmetric);
     assert!(symmetric > 2.0 * error, "{symmetric} {error}");
 }
