@@ -78,6 +78,7 @@ pub fn fit(robot: &Robot, motions: &Motions, used: &[usize], friction: Friction)
         effort: (0..joints).map(|j| motions.efforts.iter().map(|efforts| efforts[j]).collect()).collect(),
         group: vec![None; motions.states.len()],
         run: motions.motion.iter().map(|&motion| motion as u32).collect(),
+        still: vec![vec![false; motions.states.len()]; joints],
     };
     assert!(matches!(friction, Friction::None | Friction::Simple), "other friction has no columns here");
     used.iter().for_each(|&i| rows.group[i] = Some(i % GROUPS));

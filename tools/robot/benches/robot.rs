@@ -42,6 +42,7 @@ fn rows(robot: &Robot, samples: usize) -> Rows {
         friction: vec![vec![]; n],
         group: (0..samples).map(|i| Some(i * GROUPS / samples)).collect(),
         run: vec![0; samples],
+        still: vec![vec![false; samples]; n],
         rigid,
     }
 }

@@ -7,7 +7,7 @@
 
 use super::friction_columns::Friction;
 use super::recording::Recording;
-use identification::samples::Part;
+use identification::samples::{Part, Samples};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use rigid_body::Robot;
@@ -15,6 +15,9 @@ use rigid_body::inertia::PARAMETERS;
 use rigid_body::regressor::regressor;
 use std::ops::Range;
 
+/// Speed below which a joint stands still, part of its fastest, and the time that it has to do so, s.
+const SLOW: f64 = 0.01;
+const STANDS_FOR: f64 = 0.1;
 /// Groups of samples that are left out in turn.
 pub const GROUPS: usize = 4;
 
@@ -79,6 +82,8 @@ pub struct Rows {
     pub group: Vec<Option<usize>>,
     /// Continuous recording that each sample belongs to.
     pub run: Vec<u32>,
+    /// True for each joint and sample at which it stands still: its effort is whatever it has to be.
+    pub still: Vec<Vec<bool>>,
 }
 
 impl Rows {
@@ -118,7 +123,8 @@ impl Rows {
         }
         let friction = friction_columns(recording, layout.friction, load);
         let run = recording.joints[0].samples.run.clone();
-        Self { layout, rigid, friction, effort, group: groups(recording), run }
+        let still: Vec<Vec<bool>> = recording.joints.iter().map(|joint| still(&joint.samples)).collect();
+        Self { layout, rigid, friction, effort, group: groups(recording, &still), run, still }
     }
 
     /// Samples for training and validation in stretches without a gap.
@@ -178,7 +184,8 @@ impl Rows {
         (0..GROUPS)
             .into_par_iter()
             .map(|group| {
-                let used: Vec<usize> = samples.iter().copied().filter(|&i| self.group[i] == Some(group)).collect();
+                let used = samples.iter().copied().filter(|&i| self.group[i] == Some(group) && !self.still[j][i]);
+                let used: Vec<usize> = used.collect();
                 // Matrices: a product of blocks is faster than sums of rows.
                 let active: Vec<usize> = self.active(j);
                 let mut matrix = self.columns(j, &used, &active);
@@ -211,6 +218,15 @@ impl Rows {
     }
 }
 
+/// Samples at which a joint stands still: slower than a part of its fastest speed, for longer than a reversal takes.
+fn still(samples: &Samples) -> Vec<bool> {
+    let fastest = samples.velocity.iter().fold(0.0, |fastest: f64, v| fastest.max(v.abs()));
+    let least = (STANDS_FOR / samples.period()).ceil() as usize;
+    let slow = |v: &f64| v.abs() < SLOW * fastest;
+    let parts = samples.velocity.chunk_by(|one, next| slow(one) == slow(next));
+    parts.flat_map(|part| std::iter::repeat_n(slow(&part[0]) && part.len() >= least, part.len())).collect()
+}
+
 /// Friction columns of every joint.
 fn friction_columns(recording: &Recording, friction: Friction, load: Option<&[Vec<f64>]>) -> Vec<Vec<f64>> {
     let joints = recording.joints.iter().enumerate();
@@ -219,8 +235,10 @@ fn friction_columns(recording: &Recording, friction: Friction, load: Option<&[Ve
 }
 
 /// Groups of the samples for training and validation: runs, or parts of them where there are fewer than [`GROUPS`].
-fn groups(recording: &Recording) -> Vec<Option<usize>> {
-    let used = |i: &usize| matches!(recording.part(*i), Part::Train | Part::Validation);
+/// Samples at which all joints stand still are in none.
+fn groups(recording: &Recording, still: &[Vec<bool>]) -> Vec<Option<usize>> {
+    let moves = |i: usize| still.iter().any(|joint| !joint[i]);
+    let used = |i: &usize| matches!(recording.part(*i), Part::Train | Part::Validation) && moves(*i);
     let samples: Vec<usize> = (0..recording.len()).filter(used).collect();
     let run = &recording.joints[0].samples.run;
     let mut runs: Vec<u32> = samples.iter().map(|&i| run[i]).collect();
@@ -267,5 +285,30 @@ impl Normal {
     /// Sum of w (effort - row x)^2.
     pub fn residual(&self, x: &DVector<f64>) -> f64 {
         (self.square - 2.0 * self.right.dot(x) + x.dot(&(&self.matrix * x))).max(0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Samples every 10 ms with these velocities, rad/s.
+    fn samples(velocity: Vec<f64>) -> Samples {
+        let time = (0..velocity.len()).map(|i| 0.01 * i as f64).collect();
+        Samples { time, velocity, ..Samples::default() }
+    }
+
+    #[test]
+    fn a_joint_stands_below_a_hundredth_of_its_fastest_speed_for_a_tenth_of_a_second() {
+        let slow_for = |count: usize, speed: f64| {
+            let mut velocity = vec![-2.0; 40];
+            velocity[20..20 + count].fill(speed);
+            still(&samples(velocity)).iter().filter(|still| **still).count()
+        };
+        assert_eq!([slow_for(10, 0.0199), slow_for(10, -0.0199)], [10, 10]);
+        assert_eq!([slow_for(9, 0.0199), slow_for(10, 0.02)], [0, 0]);
+        // A reversal stands for no time, a joint that never moves for all of it.
+        assert!(!still(&samples((0..100).map(|i| f64::from(i - 50)).collect())).contains(&true));
+        assert!(!still(&samples(vec![0.0; 20])).contains(&true), "nothing is slower than a joint that never moves");
     }
 }

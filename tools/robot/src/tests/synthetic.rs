@@ -198,5 +198,6 @@ pub fn rows(truth: &Truth, motion: &[Vec<Reference>], columns: Friction, measure
     }
     let friction = samples.iter().map(|samples| columns.columns(samples, None, false)).collect();
     let group = (0..used).map(|i| Some(i * GROUPS / used)).collect();
-    Rows { layout, rigid, friction, effort, group, run: vec![0; used] }
+    let still = vec![vec![false; used]; n];
+    Rows { layout, rigid, friction, effort, group, run: vec![0; used], still }
 }
