@@ -19,7 +19,7 @@ const RELIEF: f64 = 0.5;
 const MODEL_BAND: f64 = 0.05;
 
 /// Least factor by which the images make the position error smaller.
-const LEAST_GAIN: f64 = 13.5;
+const LEAST_GAIN: f64 = 14.4;
 
 /// Largest part of the image's error that is left with the pair, and largest multiple of that of 003's last model.
 const LEFT: f64 = 0.6;
