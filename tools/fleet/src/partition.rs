@@ -126,7 +126,7 @@ impl From<FileType> for Kind {
 }
 
 impl Found {
-    /// What a folder's listing tells is taken from there: asking for each path by itself takes longer than its name.
+    /// Kind as the folder's listing tells it: asking for each path by itself takes longer than reading its name.
     fn of(entry: &DirEntry) -> Self {
         let path = entry.path();
         let kind = match entry.file_type() {

@@ -46,7 +46,8 @@ pub fn bodies(recording: &Recording) -> Result<Bodies, RobotFitError> {
     let used = first.group.iter().flatten().count();
     if used < LEAST {
         return Err(undetermined(format!(
-            "{used} samples for training and validation; at least {LEAST} are needed: record longer, or trim less"
+            "{used} samples for training and validation at which a joint moves; at least {LEAST} are needed: record longer, or trim \
+             less"
         )));
     }
     let base = base(&recording.robot, 1);
