@@ -123,3 +123,14 @@ fn a_table_without_rows_is_told() {
         assert!(matches!(error, LogError::Empty { .. }), "{error}");
     }
 }
+
+#[test]
+fn the_row_of_a_number_that_is_none_is_told_wherever_it_is() {
+    for at in [0, 63, 64, 65, 127, 128, 199] {
+        let mut values = vec![1.0; 200];
+        values[at] = f64::INFINITY;
+        let error = Table::of_numbers([("a", vec![0.0; 200]), ("b", values)]).all_finite(Path::new("a.parquet"));
+        let error = error.unwrap_err().to_string();
+        assert!(error.contains(&format!("row {},", at + 1)), "{at}: {error}");
+    }
+}

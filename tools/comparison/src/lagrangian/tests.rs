@@ -96,6 +96,17 @@ fn the_power_of_inertial_efforts_is_the_rate_of_kinetic_energy() {
     }
 }
 
+#[test]
+fn a_rotor_inertia_below_zero_is_taken_to_zero_and_nothing_else() {
+    let mut model = random_model(Inputs::Angles, Activation::Sine, Friction::Nonsymmetric);
+    let networks = model.networks();
+    model.weights[networks..].copy_from_slice(&[-0.1, -0.2, -0.3, -1e-9, 0.1, 0.2, 0.3, 1e-9, -1.0, -2.0, -3.0, 4.0]);
+    let before = model.weights.clone();
+    model.bound_rotors();
+    let changed: Vec<usize> = (0..before.len()).filter(|&i| before[i] != model.weights[i]).collect();
+    assert_eq!((changed, model.weights[networks + 3]), (vec![networks + 3], 0.0));
+}
+
 /// Friction of both pendulum's joints: viscous, Coulomb forward and backward.
 const FRICTION: [[f64; 3]; 2] = [[0.8, 1.5, 0.7], [0.4, 0.5, 1.1]];
 
