@@ -123,6 +123,7 @@ impl Leg {
         let robot = Robot {
             name: "leg".into(),
             links: joints.iter().map(|joint| joint.name.clone()).collect(),
+            shapes: vec![None; n],
             drives: vec![Drive::default(); n],
             coupling,
             limits: vec![Limits::default(); n],

@@ -100,7 +100,7 @@ impl From<RemoteError> for Ended {
 /// The robot, where one is named.
 fn robot(arguments: &Arguments) -> Result<Option<Value>, Ended> {
     let Some(path) = &arguments.robot else { return Ok(None) };
-    let (robot, _) = read_robot(path, &|name| std::env::var(name).ok()).map_err(|error| error.to_string())?;
+    let robot = read_robot(path, &|name| std::env::var(name).ok()).map_err(|error| error.to_string())?;
     let nodes = match arguments.joints.as_slice() {
         [] => (1..=robot.tree.len().min(127) as u8).collect(),
         named => named.to_vec(),

@@ -8,6 +8,7 @@
 //! |---|---|
 //! | [`urdf`], [`drives`], [`limits`], [`robot`] | the files, their checks, and the robot that they describe |
 //! | [`tree`], [`placement`], [`inertia`] | joints and links, frames, inertial parameters and their physical consistency |
+//! | [`shape`], [`ellipsoid`] | shapes of links, and ellipsoids that hold their mass |
 //! | [`newton_euler`] | tau from q, v, a |
 //! | [`regressor`], [`base_parameters`] | tau as a linear function of phi, and which combinations of phi it shows |
 //! | [`mass_matrix`], [`articulated_body`] | the mass matrix, and a from q, v, tau |
@@ -21,6 +22,7 @@
 pub mod articulated_body;
 pub mod base_parameters;
 pub mod drives;
+pub mod ellipsoid;
 pub mod inertia;
 pub mod limits;
 pub mod mass_matrix;
@@ -31,6 +33,7 @@ pub mod placement;
 pub mod random_tree;
 pub mod regressor;
 pub mod robot;
+pub mod shape;
 pub mod tree;
 pub mod urdf;
 

@@ -8,8 +8,9 @@ use crate::mass_matrix::mass_matrix;
 use crate::newton_euler::inverse_dynamics;
 use crate::pairs::{Pair, PairDefect, pairs};
 use crate::placement::Placement;
+use crate::shape::Placed;
 use crate::tree::{Joint, JointKind, Tree};
-use crate::urdf::{Allowed, Urdf, UrdfJoint, parse};
+use crate::urdf::{Allowed, Link, Urdf, UrdfJoint, parse};
 use nalgebra::{DMatrix, DVector, Vector3};
 
 /// A defect of a robot's files.
@@ -207,6 +208,9 @@ pub struct Robot {
     pub tree: Tree,
     /// Name of each joint's link.
     pub links: Vec<String>,
+    /// Collision shapes of each joint's link and of all that is fixed to it, in its frame; None where a part of its mass
+    /// has none.
+    pub shapes: Vec<Option<Vec<Placed>>>,
     /// Drive of each joint's motor.
     pub drives: Vec<Drive>,
     /// Motor velocities = coupling * joint velocities.
@@ -232,7 +236,7 @@ impl Robot {
         let in_toml = |defect| RobotError { file: toml_file.to_owned(), line: None, defect };
         let in_urdf = |defect| RobotError { file: urdf_file.to_owned(), line: None, defect };
         consistent(&description, &urdf).map_err(in_toml)?;
-        let Moving { tree, links, limits, frames } =
+        let Moving { tree, links, shapes, limits, frames } =
             moving(&description, &urdf).map_err(|(in_drives, defect)| match in_drives {
                 true => in_toml(defect),
                 false => in_urdf(defect),
@@ -240,7 +244,18 @@ impl Robot {
         let drives: Vec<Drive> = tree.joints.iter().map(|joint| description.joint[&joint.name]).collect();
         let coupling = coupling(&description, &tree, &drives).map_err(in_toml)?;
         let pairs = pairs(&description, &tree).map_err(|defect| in_toml(defect.into()))?;
-        Ok(Self { name: urdf.name, tree, links, drives, coupling, pairs, limits, frames, floor: description.floor })
+        Ok(Self {
+            name: urdf.name,
+            tree,
+            links,
+            shapes,
+            drives,
+            coupling,
+            pairs,
+            limits,
+            frames,
+            floor: description.floor,
+        })
     }
 
     /// Height of each of [`Self::frames`] above the base's origin at positions `q`, against gravity (along z without
@@ -370,6 +385,7 @@ fn consistent(description: &RobotDescription, urdf: &Urdf) -> Result<(), Defect>
 struct Moving {
     tree: Tree,
     links: Vec<String>,
+    shapes: Vec<Option<Vec<Placed>>>,
     limits: Vec<Limits>,
     frames: Vec<Frame>,
 }
@@ -399,8 +415,8 @@ fn moving(description: &RobotDescription, urdf: &Urdf) -> Result<Moving, (bool, 
         [_] => {}
         _ => return Err(in_urdf(Defect::Roots { roots })),
     }
-    let (joints, links, limits, frames) = (vec![], vec![], vec![], vec![]);
-    let mut walk = Walk { description, urdf, joints, links, limits, frames, reached: vec![] };
+    let (joints, links, shapes, limits, frames) = (vec![], vec![], vec![], vec![], vec![]);
+    let mut walk = Walk { description, urdf, joints, links, shapes, limits, frames, reached: vec![] };
     walk.behind(&roots[0], None, Placement::identity())?;
     if let Some(joint) = urdf.joints.iter().find(|joint| !walk.reached.contains(&joint.name)) {
         return Err(in_urdf(Defect::Ring { joint: joint.name.clone() }));
@@ -413,8 +429,8 @@ fn moving(description: &RobotDescription, urdf: &Urdf) -> Result<Moving, (bool, 
             return Err(in_urdf(Defect::Massless { link: link.clone(), joint: joint.name.clone() }));
         }
     }
-    let Walk { joints, links, limits, frames, .. } = walk;
-    Ok(Moving { tree: Tree { joints, gravity: Vector3::from(description.gravity) }, links, limits, frames })
+    let Walk { joints, links, shapes, limits, frames, .. } = walk;
+    Ok(Moving { tree: Tree { joints, gravity: Vector3::from(description.gravity) }, links, shapes, limits, frames })
 }
 
 struct Walk<'a> {
@@ -422,6 +438,7 @@ struct Walk<'a> {
     urdf: &'a Urdf,
     joints: Vec<Joint>,
     links: Vec<String>,
+    shapes: Vec<Option<Vec<Placed>>>,
     limits: Vec<Limits>,
     frames: Vec<Frame>,
     reached: Vec<String>,
@@ -430,7 +447,11 @@ struct Walk<'a> {
 impl Walk<'_> {
     /// Adds a link, which `placement` places in the link of the moving joint `carrier`, and all behind it.
     fn behind(&mut self, link: &str, carrier: Option<usize>, placement: Placement) -> Result<(), (bool, Defect)> {
-        let own = self.urdf.links.iter().find(|own| own.name == link).and_then(|own| own.inertia);
+        let written = self.urdf.links.iter().find(|own| own.name == link);
+        let own = written.and_then(|own| own.inertia);
+        if let (Some(carrier), Some(written)) = (carrier, written) {
+            self.shape(carrier, written, placement);
+        }
         if let Some(carrier) = carrier {
             self.frames.push(Frame { link: link.to_owned(), carrier, origin: placement.translation });
         }
@@ -467,9 +488,20 @@ impl Walk<'_> {
                 armature: 0.0,
             });
             self.links.push(joint.child.clone());
+            self.shapes.push(Some(vec![]));
             self.behind(&joint.child, Some(self.joints.len() - 1), Placement::identity())?;
         }
         Ok(())
+    }
+
+    /// Adds the shapes of a link to those of the moving joint that carries it.
+    fn shape(&mut self, carrier: usize, link: &Link, placement: Placement) {
+        let placed = |one: &Placed| Placed { placement: placement.then(&one.placement), shape: one.shape.clone() };
+        match (&link.shapes, &mut self.shapes[carrier]) {
+            (Some(own), Some(all)) if link.inertia.is_none() || !own.is_empty() => all.extend(own.iter().map(placed)),
+            (_, all) if link.inertia.is_some() => *all = None,
+            _ => {}
+        }
     }
 }
 

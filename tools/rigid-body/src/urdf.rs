@@ -1,7 +1,7 @@
-//! URDF: links with their inertias and joints, as far as dynamics needs them; shapes and everything unknown are passed
-//! over.
+//! URDF: links with their inertias and collision shapes, and joints, as far as dynamics needs them; everything else is
+//! passed over.
 //!
-//! The elements are those of the ROS XML specification of URDF (link/inertial, joint,
+//! The elements are those of the ROS XML specification of URDF (link/inertial, link/collision, joint,
 //! transmission/mechanicalReduction). Read with roxmltree, which keeps places: errors name lines, and identified
 //! values are written back into the text as it was.
 
@@ -9,6 +9,7 @@ use crate::inertia::LinkInertia;
 use crate::limits::Limits;
 use crate::placement::Placement;
 use crate::robot::{Defect, RobotError};
+use crate::shape::{Placed, Shape};
 use nalgebra::{Matrix3, Unit, Vector3};
 use roxmltree::{Document, Node};
 use std::collections::BTreeMap;
@@ -20,6 +21,8 @@ pub struct Link {
     pub name: String,
     /// Inertia about the link's frame; None without an `inertial` element.
     pub inertia: Option<LinkInertia>,
+    /// Its `collision` elements; None where one is of an unknown shape.
+    pub shapes: Option<Vec<Placed>>,
 }
 
 /// Motions that a joint allows.
@@ -150,8 +153,10 @@ impl Reader<'_> {
 
     fn link(&self, node: Node) -> Result<Link, RobotError> {
         let name = self.name(node, "link")?;
+        let shapes = elements(node, "collision").map(|collision| self.shape(collision));
+        let shapes = shapes.collect::<Result<Vec<_>, _>>()?.into_iter().collect();
         let Some(inertial) = node.children().find(|child| child.has_tag_name("inertial")) else {
-            return Ok(Link { name, inertia: None });
+            return Ok(Link { name, inertia: None, shapes });
         };
         let child = |tag: &'static str| {
             let found = inertial.children().find(|child| child.has_tag_name(tag));
@@ -170,12 +175,38 @@ impl Reader<'_> {
         let about_centre = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
         let body = LinkInertia::from_centre(mass, Vector3::zeros(), about_centre).in_parent(&self.origin(inertial)?);
         if mass == 0.0 && about_centre == Matrix3::zeros() {
-            return Ok(Link { name, inertia: None });
+            return Ok(Link { name, inertia: None, shapes });
         }
         if mass < 0.0 || mass > 0.0 && !could_be(&about_centre) || mass == 0.0 {
             return Err(self.error(node, Defect::Impossible { link: name, mass, principal: principal(&about_centre) }));
         }
-        Ok(Link { name, inertia: Some(body) })
+        Ok(Link { name, inertia: Some(body), shapes })
+    }
+
+    /// The shape of a `collision` element; None for one that is unknown.
+    fn shape(&self, collision: Node) -> Result<Option<Placed>, RobotError> {
+        let geometry = collision.children().find(|child| child.has_tag_name("geometry"));
+        let Some(shape) = geometry.and_then(|geometry| geometry.children().find(Node::is_element)) else {
+            return Ok(None);
+        };
+        let tag = shape.tag_name().name();
+        let missing =
+            |attribute: &str| self.error(shape, Defect::Missing { of: tag.to_owned(), value: attribute.to_owned() });
+        let length = |attribute: &str| {
+            let found = self.numbers(shape, attribute)?;
+            found.map(|[value]| value).ok_or_else(|| missing(attribute))
+        };
+        let shape = match tag {
+            "box" => Shape::Box { size: self.numbers(shape, "size")?.ok_or_else(|| missing("size"))? },
+            "cylinder" => Shape::Cylinder { radius: length("radius")?, length: length("length")? },
+            "sphere" => Shape::Sphere { radius: length("radius")? },
+            "mesh" => Shape::Mesh {
+                file: shape.attribute("filename").ok_or_else(|| missing("filename"))?.to_owned(),
+                scale: self.numbers(shape, "scale")?.unwrap_or([1.0; 3]),
+            },
+            _ => return Ok(None),
+        };
+        Ok(Some(Placed { placement: self.origin(collision)?, shape }))
     }
 
     fn joint(&self, node: Node) -> Result<UrdfJoint, RobotError> {

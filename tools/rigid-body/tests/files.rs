@@ -1,6 +1,7 @@
 //! Bad files: each error names file, joint or link, and what to do.
 
 use rigid_body::pairs::Pair;
+use rigid_body::shape::Shape;
 use rigid_body::{LinkInertia, Robot};
 
 const LINK: &str = r#"<inertial><origin xyz="0 0 0.1"/><mass value="2"/>
@@ -37,6 +38,39 @@ fn a_robot_is_read_and_what_is_fixed_to_a_link_is_part_of_it() {
     assert!((forearm.centre().z - 0.25).abs() < 1e-12);
     assert_eq!((robot.gains()[(0, 0)], robot.gains()[(1, 1)]), (2.0, 50.0));
     assert_eq!(robot.rotor_matrix(&[0.0, 1e-4])[(1, 1)], 0.25);
+}
+
+#[test]
+fn shapes_of_a_link_are_placed_in_it_and_none_are_known_where_a_part_of_the_mass_has_none() {
+    let collision = |rest: &str| format!("<collision>{rest}</collision>");
+    let shapes = |link: &str, tool: &str| {
+        let text = urdf().replace("name=\"lower\">", &format!("name=\"lower\">{link}"));
+        robot(TOML, &text.replace("name=\"tool\">", &format!("name=\"tool\">{tool}"))).map(|robot| robot.shapes)
+    };
+    let rod = collision("<geometry><cylinder radius=\"0.05\" length=\"0.3\"/></geometry>");
+    let mesh = collision("<origin xyz=\"0 0 0.1\"/><geometry><mesh filename=\"a.stl\" scale=\"1 2 3\"/></geometry>");
+    let found = shapes(&rod, &mesh).unwrap();
+    assert_eq!(found[0], None);
+    let Some([rod_found, mesh_found]) = found[1].as_deref() else { panic!("{found:?}") };
+    assert_eq!(rod_found.shape, Shape::Cylinder { radius: 0.05, length: 0.3 });
+    assert_eq!(mesh_found.shape, Shape::Mesh { file: "a.stl".into(), scale: [1.0, 2.0, 3.0] });
+    let heights = [rod_found, mesh_found].map(|placed| placed.placement.translation.z);
+    assert!(heights[0] == 0.0 && (heights[1] - 0.4).abs() < 1e-12, "{heights:?}");
+    let odd = collision("<geometry><capsule radius=\"1\"/></geometry>");
+    for (link, tool) in [("", rod.as_str()), (&rod, ""), (&rod, &odd), (&odd, &rod), (&rod, &collision(""))] {
+        assert_eq!(shapes(link, tool).unwrap(), [None, None], "{link} {tool}");
+    }
+    for (geometry, expected) in [
+        ("<box size=\"1 2\"/>", "size is \"1 2\", expected 3 finite numbers"),
+        ("<box/>", "box has no size; add it"),
+        ("<cylinder radius=\"1\"/>", "cylinder has no length; add it"),
+        ("<sphere/>", "sphere has no radius; add it"),
+        ("<mesh/>", "mesh has no filename; add it"),
+        ("<mesh filename=\"a.stl\" scale=\"x\"/>", "scale is \"x\""),
+    ] {
+        let error = shapes(&collision(&format!("<geometry>{geometry}</geometry>")), "").unwrap_err();
+        assert!(error.starts_with("two.urdf:7: ") && error.contains(expected), "{error}");
+    }
 }
 
 #[test]

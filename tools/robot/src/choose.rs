@@ -52,11 +52,15 @@ pub fn bodies(recording: &Recording) -> Result<Bodies, RobotFitError> {
     }
     let base = base(&recording.robot, 1);
     let simplest = least_squares::solve(&first, &base, Weighting::ByJoint);
-    let prior = Prior::of(&recording.robot);
+    let (prior, outside) = Prior::of(&recording.robot).within(&recording.bounds.ellipsoids);
     let groups = weighted(&first, &simplest.noise);
     let start = convex::solve(&sum(&groups, None), first.layout, &prior, MIDDLE).unwrap_or(simplest.unknowns.clone());
     let load = first.rigid_efforts(&start);
-    let mut notes = Vec::new();
+    let mut notes = recording.bounds.notes.clone();
+    notes.extend(outside.into_iter().map(|j| {
+        let link = &recording.robot.links[j];
+        format!("link {link} is not held to its collision shapes: its inertia in the URDF does not fit in an ellipsoid around them")
+    }));
     let candidates: Vec<Candidate> = (Friction::ALL.into_iter())
         .map(|friction| {
             let rows = first.clone().again(recording, friction, Some(&load));

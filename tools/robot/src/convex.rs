@@ -6,6 +6,9 @@
 //! Identification: A Convex Programming Approach, 2020). The logarithm keeps P positive definite. A rotor inertia J
 //! has gamma (J / J0 - log J) likewise. Friction is free.
 //!
+//! Where a link lies within an ellipsoid ([`crate::bounds`]) its room r = tr(Q P) stays above 0, and so do all linear
+//! conditions of this kind: gamma (r / r0 - log r) is added, r0 the room of the prior, a tenth of its mass at the least.
+//!
 //! A step is computed in coordinates of its own at every point: P = L (1 + T) L^T with L L^T = P of the point and T
 //! symmetric, J times 1 + t. There the logarithm's Hessian is gamma times the identity however thin a link becomes. In
 //! the parameters themselves it grows with the inverse square of P's smallest eigenvalue and hides the sum of squares
@@ -14,6 +17,7 @@
 use super::equations::{Layout, Normal};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix4};
 use rigid_body::Robot;
+use rigid_body::ellipsoid::Ellipsoid;
 use rigid_body::inertia::{LinkInertia, PARAMETERS};
 use rigid_body::mass_matrix::motion_subspace;
 
@@ -21,6 +25,9 @@ use rigid_body::mass_matrix::motion_subspace;
 const SPREAD: f64 = 0.01;
 /// A rotor's prior where none is stated, part of its link's inertia about the axis.
 const ROTOR: f64 = 0.1;
+/// Least room of a prior that is the measure of the room, part of its mass: one nearer to the ellipsoid would hold the
+/// mass at the surface.
+const ROOM: f64 = 0.1;
 /// Parts of its own curvature that are added in turn: friction columns may depend on each other.
 const DAMPING: [f64; 4] = [1e-12, 1e-10, 1e-8, 1e-6];
 /// Newton steps at the most.
@@ -33,6 +40,16 @@ const DECREMENT: f64 = 1e-9;
 pub struct Prior {
     links: Vec<Matrix4<f64>>,
     rotors: Vec<Option<f64>>,
+    rooms: Vec<Option<Room>>,
+}
+
+/// Room of a link in its ellipsoid.
+#[derive(Clone, Debug)]
+struct Room {
+    /// Q of the ellipsoid.
+    matrix: Matrix4<f64>,
+    /// Measure of the room, kg.
+    prior: f64,
 }
 
 impl Prior {
@@ -50,7 +67,24 @@ impl Prior {
             robot.drives[j].rotor_inertia.is_none().then_some(ROTOR * own)
         };
         let rotors = robot.tree.joints.iter().enumerate().map(rotor).collect();
-        Self { links, rotors }
+        Self { links, rotors, rooms: vec![None; robot.tree.joints.len()] }
+    }
+
+    /// The same, with the mass of each link within its ellipsoid. A link whose own prior is not has no bound; its index is
+    /// among those returned.
+    pub fn within(mut self, ellipsoids: &[Option<Ellipsoid>]) -> (Self, Vec<usize>) {
+        let mut outside = vec![];
+        for (j, ellipsoid) in ellipsoids.iter().enumerate() {
+            let Some(ellipsoid) = ellipsoid else { continue };
+            let room = ellipsoid.room(&self.links[j]);
+            if room <= 0.0 {
+                outside.push(j);
+                continue;
+            }
+            let mass = self.links[j][(3, 3)];
+            self.rooms[j] = Some(Room { matrix: ellipsoid.matrix(), prior: room.max(ROOM * mass) });
+        }
+        (self, outside)
     }
 
     /// The prior's own parameters; friction is zero.
@@ -146,11 +180,18 @@ impl Task<'_> {
     /// The cost; None outside of what is physical.
     fn cost(&self, x: &DVector<f64>) -> Option<f64> {
         let mut cost = 0.5 * self.normal.residual(x);
-        for (link, inverse) in links(x, self.layout).iter().zip(&self.inverses) {
+        for ((link, inverse), room) in links(x, self.layout).iter().zip(&self.inverses).zip(&self.prior.rooms) {
             let pseudo = link.pseudo_inertia();
             let root = pseudo.cholesky()?;
             let log = 2.0 * (0..4).map(|i| root.l()[(i, i)].ln()).sum::<f64>();
             cost += self.gamma * ((inverse * pseudo).trace() - log);
+            if let Some(Room { matrix, prior }) = room {
+                let room = matrix.dot(&pseudo);
+                if room <= 0.0 {
+                    return None;
+                }
+                cost += self.gamma * (room / prior - room.ln());
+            }
         }
         for (k, prior) in self.prior.rotors.iter().enumerate() {
             let rotor = x[self.layout.inertial() + k];
@@ -189,10 +230,19 @@ impl Task<'_> {
         for (j, (link, inverse)) in links(x, self.layout).iter().zip(&self.inverses).enumerate() {
             let root = link.pseudo_inertia().cholesky()?.l();
             let weighted = root.tr_mul(inverse) * root;
+            let first = PARAMETERS * j;
             for (k, direction) in symmetric().iter().enumerate() {
-                let at = PARAMETERS * j + k;
-                gradient[at] += self.gamma * (weighted.dot(direction) - direction.trace());
-                hessian[(at, at)] += self.gamma;
+                gradient[first + k] += self.gamma * (weighted.dot(direction) - direction.trace());
+                hessian[(first + k, first + k)] += self.gamma;
+            }
+            if let Some(Room { matrix, prior }) = &self.prior.rooms[j] {
+                let weighted = root.tr_mul(matrix) * root;
+                let slope = DVector::from_iterator(PARAMETERS, symmetric().iter().map(|one| weighted.dot(one)));
+                let room = weighted.trace();
+                gradient.rows_mut(first, PARAMETERS).axpy(self.gamma * (1.0 / prior - 1.0 / room), &slope, 1.0);
+                let curvature = &slope * slope.transpose() * (self.gamma / (room * room));
+                let mut own = hessian.view_mut((first, first), (PARAMETERS, PARAMETERS));
+                own += curvature;
             }
         }
         for (k, prior) in self.prior.rotors.iter().enumerate() {

@@ -19,6 +19,7 @@
 //! [`controller`] moves a robot by what came out. [`excite`] finds the motion of all joints that a recording should be
 //! of.
 
+pub mod bounds;
 pub mod choose;
 pub mod controller;
 pub mod convex;

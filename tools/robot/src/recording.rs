@@ -19,6 +19,7 @@
 //! All other keys are those of `docs/dataset.md` and hold for all joints; `[rigid]` is what the robot's links are. A
 //! delay of the effort is not identified, but can be given (`filter.effort_lag`).
 
+use super::bounds::Bounds;
 use identification::choice::Folds;
 use identification::dataset::description::{PositionColumn, PositionUnit};
 use identification::dataset::load::Environment;
@@ -148,6 +149,8 @@ pub struct Recording {
     pub robot: Robot,
     /// The text of its URDF.
     pub urdf: String,
+    /// Ellipsoids around its links.
+    pub bounds: Bounds,
     /// Every joint as a data set of its own, in the robot's order.
     pub joints: Vec<Prepared>,
     /// Name in the description.
@@ -229,7 +232,8 @@ pub fn record(path: &Path, environment: Environment) -> Result<Recording, RobotF
     };
     let folder = path.parent().unwrap_or(Path::new(""));
     let robot_file = folder.join(expanded(&robot, environment).map_err(wrong)?);
-    let (robot, urdf) = read_robot(&robot_file, environment)?;
+    let RobotFiles { robot, urdf, urdf_file } = read_files(&robot_file, environment)?;
+    let bounds = Bounds::of(&robot, &urdf_file);
     let name = common.get("name").and_then(toml::Value::as_str).unwrap_or("robot").to_owned();
     let mut prepared = Vec::new();
     for joint in &robot.tree.joints {
@@ -257,25 +261,36 @@ pub fn record(path: &Path, environment: Environment) -> Result<Recording, RobotF
             robot_file.display()
         )));
     }
-    let mut recording = Recording { robot, urdf, joints: prepared, name, path: path.to_owned() };
+    let mut recording = Recording { robot, urdf, bounds, joints: prepared, name, path: path.to_owned() };
     check(&recording, path)?;
     recording.join_pairs();
     Ok(recording)
 }
 
-/// Reads the robot that the TOML file at `path` describes, and the text of its URDF; `environment` gives the variables
-/// in its path.
+/// Reads the robot that the TOML file at `path` describes; `environment` gives the variables in the path of its URDF.
 ///
 /// # Errors
 /// [`RobotFitError`], with file, joint and what to do.
-pub fn read_robot(path: &Path, environment: Environment) -> Result<(Robot, String), RobotFitError> {
+pub fn read_robot(path: &Path, environment: Environment) -> Result<Robot, RobotFitError> {
+    Ok(read_files(path, environment)?.robot)
+}
+
+/// A robot with its URDF's text and place.
+struct RobotFiles {
+    robot: Robot,
+    urdf: String,
+    urdf_file: PathBuf,
+}
+
+fn read_files(path: &Path, environment: Environment) -> Result<RobotFiles, RobotFitError> {
     let text = read(path)?;
     let described = rigid_body::robot::describe(&text, &path.to_string_lossy())?;
     let wrong = |reason| RobotFitError::Description { path: path.to_owned(), reason };
     let urdf_file = expanded(&described.urdf, environment).map_err(wrong)?;
     let urdf_file = path.parent().unwrap_or(Path::new("")).join(urdf_file);
     let urdf = read(&urdf_file)?;
-    Ok((Robot::new(&text, &path.to_string_lossy(), &urdf, &urdf_file.to_string_lossy())?, urdf))
+    let robot = Robot::new(&text, &path.to_string_lossy(), &urdf, &urdf_file.to_string_lossy())?;
+    Ok(RobotFiles { robot, urdf, urdf_file })
 }
 
 fn check(recording: &Recording, path: &Path) -> Result<(), RobotFitError> {

@@ -52,7 +52,7 @@ impl ArmChoice {
     /// The arm, where one is named; says on standard error which actuators are too weak for their links.
     pub fn read(&self) -> Result<Option<Arm>, CommandError> {
         let Some(path) = &self.robot else { return Ok(None) };
-        let (robot, _) = read_robot(path, &|name| std::env::var(name).ok())?;
+        let robot = read_robot(path, &|name| std::env::var(name).ok())?;
         each_turns_alone(&robot, path)?;
         if let Some(folder) = self.actuators.as_deref().filter(|folder| !folder.is_dir()) {
             return Err(CommandError::Arguments(format!("--actuators {}: there is no such folder", folder.display())));

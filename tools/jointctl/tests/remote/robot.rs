@@ -80,7 +80,7 @@ fn off(joints: &[RemoteJoint]) {
 pub fn all_joints_of_an_arm_move_together_and_are_left_disabled() {
     let served = Served::arm(&arm());
     let joints = joints(&served);
-    let (mut robot, _) = read_robot(&arm(), &|_| None).unwrap();
+    let mut robot = read_robot(&arm(), &|_| None).unwrap();
     robot.pairs = vec![Pair { joints: SHARING, band: 0.05 }];
     let controller = Controller::of_urdf(robot, 30.0);
     let motion = |reach| RobotMotion {

@@ -114,7 +114,7 @@ impl Served {
         let bus = format!("virtual:remote-arm-{}", BUSES.fetch_add(1, Ordering::Relaxed));
         let transport = bus::open(&bus).unwrap();
         let stop = Arc::new(AtomicBool::new(false));
-        let (robot, _) = robot::read_robot(robot, &|_| None).unwrap();
+        let robot = robot::read_robot(robot, &|_| None).unwrap();
         let mut parameters = ActuatorParameters::reference().aligned();
         let mut setup = Setup::of(&parameters);
         setup.configuration.limits.command_deadline = DEADLINE;

@@ -115,7 +115,7 @@ impl Served {
     /// The arm of `tools/jointctl/robots`, with these nodes.
     pub fn arm(nodes: &[u8]) -> Self {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../jointctl/robots/arm/robot.toml");
-        let (robot, _) = read_robot(path.as_ref(), &|_| None).unwrap();
+        let robot = read_robot(path.as_ref(), &|_| None).unwrap();
         let told = skeleton(&robot, nodes).unwrap();
         let joints = Joints::of_arm(robot.tree, nodes);
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();

@@ -58,6 +58,7 @@ pub fn robot(seed: u64) -> Truth {
         frames: vec![],
         pairs: vec![],
         floor: None,
+        shapes: vec![None; joints],
         drives: drives.collect(),
         tree,
         coupling,

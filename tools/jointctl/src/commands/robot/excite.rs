@@ -53,7 +53,7 @@ impl RobotExcite {
     /// Runs the command.
     pub fn run(&self) -> Result<(), CommandError> {
         let progress = Terminal::new();
-        let (robot, _) = read_robot(&self.robot, &|name| std::env::var(name).ok())?;
+        let robot = read_robot(&self.robot, &|name| std::env::var(name).ok())?;
         let tables = robot.tree.joints.iter().map(|joint| self.out.join(format!("{}.csv", joint.name)));
         self.force.permits(tables.chain([self.out.join(COEFFICIENTS)]))?;
         let mut task = Task::of(&robot, &self.robot, self.acceleration)?;

@@ -84,7 +84,7 @@ impl RobotMove {
         if let Some(out) = &self.out {
             self.force.permits_in(out, &[TABLE, DESCRIPTION])?;
         }
-        let (robot, _) = read_robot(&self.robot, &|name| std::env::var(name).ok())?;
+        let robot = read_robot(&self.robot, &|name| std::env::var(name).ok())?;
         let names: Vec<String> = robot.tree.joints.iter().map(|joint| joint.name.clone()).collect();
         let nodes = self.nodes(&robot)?;
         let references = self.references(&names)?;
