@@ -21,6 +21,8 @@ const SLOPE_ROOM: f64 = 1.5;
 /// Trained speeds up to which a model without network counts: its terms either have an end or grow with the speed, as
 /// friction does. A network knows nothing beyond what it was trained on.
 const REACH: f64 = 2.0;
+/// Least part of a friction that its slope over temperature may leave at the warm end of the box, widened by the margin.
+const LEAST_WARM: f64 = 0.1;
 /// A loop gain through the measured torque that no image may exceed.
 const TORQUE_GAIN_LIMIT: f64 = 0.5;
 
@@ -159,6 +161,24 @@ fn reaching(reach: f64, (low, high): (f64, f64)) -> (f64, f64) {
     (low.min(reach * low), high.max(reach * high))
 }
 
+/// The range of temperatures with its warm end `reach` times as far away from the cold one, where heat lowers friction: what is
+/// given beyond the trained range is less than within. It ends where the slope leaves little of a friction.
+fn warmer(reach: f64, (low, high): (f64, f64), margin: f64, friction: &FloatModel) -> (f64, f64) {
+    let factors = [
+        (Term::ViscousTemperature, friction.viscous_temperature),
+        (Term::CoulombTemperature, friction.coulomb_temperature),
+    ];
+    let factors = factors.into_iter().filter(|(term, _)| friction.terms.contains(*term)).map(|(_, factor)| factor);
+    let (least, most) = factors.fold((0.0, 0.0), |(least, most): (f64, f64), k| (least.min(k), most.max(k)));
+    if most > 0.0 || friction.terms.contains(Term::Temperature) {
+        return (low, high);
+    }
+    // The physical model is clamped one margin beyond the box.
+    let little = friction.reference_temperature + (LEAST_WARM - 1.0) / least;
+    let end = (little + 0.5 * margin * low) / (1.0 + 0.5 * margin);
+    (low, high.max((low + reach * (high - low)).min(end)))
+}
+
 fn quantized(
     samples: &Samples,
     physical: &Identified,
@@ -166,6 +186,8 @@ fn quantized(
     options: &Options,
     reach: f64,
 ) -> Result<FrictionParameters, FitError> {
+    const VELOCITY: usize = Signal::Velocity as usize;
+    const TEMPERATURE: usize = Signal::Temperature as usize;
     let depends = quantize::physical::depends_on(&physical.friction);
     let range = |column: &[f64]| coverage::ends(coverage::used(samples).map(|i| column[i]).collect());
     let columns: [&[f64]; SIGNALS] = [
@@ -181,7 +203,12 @@ fn quantized(
         (depends[i] || network).then(|| {
             let ends = range(columns[i]);
             let ends = if !network && alike_both_ways(i, &physical.friction) { both_ways(ends) } else { ends };
-            if i == Signal::Velocity as usize && !learned.has_network() { reaching(reach, ends) } else { ends }
+            match i {
+                _ if learned.has_network() => ends,
+                VELOCITY => reaching(reach, ends),
+                TEMPERATURE => warmer(reach, ends, options.margin, &physical.friction),
+                _ => ends,
+            }
         })
     });
     let domain = quantize::domain(&limits, options.margin, physical.friction.reference_temperature)?;
@@ -226,6 +253,32 @@ mod tests {
         assert_eq!(reaching(2.0, (0.1, 0.3)), (0.1, 0.6));
         assert_eq!(reaching(2.0, (-0.3, -0.1)), (-0.6, -0.1));
         assert_eq!(reaching(1.0, (-0.5, 0.3)), (-0.5, 0.3));
+    }
+
+    #[test]
+    fn temperatures_reach_as_far_again_where_heat_lowers_friction_and_a_tenth_of_it_is_left() {
+        let at = |viscous, coulomb, terms: &[Term]| {
+            let terms = Terms::of(terms);
+            let model = FloatModel {
+                terms,
+                viscous_temperature: viscous,
+                coulomb_temperature: coulomb,
+                reference_temperature: 30.0,
+                ..FloatModel::default()
+            };
+            warmer(2.0, (20.0, 40.0), 0.5, &model)
+        };
+        let both = [Term::ViscousTemperature, Term::CoulombTemperature];
+        assert_eq!(at(-0.01, -0.005, &both), (20.0, 60.0));
+        // The clamped end is a quarter of the box above its warm end: 70 °C, 40 K above the reference.
+        assert_eq!(at(-0.9 / 40.0, 0.0, &both), (20.0, 60.0));
+        let (_, steeper) = at(-0.9 / 39.0, 0.0, &both);
+        assert!(steeper < 60.0 && (steeper + 0.25 * (steeper - 20.0) - 69.0).abs() < 1e-9, "{steeper}");
+        assert_eq!(at(-0.09, 0.0, &both), (20.0, 40.0), "the trained range stays, however steep");
+        assert_eq!(at(-0.01, 0.001, &both), (20.0, 40.0), "friction that rises is no reason");
+        assert_eq!(at(-0.01, 0.001, &both[..1]), (20.0, 60.0), "nor a term that is not there");
+        assert_eq!(at(-0.01, -0.01, &[Term::ViscousTemperature, Term::Temperature]), (20.0, 40.0));
+        assert_eq!(warmer(1.0, (20.0, 40.0), 0.5, &FloatModel::default()), (20.0, 40.0));
     }
 
     #[test]
