@@ -1,9 +1,9 @@
 //! An ellipsoid around a body, and the room that a distribution of mass has in it.
 //!
-//! Mass within { x : (x - c)^T A (x - c) <= 1 } has tr(Q P) >= 0, P its pseudo-inertia and Q = [-A, A c; c^T A, 1 - c^T A c] (P. Wensing,
-//! S. Kim, J.-J. Slotine, Linear Matrix Inequalities for Physically Consistent Inertial Parameter Identification, 2018,
-//! theorem 4). The ellipsoid of least volume is found by L. Khachiyan's algorithm, Rounding of Polytopes in the Real
-//! Number Model of Computation, 1996.
+//! Mass within { x : (x - c)^T A (x - c) <= 1 } has tr(Q P) >= 0, P its pseudo-inertia and
+//! Q = [-A, A c; c^T A, 1 - c^T A c] (P. Wensing, S. Kim, J.-J. Slotine, Linear Matrix Inequalities for Physically
+//! Consistent Inertial Parameter Identification, 2018). The ellipsoid of least volume is found by L. Khachiyan's
+//! algorithm, Rounding of Polytopes in the Real Number Model of Computation, 1996.
 
 use crate::shape::directions;
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
@@ -23,8 +23,8 @@ pub struct Ellipsoid {
 }
 
 impl Ellipsoid {
-    /// An ellipsoid that holds all points and has about the least volume; None where they lie in a plane, are fewer than
-    /// four, or not finite.
+    /// An ellipsoid that holds all points and has about the least volume; None where they lie in a plane, are fewer
+    /// than four, or not finite.
     pub fn around(points: &[Vector3<f64>]) -> Option<Self> {
         let extreme = extreme(points);
         let lifted: Vec<Vector4<f64>> = extreme.iter().map(|point| point.push(1.0)).collect();

@@ -208,8 +208,8 @@ pub struct Robot {
     pub tree: Tree,
     /// Name of each joint's link.
     pub links: Vec<String>,
-    /// Collision shapes of each joint's link and of all that is fixed to it, in its frame; None where a part of its mass
-    /// has none.
+    /// Collision shapes of each joint's link and of all that is fixed to it, in its frame; None where a part of its
+    /// mass has none.
     pub shapes: Vec<Option<Vec<Placed>>>,
     /// Drive of each joint's motor.
     pub drives: Vec<Drive>,

@@ -6,8 +6,8 @@
 //! Identification: A Convex Programming Approach, 2020). The logarithm keeps P positive definite. A rotor inertia J
 //! has gamma (J / J0 - log J) likewise. Friction is free.
 //!
-//! Where a link lies within an ellipsoid ([`crate::bounds`]) its room r = tr(Q P) stays above 0, and so do all linear
-//! conditions of this kind: gamma (r / r0 - log r) is added, r0 the room of the prior, a tenth of its mass at the least.
+//! Where a link lies within an ellipsoid ([`crate::bounds`]) its room r = tr(Q P) stays above 0: gamma (r / r0 - log r)
+//! is added, r0 the room of the prior, a tenth of its mass at the least.
 //!
 //! A step is computed in coordinates of its own at every point: P = L (1 + T) L^T with L L^T = P of the point and T
 //! symmetric, J times 1 + t. There the logarithm's Hessian is gamma times the identity however thin a link becomes. In
@@ -70,8 +70,8 @@ impl Prior {
         Self { links, rotors, rooms: vec![None; robot.tree.joints.len()] }
     }
 
-    /// The same, with the mass of each link within its ellipsoid. A link whose own prior is not has no bound; its index is
-    /// among those returned.
+    /// The same, with the mass of each link within its ellipsoid. A link whose own prior is not has no bound; its index
+    /// is among those returned.
     pub fn within(mut self, ellipsoids: &[Option<Ellipsoid>]) -> (Self, Vec<usize>) {
         let mut outside = vec![];
         for (j, ellipsoid) in ellipsoids.iter().enumerate() {

@@ -21,7 +21,8 @@ const SLOPE_ROOM: f64 = 1.5;
 /// Trained speeds up to which a model without network counts: its terms either have an end or grow with the speed, as
 /// friction does. A network knows nothing beyond what it was trained on.
 const REACH: f64 = 2.0;
-/// Least part of a friction that its slope over temperature may leave at the warm end of the box, widened by the margin.
+/// Least part of a friction that its slope over temperature may leave at the warm end of the box, widened by the
+/// margin.
 const LEAST_WARM: f64 = 0.1;
 /// A loop gain through the measured torque that no image may exceed.
 const TORQUE_GAIN_LIMIT: f64 = 0.5;
@@ -161,8 +162,8 @@ fn reaching(reach: f64, (low, high): (f64, f64)) -> (f64, f64) {
     (low.min(reach * low), high.max(reach * high))
 }
 
-/// The range of temperatures with its warm end `reach` times as far away from the cold one, where heat lowers friction: what is
-/// given beyond the trained range is less than within. It ends where the slope leaves little of a friction.
+/// The range of temperatures with its warm end `reach` times as far away from the cold one, where heat lowers friction:
+/// friction beyond the trained range is less than within. It ends where the slope leaves little of a friction.
 fn warmer(reach: f64, (low, high): (f64, f64), margin: f64, friction: &FloatModel) -> (f64, f64) {
     let factors = [
         (Term::ViscousTemperature, friction.viscous_temperature),

@@ -74,7 +74,8 @@ fn links_stay_within_their_shapes_whatever_the_noise_and_the_weight_of_the_prior
     assert!(change < 1.0, "{change}");
 }
 
-/// The links that a fit to nothing finds from one link that is a ball with this room in its ellipsoid, part of its mass.
+/// The first link that a fit to nothing finds where the prior's are balls with this room in their ellipsoid, part of
+/// the mass; and the prior's.
 fn of_prior_alone(room: f64) -> (LinkInertia, LinkInertia) {
     let truth = robot(0);
     // Inertia of a ball whose spread leaves this room at the middle of the ellipsoid, and what the prior adds to it.
