@@ -9,8 +9,8 @@
 //! 2. [`friction_columns`], [`equations`]: efforts as linear functions of inertial parameters, rotor inertias and a
 //!    simple friction.
 //! 3. [`least_squares`]: base parameters (IDIM-LS: ordinary, weighted, iteratively reweighted) with standard errors by
-//!    [`noise`]; [`convex`]: all inertial parameters, each link physical; [`choose`]: the friction beside them and the
-//!    regularisation, by motions that were left out.
+//!    [`noise`]; [`convex`]: all inertial parameters, each link physical and in its shapes ([`bounds`]); [`choose`]:
+//!    the friction beside them and the regularisation, by motions that were left out.
 //! 4. [`joints`]: the torque of the rigid bodies is the theoretical torque of each joint, and the pipeline of one joint
 //!    does the rest: terms, pre-sliding, network, certificate, fixed point.
 //! 5. [`mod@fit`] is the whole way, [`files`] its output, [`page`] the page of it; [`mod@evaluate`] judges that output
