@@ -1,8 +1,8 @@
-//! Mass of a link stays within its collision shapes, and what is known of its place makes up for little motion.
+//! Mass of a link keeps room in its ellipsoid, and another motion is predicted no worse for it.
 
-use super::synthetic::{EffortNoise, Measured, Truth, fourier, robot, rows};
+use super::synthetic::{EffortNoise, Measured, Truth, fourier, robot, rows, weighted};
 use crate::convex::{self, Prior, links};
-use crate::equations::{Normal, Rows};
+use crate::equations::Normal;
 use crate::friction_columns::Friction;
 use crate::least_squares::{Weighting, base, solve};
 use nalgebra::{DVector, Matrix3, Vector3};
@@ -26,15 +26,6 @@ fn placeholder(truth: &Truth) -> Prior {
         tree: truth.robot.tree.with_parameters(&ball.repeat(truth.robot.tree.len())),
         ..truth.robot.clone()
     })
-}
-
-/// The sum of the joints' equations, each divided by its noise squared.
-fn weighted(rows: &Rows, noise: &[f64]) -> Normal {
-    let mut sum = Normal::zero(rows.layout.unknowns());
-    for (j, noise) in noise.iter().enumerate() {
-        rows.normal(j, |_| 1.0).iter().for_each(|group| sum.add(group, 1.0 / (noise * noise)));
-    }
-    sum
 }
 
 #[test]

@@ -1,10 +1,10 @@
 //! Parameters are recovered within their stated errors, and every link is one that a body can have.
 
-use super::synthetic::{EffortNoise, Measured, Truth, fourier, robot, rows};
+use super::synthetic::{EffortNoise, Measured, Truth, fourier, robot, rows, weighted};
 use crate::convex::{self, Prior, links};
-use crate::equations::{Normal, Rows};
+use crate::equations::Rows;
 use crate::friction_columns::Friction;
-use crate::least_squares::{Solution, Weighting, base, solve};
+use crate::least_squares::{Weighting, base, solve};
 use rayon::prelude::*;
 use rigid_body::Robot;
 
@@ -56,15 +56,6 @@ fn unknowns_lie_within_their_95_percent_intervals_in_95_percent_of_cases_and_int
     }
 }
 
-/// The normal equations of all joints, each divided by its noise squared.
-fn weighted(rows: &Rows, solution: &Solution) -> Normal {
-    let mut sum = Normal::zero(rows.layout.unknowns());
-    for (j, noise) in solution.noise.iter().enumerate() {
-        rows.normal(j, |_| 1.0).iter().for_each(|group| sum.add(group, 1.0 / (noise * noise)));
-    }
-    sum
-}
-
 #[test]
 fn every_link_and_rotor_is_physical_whatever_the_prior_its_weight_and_the_noise() {
     let checked: usize = (0..ROBOTS)
@@ -77,7 +68,7 @@ fn every_link_and_rotor_is_physical_whatever_the_prior_its_weight_and_the_noise(
             let measured = Measured { friction: 1.0, effort, position: 1e-5 };
             let rows = rows(&truth, &motion, Friction::Simple, &measured, seed);
             let solution = solve(&rows, &base(&truth.robot, 1), Weighting::ByJoint);
-            let normal = weighted(&rows, &solution);
+            let normal = weighted(&rows, &solution.noise);
             // A prior that is wrong by a third in every mass, or three times too heavy.
             let factor = [1.33, 3.0][seed as usize / 2 % 2];
             let wrong: Vec<f64> = truth.robot.tree.parameters().iter().map(|parameter| factor * parameter).collect();
@@ -108,7 +99,7 @@ fn the_convex_fit_without_noise_and_with_a_light_prior_finds_the_base_parameters
         let solution = solve(&rows, &base, Weighting::ByJoint);
         let wrong: Vec<f64> = truth.robot.tree.parameters().iter().map(|parameter| 1.33 * parameter).collect();
         let prior = Prior::of(&Robot { tree: truth.robot.tree.with_parameters(&wrong), ..truth.robot.clone() });
-        let found = convex::solve(&weighted(&rows, &solution), rows.layout, &prior, 1e-4).unwrap();
+        let found = convex::solve(&weighted(&rows, &solution.noise), rows.layout, &prior, 1e-4).unwrap();
         let (found, expected) = (base.values(found.as_slice()), base.values(truth.unknowns(Friction::None).as_slice()));
         let departs: f64 = found.iter().zip(&expected).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
         let size: f64 = expected.iter().map(|x| x * x).sum::<f64>().sqrt();

@@ -1,6 +1,6 @@
 //! Random robots and their recordings: a Fourier motion of every joint, noise, filters.
 
-use crate::equations::{GROUPS, Layout, Rows, rigid_columns};
+use crate::equations::{GROUPS, Layout, Normal, Rows, rigid_columns};
 use crate::friction_columns::Friction;
 use identification::differentiate::central_difference;
 use identification::filter::LowPassFilter;
@@ -201,4 +201,13 @@ pub fn rows(truth: &Truth, motion: &[Vec<Reference>], columns: Friction, measure
     let group = (0..used).map(|i| Some(i * GROUPS / used)).collect();
     let still = vec![vec![false; used]; n];
     Rows { layout, rigid, friction, effort, group, run: vec![0; used], still }
+}
+
+/// The normal equations of all joints, each divided by its noise squared.
+pub fn weighted(rows: &Rows, noise: &[f64]) -> Normal {
+    let mut sum = Normal::zero(rows.layout.unknowns());
+    for (j, noise) in noise.iter().enumerate() {
+        rows.normal(j, |_| 1.0).iter().for_each(|group| sum.add(group, 1.0 / (noise * noise)));
+    }
+    sum
 }
