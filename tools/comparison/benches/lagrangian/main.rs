@@ -5,13 +5,16 @@
 
 mod page;
 
-use comparison::lagrangian::train::mean_square;
-use comparison::lagrangian::{Activation, Friction, Inputs, Model, Sample, Shape, Training};
+use comparison::lagrangian::train::{importance, mean_square};
+use comparison::lagrangian::{
+    Activation, Friction, Inputs, Learned, Model, Sample, Shape, Structure, Training, from_links,
+};
 use identification::fit::Options as JointOptions;
 use identification::progress::Silent;
 use identification::samples::Part;
 use nalgebra::SVector;
 use rayon::prelude::*;
+use rigid_body::Robot;
 use robot::equations::Rows;
 use robot::friction_columns::Friction as Columns;
 use robot::least_squares::{Weighting, base, solve};
@@ -26,58 +29,127 @@ const SHARES: [usize; 5] = [20, 40, 60, 80, 100];
 /// Seeds of the models on all of the training recordings.
 const SEEDS: u64 = 3;
 
-/// A shape of the networks and the weight decay with it.
+/// A shape of the networks, and how they learn from a recording.
 pub struct Candidate {
-    /// Inputs of both networks.
+    /// Inputs of all networks.
     pub inputs: Inputs,
-    /// Hidden layers of both networks.
-    pub hidden: &'static [(usize, Activation)],
+    /// Hidden layers of the networks of inertia and potential energy.
+    pub hidden: [Layers; 2],
+    /// What is known of the links.
+    pub known: Known,
     /// Weight decay, of inertia and potential energy.
     pub decay: [f64; 2],
 }
 
-/// Candidates, of which the one is taken that is best where a model learns from one training motion and is judged on
-/// the other.
-pub const CANDIDATES: [Candidate; 8] = [
-    Candidate { inputs: Inputs::Angles, hidden: SINE, decay: [0.3, 0.3] },
-    Candidate { inputs: Inputs::Angles, hidden: SINE, decay: [1.0, 0.1] },
-    Candidate { inputs: Inputs::Angles, hidden: SINE, decay: [1.0, 0.3] },
-    Candidate { inputs: Inputs::Angles, hidden: SINE, decay: [3.0, 0.3] },
-    Candidate { inputs: Inputs::Angles, hidden: SINE, decay: [1.0, 1.0] },
-    Candidate { inputs: Inputs::Angles, hidden: SINES, decay: [1.0, 0.3] },
-    Candidate { inputs: Inputs::SinesAndCosines, hidden: SOFTPLUS, decay: [0.3, 0.3] },
-    Candidate { inputs: Inputs::SinesAndCosines, hidden: TANH, decay: [1.0, 0.3] },
+/// Widths and nonlinearities of hidden layers.
+type Layers = &'static [(usize, Activation)];
+
+/// What a model knows of the robot before it learns from a recording.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Known {
+    /// Drive gains alone: the paper's setting.
+    Gains,
+    /// That the joints are a chain, and the links of the URDF.
+    Links,
+}
+
+/// Candidates. Of each knowledge the one is taken that is best where a model learns from one training motion and is
+/// judged on the other.
+pub const CANDIDATES: [Candidate; 12] = [
+    alike(Inputs::Angles, SINE, [0.3, 0.3]),
+    alike(Inputs::Angles, SINE, [1.0, 0.1]),
+    alike(Inputs::Angles, SINE, [1.0, 0.3]),
+    alike(Inputs::Angles, SINE, [3.0, 0.3]),
+    alike(Inputs::Angles, SINE, [1.0, 1.0]),
+    alike(Inputs::Angles, SINES, [1.0, 0.3]),
+    alike(Inputs::SinesAndCosines, SOFTPLUS, [0.3, 0.3]),
+    alike(Inputs::SinesAndCosines, TANH, [1.0, 0.3]),
+    of_links([SINE_16, SINE_32], [20.0, 10.0]),
+    of_links([SINE_16, SINE_32], [20.0, 20.0]),
+    of_links([SINE_24, SINE_24], [20.0, 10.0]),
+    of_links([SINE_24, SINE_24], [20.0, 20.0]),
 ];
 
 /// Hidden layers of the candidates.
-const SOFTPLUS: &[(usize, Activation)] = &[(32, Activation::Softplus), (32, Activation::Softplus)];
-const TANH: &[(usize, Activation)] = &[(32, Activation::Tanh), (32, Activation::Tanh)];
-const SINE: &[(usize, Activation)] = &[(64, Activation::Sine)];
-const SINES: &[(usize, Activation)] = &[(32, Activation::Sine), (32, Activation::Sine)];
+const SOFTPLUS: Layers = &[(32, Activation::Softplus), (32, Activation::Softplus)];
+const TANH: Layers = &[(32, Activation::Tanh), (32, Activation::Tanh)];
+const SINE: Layers = &[(64, Activation::Sine)];
+const SINES: Layers = &[(32, Activation::Sine), (32, Activation::Sine)];
+const SINE_16: Layers = &[(16, Activation::Sine)];
+const SINE_24: Layers = &[(24, Activation::Sine)];
+const SINE_32: Layers = &[(32, Activation::Sine)];
+
+const fn alike(inputs: Inputs, hidden: Layers, decay: [f64; 2]) -> Candidate {
+    Candidate { inputs, hidden: [hidden; 2], known: Known::Gains, decay }
+}
+
+const fn of_links(hidden: [Layers; 2], decay: [f64; 2]) -> Candidate {
+    Candidate { inputs: Inputs::Angles, hidden, known: Known::Links, decay }
+}
+
+/// Samples of the links for training and validation.
+pub const OF_LINKS: [usize; 2] = [20_000, 2_000];
+/// Further that positions of these samples reach than those of the recording, rad.
+pub const BEYOND: f64 = 0.2;
 
 impl Candidate {
     /// A trained model.
-    fn trained(&self, [train, validation]: &[Vec<Sample<JOINTS>>; 2], gain: &Gain, job: Job) -> Model<JOINTS> {
-        let shape = Shape { inputs: self.inputs, hidden: self.hidden.to_vec(), friction: job.friction, upper: false };
-        let mut model = Model::new(&shape, train, *gain, job.seed);
-        let training =
-            Training { epochs: 80, batch: 128, rate: 0.02, decay: self.decay, every: 4, power: 1.0, seed: job.seed };
-        training.run(&mut model, train, validation);
+    fn trained(&self, [train, validation]: &Parts, robot: &Robot, job: Job) -> Model<JOINTS> {
+        let gain = SVector::from_fn(|j, _| robot.drives[j].gain);
+        let shape = Shape {
+            inputs: self.inputs,
+            inertia: self.hidden[0].to_vec(),
+            potential: self.hidden[1].to_vec(),
+            friction: job.friction,
+            structure: match self.known {
+                Known::Gains => Structure::Any,
+                Known::Links => Structure::Chain,
+            },
+        };
+        let mut model = Model::new(&shape, train, gain, job.seed);
+        let importance = importance(train, 1.0);
+        let Candidate { decay, .. } = *self;
+        let random =
+            Training { epochs: 80, batch: 128, rate: 0.02, learned: Learned::All, decay, every: 4, seed: job.seed };
+        match self.known {
+            Known::Gains => random.run(&mut model, train, validation, &importance),
+            Known::Links => {
+                let [learn, check] = [0, 1].map(|part| {
+                    let seed = 2 * job.seed + part as u64;
+                    from_links::samples(&robot.tree, &gain, train, BEYOND, OF_LINKS[part], seed)
+                });
+                Training { epochs: 60, decay: [0.0; 2], ..random.clone() }.run(&mut model, &learn, &check, &importance);
+                let learned = Learned::Outputs;
+                Training { epochs: 40, rate: 0.005, learned, ..random }.run(&mut model, train, validation, &importance)
+            }
+        };
         model
     }
 }
 
-/// Torque per unit of effort.
-type Gain = SVector<f64, JOINTS>;
+/// Samples for training and validation.
+type Parts = [Vec<Sample<JOINTS>>; 2];
 
 /// A training.
 #[derive(Clone, Copy, PartialEq)]
 struct Job {
     /// Place among the shares.
     at: usize,
+    known: Known,
     friction: Friction,
     seed: u64,
 }
+
+/// What the models with nonsymmetric Coulomb friction know.
+const NONSYMMETRIC: [Known; 2] = [Known::Gains, Known::Links];
+/// Models of the table of errors.
+const MODELS: [(&str, Known, Friction); 3] = [
+    ("DeLaN", Known::Gains, Friction::Symmetric),
+    ("DeLaN + NSCF", Known::Gains, Friction::Nonsymmetric),
+    (FROM_LINKS, Known::Links, Friction::Nonsymmetric),
+];
+/// Name of the model that knows the links.
+pub const FROM_LINKS: &str = "DeLaN + NSCF, begun from the URDF";
 
 /// Mean square errors of one model on the test motion.
 pub struct Row {
@@ -96,20 +168,22 @@ pub type Coefficients = [f64; 4];
 pub struct Results {
     /// Means over joints of each candidate's mean square errors, from each training motion to the other.
     pub choice: Vec<[f64; 2]>,
-    /// Place of the candidate that was taken.
-    pub chosen: usize,
+    /// Places of the candidates that were taken: with the gains known, and with the links.
+    pub chosen: [usize; 2],
     /// Errors, share by share.
     pub rows: Vec<Row>,
-    /// Means over joints of the errors of DeLaN + NSCF on all of the recordings, for each seed.
-    pub seeds: Vec<f64>,
+    /// Means over joints of the errors of DeLaN + NSCF on all of the recordings, for each seed; by what is known.
+    pub seeds: [Vec<f64>; 2],
+    /// Errors of the mean of these models' efforts, by what is known.
+    pub averaged: [SVector<f64, JOINTS>; 2],
     /// Coefficients of each joint by least squares; the flag: its rotor inertia is a base parameter by itself.
     pub least_squares: Vec<(Coefficients, bool)>,
-    /// Coefficients of each joint by DeLaN + NSCF.
-    pub learned: Vec<Coefficients>,
+    /// Coefficients of each joint by DeLaN + NSCF, by what is known.
+    pub learned: [Vec<Coefficients>; 2],
     /// Samples of training, validation and test.
     pub samples: [usize; 3],
-    /// Weights of DeLaN + NSCF.
-    pub weights: usize,
+    /// Weights of DeLaN + NSCF, by what is known.
+    pub weights: [usize; 2],
     /// Time of all trainings, s.
     pub seconds: f64,
 }
@@ -130,29 +204,31 @@ fn main() {
     };
     let recordings: Vec<(usize, Recording)> = SHARES.iter().map(|&share| (share, part(share))).collect();
 
-    let gain = SVector::from_fn(|j, _| whole.robot.drives[j].gain);
     let begin = Instant::now();
-    let choice = choice(&whole, &gain);
-    let mean = |at: &usize| choice[*at].iter().sum::<f64>();
-    let chosen = (0..CANDIDATES.len()).min_by(|a, b| mean(a).total_cmp(&mean(b))).expect("candidates");
-    let job = |at, friction, seed| Job { at, friction, seed };
+    let choice = choice(&whole);
+    let sum = |at: &usize| choice[*at].iter().sum::<f64>();
+    let chosen = [Known::Gains, Known::Links].map(|known| {
+        let own = (0..CANDIDATES.len()).filter(|&at| CANDIDATES[at].known == known);
+        own.min_by(|a, b| sum(a).total_cmp(&sum(b))).expect("candidates")
+    });
+    let job = |at, known, friction, seed| Job { at, known, friction, seed };
     let last = recordings.len() - 1;
     let mut jobs: Vec<Job> = (0..recordings.len())
-        .flat_map(|at| [Friction::Symmetric, Friction::Nonsymmetric].map(|friction| job(at, friction, 1)))
-        .chain((2..=SEEDS).map(|seed| job(last, Friction::Nonsymmetric, seed)))
+        .flat_map(|at| MODELS.map(|(_, known, friction)| job(at, known, friction, 1)))
+        .chain((2..=SEEDS).flat_map(|seed| NONSYMMETRIC.map(|known| job(last, known, Friction::Nonsymmetric, seed))))
         .collect();
     // The longest first: both cores are busy to the end.
-    jobs.reverse();
+    jobs.sort_by_key(|job| (job.known == Known::Gains, std::cmp::Reverse(job.at)));
     let train = |job: &Job| {
         let parts = [Part::Train, Part::Validation].map(|part| samples(&recordings[job.at].1, part));
-        CANDIDATES[chosen].trained(&parts, &gain, *job)
+        CANDIDATES[chosen[job.known as usize]].trained(&parts, &whole.robot, *job)
     };
     let models: Vec<Model<JOINTS>> = jobs.par_iter().with_max_len(1).map(train).collect();
     let seconds = begin.elapsed().as_secs_f64();
 
     let test = samples(&whole, Part::Test);
-    let model = |at: usize, friction, seed| {
-        let wanted = job(at, friction, seed);
+    let model = |at: usize, known, friction, seed| {
+        let wanted = job(at, known, friction, seed);
         &models[jobs.iter().position(|job| *job == wanted).expect("a model of each job")]
     };
     let mut rows = Vec::new();
@@ -160,25 +236,30 @@ fn main() {
         let mut row = |model, errors| rows.push(Row { share: *share, model, errors });
         row("IDIM-LS", least_squares(recording, Weighting::Ordinary).0);
         row("IDIM-LS, weighted", least_squares(recording, Weighting::ByJoint).0);
-        row("DeLaN", mean_square(model(at, Friction::Symmetric, 1), &test));
-        row("DeLaN + NSCF", mean_square(model(at, Friction::Nonsymmetric, 1), &test));
+        for (name, known, friction) in MODELS {
+            row(name, mean_square(model(at, known, friction, 1), &test));
+        }
     }
     rows.push(Row { share: 100, model: "images of this project", errors: images(&whole) });
-    let best = model(last, Friction::Nonsymmetric, 1);
-    let coefficients = |j: usize| {
-        let [viscous, forward, backward, _] = best.linear(j);
-        [viscous, forward, backward, best.rotor(j)]
+    let best = NONSYMMETRIC.map(|known| model(last, known, Friction::Nonsymmetric, 1));
+    let coefficients = |model: &Model<JOINTS>, j: usize| {
+        let [viscous, forward, backward, _] = model.linear(j);
+        [viscous, forward, backward, model.rotor(j)]
     };
-    let seeds = (1..=SEEDS).map(|seed| mean_square(model(last, Friction::Nonsymmetric, seed), &test).mean());
+    let error = |known, seed| mean_square(model(last, known, Friction::Nonsymmetric, seed), &test).mean();
     let results = Results {
         choice,
         chosen,
         rows,
-        seeds: seeds.collect(),
+        averaged: NONSYMMETRIC.map(|known| {
+            let of = |seed| model(last, known, Friction::Nonsymmetric, seed).efforts(&test);
+            averaged(&(1..=SEEDS).map(of).collect::<Vec<_>>(), &test)
+        }),
+        seeds: NONSYMMETRIC.map(|known| (1..=SEEDS).map(|seed| error(known, seed)).collect()),
         least_squares: least_squares(&whole, Weighting::ByJoint).1,
-        learned: (0..JOINTS).map(coefficients).collect(),
+        learned: best.map(|model| (0..JOINTS).map(|j| coefficients(model, j)).collect()),
         samples: [Part::Train, Part::Validation, Part::Test].map(|part| samples(&whole, part).len()),
-        weights: best.weights.len(),
+        weights: best.map(|model| model.weights.len()),
         seconds,
     };
     page::write(&results);
@@ -195,8 +276,17 @@ fn samples(recording: &Recording, part: Part) -> Vec<Sample<JOINTS>> {
     (0..recording.len()).filter(|&i| recording.part(i) == part).map(|i| sample(recording, i)).collect()
 }
 
+/// Mean square errors of the mean of several models' efforts.
+fn averaged(efforts: &[Vec<SVector<f64, JOINTS>>], test: &[Sample<JOINTS>]) -> SVector<f64, JOINTS> {
+    let error = |(i, sample): (usize, &Sample<JOINTS>)| {
+        let sum: SVector<f64, JOINTS> = efforts.iter().map(|of_model| of_model[i]).sum();
+        (sum / efforts.len() as f64 - sample.effort).map(|error| error * error)
+    };
+    test.iter().enumerate().map(error).sum::<SVector<f64, JOINTS>>() / test.len() as f64
+}
+
 /// Mean square errors of each candidate that learns from one training motion, on the other: mean over the joints.
-fn choice(recording: &Recording, gain: &Gain) -> Vec<[f64; 2]> {
+fn choice(recording: &Recording) -> Vec<[f64; 2]> {
     let of = |run: u32, parts: &[Part]| -> Vec<Sample<JOINTS>> {
         let own = |i: &usize| recording.joints[0].samples.run[*i] == run && parts.contains(&recording.part(*i));
         (0..recording.len()).filter(own).map(|i| sample(recording, i)).collect()
@@ -204,8 +294,8 @@ fn choice(recording: &Recording, gain: &Gain) -> Vec<[f64; 2]> {
     let jobs: Vec<(&Candidate, u32)> = CANDIDATES.iter().flat_map(|one| [(one, 0), (one, 1)]).collect();
     let error = |(candidate, run): &(&Candidate, u32)| {
         let parts = [of(*run, &[Part::Train]), of(*run, &[Part::Validation])];
-        let job = Job { at: 0, friction: Friction::Nonsymmetric, seed: 1 };
-        let model = candidate.trained(&parts, gain, job);
+        let job = Job { at: 0, known: candidate.known, friction: Friction::Nonsymmetric, seed: 1 };
+        let model = candidate.trained(&parts, &recording.robot, job);
         mean_square(&model, &of(1 - run, &[Part::Train, Part::Validation])).mean()
     };
     let errors: Vec<f64> = jobs.par_iter().with_max_len(1).map(error).collect();

@@ -1,18 +1,19 @@
 //! docs/lagrangian-networks.md: its text, and the claims that the figures are held to.
 
-use super::{CANDIDATES, Results, Row};
-use comparison::lagrangian::Inputs;
+use super::{BEYOND, CANDIDATES, FROM_LINKS, Known, OF_LINKS, Results, Row};
+use comparison::lagrangian::{Activation, Inputs};
 
 /// Names of the coefficients, with their units.
 const COEFFICIENTS: [&str; 4] = ["f_v, A s/rad", "f_c+, A", "f_c-, A", "I_a, kg m^2"];
-/// Most that DeLaN + NSCF may leave, over what weighted least squares do.
-const MOST: f64 = 2.3;
+/// Most that the mean of DeLaN + NSCF with several seeds may leave, over what weighted least squares do: with the gains
+/// known, and with the URDF.
+const MOST: [f64; 2] = [2.3, 1.1];
 /// Longest time of all trainings, s.
 const LONGEST: f64 = 600.0;
 
 /// The page, to standard output.
 pub fn write(results: &Results) {
-    let Results { samples: [train, validation, test], weights, seconds, .. } = results;
+    let Results { samples: [train, validation, test], weights: [weights, from_links], seconds, .. } = results;
     println!("# Lagrangian networks\n");
     println!(
         "Written by `cargo bench -p comparison --bench lagrangian`. Deep Lagrangian Networks with nonsymmetric Coulomb friction (002) beside\n\
@@ -32,7 +33,12 @@ pub fn write(results: &Results) {
          validation samples of the training motions.\n\
          - IDIM-LS: base parameters by least squares with viscous friction, Coulomb friction and offset, which span the same as f_v, f_c+\n  \
          and f_c-; ordinary, or weighted by the noise of each joint.\n\
-         - Ours, not the paper's: biases do not decay, and a rotor inertia that is negative is taken to 0 after each step.\n"
+         - Ours, not the paper's: biases do not decay, and a rotor inertia that is negative is taken to 0 after each step.\n\
+         - {FROM_LINKS}: ours, for a user who has what least squares need, too. M = U U^T with an upper triangular U, whose row i\n  \
+         depends on the positions after the i-th alone, as in every serial chain. Before the recording it learns from {} random states and\n  \
+         efforts of the URDF's links, up to {BEYOND} rad beyond the recording's positions, without friction and rotors; from the recording the\n  \
+         networks' outputs and the linear layers alone, and the outputs decay to what they were. {from_links} weights.\n",
+        OF_LINKS[0],
     );
     choice(results);
     println!("## Errors on another motion\n");
@@ -44,31 +50,53 @@ pub fn write(results: &Results) {
         let cells: Vec<String> = errors.iter().map(|error| format!("{error:.5}")).collect();
         println!("| {share} % | {model} | {} | {:.5} |", cells.join(" | "), errors.mean());
     }
-    let (low, high) = extremes(&results.seeds);
+    let [gains, links] = [0, 1].map(|known| {
+        let (low, high) = extremes(&results.seeds[known]);
+        format!(
+            "{low:.4} to {high:.4} | {:.2} | {:.4} | {:.2} |",
+            behind(results, known),
+            results.averaged[known].mean(),
+            averaged(results, known)
+        )
+    });
     println!(
-        "\nThe table's networks have the first seed. On all of the training motions DeLaN + NSCF leaves {low:.4} to {high:.4} A^2 with {} seeds,\n\
-         {:.2} times the mean square error of weighted IDIM-LS in the mean (at most {MOST} is asserted). In 002 it is 1.09 and 1.30 times\n\
-         (sums over table I, without and with the vibration-free table). A tenth more, as we wished, is not reached: 90 s are few for\n\
-         a method that knows no kinematics, and directions of Coulomb friction differ little on this robot, so that NSCF gains nothing.\n",
-        results.seeds.len(),
-        behind(results),
+        "\nDeLaN + NSCF on all of the training motions with {} seeds; the table above has the first.\n",
+        results.seeds[0].len()
+    );
+    println!(
+        "| known | A^2, each seed | over weighted IDIM-LS, mean | A^2, mean of the models | over weighted IDIM-LS |\n|---|---|---|---|---|"
+    );
+    println!("| gains | {gains}\n| URDF | {links}\n");
+    println!(
+        "The mean of several models' efforts is that of one model as well, whose M, potential and coefficients are the means of theirs. The program\n\
+         fails where the last column is above {} and {}. In 002 it is 1.09 and 1.30 (sums over table I, without and with the vibration-free\n\
+         table). Without kinematics 90 s are few: networks learn friction that depends on load as a potential of that motion, which another\n\
+         motion does not have. Directions of Coulomb friction differ little on this robot, so that NSCF gains nothing.\n",
+        MOST[0], MOST[1]
     );
     println!("## Friction and rotors\n");
     println!(
-        "Coefficients after all of the training motions: weighted IDIM-LS / DeLaN + NSCF, and the difference in %.\n"
+        "Coefficients after all of the training motions: weighted IDIM-LS / DeLaN + NSCF, and the difference in % / begun from the URDF,\n\
+         likewise.\n"
     );
     println!("| joint | {} |\n|---|---|---|---|---|", COEFFICIENTS.join(" | "));
-    for (j, ((expected, alone), found)) in results.least_squares.iter().zip(&results.learned).enumerate() {
-        let cell = |k: usize| match k {
-            3 if !alone => format!("- / {:.3}", found[k]),
-            _ => format!("{:.3} / {:.3}, {:+.0}", expected[k], found[k], 100.0 * (found[k] / expected[k] - 1.0)),
+    for (j, (expected, alone)) in results.least_squares.iter().enumerate() {
+        let cell = |k: usize| {
+            let known = k != 3 || *alone;
+            let found = results.learned.each_ref().map(|joints| {
+                let found = joints[j][k];
+                let difference = 100.0 * (found / expected[k] - 1.0);
+                if known { format!("{found:.3}, {difference:+.0}") } else { format!("{found:.3}") }
+            });
+            let expected = if known { format!("{:.3}", expected[k]) } else { "-".to_owned() };
+            format!("{expected} / {}", found.join(" / "))
         };
         println!("| {} | {} |", j + 1, [0, 1, 2, 3].map(cell).join(" | "));
     }
     println!(
         "\nRotor inertias without a value of least squares are no base parameters by themselves: torques show their sum with inertias of the\n\
-         links, as for joints 1 and 2 in 002. The network cannot tell any of them from a constant on the diagonal of M(q)\n\
-         either: what is in I_a and what in M is decided by the weights' begin and decay, here mostly for M.\n"
+         links, as for joints 1 and 2 in 002. Networks cannot tell I_a from a constant on the diagonal of M(q) either: where they begin at random\n\
+         it is in M. Begun from the URDF, whose links have no rotors, it is in I_a for the wrist (joints 4 to 6), and hardly for joint 3.\n"
     );
     println!("All trainings took {seconds:.0} s on two cores.");
 }
@@ -78,35 +106,48 @@ fn choice(results: &Results) {
     println!("## Choice of the networks\n");
     println!(
         "Mean square error over the joints, A^2, where DeLaN + NSCF learns from one of the two training motions and is judged on the other, both\n\
-         ways. The least sum is taken; the motion of the next section is used for no choice.\n"
+         ways. Of each knowledge the least sum is taken; the motion of the next section is used for no choice.\n"
     );
     println!(
-        "| inputs | hidden layers | weight decay: inertia, potential | 50 s to 40 s | 40 s to 50 s | |\n|---|---|---|---|---|---|"
+        "| known | inputs | hidden layers | weight decay: inertia, potential | 50 s to 40 s | 40 s to 50 s | |\n|---|---|---|---|---|---|---|"
     );
     for (at, (candidate, errors)) in CANDIDATES.iter().zip(&results.choice).enumerate() {
+        let known = match candidate.known {
+            Known::Gains => "gains",
+            Known::Links => "URDF",
+        };
         let inputs = match candidate.inputs {
             Inputs::Angles => "angles",
             Inputs::SinesAndCosines => "sines and cosines",
         };
-        let hidden: Vec<String> = candidate
-            .hidden
-            .iter()
-            .map(|(width, activation)| format!("{width} {activation:?}").to_lowercase())
-            .collect();
-        let taken = if at == results.chosen { "taken" } else { "" };
+        let layers = candidate.hidden.map(|layers| {
+            let named = |(width, activation): &(usize, Activation)| format!("{width} {activation:?}").to_lowercase();
+            layers.iter().map(named).collect::<Vec<_>>().join(", ")
+        });
+        let hidden = if layers[0] == layers[1] { layers[0].clone() } else { layers.join("; potential ") };
+        let taken = if results.chosen.contains(&at) { "taken" } else { "" };
         let [first, second] = errors;
         let [inertia, potential] = candidate.decay;
-        println!("| {inputs} | {} | {inertia}, {potential} | {first:.4} | {second:.4} | {taken} |", hidden.join(", "));
+        println!("| {known} | {inputs} | {hidden} | {inertia}, {potential} | {first:.4} | {second:.4} | {taken} |");
     }
     println!();
 }
 
-/// Mean square error of DeLaN + NSCF, mean over the seeds, over that of weighted least squares, on all of the training
-/// motions.
-fn behind(results: &Results) -> f64 {
+/// Mean square error of weighted least squares on all of the training motions.
+fn weighted(results: &Results) -> f64 {
     let row = results.rows.iter().find(|row| row.share == 100 && row.model == "IDIM-LS, weighted");
-    let seeds = results.seeds.iter().sum::<f64>() / results.seeds.len() as f64;
-    seeds / row.map_or(f64::NAN, |row| row.errors.mean())
+    row.map_or(f64::NAN, |row| row.errors.mean())
+}
+
+/// Mean square error of DeLaN + NSCF with what is known, mean over the seeds, over that of weighted least squares.
+fn behind(results: &Results, known: usize) -> f64 {
+    let seeds = &results.seeds[known];
+    seeds.iter().sum::<f64>() / seeds.len() as f64 / weighted(results)
+}
+
+/// The same of the mean of the models.
+fn averaged(results: &Results, known: usize) -> f64 {
+    results.averaged[known].mean() / weighted(results)
 }
 
 fn extremes(values: &[f64]) -> (f64, f64) {
@@ -119,6 +160,8 @@ fn extremes(values: &[f64]) -> (f64, f64) {
 /// One does not hold.
 pub fn check(results: &Results) {
     assert!(results.seconds <= LONGEST, "{} s", results.seconds);
-    let behind = behind(results);
-    assert!(behind <= MOST, "{behind}");
+    for (known, most) in MOST.iter().enumerate() {
+        let behind = averaged(results, known);
+        assert!(behind <= *most, "{behind}");
+    }
 }

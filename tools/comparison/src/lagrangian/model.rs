@@ -71,21 +71,62 @@ impl Friction {
 /// Shape of a model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shape {
-    /// Inputs of both networks.
+    /// Inputs of all networks.
     pub inputs: Inputs,
-    /// Hidden layers of both networks.
-    pub hidden: Vec<(usize, Activation)>,
+    /// Hidden layers of each network of the inertia.
+    pub inertia: Vec<(usize, Activation)>,
+    /// Hidden layers of the potential energy's network.
+    pub potential: Vec<(usize, Activation)>,
     /// Linear layers.
     pub friction: Friction,
-    /// Upper triangular Cholesky factor instead of a lower one.
-    pub upper: bool,
+    /// What is known of the robot's links.
+    pub structure: Structure,
+}
+
+/// What a model knows of the robot's links.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Structure {
+    /// Nothing: one network for all of a lower Cholesky factor.
+    Any,
+    /// Joints are those of a serial chain, from the base on: M = U U^T with an upper triangular U, whose row i depends
+    /// on the positions after the i-th alone. A network for each row.
+    Chain,
+}
+
+/// What a training changes, beside the linear layers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Learned {
+    /// All weights. Matrices decay to 0, biases do not.
+    All,
+    /// The networks' outputs, a linear combination of what their hidden layers have learned before. Its weights decay
+    /// to what they were.
+    Outputs,
+}
+
+/// What a training does to a weight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rule {
+    /// True if it is changed.
+    pub learned: bool,
+    /// Weight decay.
+    pub decay: f64,
+}
+
+/// A network for entries of the Cholesky factor.
+#[derive(Clone, Debug)]
+struct Block {
+    network: Network,
+    /// The first position that is an input; all after it are.
+    from: usize,
+    /// Row and column of each output.
+    entries: Vec<(usize, usize)>,
 }
 
 /// A model and its weights.
 #[derive(Clone, Debug)]
 pub struct Model<const N: usize> {
     shape: Shape,
-    inertia: Network,
+    inertia: Vec<Block>,
     potential: Network,
     scales: Scales<N>,
     /// Weights: inertia, potential, then the coefficients of each joint.
@@ -115,12 +156,25 @@ pub fn root_mean_square<const N: usize>(values: impl Iterator<Item = SVector<f64
 impl<const N: usize> Model<N> {
     /// A model with random weights, scaled to these samples; `gain`: torque per unit of effort.
     pub fn new(shape: &Shape, samples: &[Sample<N>], gain: SVector<f64, N>, seed: u64) -> Self {
-        let inputs = match shape.inputs {
-            Inputs::Angles => N,
-            Inputs::SinesAndCosines => 2 * N,
+        let network = |from: usize, hidden: &[(usize, Activation)], outputs| Network {
+            inputs: shape.inputs.of(N - from),
+            hidden: hidden.to_vec(),
+            outputs,
         };
-        let network = |outputs| Network { inputs, hidden: shape.hidden.clone(), outputs };
-        let (inertia, potential) = (network(N * (N + 1) / 2), network(1));
+        let block = |from, entries: Vec<(usize, usize)>| Block {
+            network: network(from, &shape.inertia, entries.len()),
+            from,
+            entries,
+        };
+        let inertia = match shape.structure {
+            Structure::Any => {
+                vec![block(0, (0..N).flat_map(|row| (0..=row).map(move |column| (row, column))).collect())]
+            }
+            Structure::Chain => {
+                (0..N).map(|row| block(row + 1, (row..N).map(|column| (row, column)).collect())).collect()
+            }
+        };
+        let potential = network(0, &shape.potential, 1);
         let rms = |of: fn(&Sample<N>) -> SVector<f64, N>| root_mean_square(samples.iter().map(of));
         let (effort, v, a) = (rms(|s| s.effort), rms(|s| s.v), rms(|s| s.a));
         let torque = effort.component_mul(&gain);
@@ -134,7 +188,7 @@ impl<const N: usize> Model<N> {
             }),
         };
         let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let mut weights = inertia.random(&mut random);
+        let mut weights: Vec<f64> = inertia.iter().flat_map(|block| block.network.random(&mut random)).collect();
         weights.extend(potential.random(&mut random));
         weights.resize(weights.len() + N * shape.friction.width(), 0.0);
         Self { shape: shape.clone(), inertia, potential, scales, weights }
@@ -142,17 +196,30 @@ impl<const N: usize> Model<N> {
 
     /// Number of the networks' weights; linear coefficients follow.
     pub fn networks(&self) -> usize {
-        self.inertia.len() + self.potential.len()
+        self.of_inertia() + self.potential.len()
     }
 
-    /// Weight decay of each weight, of those of the networks' matrices alone: inertia and potential energy.
-    pub fn decays(&self, [inertia, potential]: [f64; 2]) -> Vec<f64> {
-        let of = |network: &Network, decay: f64| {
-            network.matrices().map(move |of_matrix| if of_matrix { decay } else { 0.0 })
+    /// Number of the weights of the inertia's networks.
+    fn of_inertia(&self) -> usize {
+        self.inertia.iter().map(|block| block.network.len()).sum()
+    }
+
+    /// Rule of each weight, with the decay of inertia and potential energy.
+    pub fn rules(&self, learned: Learned, [inertia, potential]: [f64; 2]) -> Vec<Rule> {
+        let of = |network: &Network, decay: f64| -> Vec<Rule> {
+            let decayed = move |decays: bool| Rule { learned: true, decay: if decays { decay } else { 0.0 } };
+            match learned {
+                Learned::All => network.matrices().map(decayed).collect(),
+                Learned::Outputs => {
+                    let rule = |output: bool| Rule { learned: output, ..decayed(output) };
+                    network.output_layer().map(rule).collect()
+                }
+            }
         };
-        let mut decays: Vec<f64> = of(&self.inertia, inertia).chain(of(&self.potential, potential)).collect();
-        decays.resize(self.weights.len(), 0.0);
-        decays
+        let mut rules: Vec<Rule> = self.inertia.iter().flat_map(|block| of(&block.network, inertia)).collect();
+        rules.extend(of(&self.potential, potential));
+        rules.resize(self.weights.len(), Rule { learned: true, decay: 0.0 });
+        rules
     }
 
     /// Takes rotor inertias that are negative to 0: no rotor has one, and M(q) would grow by as much.
@@ -204,11 +271,12 @@ impl<const N: usize> Model<N> {
     /// Sum over samples and joints of importance * (effort - measured)^2; its gradient is added to `gradient`.
     pub fn error(&self, samples: &[Sample<N>], importance: &SVector<f64, N>, gradient: &mut [f64]) -> f64 {
         let positions: Vec<_> = samples.iter().map(|sample| sample.q).collect();
-        let (lagrangians, [inertia_pass, potential_pass]) = self.forward(&positions);
+        let (lagrangians, passes) = self.forward(&positions);
         let Scales { gain, joint, potential, linear } = &self.scales;
         let (width, begin) = (self.shape.friction.width(), self.networks());
-        let mut inertia = DMatrix::zeros(self.inertia.outputs, inertia_pass.outputs.ncols());
-        let mut energy = DMatrix::zeros(1, potential_pass.outputs.ncols());
+        let zeros = |pass: &Pass| DMatrix::zeros(pass.outputs.nrows(), pass.outputs.ncols());
+        let mut inertia: Vec<DMatrix<f64>> = passes.inertia.iter().map(zeros).collect();
+        let mut energy: DMatrix<f64> = zeros(&passes.potential);
         let (mut error, n) = (0.0, samples.len());
         for (i, (sample, lagrangian)) in samples.iter().zip(&lagrangians).enumerate() {
             let residual = self.effort(sample, lagrangian) - sample.effort;
@@ -223,84 +291,105 @@ impl<const N: usize> Model<N> {
             let torques = adjoint.component_mul(joint).component_div(gain);
             let (v, a) = (joint.component_mul(&sample.v), joint.component_mul(&sample.a));
             let adjoint = lagrangian.adjoint(&v, &a, &torques);
-            entries::<N>(self.shape.upper, |row, column, entry| {
-                let values = &inertia_pass.outputs;
-                let of_tangent = |k: usize| adjoint.factor_by[k][(row, column)] / joint[k];
-                if row == column {
-                    let [_, slope, curvature] = Activation::Softplus.at(values[(entry, i)]);
-                    let bent: f64 = (0..N).map(|k| values[(entry, i + n * (k + 1))] * of_tangent(k)).sum();
-                    inertia[(entry, i)] = slope * adjoint.factor[(row, row)] + curvature * bent;
-                    (0..N).for_each(|k| inertia[(entry, i + n * (k + 1))] = slope * of_tangent(k));
-                } else {
-                    inertia[(entry, i)] = adjoint.factor[(row, column)];
-                    (0..N).for_each(|k| inertia[(entry, i + n * (k + 1))] = of_tangent(k));
+            for ((block, pass), inertia) in self.inertia.iter().zip(&passes.inertia).zip(&mut inertia) {
+                let values = &pass.outputs;
+                for (entry, &(row, column)) in block.entries.iter().enumerate() {
+                    let of_tangent = |k: usize| adjoint.factor_by[k][(row, column)] / joint[k];
+                    let tangent = |k: usize| (entry, i + n * (k - block.from + 1));
+                    if row == column {
+                        let [_, slope, curvature] = Activation::Softplus.at(values[(entry, i)]);
+                        let bent: f64 = (block.from..N).map(|k| values[tangent(k)] * of_tangent(k)).sum();
+                        inertia[(entry, i)] = slope * adjoint.factor[(row, row)] + curvature * bent;
+                        (block.from..N).for_each(|k| inertia[tangent(k)] = slope * of_tangent(k));
+                    } else {
+                        inertia[(entry, i)] = adjoint.factor[(row, column)];
+                        (block.from..N).for_each(|k| inertia[tangent(k)] = of_tangent(k));
+                    }
                 }
-            });
+            }
             (0..N).for_each(|k| energy[i + n * (k + 1)] = adjoint.potential_by[k] * potential / joint[k]);
         }
-        let (of_inertia, of_potential) = gradient[..begin].split_at_mut(self.inertia.len());
-        let (inertia_weights, potential_weights) = self.weights[..begin].split_at(self.inertia.len());
-        self.inertia.backward(inertia_weights, &inertia_pass, inertia, of_inertia);
-        self.potential.backward(potential_weights, &potential_pass, energy, of_potential);
+        let mut place = 0;
+        for ((block, pass), adjoint) in self.inertia.iter().zip(&passes.inertia).zip(inertia) {
+            let own = place..place + block.network.len();
+            place = own.end;
+            block.network.backward(&self.weights[own.clone()], pass, adjoint, &mut gradient[own]);
+        }
+        self.potential.backward(&self.weights[place..begin], &passes.potential, energy, &mut gradient[place..begin]);
         error
     }
 
-    /// Lagrangians at these positions, and the passes of both networks.
-    fn forward(&self, positions: &[SVector<f64, N>]) -> (Vec<Lagrangian<N>>, [Pass; 2]) {
-        let (inputs, n) = (self.inputs(positions), positions.len());
-        let (inertia, potential) = self.weights[..self.networks()].split_at(self.inertia.len());
-        let inertia = self.inertia.forward(inertia, n, inputs.clone());
-        let potential = self.potential.forward(potential, n, inputs);
+    /// Lagrangians at these positions, and the passes of all networks.
+    fn forward(&self, positions: &[SVector<f64, N>]) -> (Vec<Lagrangian<N>>, Passes) {
+        let n = positions.len();
+        let (mut place, mut inertia) = (0, Vec::new());
+        for block in &self.inertia {
+            let own = place..place + block.network.len();
+            place = own.end;
+            let inputs = self.shape.inputs.with_tangents(positions, block.from);
+            inertia.push(block.network.forward(&self.weights[own], n, inputs));
+        }
+        let inputs = self.shape.inputs.with_tangents(positions, 0);
+        let potential = self.potential.forward(&self.weights[place..self.networks()], n, inputs);
         let Scales { joint, potential: energy, .. } = &self.scales;
         let lagrangian = |i: usize| {
             let mut factor = SMatrix::zeros();
             let mut factor_by = [SMatrix::zeros(); N];
-            entries::<N>(self.shape.upper, |row, column, entry| {
-                let [value, slope, _] = match inertia.outputs[(entry, i)] {
-                    raw if row == column => Activation::Softplus.at(raw),
-                    raw => [raw, 1.0, 0.0],
-                };
-                factor[(row, column)] = value;
-                for (k, by) in factor_by.iter_mut().enumerate() {
-                    by[(row, column)] = slope * inertia.outputs[(entry, i + n * (k + 1))] / joint[k];
+            for (block, pass) in self.inertia.iter().zip(&inertia) {
+                for (entry, &(row, column)) in block.entries.iter().enumerate() {
+                    let [value, slope, _] = match pass.outputs[(entry, i)] {
+                        raw if row == column => Activation::Softplus.at(raw),
+                        raw => [raw, 1.0, 0.0],
+                    };
+                    factor[(row, column)] = value;
+                    for k in block.from..N {
+                        let tangent = pass.outputs[(entry, i + n * (k - block.from + 1))];
+                        factor_by[k][(row, column)] = slope * tangent / joint[k];
+                    }
                 }
-            });
+            }
             let potential_by = SVector::from_fn(|k, _| energy * potential.outputs[i + n * (k + 1)] / joint[k]);
             Lagrangian { factor, factor_by, potential_by }
         };
-        ((0..n).map(lagrangian).collect(), [inertia, potential])
+        ((0..n).map(lagrangian).collect(), Passes { inertia, potential })
+    }
+}
+
+/// Passes of all networks.
+struct Passes {
+    inertia: Vec<Pass>,
+    potential: Pass,
+}
+
+impl Inputs {
+    /// Number of inputs for a number of positions.
+    fn of(self, positions: usize) -> usize {
+        match self {
+            Self::Angles => positions,
+            Self::SinesAndCosines => 2 * positions,
+        }
     }
 
-    /// Inputs of the networks with their tangents.
-    fn inputs(&self, positions: &[SVector<f64, N>]) -> DMatrix<f64> {
-        let n = positions.len();
-        let mut inputs = DMatrix::zeros(self.inertia.inputs, n * (N + 1));
+    /// Inputs by the positions from one on, and their tangents.
+    fn with_tangents<const N: usize>(self, positions: &[SVector<f64, N>], from: usize) -> DMatrix<f64> {
+        let (n, used) = (positions.len(), N - from);
+        let mut inputs = DMatrix::zeros(self.of(used), n * (used + 1));
         for (i, q) in positions.iter().enumerate() {
-            for j in 0..N {
+            for j in 0..used {
                 let tangent = i + n * (j + 1);
-                match self.shape.inputs {
-                    Inputs::Angles => {
-                        inputs[(j, i)] = q[j];
+                match self {
+                    Self::Angles => {
+                        inputs[(j, i)] = q[from + j];
                         inputs[(j, tangent)] = 1.0;
                     }
-                    Inputs::SinesAndCosines => {
-                        let (sine, cosine) = q[j].sin_cos();
-                        (inputs[(j, i)], inputs[(N + j, i)]) = (sine, cosine);
-                        (inputs[(j, tangent)], inputs[(N + j, tangent)]) = (cosine, -sine);
+                    Self::SinesAndCosines => {
+                        let (sine, cosine) = q[from + j].sin_cos();
+                        (inputs[(j, i)], inputs[(used + j, i)]) = (sine, cosine);
+                        (inputs[(j, tangent)], inputs[(used + j, tangent)]) = (cosine, -sine);
                     }
                 }
             }
         }
         inputs
     }
-}
-
-/// Calls `of` with row, column and place among the outputs of each entry of a triangle.
-fn entries<const N: usize>(upper: bool, mut of: impl FnMut(usize, usize, usize)) {
-    (0..N).for_each(|row| {
-        (0..=row).for_each(|column| {
-            let entry = row * (row + 1) / 2 + column;
-            if upper { of(column, row, entry) } else { of(row, column, entry) }
-        })
-    });
 }

@@ -96,6 +96,14 @@ impl Network {
         self.layers().flat_map(|(from, to, _)| (0..(from + 1) * to).map(move |i| i < from * to))
     }
 
+    /// True for each weight of the last layer, biases included.
+    pub fn output_layer(&self) -> impl Iterator<Item = bool> + use<> {
+        let last = self.hidden.len();
+        self.layers()
+            .enumerate()
+            .flat_map(move |(layer, (from, to, _))| (0..(from + 1) * to).map(move |_| layer == last))
+    }
+
     /// Random weights: normal with variance 1 / inputs of the layer; biases likewise with variance 1.
     pub fn random(&self, random: &mut impl Rng) -> Vec<f64> {
         let mut weights = Vec::with_capacity(self.len());

@@ -1,7 +1,7 @@
 //! Training of a model by Adam (D. Kingma, J. Ba, 2015) with decoupled weight decay (I. Loshchilov, F. Hutter, 2019)
 //! and early stopping; host.
 
-use super::model::{Model, Sample};
+use super::model::{Learned, Model, Rule, Sample, root_mean_square};
 use nalgebra::SVector;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -21,13 +21,13 @@ pub struct Training {
     pub batch: usize,
     /// Learning rate at the begin; it falls to 0 along half a cosine.
     pub rate: f64,
-    /// Weight decay of the networks' matrices, inertia and potential energy: part of a weight that a step at rate 1
-    /// takes away.
+    /// Weights that are changed.
+    pub learned: Learned,
+    /// Weight decay of the networks, inertia and potential energy: part of a weight, or of its distance from what it
+    /// was, that a step at rate 1 takes away.
     pub decay: [f64; 2],
     /// Epochs from one validation to the next.
     pub every: usize,
-    /// Power of the effort's RMS by which a joint's squared errors are divided; 2 makes all joints alike.
-    pub power: f64,
     /// Seed of the order of samples.
     pub seed: u64,
 }
@@ -39,6 +39,11 @@ pub struct Outcome {
     pub epoch: usize,
     /// Weighted error on the validation samples at that epoch.
     pub validation: f64,
+}
+
+/// Importance of each joint's squared errors: its effort's RMS to a negative power; 2 makes all joints alike.
+pub fn importance<const N: usize>(samples: &[Sample<N>], power: f64) -> SVector<f64, N> {
+    root_mean_square(samples.iter().map(|sample| sample.effort)).map(|rms| rms.powf(-power))
 }
 
 /// Mean square of each joint's error.
@@ -59,29 +64,32 @@ impl Training {
         model: &mut Model<N>,
         samples: &[Sample<N>],
         validation: &[Sample<N>],
+        importance: &SVector<f64, N>,
     ) -> Outcome {
-        let rms = super::model::root_mean_square(samples.iter().map(|sample| sample.effort));
-        let importance = rms.map(|rms| rms.powf(-self.power));
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
         let mut order: Vec<usize> = (0..samples.len()).collect();
         let mut moments = vec![[0.0; 2]; model.weights.len()];
-        let decays = model.decays(self.decay);
+        let rules = model.rules(self.learned, self.decay);
+        let begin = match self.learned {
+            Learned::All => vec![0.0; model.weights.len()],
+            Learned::Outputs => model.weights.clone(),
+        };
         let (mut step, mut best) = (0, model.weights.clone());
-        let mut outcome = Outcome { epoch: 0, validation: mean_square(model, validation).dot(&importance) };
+        let mut outcome = Outcome { epoch: 0, validation: mean_square(model, validation).dot(importance) };
         let steps = self.epochs * samples.len().div_ceil(self.batch);
         for epoch in 1..=self.epochs {
             order.shuffle(&mut random);
             for batch in order.chunks(self.batch) {
                 let batch: Vec<Sample<N>> = batch.iter().map(|&i| samples[i]).collect();
                 let mut gradient = vec![0.0; model.weights.len()];
-                model.error(&batch, &importance, &mut gradient);
+                model.error(&batch, importance, &mut gradient);
                 let rate = 0.5 * self.rate * (1.0 + (std::f64::consts::PI * step as f64 / steps as f64).cos());
                 step += 1;
-                adam(model, &gradient, &mut moments, &decays, step, rate);
+                adam(model, &gradient, &mut moments, (&rules, &begin), step, rate);
                 model.bound_rotors();
             }
             if epoch % self.every == 0 || epoch == self.epochs {
-                let error = mean_square(model, validation).dot(&importance);
+                let error = mean_square(model, validation).dot(importance);
                 if error < outcome.validation {
                     outcome = Outcome { epoch, validation: error };
                     best.clone_from(&model.weights);
@@ -93,20 +101,20 @@ impl Training {
     }
 }
 
-/// One step of Adam.
+/// One step of Adam on the weights that are learned; they decay to `begin`.
 fn adam<const N: usize>(
     model: &mut Model<N>,
     gradient: &[f64],
     moments: &mut [[f64; 2]],
-    decays: &[f64],
+    (rules, begin): (&[Rule], &[f64]),
     step: i32,
     rate: f64,
 ) {
     let corrections = MOMENTS.map(|decay| 1.0 - decay.powi(step));
-    for (i, (weight, moment)) in model.weights.iter_mut().zip(moments).enumerate() {
+    for (i, (weight, moment)) in model.weights.iter_mut().zip(moments).enumerate().filter(|(i, _)| rules[*i].learned) {
         moment[0] += (1.0 - MOMENTS[0]) * (gradient[i] - moment[0]);
         moment[1] += (1.0 - MOMENTS[1]) * (gradient[i] * gradient[i] - moment[1]);
         let [mean, square] = [moment[0] / corrections[0], moment[1] / corrections[1]];
-        *weight -= rate * (mean / (square.sqrt() + 1e-8) + decays[i] * *weight);
+        *weight -= rate * (mean / (square.sqrt() + 1e-8) + rules[i].decay * (*weight - begin[i]));
     }
 }
