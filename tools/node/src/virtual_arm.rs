@@ -7,7 +7,7 @@ use crate::serve::Served;
 use crate::virtual_node::VirtualNode;
 use bus::Frame;
 use joint_firmware::joint::state_machine::State;
-use plant::{ArmError, Links, VirtualJoint};
+use plant::{ArmError, Links, Pair, VirtualJoint};
 use rigid_body::Tree;
 use std::time::Duration;
 
@@ -29,6 +29,21 @@ impl VirtualArm {
         let links = Links::new(tree, &joints)?;
         let held = vec![true; nodes.len()];
         Ok(Self { links, nodes, held })
+    }
+
+    /// The same with joints that share drives in pairs.
+    ///
+    /// # Errors
+    /// [`ArmError::Pair`].
+    pub fn with_pairs(mut self, pairs: Vec<Pair>) -> Result<Self, ArmError> {
+        self.links = self.links.with_pairs(pairs)?;
+        Ok(self)
+    }
+
+    /// Pairs of joints that share a drive, with the joint that leads now.
+    #[must_use]
+    pub fn pairs(&self) -> &[Pair] {
+        self.links.pairs()
     }
 
     /// The nodes.
@@ -131,6 +146,31 @@ mod tests {
         for word in [6u16, 7, 15] {
             write(arm, node, 0x6040, 0, &word.to_le_bytes());
         }
+    }
+
+    /// Velocity that a joint has after a push of 30 ms, with a pair of the first two joints or without.
+    fn pushed(pairs: Vec<Pair>) -> f64 {
+        let mut arm = arm().with_pairs(pairs).unwrap();
+        enable(&mut arm, 1);
+        enable(&mut arm, 2);
+        arm.nodes[0].push(25.0);
+        arm.nodes[1].push(60.0);
+        arm.advance(30 * MILLISECOND);
+        let velocity = |node: usize| arm.nodes()[node].joint().actuator().state().joint.velocity;
+        assert!(velocity(1) > velocity(0) + 0.1, "{} {}", velocity(0), velocity(1));
+        let leader = arm.pairs().first().and_then(Pair::leader);
+        assert_eq!(leader, arm.pairs().first().map(|_| 1));
+        velocity(0)
+    }
+
+    #[test]
+    fn a_joint_of_a_pair_moves_more_easily_while_the_other_is_faster() {
+        let [alone, paired, whole] =
+            [vec![], vec![Pair::new([0, 1], 0.05, 0.2)], vec![Pair::new([0, 1], 0.05, 1.0)]].map(pushed);
+        assert!(paired > 1.1 * alone, "{paired} {alone}");
+        assert_eq!(whole.to_bits(), alone.to_bits());
+        let wrong = arm().with_pairs(vec![Pair::new([0, 3], 0.05, 0.5)]);
+        assert!(matches!(wrong, Err(ArmError::Pair(0, _))));
     }
 
     fn positions(arm: &VirtualArm) -> Vec<f64> {

@@ -1,7 +1,7 @@
 //! A virtual arm: virtual joints, each with its actuator, friction and control step, on one tree of rigid links.
 
 use crate::links::{ArmError, Links};
-use crate::pair::{Pair, check};
+use crate::pair::Pair;
 use crate::virtual_joint::VirtualJoint;
 use joint_firmware::joint::state_machine::{Controlword, State};
 use joint_firmware::joint::{Demand, OFFSET_STEPS, Telemetry};
@@ -12,7 +12,6 @@ use rigid_body::Tree;
 pub struct Arm {
     links: Links,
     joints: Vec<VirtualJoint>,
-    pairs: Vec<Pair>,
     held: bool,
 }
 
@@ -24,7 +23,7 @@ impl Arm {
     /// [`ArmError`].
     pub fn new(tree: Tree, joints: Vec<VirtualJoint>) -> Result<Self, ArmError> {
         let links = Links::new(tree, &joints.iter().collect::<Vec<_>>())?;
-        Ok(Self { links, joints, pairs: vec![], held: false })
+        Ok(Self { links, joints, held: false })
     }
 
     /// The same with joints that share drives in pairs.
@@ -32,15 +31,14 @@ impl Arm {
     /// # Errors
     /// [`ArmError::Pair`].
     pub fn with_pairs(mut self, pairs: Vec<Pair>) -> Result<Self, ArmError> {
-        check(&pairs, self.joints.len()).map_err(|(number, error)| ArmError::Pair(number, error))?;
-        self.pairs = pairs;
+        self.links = self.links.with_pairs(pairs)?;
         Ok(self)
     }
 
     /// Pairs of joints that share a drive, with the joint that leads now.
     #[must_use]
     pub fn pairs(&self) -> &[Pair] {
-        &self.pairs
+        self.links.pairs()
     }
 
     /// The joints.
@@ -81,14 +79,6 @@ impl Arm {
     /// One control step of every joint, then one period of physics with external torques (Nm at the joints). What is
     /// missing is zero.
     pub fn step(&mut self, demands: &[Demand], external: &[f64]) -> Vec<Telemetry> {
-        for pair in &mut self.pairs {
-            let [first, second] = pair.joints;
-            let speed = |joint: usize| self.joints[joint].actuator().state().joint.velocity.abs();
-            let factors = pair.look([speed(first), speed(second)]);
-            for (joint, factor) in pair.joints.into_iter().zip(factors) {
-                self.joints[joint].actuator_mut().relieve(factor);
-            }
-        }
         let held = vec![self.held; self.joints.len()];
         let mut joints: Vec<_> = self.joints.iter_mut().collect();
         self.links.step(&mut joints, demands, external, &held)

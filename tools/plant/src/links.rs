@@ -9,10 +9,11 @@
 //!
 //! which is the backward Euler step of [`crate::joint`], for all joints at once. Each joint then makes that step
 //! itself, under the torque that the others exert on its link. M and h are computed anew every [`EVERY`] periods.
-//! A joint that is held, as by a closed brake, stands at once, and the others move around it.
+//! A joint that is held, as by a closed brake, stands at once, and the others move around it. Joints of a pair relieve
+//! each other's friction before the step ([`crate::pair`]).
 
 use crate::joint::{Answer, MAXIMUM_STEP};
-use crate::pair::PairError;
+use crate::pair::{Pair, PairError, check};
 use crate::virtual_joint::VirtualJoint;
 use joint_firmware::joint::state_machine::State;
 use joint_firmware::joint::{Demand, Telemetry};
@@ -66,6 +67,7 @@ pub struct Links {
     mass: DMatrix<f64>,
     bias: DVector<f64>,
     steps: u64,
+    pairs: Vec<Pair>,
 }
 
 impl Links {
@@ -93,7 +95,23 @@ impl Links {
                 return Err(ArmError::Period(i));
             }
         }
-        Ok(Self { tree, mass: DMatrix::zeros(n, n), bias: DVector::zeros(n), steps: 0 })
+        Ok(Self { tree, mass: DMatrix::zeros(n, n), bias: DVector::zeros(n), steps: 0, pairs: vec![] })
+    }
+
+    /// The same between joints that share drives in pairs.
+    ///
+    /// # Errors
+    /// [`ArmError::Pair`].
+    pub fn with_pairs(mut self, pairs: Vec<Pair>) -> Result<Self, ArmError> {
+        check(&pairs, self.tree.len()).map_err(|(number, error)| ArmError::Pair(number, error))?;
+        self.pairs = pairs;
+        Ok(self)
+    }
+
+    /// Pairs of joints that share a drive, with the joint that leads now.
+    #[must_use]
+    pub fn pairs(&self) -> &[Pair] {
+        &self.pairs
     }
 
     /// The tree.
@@ -111,6 +129,12 @@ impl Links {
         external: &[f64],
         held: &[bool],
     ) -> Vec<Telemetry> {
+        for pair in &mut self.pairs {
+            let speeds = pair.joints.map(|joint| joints[joint].actuator().state().joint.velocity.abs());
+            for (joint, factor) in pair.joints.into_iter().zip(pair.look(speeds)) {
+                joints[joint].actuator_mut().relieve(factor);
+            }
+        }
         let nothing = Demand::default();
         let demands = demands.iter().chain(std::iter::repeat(&nothing));
         let driven: Vec<_> = joints.iter_mut().zip(demands).map(|(joint, demand)| joint.drive(demand)).collect();

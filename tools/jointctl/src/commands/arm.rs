@@ -6,6 +6,7 @@ use crate::joint_text;
 use clap::Args;
 use plant::ActuatorParameters;
 use plant::load::LoadParameters;
+use plant::pair::{self, Pair};
 use plant::virtual_joint::Setup;
 use rigid_body::newton_euler::inverse_dynamics;
 use rigid_body::{JointKind, Robot, Tree};
@@ -14,6 +15,9 @@ use std::path::{Path, PathBuf};
 
 /// Postures of which the heaviest counts, for each joint.
 const POSTURES: u32 = 1_000;
+
+/// Part of its dry friction that a joint of a pair keeps while the other one leads.
+const RELIEF: f64 = 0.5;
 
 /// Which arm.
 #[derive(Debug, Args)]
@@ -26,6 +30,10 @@ pub struct ArmChoice {
     /// Folder with JOINT/plant.toml and JOINT/joint.toml for joints that differ from the reference joint
     #[arg(long, value_name = "DIR", requires = "robot")]
     actuators: Option<PathBuf>,
+    /// Part of its dry friction that a joint of a `[[pair]]` keeps while the other moves faster, 0.01 to 1; 0.5 unless
+    /// it is given
+    #[arg(long, value_name = "PART", requires = "robot")]
+    relief: Option<f64>,
 }
 
 /// A joint of an arm.
@@ -46,6 +54,8 @@ pub struct Arm {
     pub tree: Tree,
     /// Its joints, in the order of the tree's.
     pub joints: Vec<ArmJoint>,
+    /// Joints that share a drive.
+    pub pairs: Vec<Pair>,
 }
 
 impl ArmChoice {
@@ -70,7 +80,22 @@ impl ArmChoice {
                 );
             }
         }
-        Ok(Some(Arm { tree: robot.tree, joints }))
+        let pairs = self.pairs(&robot, path)?;
+        Ok(Some(Arm { tree: robot.tree, joints, pairs }))
+    }
+
+    fn pairs(&self, robot: &Robot, path: &Path) -> Result<Vec<Pair>, CommandError> {
+        if let (Some(relief), true) = (self.relief, robot.pairs.is_empty()) {
+            let reason =
+                format!("--relief {relief}: {} has no [[pair]], add it or leave the option out", path.display());
+            return Err(CommandError::Arguments(reason));
+        }
+        let relief = self.relief.unwrap_or(RELIEF);
+        let pairs: Vec<Pair> = robot.pairs.iter().map(|pair| Pair::new(pair.joints, pair.band, relief)).collect();
+        match pair::check(&pairs, robot.tree.len()) {
+            Ok(()) => Ok(pairs),
+            Err((_, error)) => Err(CommandError::Arguments(format!("--relief {relief}: {error}"))),
+        }
     }
 
     fn joint(&self, name: &str) -> Result<ArmJoint, CommandError> {
@@ -157,6 +182,27 @@ mod tests {
         let coupling = "[coupling]\njoints = ['a', 'b']\nmatrix = [[1.0, 1.0], [1.0, -1.0]]\n";
         let shared = told(&robot("revolute", coupling)).unwrap_err();
         assert!(shared.contains("joint a shares its motor"), "{shared}");
+    }
+
+    #[test]
+    fn joints_of_a_pair_relieve_each_other_by_half_or_by_what_is_given_within_its_limits() {
+        let pair = "[[pair]]\njoints = ['a', 'b']\nband = 0.1\n";
+        let (paired, single) = (robot("revolute", pair), robot("revolute", ""));
+        let read = |robot: &Robot, relief: Option<f64>| {
+            let choice = ArmChoice { robot: None, actuators: None, relief };
+            choice.pairs(robot, Path::new("robot.toml")).map_err(|error| error.to_string())
+        };
+        assert_eq!(read(&paired, None), Ok(vec![Pair::new([0, 1], 0.1, 0.5)]));
+        assert_eq!(read(&single, None), Ok(vec![]));
+        for relief in [0.01, 1.0] {
+            assert_eq!(read(&paired, Some(relief)), Ok(vec![Pair::new([0, 1], 0.1, relief)]));
+        }
+        for relief in [0.0099, 1.001, f64::NAN] {
+            let text = read(&paired, Some(relief)).unwrap_err();
+            assert!(text.contains(&format!("--relief {relief}: pair.relief = ")), "{text}");
+        }
+        let text = read(&single, Some(0.5)).unwrap_err();
+        assert!(text.contains("robot.toml has no [[pair]]"), "{text}");
     }
 
     #[test]

@@ -144,7 +144,9 @@ impl OnBus {
             joints.push(self.joint(&joint.plant, &joint.setup, &options, None)?);
             eprintln!("{}", introduced(name, &joint.name, &options));
         }
-        let mut arm = VirtualArm::new(arm.tree, joints).map_err(|error| failed(&error))?;
+        let mut arm = VirtualArm::new(arm.tree, joints)
+            .and_then(|made| made.with_pairs(arm.pairs))
+            .map_err(|error| failed(&error))?;
         self.until_the_end(|stop| serve(&mut arm, &*transport, stop).map_err(|error| failed(&error)))
     }
 
