@@ -48,20 +48,26 @@ pub struct Built {
 }
 
 /// Quantises and certifies the learned model; a network that the certificate refuses is left out, with the reason.
-/// Without one the model counts up to [`REACH`] times the trained speed, or to that speed where more is refused.
+/// Without one the model counts up to [`REACH`] times the trained speed, and without one of the temperature as far into
+/// heat; where that is refused, or would take the network, to what was trained.
 pub fn build_image(
     samples: &Samples,
     physical: &Identified,
     learned: &Learned,
     context: &Context,
 ) -> Result<Built, FitError> {
+    let trained = || build_to(1.0, samples, physical, learned, context);
     match build_to(REACH, samples, physical, learned, context) {
-        Err(FitError::Refused(_) | FitError::Quantize(_)) => build_to(1.0, samples, physical, learned, context),
+        Err(FitError::Refused(_) | FitError::Quantize(_)) => trained(),
+        Ok(far) if learned.has_network() && !far.learned.has_network() => {
+            let near = trained()?;
+            Ok(if near.learned.has_network() { near } else { far })
+        }
         built => built,
     }
 }
 
-/// [`build_image`] for a model that counts up to `reach` times the trained speed.
+/// [`build_image`] for a model that counts up to `reach` times what was trained.
 fn build_to(
     reach: f64,
     samples: &Samples,
@@ -205,9 +211,8 @@ fn quantized(
             let ends = range(columns[i]);
             let ends = if !network && alike_both_ways(i, &physical.friction) { both_ways(ends) } else { ends };
             match i {
-                _ if learned.has_network() => ends,
-                VELOCITY => reaching(reach, ends),
-                TEMPERATURE => warmer(reach, ends, options.margin, &physical.friction),
+                TEMPERATURE if !network => warmer(reach, ends, options.margin, &physical.friction),
+                VELOCITY if !learned.has_network() => reaching(reach, ends),
                 _ => ends,
             }
         })
@@ -228,6 +233,11 @@ fn quantized(
 mod tests {
     use super::*;
     use crate::friction_model::Terms;
+    use crate::identify::synthetic::{RIGID, drive, friction, motion, rigid};
+    use crate::network::{InputBox, Network};
+    use crate::page::NetworkOutcome;
+    use crate::presets::Preset;
+    use crate::rigid::RigidParameters;
 
     #[test]
     fn an_image_may_give_three_times_the_largest_effort_and_never_more_than_the_joint() {
@@ -280,6 +290,67 @@ mod tests {
         assert_eq!(at(-0.01, 0.001, &both[..1]), (20.0, 60.0), "nor a term that is not there");
         assert_eq!(at(-0.01, -0.01, &[Term::ViscousTemperature, Term::Temperature]), (20.0, 40.0));
         assert_eq!(warmer(1.0, (20.0, 40.0), 0.5, &FloatModel::default()), (20.0, 40.0));
+    }
+
+    /// A joint whose friction falls with heat, learned between 20 and 40 °C, with a network of position and velocity,
+    /// and of the temperature or not.
+    fn with_network(of_temperature: bool) -> (Samples, Identified, Learned) {
+        let terms = [Term::Viscous, Term::Coulomb, Term::ViscousTemperature, Term::CoulombTemperature];
+        let mut samples = motion(6_000);
+        let friction = friction(Terms::of(&terms));
+        drive(&mut samples, &rigid(), &friction, 0.0, 1);
+        samples.load = vec![0.0; samples.len()];
+        let physical = Identified {
+            preset: Preset::CoulombViscous,
+            rigid_model: RIGID,
+            rigid: RigidParameters::default(),
+            theoretical: RigidParameters::default(),
+            friction,
+            parameters: vec![],
+            train_rmse: 0.0,
+            folds: vec![],
+            notes: vec![],
+        };
+        let used = [true, true, false, false, of_temperature];
+        let input_box = InputBox::new([-1.5, -1.0, 0.0, 0.0, 20.0], [1.5, 1.0, 0.0, 0.0, 40.0], used).expect("a box");
+        // The last number is the bias of the output: friction is 0.2 Nm more with the network.
+        let mut parameters = vec![0.0; 96];
+        parameters[95] = 1.0;
+        let network = Network::new(&[5, 5, 5], input_box.clone(), 0.2, parameters).expect("a network");
+        let mut learned = Learned::physical(&samples, &physical, NetworkOutcome::Kept);
+        learned.float.sets[0].1 = Some(network);
+        learned.input_box = Some(input_box);
+        (samples, physical, learned)
+    }
+
+    /// Warm end of an image's temperatures, K above the reference.
+    fn warm_end(built: &Built) -> f64 {
+        f64::from(built.image.friction.domain.ranges[Signal::Temperature as usize].high) / 65_536.0
+    }
+
+    #[test]
+    fn an_image_with_a_network_reaches_into_heat_where_the_network_does_not_know_it_and_as_far_as_it_is_certified() {
+        let built = |of_temperature: bool, torque_limit: Option<f64>, reach: Option<f64>| {
+            let (samples, physical, learned) = with_network(of_temperature);
+            let options = Options { torque_limit, ..Options::default() };
+            let context = Context { effort: EffortUnit::NewtonMetre, sha256: &[0; 32], options: &options };
+            match reach {
+                Some(reach) => build_to(reach, &samples, &physical, &learned, &context).expect("an image"),
+                None => build_image(&samples, &physical, &learned, &context).expect("an image"),
+            }
+        };
+        let (far, near) = (built(false, None, None), built(false, None, Some(1.0)));
+        let knowing = built(true, None, None);
+        assert!([&far, &near, &knowing].iter().all(|built| built.learned.has_network()));
+        assert_eq!(warm_end(&knowing), warm_end(&near));
+        assert!((warm_end(&far) - warm_end(&near) - 20.0).abs() < 0.2, "{} {}", warm_end(&far), warm_end(&near));
+        // The margin of the wider box is wider on its cold side, where friction is greater.
+        let [most, least] = [&far, &near].map(|built| f64::from(built.certificate.output) / 65_536.0);
+        assert!(most > least + 0.01, "{most} {least}");
+        let between = built(false, Some(0.5 * (most + least)), None);
+        assert_eq!((between.learned.has_network(), warm_end(&between)), (true, warm_end(&near)));
+        let below = built(false, Some(0.99 * least), None);
+        assert!(!below.learned.has_network());
     }
 
     #[test]

@@ -301,6 +301,6 @@ impl Problem {
 #[cfg(test)]
 mod recovery_tests;
 #[cfg(test)]
-mod synthetic;
+pub(crate) mod synthetic;
 #[cfg(test)]
 mod tests;
