@@ -14,8 +14,8 @@ use identification::rigid::RigidParameters;
 use identification::samples::Part;
 use nalgebra::DVector;
 use rayon::prelude::*;
-use rigid_body::Robot;
 use rigid_body::inertia::PARAMETERS;
+use rigid_body::{JointKind, Robot};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -98,6 +98,16 @@ pub struct JointErrors {
     pub relative_percent: f64,
 }
 
+/// A robot that was judged.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Evaluation {
+    /// Errors of each joint.
+    pub errors: Vec<JointErrors>,
+    /// External torque of each joint (Nm, or N where it slides) at each sample, in the direction of its position: what
+    /// links, rotors and friction take beyond what the motors give. Errors of the model are in it, too.
+    pub external: Vec<Vec<f64>>,
+}
+
 /// Samples that are judged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Judged {
@@ -111,17 +121,13 @@ pub enum Judged {
 ///
 /// # Errors
 /// Files that are missing, damaged, of another robot or in another unit.
-pub fn evaluate(
-    folder: &Path,
-    recording: &mut Recording,
-    judged: Judged,
-) -> Result<Vec<JointErrors>, RobotEvaluateError> {
+pub fn evaluate(folder: &Path, recording: &mut Recording, judged: Judged) -> Result<Evaluation, RobotEvaluateError> {
     let (bodies, images) = fitted(folder, recording)?;
     let efforts = efforts(recording, &bodies);
     let parts: Vec<Part> = (0..recording.len()).map(|i| recording.part(i)).collect();
     let wanted = |part: Part| if judged == Judged::Test { part == Part::Test } else { part != Part::Unused };
     let used: Vec<usize> = (0..parts.len()).filter(|&i| wanted(parts[i])).collect();
-    let mut errors = Vec::new();
+    let (mut errors, mut lacking) = (Vec::new(), Vec::new());
     for (j, ((own, image), given)) in bodies.iter().zip(&images).zip(efforts).enumerate() {
         let joint = recording.robot.tree.joints[j].name.clone();
         let unit = recording.joints[j].description.columns.effort.unit.symbol();
@@ -134,7 +140,10 @@ pub fn evaluate(
         let rigid = rigid_efforts(&own.rigid, samples);
         let over = |left: &dyn Fn(usize) -> f64| rmse(used.iter().map(|&i| left(i)));
         let effort = over(&|i| samples.effort[i]);
-        let with_image = over(&|i| samples.effort[i] - rigid[i] - friction[i].0 - friction[i].1);
+        let left: Vec<f64> =
+            (0..samples.len()).map(|i| samples.effort[i] - rigid[i] - friction[i].0 - friction[i].1).collect();
+        let with_image = over(&|i| left[i]);
+        lacking.push(left);
         errors.push(JointErrors {
             joint,
             unit,
@@ -145,7 +154,36 @@ pub fn evaluate(
             relative_percent: 100.0 * with_image / effort,
         });
     }
-    Ok(errors)
+    Ok(Evaluation { errors, external: external(&recording.robot, &lacking) })
+}
+
+/// Torques at the joints in place of efforts that the motors give beyond a model.
+fn external(robot: &Robot, beyond: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let gains = robot.gains();
+    let samples = beyond.first().map_or(0, Vec::len);
+    let at = |i: usize| &gains * DVector::from_iterator(beyond.len(), beyond.iter().map(|joint| -joint[i]));
+    let torques: Vec<DVector<f64>> = (0..samples).map(at).collect();
+    (0..beyond.len()).map(|j| torques.iter().map(|of| of[j]).collect()).collect()
+}
+
+/// External torques as a table: a row for each sample of the recording, with its file's number and its time.
+pub fn external_table(recording: &Recording, external: &[Vec<f64>]) -> String {
+    let mut text = String::from("run,time_s");
+    for joint in &recording.robot.tree.joints {
+        let unit = if joint.kind == JointKind::Prismatic { "force_N" } else { "torque_Nm" };
+        // Writing to a string does not fail.
+        let _ = write!(text, ",{}.external_{unit}", joint.name);
+    }
+    text.push('\n');
+    let of_first = recording.joints.first().map(|joint| &joint.samples);
+    for (i, (run, time)) in of_first.into_iter().flat_map(|of| of.run.iter().zip(&of.time)).enumerate() {
+        let _ = write!(text, "{run},{time:.6}");
+        external.iter().for_each(|joint| {
+            let _ = write!(text, ",{:.5}", joint[i]);
+        });
+        text.push('\n');
+    }
+    text
 }
 
 /// Rigid parts of a fitted robot in `folder`, in the order of the joints of `robot`, which `of` describes.

@@ -33,7 +33,11 @@ const EXAMPLES: [(&str, &[&str]); 50] = [
     ),
     (
         "robot evaluate",
-        &["jointctl robot evaluate arm second.toml", "jointctl robot evaluate arm recording.toml --test"],
+        &[
+            "jointctl robot evaluate arm second.toml",
+            "jointctl robot evaluate arm recording.toml --test",
+            "jointctl robot evaluate arm pushed.toml --external torques.csv",
+        ],
     ),
     (
         "robot move",
