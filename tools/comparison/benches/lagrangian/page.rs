@@ -7,7 +7,7 @@ use comparison::lagrangian::{Activation, Inputs};
 const COEFFICIENTS: [&str; 4] = ["f_v, A s/rad", "f_c+, A", "f_c-, A", "I_a, kg m^2"];
 /// Most that the mean of DeLaN + NSCF with several seeds may leave, over what weighted least squares do: with the gains
 /// known, and with the URDF.
-const MOST: [f64; 2] = [2.3, 1.1];
+const MOST: [f64; 2] = [2.3, 1.2];
 /// Longest time of all trainings, s.
 const LONGEST: f64 = 600.0;
 
