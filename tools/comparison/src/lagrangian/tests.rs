@@ -38,6 +38,18 @@ fn random_model(inputs: Inputs, activation: Activation, friction: Friction) -> M
     model
 }
 
+/// A chain whose networks have one layer of so many sines.
+fn chain(width: usize) -> Shape {
+    let layer = vec![(width, Activation::Sine)];
+    Shape {
+        inputs: Inputs::Angles,
+        inertia: layer.clone(),
+        potential: layer,
+        friction: Friction::Nonsymmetric,
+        structure: Structure::Chain,
+    }
+}
+
 #[test]
 fn the_gradient_is_that_of_central_differences() {
     let samples = random_samples(4, 2);
@@ -83,14 +95,7 @@ fn the_mass_matrix_is_symmetric_and_positive_definite_whatever_the_weights() {
 
 #[test]
 fn the_mass_matrix_of_a_chain_depends_on_the_positions_after_a_joint_alone() {
-    let shape = Shape {
-        inputs: Inputs::Angles,
-        inertia: vec![(7, Activation::Sine)],
-        potential: vec![(7, Activation::Sine)],
-        friction: Friction::Nonsymmetric,
-        structure: Structure::Chain,
-    };
-    let model = Model::<3>::new(&shape, &random_samples(50, 1), gain(), 3);
+    let model = Model::<3>::new(&chain(7), &random_samples(50, 1), gain(), 3);
     let [base, first, second, third] = [[0.1, 0.2, 0.3], [0.9, 0.2, 0.3], [0.1, 0.9, 0.3], [0.1, 0.2, 0.9]]
         .map(|q| model.mass_matrix(&SVector::from(q)));
     let changed = |other: &nalgebra::SMatrix<f64, 3, 3>| {
@@ -206,15 +211,8 @@ fn what_was_learned_from_the_links_is_kept_but_for_the_outputs_and_helps_where_s
     let mut wrong = links();
     wrong.joints.iter_mut().for_each(|joint| joint.link.mass *= 1.2);
     let importance = importance(samples, 2.0);
-    let shape = Shape {
-        inputs: Inputs::Angles,
-        inertia: vec![(16, Activation::Sine)],
-        potential: vec![(16, Activation::Sine)],
-        friction: Friction::Nonsymmetric,
-        structure: Structure::Chain,
-    };
     let test = pendulum(500, 9);
-    let mut model = Model::new(&shape, samples, gain(), 1);
+    let mut model = Model::new(&chain(16), samples, gain(), 1);
     let learned = Learned::All;
     let training = Training { epochs: 60, batch: 50, rate: 0.02, learned, decay: [0.0; 2], every: 5, seed: 1 };
     let of_links = |count, seed| from_links::samples(&wrong, &gain(), &all, 0.0, count, seed);
@@ -231,7 +229,7 @@ fn what_was_learned_from_the_links_is_kept_but_for_the_outputs_and_helps_where_s
     assert_eq!(learned, 17 * (2 + 1 + 1) + 4 * 2);
     assert!((0..rules.len()).filter(changed).all(|i| rules[i].learned));
 
-    let mut alone = Model::new(&shape, samples, gain(), 1);
+    let mut alone = Model::new(&chain(16), samples, gain(), 1);
     Training { epochs: 260, ..training }.run(&mut alone, samples, validation, &importance);
     let [begun, alone] = [&model, &alone].map(|model| relative(model, &test));
     println!("{begun} begun from the links, {alone} alone, {} from the links alone", relative(&before, &test));
@@ -243,14 +241,7 @@ fn decay_leads_outputs_to_what_they_were() {
     let samples = pendulum(300, 13);
     let mut distances = Vec::new();
     for decay in [0.0, 30.0] {
-        let shape = Shape {
-            inputs: Inputs::Angles,
-            inertia: vec![(8, Activation::Sine)],
-            potential: vec![(8, Activation::Sine)],
-            friction: Friction::Nonsymmetric,
-            structure: Structure::Chain,
-        };
-        let mut model = Model::new(&shape, &samples, gain(), 1);
+        let mut model = Model::new(&chain(8), &samples, gain(), 1);
         let (networks, begin) = (model.networks(), model.weights.clone());
         let learned = Learned::Outputs;
         let training = Training { epochs: 20, batch: 50, rate: 0.01, learned, decay: [decay; 2], every: 5, seed: 1 };

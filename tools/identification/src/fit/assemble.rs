@@ -316,7 +316,7 @@ mod tests {
         // The last number is the bias of the output: friction is 0.2 Nm more with the network.
         let mut parameters = vec![0.0; 96];
         parameters[95] = 1.0;
-        let network = Network::new(&[5, 5, 5], input_box.clone(), 0.2, parameters).expect("a network");
+        let network = Network::new(&[5, 5, 5], input_box, 0.2, parameters).expect("a network");
         let mut learned = Learned::physical(&samples, &physical, NetworkOutcome::Kept);
         learned.float.sets[0].1 = Some(network);
         learned.input_box = Some(input_box);
