@@ -70,8 +70,8 @@ pub fn write(results: &Results) {
     println!(
         "The mean of several models' efforts is that of one model as well, whose M, potential and coefficients are the means of theirs. The program\n\
          fails where the last column is above {} and {}. In 002 it is 1.09 and 1.30 (sums over table I, without and with the vibration-free\n\
-         table). Without kinematics 90 s are few: networks learn friction that depends on load as a potential of that motion, which another\n\
-         motion does not have. Directions of Coulomb friction differ little on this robot, so that NSCF gains nothing.\n",
+         table). Without kinematics 90 s are few. Where all weights are learned, from the URDF on as well, networks take friction that depends\n\
+         on load for a potential ([0145](decisions/0145-a-lagrangian-network-can-begin-from-the-urdf.md)). Directions of Coulomb friction differ little on this robot, so that NSCF gains nothing.\n",
         MOST[0], MOST[1]
     );
     println!("## Friction and rotors\n");
