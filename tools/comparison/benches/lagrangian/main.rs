@@ -35,7 +35,7 @@ pub struct Candidate {
     pub inputs: Inputs,
     /// Hidden layers of the networks of inertia and potential energy.
     pub hidden: [Layers; 2],
-    /// What is known of the links.
+    /// Knowledge of the links.
     pub known: Known,
     /// Weight decay, of inertia and potential energy.
     pub decay: [f64; 2],
@@ -44,7 +44,7 @@ pub struct Candidate {
 /// Widths and nonlinearities of hidden layers.
 type Layers = &'static [(usize, Activation)];
 
-/// What a model knows of the robot before it learns from a recording.
+/// Knowledge of the robot before a model learns from a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Known {
     /// Drive gains alone: the paper's setting.
@@ -140,7 +140,7 @@ struct Job {
     seed: u64,
 }
 
-/// What the models with nonsymmetric Coulomb friction know.
+/// Knowledge of the models with nonsymmetric Coulomb friction.
 const NONSYMMETRIC: [Known; 2] = [Known::Gains, Known::Links];
 /// Models of the table of errors.
 const MODELS: [(&str, Known, Friction); 3] = [

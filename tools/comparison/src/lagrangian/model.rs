@@ -79,11 +79,11 @@ pub struct Shape {
     pub potential: Vec<(usize, Activation)>,
     /// Linear layers.
     pub friction: Friction,
-    /// What is known of the robot's links.
+    /// Knowledge of the robot's links.
     pub structure: Structure,
 }
 
-/// What a model knows of the robot's links.
+/// Knowledge of the robot's links in a model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Structure {
     /// Nothing: one network for all of a lower Cholesky factor.
@@ -93,7 +93,7 @@ pub enum Structure {
     Chain,
 }
 
-/// What a training changes, beside the linear layers.
+/// Weights that a training changes, beside those of the linear layers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Learned {
     /// All weights. Matrices decay to 0, biases do not.
@@ -103,7 +103,7 @@ pub enum Learned {
     Outputs,
 }
 
-/// What a training does to a weight.
+/// Treatment of a weight by a training.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rule {
     /// True if it is changed.
