@@ -5,8 +5,8 @@ use comparison::lagrangian::{Activation, Inputs};
 
 /// Names of the coefficients, with their units.
 const COEFFICIENTS: [&str; 4] = ["f_v, A s/rad", "f_c+, A", "f_c-, A", "I_a, kg m^2"];
-/// Most that DeLaN + NSCF may leave, mean over the seeds, over what weighted least squares do: with the gains known, and
-/// with the URDF.
+/// Most that DeLaN + NSCF may leave, mean over the seeds, over what weighted least squares do: with the gains known,
+/// and with the URDF.
 const MOST: [f64; 2] = [2.0, 1.1];
 /// Most that rotor inertias of DeLaN + NSCF begun from the URDF may differ from those of least squares, part.
 const ROTORS: f64 = 0.5;
