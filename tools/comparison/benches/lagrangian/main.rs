@@ -39,9 +39,13 @@ pub struct Candidate {
     pub hidden: [Layers; 2],
     /// Knowledge of the links.
     pub known: Known,
-    /// Weight decay, of inertia and potential energy.
-    pub decay: [f64; 2],
+    /// Weight decays that are tried, of inertia and potential energy, where a model learns from [`DECAYED`] samples.
+    pub decays: &'static [[f64; 2]],
 }
+
+/// Samples that a candidate's weight decay is stated for. It is less in proportion where there are more of them: they
+/// outweigh what was known before.
+pub const DECAYED: f64 = 4_000.0;
 
 /// Widths and nonlinearities of hidden layers.
 type Layers = &'static [(usize, Activation)];
@@ -57,19 +61,15 @@ pub enum Known {
 
 /// Candidates. Of each knowledge the one is taken that is best where a model learns from one training motion and is
 /// judged on the other.
-pub const CANDIDATES: [Candidate; 12] = [
-    alike(Inputs::Angles, SINE, [0.3, 0.3]),
-    alike(Inputs::Angles, SINE, [1.0, 0.1]),
-    alike(Inputs::Angles, SINE, [1.0, 0.3]),
-    alike(Inputs::Angles, SINE, [3.0, 0.3]),
-    alike(Inputs::Angles, SINE, [1.0, 1.0]),
-    alike(Inputs::Angles, SINES, [1.0, 0.3]),
-    alike(Inputs::SinesAndCosines, SOFTPLUS, [0.3, 0.3]),
-    alike(Inputs::SinesAndCosines, TANH, [1.0, 0.3]),
-    of_links([SINE_24, SINE_24], [20.0, 10.0]),
-    of_links([SINE_24, SINE_16], [100.0, 5.0]),
-    of_links([SINE_24, SINE_10], [100.0, 5.0]),
-    of_links([SINE_24, SINE_10], [100.0, 10.0]),
+pub static CANDIDATES: [Candidate; 8] = [
+    alike(Inputs::Angles, SINE, &[[0.3, 0.3], [1.0, 0.1], [1.0, 0.3], [3.0, 0.3], [1.0, 1.0]]),
+    alike(Inputs::Angles, SINES, &[[1.0, 0.3]]),
+    alike(Inputs::SinesAndCosines, SOFTPLUS, &[[0.3, 0.3]]),
+    alike(Inputs::SinesAndCosines, TANH, &[[1.0, 0.3]]),
+    of_links(&[(8, Activation::Sine)]),
+    of_links(&[(10, Activation::Sine)]),
+    of_links(&[(12, Activation::Sine)]),
+    of_links(&[(16, Activation::Sine)]),
 ];
 
 /// Hidden layers of the candidates.
@@ -77,16 +77,15 @@ const SOFTPLUS: Layers = &[(32, Activation::Softplus), (32, Activation::Softplus
 const TANH: Layers = &[(32, Activation::Tanh), (32, Activation::Tanh)];
 const SINE: Layers = &[(64, Activation::Sine)];
 const SINES: Layers = &[(32, Activation::Sine), (32, Activation::Sine)];
-const SINE_10: Layers = &[(10, Activation::Sine)];
-const SINE_16: Layers = &[(16, Activation::Sine)];
-const SINE_24: Layers = &[(24, Activation::Sine)];
+const OF_INERTIA: Layers = &[(24, Activation::Sine)];
 
-const fn alike(inputs: Inputs, hidden: Layers, decay: [f64; 2]) -> Candidate {
-    Candidate { inputs, hidden: [hidden; 2], known: Known::Gains, decay }
+const fn alike(inputs: Inputs, hidden: Layers, decays: &'static [[f64; 2]]) -> Candidate {
+    Candidate { inputs, hidden: [hidden; 2], known: Known::Gains, decays }
 }
 
-const fn of_links(hidden: [Layers; 2], decay: [f64; 2]) -> Candidate {
-    Candidate { inputs: Inputs::Angles, hidden, known: Known::Links, decay }
+const fn of_links(potential: Layers) -> Candidate {
+    let decays = &[[100.0, 2.5], [100.0, 5.0], [100.0, 10.0]];
+    Candidate { inputs: Inputs::Angles, hidden: [OF_INERTIA, potential], known: Known::Links, decays }
 }
 
 /// Samples of the links for training and validation.
@@ -95,8 +94,8 @@ pub const OF_LINKS: [usize; 2] = [20_000, 2_000];
 pub const BEYOND: f64 = 0.2;
 
 impl Candidate {
-    /// A trained model.
-    fn trained(&self, [train, validation]: &Parts, robot: &Robot, job: Job) -> Model<JOINTS> {
+    /// A model before it learns from samples.
+    fn begun(&self, train: &[Sample<JOINTS>], robot: &Robot, job: Job) -> Model<JOINTS> {
         let gain = SVector::from_fn(|j, _| robot.drives[j].gain);
         let shape = Shape {
             inputs: self.inputs,
@@ -109,24 +108,60 @@ impl Candidate {
             },
         };
         let mut model = Model::new(&shape, train, gain, job.seed);
-        let importance = importance(train, 1.0);
-        let Candidate { decay, .. } = *self;
-        let random =
-            Training { epochs: 80, batch: 128, rate: 0.02, learned: Learned::All, decay, every: 4, seed: job.seed };
-        match self.known {
-            Known::Gains => random.run(&mut model, train, validation, &importance),
-            Known::Links => {
-                let [learn, check] = [0, 1].map(|part| {
-                    let seed = 2 * job.seed + part as u64;
-                    from_links::samples(&robot.tree, &gain, train, BEYOND, OF_LINKS[part], seed)
-                });
-                Training { epochs: 60, decay: [0.0; 2], ..random.clone() }.run(&mut model, &learn, &check, &importance);
-                let learned = Learned::Outputs;
-                Training { epochs: 40, rate: 0.005, learned, ..random }.run(&mut model, train, validation, &importance)
-            }
-        };
+        if self.known == Known::Links {
+            let [learn, check] = [0, 1].map(|part| {
+                let seed = 2 * job.seed + part as u64;
+                from_links::samples(&robot.tree, &gain, train, BEYOND, OF_LINKS[part], seed)
+            });
+            let training = Training { epochs: 60, seed: job.seed, ..RANDOM };
+            training.run(&mut model, &learn, &check, &importance(train, 1.0));
+        }
         model
     }
+
+    /// Training of such a model from samples.
+    fn learn(&self, model: &mut Model<JOINTS>, [train, validation]: &Parts, decay: [f64; 2], seed: u64) {
+        let decay = decay.map(|decay| decay * DECAYED / train.len() as f64);
+        let training = match self.known {
+            Known::Gains => Training { decay, seed, ..RANDOM },
+            Known::Links => {
+                let epochs = STEPS * RANDOM.batch / train.len();
+                Training { epochs, rate: 0.005, learned: Learned::Outputs, decay, seed, ..RANDOM }
+            }
+        };
+        training.run(model, train, validation, &importance(train, 1.0));
+    }
+
+    /// Mean over joints of the mean square errors on other samples, for each decay; models learn from the links once.
+    fn errors(&self, parts: &Parts, other: &[Sample<JOINTS>], robot: &Robot, seed: u64) -> Vec<f64> {
+        let job = Job { at: 0, known: self.known, friction: Friction::Nonsymmetric, seed };
+        let begun = self.begun(&parts[0], robot, job);
+        let error = |decay: &[f64; 2]| {
+            let mut model = begun.clone();
+            self.learn(&mut model, parts, *decay, seed);
+            mean_square(&model, other).mean()
+        };
+        self.decays.iter().map(error).collect()
+    }
+}
+
+/// Steps of a training that begins from the links, whatever the samples: how far weights get, at most.
+pub const STEPS: usize = 2_600;
+/// Training from random weights, without decay.
+const RANDOM: Training =
+    Training { epochs: 80, batch: 128, rate: 0.02, learned: Learned::All, decay: [0.0; 2], every: 4, seed: 0 };
+
+/// A candidate with one of its decays.
+pub struct Tried {
+    /// The candidate.
+    pub candidate: &'static Candidate,
+    /// Weight decay.
+    pub decay: [f64; 2],
+    /// Means over joints and seeds of the mean square errors, from each training motion to the other.
+    pub errors: [f64; 2],
+    /// Mean over joints of the mean square errors on the test motion after all of the training motions, one seed: of
+    /// candidates that know the links, and used for no choice.
+    pub in_hindsight: Option<f64>,
 }
 
 /// Samples for training and validation.
@@ -168,9 +203,9 @@ pub type Coefficients = [f64; 4];
 
 /// Everything that the page tells.
 pub struct Results {
-    /// Means over joints and seeds of each candidate's mean square errors, from each training motion to the other.
-    pub choice: Vec<[f64; 2]>,
-    /// Places of the candidates that were taken: with the gains known, and with the links.
+    /// Candidates and decays, each on the training motions.
+    pub choice: Vec<Tried>,
+    /// Places of those that were taken: with the gains known, and with the links.
     pub chosen: [usize; 2],
     /// Errors, share by share.
     pub rows: Vec<Row>,
@@ -209,11 +244,11 @@ fn main() {
     let recordings: Vec<(usize, Recording)> = SHARES.iter().map(|&share| (share, part(share))).collect();
 
     let mut begin = Instant::now();
-    let choice = choice(&whole);
+    let mut choice = choice(&whole);
     let choosing = begin.elapsed().as_secs_f64();
-    let sum = |at: &usize| choice[*at].iter().sum::<f64>();
+    let sum = |at: &usize| choice[*at].errors.iter().sum::<f64>();
     let chosen = [Known::Gains, Known::Links].map(|known| {
-        let own = (0..CANDIDATES.len()).filter(|&at| CANDIDATES[at].known == known);
+        let own = (0..choice.len()).filter(|&at| choice[at].candidate.known == known);
         own.min_by(|a, b| sum(a).total_cmp(&sum(b))).expect("candidates")
     });
     let job = |at, known, friction, seed| Job { at, known, friction, seed };
@@ -227,12 +262,21 @@ fn main() {
     begin = Instant::now();
     let train = |job: &Job| {
         let parts = [Part::Train, Part::Validation].map(|part| samples(&recordings[job.at].1, part));
-        CANDIDATES[chosen[job.known as usize]].trained(&parts, &whole.robot, *job)
+        let Tried { candidate, decay, .. } = choice[chosen[job.known as usize]];
+        let mut model = candidate.begun(&parts[0], &whole.robot, *job);
+        candidate.learn(&mut model, &parts, decay, job.seed);
+        model
     };
     let models: Vec<Model<JOINTS>> = jobs.par_iter().with_max_len(1).map(train).collect();
     let seconds = begin.elapsed().as_secs_f64();
 
     let test = samples(&whole, Part::Test);
+    let parts = [Part::Train, Part::Validation].map(|part| samples(&whole, part));
+    let of_links: Vec<&Candidate> = CANDIDATES.iter().filter(|one| one.known == Known::Links).collect();
+    let in_hindsight: Vec<Vec<f64>> =
+        of_links.par_iter().with_max_len(1).map(|candidate| candidate.errors(&parts, &test, &whole.robot, 1)).collect();
+    let tried = choice.iter_mut().filter(|tried| tried.candidate.known == Known::Links);
+    tried.zip(in_hindsight.concat()).for_each(|(tried, error)| tried.in_hindsight = Some(error));
     let model = |at: usize, known, friction, seed| {
         let wanted = job(at, known, friction, seed);
         &models[jobs.iter().position(|job| *job == wanted).expect("a model of each job")]
@@ -292,26 +336,36 @@ fn averaged(efforts: &[Vec<SVector<f64, JOINTS>>], test: &[Sample<JOINTS>]) -> S
     test.iter().enumerate().map(error).sum::<SVector<f64, JOINTS>>() / test.len() as f64
 }
 
-/// Mean square errors of each candidate that learns from one training motion, on the other: means over joints and
-/// seeds.
-fn choice(recording: &Recording) -> Vec<[f64; 2]> {
+/// Candidates that learn from one training motion, and their errors on the other.
+fn choice(recording: &Recording) -> Vec<Tried> {
     let of = |run: u32, parts: &[Part]| -> Vec<Sample<JOINTS>> {
         let own = |i: &usize| recording.joints[0].samples.run[*i] == run && parts.contains(&recording.part(*i));
         (0..recording.len()).filter(own).map(|i| sample(recording, i)).collect()
     };
-    let seeds = |one, run| (1..=CHOICE_SEEDS).map(move |seed| (one, run, seed));
-    let jobs: Vec<(&Candidate, u32, u64)> =
-        CANDIDATES.iter().flat_map(|one| seeds(one, 0).chain(seeds(one, 1))).collect();
-    let error = |(candidate, run, seed): &(&Candidate, u32, u64)| {
-        let parts = [of(*run, &[Part::Train]), of(*run, &[Part::Validation])];
-        let job = Job { at: 0, known: candidate.known, friction: Friction::Nonsymmetric, seed: *seed };
-        let model = candidate.trained(&parts, &recording.robot, job);
-        mean_square(&model, &of(1 - run, &[Part::Train, Part::Validation])).mean()
+    let jobs: Vec<(usize, u64, u32)> = (0..CANDIDATES.len())
+        .flat_map(|at| (1..=CHOICE_SEEDS).flat_map(move |seed| [(at, seed, 0), (at, seed, 1)]))
+        .collect();
+    let errors = |&(at, seed, run): &(usize, u64, u32)| {
+        let parts = [of(run, &[Part::Train]), of(run, &[Part::Validation])];
+        let other = of(1 - run, &[Part::Train, Part::Validation]);
+        CANDIDATES[at].errors(&parts, &other, &recording.robot, seed)
     };
-    let errors: Vec<f64> = jobs.par_iter().with_max_len(1).map(error).collect();
-    let means: Vec<f64> =
-        errors.chunks(CHOICE_SEEDS as usize).map(|of| of.iter().sum::<f64>() / of.len() as f64).collect();
-    means.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect()
+    let errors: Vec<Vec<f64>> = jobs.par_iter().with_max_len(1).map(errors).collect();
+    let mean = |at: usize, decay: usize, run: u32| {
+        let own = jobs.iter().zip(&errors).filter(|((of, _, on), _)| (*of, *on) == (at, run));
+        own.map(|(_, errors)| errors[decay]).sum::<f64>() / CHOICE_SEEDS as f64
+    };
+    let tried = |at: usize| {
+        let candidate = &CANDIDATES[at];
+        candidate.decays.iter().enumerate().map(move |(i, decay)| (at, candidate, i, *decay))
+    };
+    (0..CANDIDATES.len())
+        .flat_map(tried)
+        .map(|(at, candidate, i, decay)| {
+            let errors = [0, 1].map(|run| mean(at, i, run));
+            Tried { candidate, decay, errors, in_hindsight: None }
+        })
+        .collect()
 }
 
 /// Mean square errors of least squares on the test samples, and its coefficients of each joint.
