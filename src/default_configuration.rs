@@ -11,7 +11,7 @@ use crate::joint::configuration::{
     FRICTION_UNCERTAINTY, Gains, GearConfiguration, Limits, LoadConfiguration, MotorConfiguration,
     ThermalConfiguration, VelocitySource,
 };
-use crate::joint::stopping::StopConfiguration;
+use crate::joint::stop_options::StopConfiguration;
 use crate::motor::angle::{Direction, ElectricalAngle, EncoderAlignment};
 use crate::sensors::analog::Analog;
 use friction_compensation::compensation::Request;

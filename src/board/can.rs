@@ -32,7 +32,7 @@ use embassy_sync::channel::Channel;
 use embassy_time::Instant;
 use joint_firmware::joint::Demand;
 use joint_firmware::joint::configuration::CollisionReaction;
-use joint_firmware::joint::load_feedforward::LOADS;
+use joint_firmware::joint::configuration::LOADS;
 use joint_firmware::objects::{JointImage, Observed};
 
 /// The bus's timing ([`bit_timing`]) as the driver takes it. Said here, because embassy would compute it while the

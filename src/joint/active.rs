@@ -2,13 +2,12 @@
 
 use super::chopper::{CHOPS, ChopperGains};
 use super::configuration::{
-    AdaptationRequest, BridgeConfiguration, Configuration, ConfigurationError, GearConfiguration, Limits, MOTION_STEPS,
-    MotorConfiguration, VelocitySource,
+    AdaptationRequest, BridgeConfiguration, Configuration, ConfigurationError, GearConfiguration, LOADS, Limits,
+    MOTION_STEPS, MotorConfiguration, VelocitySource,
 };
-use super::limit_law::LimitGains;
-use super::load_feedforward::{LOADS, LoadGains};
-use super::monitor::OVER_SPEED;
-use super::stopping::StopGains;
+use super::limit_gains::LimitGains;
+use super::load::LoadGains;
+use super::stop_options::StopGains;
 use crate::motor::angle::{Direction, EncoderAlignment, STEPS, TAU};
 use crate::motor::current::{CurrentSettings, MotorConstants};
 use crate::motor::field_oriented::FieldOrientedGains;
@@ -34,6 +33,8 @@ pub const DERATING: f32 = 20.0;
 /// Part of the regeneration band in which braking current fades. In the rest nothing feeds the supply: the board takes
 /// so little that its voltage comes to rest where almost all is withheld, and there noise would find the limit.
 const FADE: f32 = 0.8;
+/// A velocity this much above its limit is a fault.
+pub(super) const OVER_SPEED: f32 = 1.2;
 /// Peak of the voltage between two phases over that of one.
 const SQRT_3: f32 = 1.732_050_8;
 /// Fastest rotor that the observer follows, beyond the velocity limit.

@@ -5,7 +5,7 @@
 //! end of a converter's range may stand for anything beyond it, and counts as beyond its limit: no limit reaches that
 //! far, and no offset of a sensor takes the reading back below it.
 
-use super::configuration::Limits;
+use super::limits::Limits;
 use crate::motor::number::lesser;
 use crate::sensors::analog::Analog;
 

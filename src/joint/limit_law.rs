@@ -38,57 +38,7 @@
 //! this (`tools/plant/tests/joint/limits.rs`).
 
 use super::active::{Active, JointMotion};
-use super::configuration::{Gains, Limits};
-use crate::motor::number::{greater, lesser, limited, square_root};
-
-/// Part of the longest braking time that the integral of braking takes at least: it has three such times to find a
-/// load.
-const SHORTEST_INTEGRAL: f32 = 0.05;
-
-/// More than twice the relative error of the root: a square this much above that of a limit has its root above the
-/// limit.
-const ROOT_RESERVE: f32 = 1e-5;
-
-/// The gains of the limits, prepared.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LimitGains {
-    /// Velocity over which the whole torque fades, rad/s.
-    pub fade: f32,
-    /// Its slope beyond a position limit, 1/s.
-    pub slope: f32,
-    /// The fade's square, rad²/s².
-    fade_squared: f32,
-    /// Twice the quick stop's deceleration, rad/s².
-    twice_deceleration: f32,
-    /// Square of a speed, rad²/s², that no error of the root brings below the velocity limit.
-    beyond_velocity: f32,
-    /// Nm/rad of the velocity error's integral while the joint brakes, times the motion loop's period.
-    pub braking_integral: f32,
-}
-
-impl LimitGains {
-    /// Gains for a motion loop with rounds of `period` s.
-    pub(super) fn new(limits: &Limits, gains: &Gains, period: f32) -> Self {
-        let fade = limits.torque / limits.damping;
-        // With it the loop's damping ratio is 0.5 for the largest inertia that the torque can brake so, and more for
-        // all others.
-        let integral_time = greater(fade / gains.quick_stop_deceleration, SHORTEST_INTEGRAL * gains.braking_time);
-        Self {
-            fade,
-            slope: 2.0 * fade / limits.position_margin,
-            fade_squared: fade * fade,
-            twice_deceleration: 2.0 * gains.quick_stop_deceleration,
-            beyond_velocity: limits.velocity * limits.velocity * (1.0 + ROOT_RESERVE),
-            braking_integral: limits.damping / integral_time * period,
-        }
-    }
-
-    /// A speed, rad/s, of this square; where it is beyond the velocity limit, that one, and no root is taken.
-    #[inline(always)]
-    pub(super) fn speed(&self, square: f32, active: &Active) -> f32 {
-        if square > self.beyond_velocity { active.limits.velocity } else { square_root(square) }
-    }
-}
+use crate::motor::number::{greater, lesser, limited};
 
 /// Lowest and highest torque that the joint may be given where it is, Nm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -120,9 +70,9 @@ impl Bounds {
 /// Torque, Nm, towards a position limit that is `room` rad away, at a velocity, rad/s, in its direction.
 #[inline(never)]
 fn bound(active: &Active, room: f32, velocity: f32, limit: f32) -> f32 {
-    let gains = &active.limit_gains;
+    let (gains, velocity_limit) = (&active.limit_gains, active.limits.velocity);
     let permitted = if room > 0.0 && velocity > 0.0 {
-        lesser(gains.speed(gains.fade_squared + gains.twice_deceleration * room, active), active.limits.velocity)
+        lesser(gains.speed(gains.fade_squared + gains.twice_deceleration * room, velocity_limit), velocity_limit)
     } else {
         // A joint that goes away from the limit, or stands, has more than its fade: the whole torque.
         gains.fade + gains.slope * lesser(room, 0.0)

@@ -31,7 +31,10 @@ pub mod external_torque;
 pub mod fault;
 pub mod friction_feedforward;
 pub mod history;
+pub mod limit_gains;
 pub mod limit_law;
+pub mod limits;
+pub mod load;
 pub mod load_feedforward;
 mod mean_torque;
 pub mod monitor;
@@ -44,6 +47,7 @@ mod rig;
 pub mod shadow;
 mod signals;
 pub mod state_machine;
+pub mod stop_options;
 pub mod stopping;
 mod telemetry;
 
@@ -73,7 +77,8 @@ use motion_loop::{MotionLoop, Seen, Stage};
 use offsets::Offsets;
 use regeneration::Regeneration;
 use state_machine::{Controlword, Events, State, StateMachine};
-use stopping::{QUICK_STOP, Stopping};
+use stop_options::QUICK_STOP;
+use stopping::Stopping;
 
 /// Speed below which a braking joint counts as standing, as a part of the velocity limit.
 pub(crate) const STANDING: f32 = 0.01;

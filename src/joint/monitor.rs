@@ -40,8 +40,6 @@ const INDUCED_ERROR: f32 = 0.3;
 const MISSED_LIMIT: f32 = 0.02;
 /// ... this part of the reference.
 const MISSED_REFERENCE: f32 = 0.25;
-/// A velocity this much above its limit is a fault.
-pub(super) const OVER_SPEED: f32 = 1.2;
 /// Temperatures outside these are an open or shorted sensor, °C.
 const SENSOR_RANGE: (f32, f32) = (-40.0, 180.0);
 

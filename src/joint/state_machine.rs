@@ -8,7 +8,7 @@
 //! [`Mode::OpenLoop`](super::Mode::OpenLoop), in which a voltage turns the motor and nothing can brake it. Whatever
 //! leaves it switches the bridge off in the same step.
 
-use super::stopping::StopConfiguration;
+use super::stop_options::StopConfiguration;
 
 /// Control steps for which a fault reset waits for the gate driver: a task clears it, and configures it anew where it
 /// has to. 100 ms at 40 kHz.

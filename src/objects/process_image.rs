@@ -24,7 +24,7 @@ use super::set_points::SetPoints;
 use super::shared::Shared;
 use super::table;
 use crate::joint::configuration::CollisionReaction;
-use crate::joint::load_feedforward::LOADS;
+use crate::joint::configuration::LOADS;
 use crate::joint::state_machine::Controlword;
 use crate::joint::{Command, Coupled, Demand, Mode, PROFILES};
 use canopen_node::{MappedObject, NmtState, ProcessImage};

@@ -2,11 +2,11 @@
 //! member stands here and nowhere else.
 
 use crate::joint::adaptation::ADAPTS;
+use crate::joint::configuration::LOADS;
 use crate::joint::configuration::{
     AdaptationRequest, CollisionReaction, Configuration, LoadConfiguration, LoadFeedforwardRequest, VelocitySource,
 };
-use crate::joint::load_feedforward::LOADS;
-use crate::joint::stopping::StopConfiguration;
+use crate::joint::stop_options::StopConfiguration;
 use crate::motor::angle::Direction;
 use friction_compensation::compensation::Request;
 

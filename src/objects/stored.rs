@@ -18,7 +18,7 @@ use super::field::{Field, RANGES, Range};
 use super::shared::DEFAULT_RANGES;
 use super::table::OBJECTS;
 use crate::joint::configuration::Configuration;
-use crate::joint::load_feedforward::LOADS;
+use crate::joint::configuration::LOADS;
 use canopen_node::{COUNTER_AND_DATE, CommunicationParameters, NO_NODE_ID};
 
 /// Longest record: what all objects take, 1,221 bytes and those of the SYNC counter, of 1020h and of a load, and three

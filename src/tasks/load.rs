@@ -5,8 +5,10 @@ use crate::board::can;
 use core::cell::Cell;
 use critical_section::Mutex;
 use joint_firmware::joint::adaptation::Factors;
+use joint_firmware::joint::configuration::LOADS;
 use joint_firmware::joint::external_torque::{self, ExternalTorque, Report};
-use joint_firmware::joint::load_feedforward::{LOADS, LoadFeedforward, LoadGains};
+use joint_firmware::joint::load::LoadGains;
+use joint_firmware::joint::load_feedforward::LoadFeedforward;
 use joint_firmware::joint::{Active, Telemetry};
 
 /// Gains and settings that were prepared last.

@@ -11,7 +11,7 @@ use joint_firmware::objects::settings::Setting;
 use jointctl::commission::bench::Motion;
 use jointctl::commission::joint::Joint;
 use jointctl::commission::{Bench as _, Found, Plan, Stopped, commission, find_index};
-use jointctl::remote::drive;
+use jointctl::remote::condition;
 use libtest_mimic::{Failed, Trial};
 use plant::ActuatorParameters;
 use plant::actuator::windings::PhaseOrder;
@@ -247,7 +247,7 @@ fn turns_again(seed: u64) -> Result<(), Failed> {
     joint.objects().bench.restart(NODE)?;
     joint.pass(0.5).map_err(stopped)?;
     let lost = joint.condition().map_err(stopped)?;
-    if (lost.state.as_str(), lost.faults.as_str()) != (drive::name(State::NotReadyToSwitchOn), "") {
+    if (lost.state.as_str(), lost.faults.as_str()) != (condition::name(State::NotReadyToSwitchOn), "") {
         return Err(format!("after the loss of power it is {} ({})", lost.state, lost.faults).into());
     }
     if joint.begin_motion(Motion::Velocity).is_ok() {
@@ -260,7 +260,7 @@ fn turns_again(seed: u64) -> Result<(), Failed> {
     }
     joint.pass(0.1).map_err(stopped)?;
     let found = joint.condition().map_err(stopped)?;
-    if (found.state.as_str(), found.faults.as_str()) != (drive::name(State::SwitchOnDisabled), "") {
+    if (found.state.as_str(), found.faults.as_str()) != (condition::name(State::SwitchOnDisabled), "") {
         return Err(format!("with its index it is {} ({})", found.state, found.faults).into());
     }
     let off = between(&mut joint)? - before;

@@ -145,7 +145,7 @@ pub const fn is_of_profiles(object: &Object) -> bool {
 }
 
 /// Returns `true` if an object is there for the model of the load: not every program has it
-/// ([`LOADS`](crate::joint::load_feedforward::LOADS)).
+/// ([`LOADS`](crate::joint::configuration::LOADS)).
 pub const fn is_of_the_load(object: &Object) -> bool {
     matches!(object.index, 0x2202 | 0x2203)
 }
@@ -160,8 +160,7 @@ pub const fn wants_room(object: &Object) -> bool {
 
 /// Returns `true` if this program has the row.
 const fn is_there(object: &Object) -> bool {
-    (crate::joint::PROFILES || !wants_room(object))
-        && (crate::joint::load_feedforward::LOADS || !is_of_the_load(object))
+    (crate::joint::PROFILES || !wants_room(object)) && (crate::joint::configuration::LOADS || !is_of_the_load(object))
 }
 
 /// Rows of a room.

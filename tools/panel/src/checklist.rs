@@ -6,7 +6,7 @@ use joint_firmware::joint::state_machine::State;
 use joint_firmware::objects::field::{Actual, Field, HardwareField, OwnerField, ResetField, StorageField};
 use joint_firmware::objects::settings::Setting;
 use jointctl::remote::configured::{self, Configured};
-use jointctl::remote::{RemoteError, RemoteJoint, drive, info, words};
+use jointctl::remote::{RemoteError, RemoteJoint, condition, info, words};
 use serde::Serialize;
 
 /// One thing to look at.
@@ -67,11 +67,11 @@ pub fn checklist(joint: &RemoteJoint) -> Result<Vec<Item>, RemoteError> {
     let found = format!("{supply:.2} V of {} to {}", ends.0, ends.1);
     item("supply", (low..=high).contains(&supply), found, "the supply, or lowest-bus-voltage and highest-bus-voltage");
     let faults = joint.faults()?;
-    let found = if faults.is_empty() { "none".into() } else { drive::list(&faults) };
+    let found = if faults.is_empty() { "none".into() } else { condition::list(&faults) };
     item("faults", faults.is_empty(), found, "docs/faults.md; once the cause is gone, move with reset");
     let state = joint.state()?;
     let remedy = "turn the rotor once by hand, or jointctl commission --index-only";
-    item("encoder", state != State::NotReadyToSwitchOn, drive::name(state).into(), remedy);
+    item("encoder", state != State::NotReadyToSwitchOn, condition::name(state).into(), remedy);
     // The placeholders of every board: `jointctl commission` tells a new joint by them as well.
     let mut new = true;
     for setting in [Setting::InductanceD, Setting::InductanceQ, Setting::TorqueConstant] {

@@ -3,7 +3,7 @@
 use bus::client::{ClientError, Network};
 use joint_firmware::objects::field::{Actual, Field};
 use jointctl::remote::present::{PATIENCE, present};
-use jointctl::remote::{RemoteError, RemoteJoint, address, drive, info};
+use jointctl::remote::{RemoteError, RemoteJoint, address, condition, info};
 use serde_json::{Value, json};
 use std::time::Duration;
 
@@ -60,8 +60,8 @@ fn line(joint: &RemoteJoint) -> Result<Value, RemoteError> {
         "node": joint.id(),
         "name": text(0x1008)?,
         "program": text(0x100A)?,
-        "state": drive::name(joint.state()?),
-        "faults": if faults.is_empty() { "none".to_owned() } else { drive::list(&faults) },
+        "state": condition::name(joint.state()?),
+        "faults": if faults.is_empty() { "none".to_owned() } else { condition::list(&faults) },
         "supply": shown(Actual::BusVoltage)?,
         "winding": shown(Actual::WindingTemperature)?,
         "bridge": shown(Actual::BridgeTemperature)?,

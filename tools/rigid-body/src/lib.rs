@@ -6,7 +6,7 @@
 //!
 //! | module | content |
 //! |---|---|
-//! | [`urdf`], [`drives`], [`limits`], [`robot`] | the files, their checks, and the robot that they describe |
+//! | [`urdf`], [`drives`], [`limits`], [`defect`], [`robot`] | the files, their checks, and the robot that they describe |
 //! | [`tree`], [`placement`], [`inertia`] | joints and links, frames, inertial parameters and their physical consistency |
 //! | [`shape`], [`ellipsoid`] | shapes of links, and ellipsoids that hold their mass |
 //! | [`newton_euler`] | tau from q, v, a |
@@ -21,6 +21,7 @@
 
 pub mod articulated_body;
 pub mod base_parameters;
+pub mod defect;
 pub mod drives;
 pub mod ellipsoid;
 pub mod inertia;
@@ -37,8 +38,9 @@ pub mod shape;
 pub mod tree;
 pub mod urdf;
 
+pub use defect::RobotError;
 pub use inertia::LinkInertia;
 pub use limits::Limits;
 pub use placement::Placement;
-pub use robot::{Robot, RobotError};
+pub use robot::Robot;
 pub use tree::{Joint, JointKind, Tree};

@@ -2,8 +2,6 @@
 //!
 //! URDF has travel and velocity (`<limit>`); `robot.toml` has what it lacks, and goes first where both state a limit.
 
-use crate::drives::Drive;
-use crate::urdf::UrdfJoint;
 use nalgebra::Vector3;
 
 /// Limits of one joint's motion; None: not stated.
@@ -15,17 +13,6 @@ pub struct Limits {
     pub velocity: Option<f64>,
     /// Largest acceleration, rad/s^2 or m/s^2.
     pub acceleration: Option<f64>,
-}
-
-impl Limits {
-    /// Limits of `robot.toml`, else those of the URDF.
-    pub fn of(drive: &Drive, joint: &UrdfJoint) -> Self {
-        Self {
-            position: drive.position.map(|[low, high]| (low, high)).or(joint.limits.position),
-            velocity: drive.velocity.or(joint.limits.velocity),
-            acceleration: drive.acceleration,
-        }
-    }
 }
 
 /// Frame of a URDF link that moves.

@@ -5,10 +5,10 @@
 //! transmission/mechanicalReduction). Read with roxmltree, which keeps places: errors name lines, and identified
 //! values are written back into the text as it was.
 
+use crate::defect::{Defect, RobotError};
 use crate::inertia::LinkInertia;
 use crate::limits::Limits;
 use crate::placement::Placement;
-use crate::robot::{Defect, RobotError};
 use crate::shape::{Placed, Shape};
 use nalgebra::{Matrix3, Unit, Vector3};
 use roxmltree::{Document, Node};

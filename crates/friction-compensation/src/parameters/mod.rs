@@ -2,13 +2,11 @@
 
 pub mod authentication;
 pub mod certificate;
-mod codec;
 pub mod ecc;
 pub mod fault_log;
 pub mod guard;
 pub mod image;
 pub mod life_cycle;
-mod pieces;
 pub mod slots;
 mod summary;
 

@@ -4,7 +4,7 @@ mod screen;
 
 use super::CommandError;
 use super::remote::{Where, catch_interrupts, running};
-use crate::remote::drive::{self, faults_of, state_of};
+use crate::remote::condition::{self, faults_of, state_of};
 use crate::remote::info;
 use crate::remote::record::{Pace, Recorder};
 use clap::Args;
@@ -98,8 +98,8 @@ impl History {
         };
         let faults = faults_of(self.now(Actual::LatchedFaults) as u16);
         line("node", self.node.to_string());
-        line("state", drive::name(state_of(self.now(Actual::Statusword) as u16)).into());
-        line("faults", if faults.is_empty() { "none".into() } else { drive::list(&faults) });
+        line("state", condition::name(state_of(self.now(Actual::Statusword) as u16)).into());
+        line("faults", if faults.is_empty() { "none".into() } else { condition::list(&faults) });
         line("position", number(Actual::Position, 4, "rad"));
         line("velocity", number(Actual::Velocity, 3, "rad/s"));
         line(

@@ -1,7 +1,7 @@
 //! A joint as a bench, by its objects: whoever carries them, a bus or an emulated one in its own time.
 
 use super::bench::{Bench, Condition, Frame, Motion, Stopped, Window};
-use crate::remote::{Entry, Value, drive};
+use crate::remote::{Entry, Value, condition};
 use bus::client::Command;
 use joint_firmware::joint::fault::Fault;
 use joint_firmware::joint::state_machine::{Controlword, State};
@@ -117,19 +117,19 @@ impl<O: Objects> Joint<O> {
     }
 
     fn state(&mut self) -> Result<State, Stopped> {
-        Ok(drive::state_of(self.raw(Field::Actual(Actual::Statusword))? as u16))
+        Ok(condition::state_of(self.raw(Field::Actual(Actual::Statusword))? as u16))
     }
 
     fn faults(&mut self) -> Result<Vec<Fault>, Stopped> {
-        Ok(drive::faults_of(self.raw(Field::Actual(Actual::LatchedFaults))? as u16))
+        Ok(condition::faults_of(self.raw(Field::Actual(Actual::LatchedFaults))? as u16))
     }
 
     /// Reason for which the joint is not in the state that it should be in.
     fn stopped(&mut self, state: State) -> Stopped {
         match self.faults() {
             Ok(faults) if faults == [Fault::StaleCommand] => Stopped::Late,
-            Ok(faults) if faults.is_empty() => Stopped::Joint(format!("it is {}", drive::name(state))),
-            Ok(faults) => Stopped::Joint(format!("it is {}: {}", drive::name(state), drive::list(&faults))),
+            Ok(faults) if faults.is_empty() => Stopped::Joint(format!("it is {}", condition::name(state))),
+            Ok(faults) => Stopped::Joint(format!("it is {}: {}", condition::name(state), condition::list(&faults))),
             Err(stopped) => stopped,
         }
     }
@@ -312,7 +312,7 @@ impl<O: Objects> Bench for Joint<O> {
         done?;
         match self.faults()? {
             faults if faults.is_empty() => Ok(()),
-            faults => Err(Stopped::Joint(format!("the fault stays: {}", drive::list(&faults)))),
+            faults => Err(Stopped::Joint(format!("the fault stays: {}", condition::list(&faults)))),
         }
     }
 
@@ -320,8 +320,8 @@ impl<O: Objects> Bench for Joint<O> {
         let state = self.state()?;
         let faults = self.faults()?;
         Ok(Condition {
-            state: drive::name(state).into(),
-            faults: if faults.is_empty() { String::new() } else { drive::list(&faults) },
+            state: condition::name(state).into(),
+            faults: if faults.is_empty() { String::new() } else { condition::list(&faults) },
             armed: !matches!(state, State::NotReadyToSwitchOn | State::SwitchOnDisabled | State::Fault),
             staged: self.raw(Field::Configuration(ConfigurationField::Changed))? != 0,
             supply: self.number(Field::Actual(Actual::BusVoltage))?,

@@ -9,7 +9,7 @@ use joint_firmware::joint::configuration::{
     Gains, GearConfiguration, LOAD_UNCERTAINTY, Limits, LoadConfiguration, LoadFeedforwardRequest, MotorConfiguration,
     ThermalConfiguration, VelocitySource,
 };
-use joint_firmware::joint::stopping::StopConfiguration;
+use joint_firmware::joint::stop_options::StopConfiguration;
 use joint_firmware::motor::angle::{Direction, ElectricalAngle, EncoderAlignment};
 use serde::{Deserialize, Serialize};
 

@@ -60,15 +60,14 @@ pub enum RemoteError {
     #[error("{0} `jointctl scan` asks every node id")]
     Silent(ClientError),
     /// A node that is something else.
-    #[error(
-        "node {node} is no joint: its device type (1000h) is {device_type:08X}h, a joint's is {:08X}h",
-        super::joint::DEVICE_TYPE
-    )]
+    #[error("node {node} is no joint: its device type (1000h) is {device_type:08X}h, a joint's is {expected:08X}h")]
     NoJoint {
         /// Node id.
         node: u8,
         /// Device type that it states.
         device_type: u32,
+        /// Device type of a joint.
+        expected: u32,
     },
     /// No object has this name.
     #[error("'{name}' is no object of a joint{}", suggestion(near))]
@@ -128,7 +127,7 @@ pub enum RemoteError {
         node: u8,
     },
     /// Armed joint: not while the motor may be under current.
-    #[error("node {node}: {what} is possible with the motor off only, and the joint is {}; `jointctl disable` switches it off", super::drive::name(*state))]
+    #[error("node {node}: {what} is possible with the motor off only, and the joint is {}; `jointctl disable` switches it off", super::condition::name(*state))]
     Armed {
         /// Node id.
         node: u8,
@@ -140,7 +139,7 @@ pub enum RemoteError {
     /// A fault has to be acknowledged.
     #[error(
         "node {node} is in a fault: {}. Once its cause is gone, `jointctl enable --reset` acknowledges it",
-        super::drive::list(faults)
+        super::condition::list(faults)
     )]
     Fault {
         /// Node id.
@@ -149,7 +148,7 @@ pub enum RemoteError {
         faults: Vec<Fault>,
     },
     /// The joint does not get to where it was told to go.
-    #[error("node {node} is {}, and did not become {} within {within_ms} ms", super::drive::name(*state), super::drive::name(*wanted))]
+    #[error("node {node} is {}, and did not become {} within {within_ms} ms", super::condition::name(*state), super::condition::name(*wanted))]
     State {
         /// Node id.
         node: u8,
@@ -170,7 +169,7 @@ pub enum RemoteError {
         node: u8,
     },
     /// The joint stopped by itself.
-    #[error("node {node} stopped following its commands: it is {}{}", super::drive::name(*state), fault_list(faults))]
+    #[error("node {node} stopped following its commands: it is {}{}", super::condition::name(*state), fault_list(faults))]
     Stopped {
         /// Node id.
         node: u8,
@@ -309,5 +308,5 @@ fn suggestion(near: &[String]) -> String {
 }
 
 fn fault_list(faults: &[Fault]) -> String {
-    if faults.is_empty() { String::new() } else { format!(", {}", super::drive::list(faults)) }
+    if faults.is_empty() { String::new() } else { format!(", {}", super::condition::list(faults)) }
 }

@@ -1,6 +1,6 @@
 //! The control steps before a joint's last fault, object 2300h; host.
 
-use super::drive;
+use super::condition;
 use super::entry::Entry;
 use super::error::RemoteError;
 use super::joint::RemoteJoint;
@@ -37,7 +37,7 @@ fn decode(bytes: &[u8]) -> Vec<Step> {
         let word = |at: usize| words.get(at).map_or(0, |word| u32::from_le_bytes(*word));
         let mut signals = [0.0; SIGNALS.len()];
         signals.iter_mut().zip(2..).for_each(|(signal, at)| *signal = f32::from_bits(word(at)));
-        Step { state: drive::state_at(word(0)), faults: drive::faults_of(word(1) as u16), signals }
+        Step { state: condition::state_at(word(0)), faults: condition::faults_of(word(1) as u16), signals }
     };
     bytes.as_chunks::<STEP>().0.iter().map(step).collect()
 }

@@ -1,7 +1,7 @@
 //! A joint on one page: what an engineer looks at first; host.
 
+use super::condition;
 use super::configured;
-use super::drive;
 use super::entry::Entry;
 use super::error::RemoteError;
 use super::image::{ImageStatus, StoredImage};
@@ -48,7 +48,7 @@ pub fn page(joint: &RemoteJoint) -> Result<String, RemoteError> {
     line("state", motion::left(joint, joint.state()?)?);
     line("mode", mode(joint.raw(Field::SetPoint(SetPoint::Mode))? as i8));
     let faults = joint.faults()?;
-    line("faults", if faults.is_empty() { "none".into() } else { drive::list(&faults) });
+    line("faults", if faults.is_empty() { "none".into() } else { condition::list(&faults) });
 
     let actual = |actual| show(joint, Field::Actual(actual));
     line("position", format!("{}, velocity {}", actual(Actual::Position)?, actual(Actual::Velocity)?));
@@ -308,7 +308,7 @@ fn logged(joint: &RemoteJoint) -> Result<(String, Vec<String>), RemoteError> {
     let shown = faults.iter().take(SHOWN).map(|logged| {
         let fault = Fault::ALL.into_iter().find(|fault| *fault as u8 == logged.fault);
         let name = match (fault, logged.code) {
-            (Some(fault), _) => drive::list(&[fault]),
+            (Some(fault), _) => condition::list(&[fault]),
             (None, emergency::WATCHDOG) => format!("stopped by the watchdog ({:04X}h)", logged.code),
             (None, emergency::STOPPED) => format!("stopped by the program ({:04X}h)", logged.code),
             (None, code) => format!("error {code:04X}h"),

@@ -62,7 +62,11 @@ impl RemoteJoint {
                 answer => break u32::from_le_bytes(answer?),
             }
         };
-        if device_type == DEVICE_TYPE { Ok(joint) } else { Err(RemoteError::NoJoint { node, device_type }) }
+        if device_type == DEVICE_TYPE {
+            Ok(joint)
+        } else {
+            Err(RemoteError::NoJoint { node, device_type, expected: DEVICE_TYPE })
+        }
     }
 
     /// Node id.

@@ -6,7 +6,7 @@ use super::joint::RemoteJoint;
 use identification::page::Parameter;
 use identification::rigid::RigidRegressor;
 use joint_firmware::joint::configuration::LoadConfiguration;
-use joint_firmware::joint::load_feedforward::Load;
+use joint_firmware::joint::load::Load;
 use joint_firmware::objects::field::Field;
 use joint_firmware::objects::settings::Setting;
 use serde::Serialize;

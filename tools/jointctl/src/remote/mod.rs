@@ -8,7 +8,8 @@
 //! ```
 //!
 //! - [`entry`], [`value`]: objects by name, and their values as people write and read them
-//! - [`joint`]: the node; [`drive`]: its state machine and faults, [`history`] the steps before one
+//! - [`joint`]: the node; [`condition`] its state and faults, [`drive`] what changes them, [`history`] the steps
+//!   before a fault
 //! - [`pdo`]: what PDOs carry; [`telemetry`]: out of the joint; [`stream`]: into it; [`motion`]: `jointctl move`
 //! - [`image`]: the life of a parameter image, [`refusal`] its numbers in words, [`words`] those of other objects;
 //!   [`configuration`]: settings, stored and restored, [`configured`] since when
@@ -20,6 +21,7 @@
 
 pub mod address;
 pub mod commission;
+pub mod condition;
 pub mod configuration;
 pub mod configured;
 pub mod drive;

@@ -1,6 +1,6 @@
 //! A motion of a joint, from being enabled to being disabled again: `jointctl move`; host.
 
-use super::drive;
+use super::condition;
 use super::entry::Entry;
 use super::error::RemoteError;
 use super::joint::RemoteJoint;
@@ -184,8 +184,8 @@ fn within(
 /// The state in words, with the faults where there are some: what a command says at its end.
 pub fn left(joint: &RemoteJoint, state: State) -> Result<String, RemoteError> {
     let faults = joint.faults()?;
-    let words = drive::name(state);
-    Ok(if faults.is_empty() { words.to_owned() } else { format!("{words}: {}", drive::list(&faults)) })
+    let words = condition::name(state);
+    Ok(if faults.is_empty() { words.to_owned() } else { format!("{words}: {}", condition::list(&faults)) })
 }
 
 #[cfg(test)]

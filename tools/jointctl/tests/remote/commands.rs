@@ -6,7 +6,7 @@ use crate::tables::{ADDRESS, OF_A_JOINT, assert_is_table};
 use bus::client::Network;
 use canopen_node::NO_NODE_ID;
 use joint_firmware::joint::state_machine::State;
-use jointctl::remote::drive::state_of;
+use jointctl::remote::condition::state_of;
 use std::io::Read;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;

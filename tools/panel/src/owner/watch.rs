@@ -5,7 +5,7 @@ use crate::live::{BY_PART, DRAWN, Kept, Reduction, STATE, Stroke, rounded};
 use bus::client::{Emergency, Subscription, SyncProducer, cob_id};
 use joint_firmware::objects::field::{Actual, Field};
 use joint_firmware::objects::settings::Setting;
-use jointctl::remote::drive::{self, faults_of, state_of};
+use jointctl::remote::condition::{self, faults_of, state_of};
 use jointctl::remote::words::words;
 use jointctl::remote::{RemoteError, RemoteJoint, Signal, Telemetry};
 use serde_json::{Value, json};
@@ -203,12 +203,12 @@ impl Watch {
                     if before.is_some_and(|before| state_of(before as u16) == now) {
                         continue;
                     }
-                    ("state", drive::name(now).to_owned())
+                    ("state", condition::name(now).to_owned())
                 }
                 _ if before == Some(*value) => continue,
                 Some(Field::Actual(Actual::LatchedFaults)) => match faults_of(*value as u16).as_slice() {
                     [] => ("faults", "none".to_owned()),
-                    faults => ("faults", drive::list(faults)),
+                    faults => ("faults", condition::list(faults)),
                 },
                 Some(Field::Actual(Actual::ActingModel)) => {
                     let models = ["nothing", "the physical model", "the physical model and the network"];

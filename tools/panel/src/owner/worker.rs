@@ -17,7 +17,7 @@ use joint_firmware::objects::field::{Actual, Field};
 use jointctl::commission::joint::Joint;
 use jointctl::commission::{Found, Plan, commission, find_index, page};
 use jointctl::remote::commission::RemoteObjects;
-use jointctl::remote::{Entry, RemoteError, RemoteJoint, Stream, configured, drive};
+use jointctl::remote::{Entry, RemoteError, RemoteJoint, Stream, condition, configured};
 use report::output::OutputFile;
 use serde_json::{Value, json};
 use std::sync::Arc;
@@ -285,7 +285,7 @@ impl Worker {
         if state.is_ok() {
             self.operate();
         }
-        let state = state.map_or_else(|error| error.to_string(), |state| drive::name(state).to_owned());
+        let state = state.map_or_else(|error| error.to_string(), |state| condition::name(state).to_owned());
         self.pages.tell(&json!({ "motion": { "moving": false, "reason": reason, "state": state } }));
     }
 
@@ -482,5 +482,5 @@ fn stop(joint: &RemoteJoint, watched: bool) -> Result<String, RemoteError> {
     if watched && before.is_ok_and(off) {
         joint.nmt(Nmt::Start, NmtState::Operational)?;
     }
-    Ok(drive::name(state).to_owned())
+    Ok(condition::name(state).to_owned())
 }

@@ -372,7 +372,7 @@ pub fn another_client_that_takes_the_tpdos_ends_the_live_values_until_they_are_a
     let failure = page.until(|message| message["failure"].as_str().map(str::to_owned));
     assert!(failure.contains("another client changes the TPDOs"), "{failure}");
     telemetry.end().unwrap();
-    assert_eq!(other.state().unwrap(), jointctl::remote::drive::state_of(0x40));
+    assert_eq!(other.state().unwrap(), jointctl::remote::condition::state_of(0x40));
     drop(other);
     page.answer(json!("look")).unwrap();
     page.sees(VELOCITY, |_| true);

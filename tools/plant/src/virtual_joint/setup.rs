@@ -9,7 +9,7 @@ use joint_firmware::joint::configuration::{
     FRICTION_UNCERTAINTY, Gains, GearConfiguration, Limits, LoadConfiguration, MotorConfiguration,
     ThermalConfiguration, VelocitySource,
 };
-use joint_firmware::joint::stopping::StopConfiguration;
+use joint_firmware::joint::stop_options::StopConfiguration;
 use joint_firmware::motor::angle::{Direction, ElectricalAngle, EncoderAlignment};
 use std::f64::consts::TAU;
 

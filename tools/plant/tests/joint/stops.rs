@@ -6,7 +6,7 @@ use crate::heartbeat::Alive;
 use crate::rig::{Rig, break_down, position, reference, torque, velocity};
 use joint_firmware::joint::active::DERATING;
 use joint_firmware::joint::state_machine::{Controlword, State};
-use joint_firmware::joint::stopping::StopConfiguration;
+use joint_firmware::joint::stop_options::StopConfiguration;
 use joint_firmware::joint::{Command, CommandLimits, Mode};
 use joint_firmware::objects::Operation;
 use plant::actuator::{Accessories, Fault as Broken};

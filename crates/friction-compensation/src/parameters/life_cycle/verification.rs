@@ -8,8 +8,7 @@ use super::Refusal;
 use crate::friction::ParameterSet;
 use crate::parameters::authentication::{Key, split};
 use crate::parameters::certificate::{self, Certificate, Limits};
-use crate::parameters::image::{Effort, Image, Target};
-use crate::parameters::pieces::Pieces;
+use crate::parameters::image::{Effort, Image, Pieces, Target};
 
 /// |d(network) / d(measured torque)| that a joint permits whatever the image permits itself, Q16.16: a newton metre for
 /// each that is measured.

@@ -4,15 +4,15 @@
 //! verifies an upload, and prepares a friction model in its place, with one parameter set in hand.
 
 use super::codec::{Header, Reader, decode_end, decode_golden, decode_header, decode_set};
-use super::image::{GoldenMismatch, GoldenSequence, GoldenVector, Image, ImageError};
+use super::{GoldenMismatch, GoldenSequence, GoldenVector, Image, ImageError};
 use crate::friction::network::{Inputs, Layers};
 use crate::friction::physical::{PreparedTerms, Scaling};
 use crate::friction::state::JointState;
 use crate::friction::{self, FrictionModel, ParameterSet};
 
 /// An image all of whose fields are right.
-pub(super) struct Pieces<'a> {
-    pub(super) header: Header,
+pub(in crate::parameters) struct Pieces<'a> {
+    pub(in crate::parameters) header: Header,
     /// Reader at the first set.
     sets: Reader<'a>,
 }
@@ -20,7 +20,7 @@ pub(super) struct Pieces<'a> {
 impl<'a> Pieces<'a> {
     /// Checks what [`Image::decode`] checks, in the same order.
     #[inline(never)]
-    pub(super) fn of(bytes: &'a [u8]) -> Result<Self, ImageError> {
+    pub(in crate::parameters) fn of(bytes: &'a [u8]) -> Result<Self, ImageError> {
         let mut reader = Reader::new(Image::content(bytes)?);
         let header = decode_header(&mut reader);
         let sets = reader.clone();
@@ -38,7 +38,7 @@ impl<'a> Pieces<'a> {
     }
 
     /// Number of parameter sets.
-    pub(super) const fn sets(&self) -> usize {
+    pub(in crate::parameters) const fn sets(&self) -> usize {
         self.header.sets as usize
     }
 
@@ -52,7 +52,7 @@ impl<'a> Pieces<'a> {
     }
 
     /// A parameter set.
-    pub(super) fn set(&self, index: usize, set: &mut ParameterSet) {
+    pub(in crate::parameters) fn set(&self, index: usize, set: &mut ParameterSet) {
         self.read_sets(index, set);
     }
 
@@ -69,7 +69,7 @@ impl<'a> Pieces<'a> {
 
     /// Evaluates every golden vector; the first that this machine computes differently.
     #[inline(never)]
-    pub(super) fn verify_golden(&self) -> Result<(), GoldenMismatch> {
+    pub(in crate::parameters) fn verify_golden(&self) -> Result<(), GoldenMismatch> {
         let domain = &self.header.domain;
         let (scaling, inputs) = (Scaling::new(domain), Inputs::new(domain));
         let mut first: Option<GoldenMismatch> = None;

@@ -1,7 +1,6 @@
-//! Reading and writing the bytes of an image, field by field, in the order of the [layout](super::image).
+//! Reading and writing the bytes of an image, field by field, in the order of the [layout](super).
 
-use super::certificate::Limits;
-use super::image::{CRC_LENGTH, Effort, GoldenVector, Image, ImageError, MAGIC, MAX_GOLDEN, Target};
+use super::{CRC_LENGTH, Effort, GoldenVector, Image, ImageError, MAGIC, MAX_GOLDEN, Target};
 use crate::friction::common::CommonTerms;
 use crate::friction::domain::{Domain, Range};
 use crate::friction::maxwell_slip::{ELEMENTS, MAX_LEVEL, MAX_STIFFNESS, MaxwellElement};
@@ -11,25 +10,26 @@ use crate::friction::regime::{Criterion, MAX_SETS, MOST_SETS, Measure, Selector}
 use crate::friction::ripple::{RIPPLES, Ripple};
 use crate::friction::state::{SIGNALS, Signal};
 use crate::friction::{Estimate, FrictionParameters, ParameterSet};
+use crate::parameters::certificate::Limits;
 use crate::quantity::Torque;
 
 /// Fields before the parameter sets.
-pub(super) struct Header {
+pub(in crate::parameters) struct Header {
     /// 1 or 2.
-    pub(super) format: u16,
-    pub(super) version: u32,
-    pub(super) target: Target,
-    pub(super) created: u64,
-    pub(super) effort: Effort,
-    pub(super) data_hash: [u8; 16],
-    pub(super) domain: Domain,
-    pub(super) selector: Selector,
-    pub(super) limits: Limits,
-    pub(super) common: CommonTerms,
+    pub(in crate::parameters) format: u16,
+    pub(in crate::parameters) version: u32,
+    pub(in crate::parameters) target: Target,
+    pub(in crate::parameters) created: u64,
+    pub(in crate::parameters) effort: Effort,
+    pub(in crate::parameters) data_hash: [u8; 16],
+    pub(in crate::parameters) domain: Domain,
+    pub(in crate::parameters) selector: Selector,
+    pub(in crate::parameters) limits: Limits,
+    pub(in crate::parameters) common: CommonTerms,
     /// Parameter sets; a bit for each that has a network; golden vectors.
-    pub(super) sets: u8,
-    pub(super) networks: u8,
-    pub(super) golden: u8,
+    pub(in crate::parameters) sets: u8,
+    pub(in crate::parameters) networks: u8,
+    pub(in crate::parameters) golden: u8,
 }
 
 /// Decodes everything between the length and the checksum.

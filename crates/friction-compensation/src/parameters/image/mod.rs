@@ -58,8 +58,12 @@
 //! An upload is an image and, behind it, the tag of 32 bytes that [authenticates](super::authentication) it, where
 //! there is one.
 
+mod codec;
+mod pieces;
+
+pub(in crate::parameters) use pieces::Pieces;
+
 use super::certificate::Limits;
-use super::codec::{Reader, Writer, decode_content, encode_content};
 use crate::friction::common::{Common, CommonTerms, CommonTorques};
 use crate::friction::maxwell_slip::{Bent, MAX_LEVEL, MAX_STIFFNESS};
 use crate::friction::network::{MAX_FRACTION, MAX_SCALE, MIN_FRACTION};
@@ -67,6 +71,7 @@ use crate::friction::physical::{Coefficients, Terms};
 use crate::friction::regime::MAX_SETS;
 use crate::friction::state::{JointState, SIGNALS, Signal};
 use crate::friction::{Estimate, FrictionModel, FrictionParameters, ParameterSet};
+use codec::{Reader, Writer, decode_content, encode_content};
 
 /// The magic bytes.
 pub const MAGIC: [u8; 4] = *b"JFPI";
@@ -85,7 +90,7 @@ pub const ROOM: usize = {
 };
 
 const HEADER_LENGTH: usize = 144;
-pub(super) const CRC_LENGTH: usize = 4;
+const CRC_LENGTH: usize = 4;
 const CRC: crc::Crc<u32, crc::NoTable> = crc::Crc::<u32, crc::NoTable>::new(&crc::CRC_32_ISO_HDLC);
 
 /// Unit of the effort that an image speaks of. A board accepts Nm (N on a linear axis); data sets in A or V are for
