@@ -3,6 +3,7 @@
 
 pub mod bench;
 pub mod commissioned;
+mod each_board;
 pub mod kept;
 pub mod master;
 pub mod motion;

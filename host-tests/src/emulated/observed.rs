@@ -5,6 +5,7 @@ use emulator::bus::{Bus as _, Width};
 use emulator::chip::Chip;
 use emulator::variables::Variable;
 use joint_firmware::default_configuration::{B_G431B_ESC1, BoardConfiguration, MOTEUS_R4};
+use joint_firmware::objects::Operation;
 use joint_firmware::sensors::as5047p;
 use libtest_mimic::Failed;
 
@@ -23,6 +24,10 @@ pub trait Observed: Wired + Sized {
     /// Variable that tells whether the gate driver is ready, 1, or has not been since the start, 0; none where there is
     /// nothing to get ready.
     const GATE: Option<&'static str>;
+    /// Modes that the program has, as in 6502h.
+    const MODES: u32;
+    /// Most cycles of the receive interrupt with one RPDO of three objects, entry and return included.
+    const RECEIVE_CYCLES: u64;
     /// Variables of the control interrupt that [`Observed::encoder`] and [`Observed::encoder_taken`] read.
     const ENCODER: &'static [&'static str];
 
@@ -68,6 +73,8 @@ impl Observed for MoteusR4 {
     const ADAPTS: bool = true;
     const INDEX: bool = false;
     const GATE: Option<&'static str> = Some("gate::STATE");
+    const MODES: u32 = Operation::SUPPORTED;
+    const RECEIVE_CYCLES: u64 = 3_300;
     const ENCODER: &'static [&'static str] = &["sensors.answer"];
 
     fn bridge_fault(memory: &mut Memory<'_, Self>) -> Result<bool, Failed> {
@@ -93,6 +100,9 @@ impl Observed for BG431BEsc1 {
     const ADAPTS: bool = false;
     const INDEX: bool = true;
     const GATE: Option<&'static str> = None;
+    // No profile modes: CSP, CSV, CST, impedance, open loop.
+    const MODES: u32 = 0x0003_0380;
+    const RECEIVE_CYCLES: u64 = 4_700;
     const ENCODER: &'static [&'static str] = &[
         "joint.encoder",
         "sensors.counts_kept",

@@ -5,12 +5,13 @@
 //! Every stage under current is stopped by every cause, all of the product on both boards: a stop takes milliseconds,
 //! and the commissioning that leads to it some seconds.
 
-use super::commissioning::{ESC1, MOTEUS, Motor, NODE, built};
-use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired};
+use super::commissioning::{ESC1, Motor, NODE, built};
+use emulator::board::{Drivetrain, Wired};
 use emulator::chip::time::Instant;
 use host_tests::emulated::Bench;
 use host_tests::emulated::commissioned::OnBoard;
 use host_tests::emulated::master::send;
+use host_tests::on_each_board;
 use joint_firmware::objects::settings::Setting;
 use jointctl::commission::joint::Joint;
 use jointctl::commission::{Bench as _, Failure as NotCommissioned, Plan, Stage, commission};
@@ -20,10 +21,7 @@ use std::collections::BTreeMap;
 
 /// The tests of this file, by name.
 pub fn trials() -> Vec<Trial> {
-    vec![
-        Trial::test("moteus_r4_stops_a_commissioning_in_the_same_control_step", || stops(MOTEUS, MoteusR4::new)),
-        Trial::test("b_g431b_esc1_stops_a_commissioning_in_the_same_control_step", || stops(ESC1, BG431BEsc1::new)),
-    ]
+    on_each_board!("stops_a_commissioning_in_the_same_control_step", stops).into()
 }
 
 /// Carrier of a controlword.
@@ -124,7 +122,8 @@ const TICK: f64 = 0.001;
 /// Instant in a stage at which it is stopped: at this object that the client reads.
 const LOOKS: u32 = 120;
 
-fn stops<W: Wired + Clone>(board: &'static str, wired: fn(Drivetrain) -> W) -> Result<(), Failed> {
+fn stops<W: Wired + Clone>(wired: fn(Drivetrain) -> W) -> Result<(), Failed> {
+    let board = W::NAME;
     let motor = Motor::random(7, board == ESC1);
     let mut moments: BTreeMap<&str, Bench<W>> = BTreeMap::new();
     let mut looks: BTreeMap<&str, u32> = BTreeMap::new();

@@ -21,6 +21,7 @@ use host_tests::emulated::taken::{CONTROL, taken};
 use host_tests::emulated::twin::Seen;
 use host_tests::emulated::{Bench, Twin};
 use host_tests::image_bytes::encoded;
+use host_tests::on_each_board;
 use host_tests::parameters;
 use joint_firmware::joint::Active;
 use joint_firmware::joint::configuration::Configuration;
@@ -49,20 +50,15 @@ const NODE: u8 = 5;
 
 /// The tests of this file, by name.
 pub fn trials() -> Vec<Trial> {
-    vec![
-        Trial::test("every_control_step_of_the_flashed_programs_is_the_hosts", same_steps),
-        Trial::test("moteus_r4_in_motion_takes_the_cycles_that_are_published", || {
-            published(PROGRAMS[0], MoteusR4::new)
-        }),
-        Trial::test("b_g431b_esc1_in_motion_takes_the_cycles_that_are_published", || {
-            published(PROGRAMS[1], BG431BEsc1::new)
-        }),
-    ]
+    let mut trials = vec![Trial::test("every_control_step_of_the_flashed_programs_is_the_hosts", same_steps)];
+    trials.extend(on_each_board!("in_motion_takes_the_cycles_that_are_published", published));
+    trials
 }
 
 /// Longest control interrupt with the network acting: it takes what docs/budget.md says, and no more than the target
 /// where that is called kept.
-fn published<W: Observed + Clone>(name: &str, board: fn(Drivetrain) -> W) -> Result<(), Failed> {
+fn published<W: Observed + Clone>(board: fn(Drivetrain) -> W) -> Result<(), Failed> {
+    let name = W::NAME;
     let path = build(name, env!("CARGO_TARGET_TMPDIR"))?;
     let program = Program::parse(std::fs::read(&path)?)?;
     let moving = Moving::start(board, &actuator(), &program, &acting_image::<W>())?;

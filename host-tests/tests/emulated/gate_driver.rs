@@ -2,7 +2,7 @@
 //! are named over CAN and gone after a fault reset, without a loss of power; a driver that does not answer, or a supply
 //! that comes late, is waited for; another board is left alone; option bytes are told, and set when asked.
 
-use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired as _};
+use emulator::board::{Drivetrain, MoteusR4, Wired as _};
 use emulator::cpu::Origin;
 use emulator::parts::drv8353::{Drv8353, fault};
 use emulator::program::Program;
@@ -13,6 +13,7 @@ use host_tests::emulated::kept::{Kept, configuration};
 use host_tests::emulated::master::send;
 use host_tests::emulated::motion::{Moving, NODE, SET_POINT};
 use host_tests::emulated::observed::Observed;
+use host_tests::on_each_board;
 use joint_firmware::hardware::chip_options::{COMMAND, N_SWBOOT0, SRAM_PE};
 use joint_firmware::hardware::drv8353::MOTEUS_R4_11;
 use joint_firmware::hardware::moteus_revision::{OTHER_FAMILY, SUPPORTED};
@@ -40,7 +41,7 @@ const LONG: f64 = 30.0 * SET_POINT;
 
 /// The tests of this file, by name.
 pub fn trials() -> Vec<Trial> {
-    vec![
+    let mut trials = vec![
         Trial::test("moteus_r4_names_a_fault_of_its_gate_driver_and_clears_it", faults_in_motion),
         Trial::test("moteus_r4_clears_no_fault_whose_cause_is_there", causes_that_stay),
         Trial::test("moteus_r4_configures_a_driver_anew_that_has_forgotten", forgotten),
@@ -48,9 +49,9 @@ pub fn trials() -> Vec<Trial> {
         Trial::test("moteus_r4_waits_for_a_silent_driver", silent_at_start),
         Trial::test("moteus_r4_waits_for_its_supply", late_supply),
         Trial::test("moteus_r4_leaves_another_board_alone", other_boards),
-        Trial::test("moteus_r4_tells_its_option_bytes_and_sets_them_when_asked", || options(MoteusR4::new)),
-        Trial::test("b_g431b_esc1_tells_its_option_bytes_and_sets_them_when_asked", || options(BG431BEsc1::new)),
-    ]
+    ];
+    trials.extend(on_each_board!("tells_its_option_bytes_and_sets_them_when_asked", options));
+    trials
 }
 
 fn expect<T: PartialEq + std::fmt::Debug>(what: &str, found: T, expected: T) -> Result<(), Failed> {

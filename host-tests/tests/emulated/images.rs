@@ -3,7 +3,7 @@
 //! deep the stack got on the way is held against what it has.
 
 use bus::client::cob_id;
-use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired};
+use emulator::board::{BG431BEsc1, Drivetrain, Wired};
 use emulator::cpu::Origin;
 use friction_compensation::friction::physical::PhysicalParameters;
 use friction_compensation::friction::regime::MOST_SETS;
@@ -15,6 +15,7 @@ use host_tests::emulated::bench::program;
 use host_tests::emulated::observed::Observed;
 use host_tests::emulated::stack::PaintedStack;
 use host_tests::image_bytes::encoded;
+use host_tests::on_each_board;
 use host_tests::parameters::{image, tame_within};
 use libtest_mimic::{Failed, Trial};
 use rand_chacha::ChaCha8Rng;
@@ -37,12 +38,12 @@ const ACTIVE: u32 = 7;
 
 /// The tests of this file, by name.
 pub fn trials() -> Vec<Trial> {
-    vec![
-        Trial::test("b_g431b_esc1_takes_an_image_and_starts_with_it", || takes_an_image(ESC1, BG431BEsc1::new)),
-        Trial::test("moteus_r4_takes_an_image_and_starts_with_it", || takes_an_image(MoteusR4::NAME, MoteusR4::new)),
+    let mut trials = vec![
         Trial::test("b_g431b_esc1_refuses_an_image_that_computes_otherwise", refuses_an_image),
         Trial::test("b_g431b_esc1_refuses_an_image_with_regimes", refuses_regimes),
-    ]
+    ];
+    trials.extend(on_each_board!("takes_an_image_and_starts_with_it", takes_an_image));
+    trials
 }
 
 /// The first image of a seed that a joint would take, with a network in each of `most_sets` sets.
@@ -80,8 +81,8 @@ fn take_part<W: Wired>(bench: &mut Bench<W>) -> Result<(), Failed> {
     expect("device type", bench.number(NODE, 0x1000, 0)?, 0x0002_0192)
 }
 
-fn takes_an_image<W: Observed>(name: &str, board: impl FnOnce(Drivetrain) -> W) -> Result<(), Failed> {
-    let program = program(name, env!("CARGO_TARGET_TMPDIR"))?;
+fn takes_an_image<W: Observed>(board: fn(Drivetrain) -> W) -> Result<(), Failed> {
+    let program = program(W::NAME, env!("CARGO_TARGET_TMPDIR"))?;
     let mut bench = Bench::new(board, &program)?;
     let stack = PaintedStack::new(&mut bench.emulation, &program)?;
     let bytes = encoded(&sample(W::CONFIGURATION.parameter_sets));
@@ -119,7 +120,7 @@ fn takes_an_image<W: Observed>(name: &str, board: impl FnOnce(Drivetrain) -> W) 
         return Err(bench.log().into());
     }
     let used = used.max(stack.used(&mut bench.emulation)?.0);
-    println!("{name}: {used} of {region} B of stack used");
+    println!("{}: {used} of {region} B of stack used", W::NAME);
     match used + MARGIN <= region {
         true => Ok(()),
         false => Err(format!("{used} of {region} B of stack used").into()),

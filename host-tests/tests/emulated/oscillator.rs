@@ -1,10 +1,11 @@
 //! The trim of the boards' oscillator: a setting that acts as soon as it is taken, and outlasts a loss of power
 //! once it is stored.
 
-use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired};
+use emulator::board::{Drivetrain, Wired};
 use emulator::bus::{Bus, Width};
 use host_tests::emulated::Bench;
 use host_tests::emulated::bench::program;
+use host_tests::on_each_board;
 use joint_firmware::motor::setting::Name;
 use libtest_mimic::{Failed, Trial};
 
@@ -16,10 +17,7 @@ const FACTORY: u32 = 64;
 
 /// The tests of this file, by name.
 pub fn trials() -> Vec<Trial> {
-    vec![
-        Trial::test("moteus_r4_trims_its_oscillator", || trims("moteus-r4", MoteusR4::new)),
-        Trial::test("b_g431b_esc1_trims_its_oscillator", || trims("b-g431b-esc1", BG431BEsc1::new)),
-    ]
+    on_each_board!("trims_its_oscillator", trims).into()
 }
 
 /// The trim in the oscillator's register.
@@ -33,8 +31,8 @@ fn expect<T: PartialEq + std::fmt::Debug>(what: &str, found: T, expected: T) -> 
     if found == expected { Ok(()) } else { Err(format!("{what}: {found:?} instead of {expected:?}").into()) }
 }
 
-fn trims<W: Wired>(name: &str, board: impl FnOnce(Drivetrain) -> W) -> Result<(), Failed> {
-    let mut bench = Bench::new(board, &program(name, env!("CARGO_TARGET_TMPDIR"))?)?;
+fn trims<W: Wired>(board: fn(Drivetrain) -> W) -> Result<(), Failed> {
+    let mut bench = Bench::new(board, &program(W::NAME, env!("CARGO_TARGET_TMPDIR"))?)?;
     bench.run(0.3)?;
     bench.give_node_id(NODE)?;
     expect("of a new board", (trimmed(&mut bench)?, bench.number(NODE, TRIM.0, TRIM.1)?), (FACTORY, FACTORY))?;

@@ -5,6 +5,7 @@ use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired as _};
 use host_tests::emulated::bench::{SUPPLY, actuator, program};
 use host_tests::emulated::motion::{Moving, NODE, SET_POINT};
 use host_tests::emulated::observed::Observed;
+use host_tests::on_each_board;
 use libtest_mimic::{Failed, Trial};
 use node::SampleImage;
 use plant::actuator::Fault;
@@ -17,12 +18,12 @@ const TAKE: u8 = 1;
 
 /// The tests of this file, by name.
 pub fn trials() -> Vec<Trial> {
-    vec![
-        Trial::test("b_g431b_esc1_opens_and_closes_a_holding_brake", || brake(BG431BEsc1::new)),
-        Trial::test("moteus_r4_opens_and_closes_a_holding_brake", || brake(MoteusR4::new)),
+    let mut trials = vec![
         Trial::test("moteus_r4_lets_a_brake_chopper_conduct", chopper),
         Trial::test("b_g431b_esc1_refuses_a_brake_chopper", no_chopper),
-    ]
+    ];
+    trials.extend(on_each_board!("opens_and_closes_a_holding_brake", brake));
+    trials
 }
 
 fn moving<W: Observed>(board: impl FnOnce(Drivetrain) -> W) -> Result<Moving<W>, Failed> {

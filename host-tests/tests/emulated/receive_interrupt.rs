@@ -4,21 +4,19 @@
 //! a half times as long: 3,300 cycles are 49 us there, nearly two control periods. A quarter of them come behind the
 //! demand.
 
-use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4};
+use emulator::board::Drivetrain;
 use friction_compensation::compensation::Request;
 use host_tests::emulated::Bench;
 use host_tests::emulated::bench::{actuator, program};
 use host_tests::emulated::kept::{Kept, configuration};
 use host_tests::emulated::master::send;
 use host_tests::emulated::observed::Observed;
+use host_tests::on_each_board;
 use libtest_mimic::{Failed, Trial};
 
 const NODE: u8 = 5;
 /// Exception of the receive interrupt, FDCAN1_IT0: interrupt 21 of both chips.
 const RECEIVE: u16 = 16 + 21;
-/// Most cycles with one RPDO of three objects, entry and return included.
-const MOTEUS: u64 = 3_300;
-const ESC1: u64 = 4_700;
 /// Period of set-points, s, and their number.
 const SET_POINT: f64 = 0.001;
 const SET_POINTS: i32 = 50;
@@ -27,10 +25,7 @@ const PERIOD: u8 = 10;
 
 /// The tests of this file, by name.
 pub fn trials() -> Vec<Trial> {
-    vec![
-        Trial::test("the_receive_interrupt_of_moteus_r4_keeps_its_cycles", || keeps_cycles(MoteusR4::new, MOTEUS)),
-        Trial::test("the_receive_interrupt_of_b_g431b_esc1_keeps_its_cycles", || keeps_cycles(BG431BEsc1::new, ESC1)),
-    ]
+    on_each_board!("keeps_the_cycles_of_its_receive_interrupt", keeps_cycles).into()
 }
 
 /// A set-point of cyclic synchronous velocity mode, mrad/s, and the time until the next.
@@ -42,7 +37,8 @@ fn commanded<W: Observed>(bench: &mut Bench<W>, controlword: u16, velocity: i32)
     bench.run(SET_POINT)
 }
 
-fn keeps_cycles<W: Observed>(board: fn(Drivetrain) -> W, limit: u64) -> Result<(), Failed> {
+fn keeps_cycles<W: Observed>(board: fn(Drivetrain) -> W) -> Result<(), Failed> {
+    let limit = W::RECEIVE_CYCLES;
     let program = program(W::NAME, env!("CARGO_TARGET_TMPDIR"))?;
     let configuration = configuration::<W>(&actuator(), NODE, Request::Off);
     let mut bench = Bench::with(board, &actuator(), &program)?;

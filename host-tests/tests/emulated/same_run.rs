@@ -2,12 +2,13 @@
 //! repeated, however its time is cut into pieces, whether or not somebody watches, by whichever clone it is gone on
 //! with, and whatever of it is translated.
 
-use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired, Witnessed};
+use emulator::board::{Drivetrain, Wired, Witnessed};
 use emulator::chip::fdcan::line::CanFrame;
 use emulator::cpu::{End, Watch};
 use emulator::emulation::Emulation;
 use emulator::program::Program;
 use host_tests::emulated::bench::program;
+use host_tests::on_each_board;
 use libtest_mimic::{Failed, Trial};
 use plant::ActuatorParameters;
 
@@ -18,10 +19,7 @@ const STEPS: u64 = 300;
 
 /// The tests of this file, by name.
 pub fn trials() -> Vec<Trial> {
-    vec![
-        Trial::test("b_g431b_esc1_does_the_same_every_time", || same_every_time(BG431BEsc1::new)),
-        Trial::test("moteus_r4_does_the_same_every_time", || same_every_time(MoteusR4::new)),
-    ]
+    on_each_board!("does_the_same_every_time", same_every_time).into()
 }
 
 /// Options of a run.

@@ -4,10 +4,11 @@
 //! of the board.
 
 use canopen_node::Access;
-use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4, Wired as _};
+use emulator::board::{Drivetrain, MoteusR4, Wired as _};
 use host_tests::emulated::Bench;
 use host_tests::emulated::bench::program;
 use host_tests::emulated::observed::Observed;
+use host_tests::on_each_board;
 use joint_firmware::default_configuration::BOARDS;
 use joint_firmware::objects::field::Field;
 use joint_firmware::objects::settings::Setting;
@@ -36,10 +37,7 @@ const HEXAGON: f64 = 1.154_700_6;
 
 /// The tests of this file, by name.
 pub fn trials() -> Vec<Trial> {
-    vec![
-        Trial::test("moteus_r4_takes_no_setting_that_it_does_not_bear", || sweep(MoteusR4::new)),
-        Trial::test("b_g431b_esc1_takes_no_setting_that_it_does_not_bear", || sweep(BG431BEsc1::new)),
-    ]
+    on_each_board!("takes_no_setting_that_it_does_not_bear", sweep).into()
 }
 
 /// Limits of a board, by the table of docs/boards.md.

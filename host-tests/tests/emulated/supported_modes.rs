@@ -1,22 +1,17 @@
 //! Modes of the flashed programs, as 6502h names them.
 
-use emulator::board::{BG431BEsc1, Drivetrain, MoteusR4};
+use emulator::board::Drivetrain;
 use host_tests::emulated::Bench;
 use host_tests::emulated::bench::program;
 use host_tests::emulated::observed::Observed;
-use joint_firmware::objects::Operation;
+use host_tests::on_each_board;
 use libtest_mimic::{Failed, Trial};
 
 const NODE: u8 = 5;
-/// Modes of a program without the profile modes: CSP, CSV, CST, impedance, open loop.
-const WITHOUT_PROFILES: u32 = 0x0003_0380;
 
 /// The tests of this file, by name.
 pub fn trials() -> Vec<Trial> {
-    vec![
-        Trial::test("moteus_r4_has_the_modes_that_6502h_names", || modes(MoteusR4::new, Operation::SUPPORTED)),
-        Trial::test("b_g431b_esc1_has_the_modes_that_6502h_names", || modes(BG431BEsc1::new, WITHOUT_PROFILES)),
-    ]
+    on_each_board!("has_the_modes_that_6502h_names", modes).into()
 }
 
 fn named<W: Observed>(board: fn(Drivetrain) -> W) -> Result<Bench<W>, Failed> {
@@ -31,8 +26,8 @@ fn is<T: PartialEq + std::fmt::Debug>(what: &str, found: T, expected: T) -> Resu
     if found == expected { Ok(()) } else { Err(format!("{what}: {found:x?}, not {expected:x?}").into()) }
 }
 
-fn modes<W: Observed>(board: fn(Drivetrain) -> W, supported: u32) -> Result<(), Failed> {
-    let mut bench = named(board)?;
+fn modes<W: Observed>(board: fn(Drivetrain) -> W) -> Result<(), Failed> {
+    let (mut bench, supported) = (named(board)?, W::MODES);
     is("6502h", bench.number(NODE, 0x6502, 0)?, supported)?;
     for mode in -4i8..=12 {
         let there = match mode {
