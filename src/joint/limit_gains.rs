@@ -46,9 +46,9 @@ impl LimitGains {
         }
     }
 
-    /// A speed, rad/s, of this square; where it is beyond the velocity limit, rad/s, that one, and no root is taken.
+    /// A speed, rad/s, of this square; where it is beyond the velocity limit, that one, and no root is taken.
     #[inline(always)]
-    pub(super) fn speed(&self, square: f32, limit: f32) -> f32 {
-        if square > self.beyond_velocity { limit } else { square_root(square) }
+    pub(super) fn speed(&self, square: f32, limits: &Limits) -> f32 {
+        if square > self.beyond_velocity { limits.velocity } else { square_root(square) }
     }
 }

@@ -70,9 +70,12 @@ impl Bounds {
 /// Torque, Nm, towards a position limit that is `room` rad away, at a velocity, rad/s, in its direction.
 #[inline(never)]
 fn bound(active: &Active, room: f32, velocity: f32, limit: f32) -> f32 {
-    let (gains, velocity_limit) = (&active.limit_gains, active.limits.velocity);
+    let gains = &active.limit_gains;
     let permitted = if room > 0.0 && velocity > 0.0 {
-        lesser(gains.speed(gains.fade_squared + gains.twice_deceleration * room, velocity_limit), velocity_limit)
+        lesser(
+            gains.speed(gains.fade_squared + gains.twice_deceleration * room, &active.limits),
+            active.limits.velocity,
+        )
     } else {
         // A joint that goes away from the limit, or stands, has more than its fade: the whole torque.
         gains.fade + gains.slope * lesser(room, 0.0)

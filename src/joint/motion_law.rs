@@ -207,10 +207,8 @@ impl MotionLaw {
         let distance = if way < 0.0 { -way } else { way };
         let deceleration = lesser(limits.deceleration(), gains.acceleration);
         // Of the way that the next round needs anyway, nothing is left to brake on.
-        let speed = lesser(
-            active.limit_gains.speed(2.0 * deceleration * distance, active.limits.velocity),
-            distance * gains.rate,
-        );
+        let speed =
+            lesser(active.limit_gains.speed(2.0 * deceleration * distance, &active.limits), distance * gains.rate);
         let speed = lesser(speed, lesser(limits.velocity(), active.limits.velocity));
         if way < 0.0 { -speed } else { speed }
     }
