@@ -6,8 +6,9 @@
 //! torque = (J + m l²) dv/dt + (G + m g l) sin(q - q0)
 //! ```
 //!
-//! from the reference velocity `v` and the measured position `q` of that step and a [`LoadConfiguration`]: inertia `J`,
-//! gravity torque `G`, hanging position `q0`, payload `m` at an arm `l`. It joins the command's torque, as a torque
+//! from the reference velocity `v` and the measured position `q` of that step and a
+//! [`LoadConfiguration`](super::configuration::LoadConfiguration): inertia `J`, gravity torque `G`, hanging position
+//! `q0`, payload `m` at an arm `l`. It joins the command's torque, as a torque
 //! offset (60B2h) would, in modes that have a reference velocity ([`Command::bear`](super::Command::bear)): the control
 //! step does nothing for it. Torque mode has none, so the energy guard never takes it for a push or for what holds the
 //! joint.

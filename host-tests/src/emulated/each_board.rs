@@ -1,7 +1,7 @@
 //! A trial on each emulated board.
 
-/// Trials of one promise, named `<board>_<promise>`, on each emulated board. `$test` is generic over the board. It takes
-/// the function that makes it from the drivetrain behind it, and the board's constants from
+/// Trials of one promise, named `<board>_<promise>`, on each emulated board. `$test` is generic over the board: it
+/// takes the function that makes it from the drivetrain behind it, and the board's constants from
 /// [`Observed`](crate::emulated::observed::Observed).
 #[macro_export]
 macro_rules! on_each_board {
