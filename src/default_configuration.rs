@@ -14,6 +14,8 @@ use crate::joint::configuration::{
 use crate::joint::stop_options::StopConfiguration;
 use crate::motor::angle::{Direction, ElectricalAngle, EncoderAlignment};
 use crate::sensors::analog::Analog;
+use crate::sensors::as5047p::As5047p;
+use crate::sensors::rotor_encoder;
 use friction_compensation::compensation::Request;
 use friction_compensation::friction::regime::MOST_SETS;
 
@@ -96,8 +98,8 @@ pub const B_G431B_ESC1: BoardConfiguration = BoardConfiguration {
     parameter_sets: 1,
 };
 
-/// mjbots moteus r4.11. Supply: a bench supply of 12 to 24 V. The encoder's answer is two control periods old. The
-/// motor's thermistor is the user's to fit, so none is expected.
+/// mjbots moteus r4.11. Supply: a bench supply of 12 to 24 V. The motor's thermistor is the user's to fit, so none is
+/// expected.
 pub const MOTEUS_R4: BoardConfiguration = BoardConfiguration {
     bridge: settled(
         MOTEUS_R4_SETTLING,
@@ -124,9 +126,12 @@ pub const MOTEUS_R4: BoardConfiguration = BoardConfiguration {
         },
     ),
     analog: MOTEUS_R4_ANALOG,
-    joint: uncommissioned((10.0, 30.0), 4.0, 2.0 / MOTEUS_R4_RATE),
+    joint: uncommissioned((10.0, 30.0), 4.0, rotor_encoder::age::<MoteusR4Encoder>(MOTEUS_R4_RATE)),
     parameter_sets: MOST_SETS,
 };
+
+/// Rotor encoder of the moteus r4.
+pub type MoteusR4Encoder = As5047p;
 
 /// Control steps a second, Hz.
 const MOTEUS_R4_RATE: f32 = 40_000.0;

@@ -11,7 +11,7 @@
 //! | current A, B, C | PB0 ADC3_IN12, PB1 ADC1_IN12, PB2 ADC2_IN12 |
 //! | supply | PB12 ADC1_IN11 |
 //! | bridge NTC, motor NTC | PA9 ADC5_IN2, PA8 ADC5_IN1 |
-//! | AS5047P | SPI2: SCK PB13, MISO PB14, MOSI PB15, select PB11 |
+//! | rotor encoder | SPI2: SCK PB13, MISO PB14, MOSI PB15, select PB11 |
 //! | CAN receive, transmit | PA11, PA12: FDCAN1 |
 //! | holding brake, brake chopper | PC15, PC14: the pads DBG2, DBG1; high opens the brake, high conducts. For the input of a driver with a pull-down: they float until the program starts, and give no current |
 //! | LEDs | PF0 debug, PF1 power (lit when low: unconfirmed) |
@@ -23,7 +23,7 @@ use super::adc::{self, FULL_SCALE, Sequence};
 use super::drv8353::Drv8353;
 use super::gate::{self, Gate};
 pub use super::gate::{ask_reset, is_started};
-use super::pwm;
+use super::pwm::{self, TIMER_HZ};
 use super::{Led, Parts, Peripherals, StartError};
 use core::sync::atomic::{AtomicU8, Ordering};
 use cortex_m::peripheral::DWT;
@@ -39,11 +39,11 @@ use embassy_stm32::spi::{self, Spi};
 use embassy_stm32::time::Hertz;
 use embassy_stm32::timer::low_level::CountingMode;
 use embassy_stm32::timer::simple_pwm::{PwmPin, SimplePwm};
-use joint_firmware::default_configuration::{self, BoardConfiguration};
+use joint_firmware::default_configuration::{self, BoardConfiguration, MoteusR4Encoder};
 use joint_firmware::hardware::moteus_revision::{Pins, SUPPORTED};
 use joint_firmware::hardware::{Hardware, Setup};
 use joint_firmware::joint::{Bridge, BridgeState, Measurements, Outputs};
-use joint_firmware::sensors::as5047p;
+use joint_firmware::sensors::rotor_encoder::{self, RotorEncoder};
 use joint_firmware::sensors::thermistor::Thermistor;
 
 /// Name of the board.
@@ -80,9 +80,16 @@ const TRIGGER: u8 = 2;
 /// Polls of the encoder's answer before it counts as lost. A frame takes 3 µs at 5.3 MHz, 510 cycles; a poll takes more
 /// than four.
 const ENCODER_POLLS: u32 = 200;
-
-/// Core cycles in 350 ns.
-const SELECT_CYCLES: u32 = 60;
+/// Clock of the encoder's bus, Hz. A frame at a slower one than its polls wait for would be lost each time.
+const ENCODER_CLOCK: u32 = {
+    let clock = rotor_encoder::clock::<MoteusR4Encoder>(TIMER_HZ);
+    assert!(16 * (TIMER_HZ / clock) <= 4 * ENCODER_POLLS, "a frame of the encoder takes longer than its polls");
+    clock
+};
+/// SPI mode of the encoder.
+const ENCODER_MODE: spi::Mode = [spi::MODE_0, spi::MODE_1, spi::MODE_2, spi::MODE_3][MoteusR4Encoder::MODE as usize];
+/// Core cycles from the encoder's selection to its clock.
+const SELECT_CYCLES: u32 = rotor_encoder::select_cycles::<MoteusR4Encoder>(TIMER_HZ / 1_000_000);
 
 /// embassy's set-up, at 16 MHz.
 pub fn chip_configuration() -> Config {
@@ -177,16 +184,15 @@ pub fn start(mut p: Peripherals) -> Result<Parts, StartError> {
     };
     parts.gate = gate::Parts::Gate(Gate { driver, enable: Output::new(p.PA3, Level::Low, Speed::Low) });
 
-    // Set up by embassy, used by register in the control interrupt. 5.3 MHz: the next faster is over the encoder's 10
-    // MHz.
+    // Set up by embassy, used by register in the control interrupt.
     let mut bus = spi::Config::default();
-    bus.mode = spi::MODE_1;
-    bus.frequency = Hertz(6_000_000);
+    bus.mode = ENCODER_MODE;
+    bus.frequency = Hertz(ENCODER_CLOCK);
     let mut encoder = Spi::new_blocking(p.SPI2, p.PB13, p.PB15, p.PB14, bus);
     core::mem::forget(Output::new(p.PB11, Level::High, Speed::VeryHigh));
     // The first transfer leaves the bus enabled, with frames of 16 bits; its answer is thrown away. An encoder that
     // does not answer is the joint's to find.
-    let _ = encoder.blocking_transfer_in_place(&mut [as5047p::READ_ANGLE]);
+    let _ = encoder.blocking_transfer_in_place(&mut [MoteusR4Encoder::READ]);
     core::mem::forget(encoder);
     pac::SPI2.cr1().modify(|w| w.set_spe(true));
 
@@ -278,9 +284,8 @@ fn select() -> u32 {
     DWT::cycle_count()
 }
 
-/// Begins a frame with the encoder, which has been selected: the first edge of the clock may come 350 ns after that
-/// (AS5047P datasheet, t_L). What was done meanwhile has mostly taken longer; what is left is waited for, a bounded
-/// number of times.
+/// Begins a frame with the encoder, which has been selected: the first edge of the clock may come some time after that.
+/// What was done meanwhile has mostly taken longer; what is left is waited for, a bounded number of times.
 #[inline(always)]
 fn begin_frame(selected: u32) {
     for _ in 0..SELECT_CYCLES {
@@ -288,7 +293,7 @@ fn begin_frame(selected: u32) {
             break;
         }
     }
-    pac::SPI2.dr16().write_value(as5047p::READ_ANGLE);
+    pac::SPI2.dr16().write_value(MoteusR4Encoder::READ);
 }
 
 /// Ends the frame, which has long been over unless the step was very short; its wait is bounded. The answer, or none
@@ -314,8 +319,7 @@ impl Sensors {
     /// Measurements known now; temperatures and overrun are filled in by the caller.
     ///
     /// The encoder's angle is the one that the frame of the period before brought, which runs while the control step
-    /// does: two periods old, because an answer is to the command of the frame before. Waiting for a frame of this
-    /// period would take 600 of the period's 4,250 cycles.
+    /// does ([`rotor_encoder::age`]). Waiting for a frame of this period would take 600 of the period's 4,250 cycles.
     #[inline(always)]
     pub fn measure(&mut self) -> Measurements {
         let selected = select();
@@ -324,7 +328,7 @@ impl Sensors {
         if gate::amplifies() {
             self.currents = [pac::ADC3, pac::ADC1, pac::ADC2].map(adc::code::<0>);
         }
-        let angle = self.answer.take().and_then(as5047p::angle);
+        let angle = self.answer.take().and_then(MoteusR4Encoder::angle);
         // The last good angle stands in: a jump to zero would be worse for whoever looks at the angle only.
         self.angle = angle.unwrap_or(self.angle);
         let measurements = Measurements {

@@ -3,8 +3,7 @@
 //! Source: ams AS5047P datasheet, "SPI interface": 16-bit frames, mode 1, at most 10 MHz; bit 15 is even parity over
 //! the lower 15 bits, bit 14 of an answer flags an error of the previous command.
 
-/// Command that reads the angle with dynamic error compensation (register 0x3FFF, read bit, parity).
-pub const READ_ANGLE: u16 = with_parity(1 << 14 | 0x3fff);
+use super::rotor_encoder::RotorEncoder;
 
 /// The command with its parity bit.
 const fn with_parity(command: u16) -> u16 {
@@ -12,15 +11,26 @@ const fn with_parity(command: u16) -> u16 {
     command | ((command.count_ones() as u16 & 1) << 15)
 }
 
-/// Angle in an answer, 2^32 a turn; none where parity fails or the encoder flags an error.
-///
-/// A data line stuck high fails (the error flag is set); one stuck low reads as a valid angle of zero, which only the
-/// joint's own check for a standing angle can find.
-#[inline(always)]
-pub fn angle(frame: u16) -> Option<u32> {
-    let even = frame.count_ones() & 1 == 0;
-    let error = frame & (1 << 14) != 0;
-    (even && !error).then_some(u32::from(frame & 0x3fff) << 18)
+/// The chip.
+pub struct As5047p;
+
+impl RotorEncoder for As5047p {
+    /// The angle with dynamic error compensation: register 0x3FFF, read bit, parity.
+    const READ: u16 = with_parity(1 << 14 | 0x3fff);
+    const MODE: u8 = 1;
+    const FASTEST: u32 = 10_000_000;
+    /// t_L of the datasheet.
+    const SELECT: u32 = 350;
+    const ANSWERS_AFTER: u32 = 1;
+
+    /// A data line stuck high fails (the error flag is set); one stuck low reads as a valid angle of zero, which only the
+    /// joint's own check for a standing angle can find.
+    #[inline(always)]
+    fn angle(frame: u16) -> Option<u32> {
+        let even = frame.count_ones() & 1 == 0;
+        let error = frame & (1 << 14) != 0;
+        (even && !error).then_some(u32::from(frame & 0x3fff) << 18)
+    }
 }
 
 #[cfg(test)]
@@ -31,21 +41,21 @@ mod tests {
     fn every_angle_is_read_and_any_single_flipped_bit_is_refused() {
         for code in 0..1u16 << 14 {
             let frame = with_parity(code);
-            assert_eq!(angle(frame), Some(u32::from(code) << 18));
+            assert_eq!(As5047p::angle(frame), Some(u32::from(code) << 18));
             for bit in 0..16 {
-                assert_eq!(angle(frame ^ (1 << bit)), None, "code {code}, bit {bit}");
+                assert_eq!(As5047p::angle(frame ^ (1 << bit)), None, "code {code}, bit {bit}");
             }
         }
     }
 
     #[test]
     fn an_answer_with_the_error_flag_or_from_a_line_stuck_high_is_refused() {
-        assert_eq!(angle(with_parity(1 << 14 | 77)), None);
-        assert_eq!(angle(0xffff), None);
+        assert_eq!(As5047p::angle(with_parity(1 << 14 | 77)), None);
+        assert_eq!(As5047p::angle(0xffff), None);
     }
 
     #[test]
     fn the_command_is_the_datasheets() {
-        assert_eq!(READ_ANGLE, 0xffff);
+        assert_eq!(As5047p::READ, 0xffff);
     }
 }

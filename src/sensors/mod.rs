@@ -3,4 +3,5 @@
 pub mod analog;
 pub mod as5047p;
 pub mod incremental;
+pub mod rotor_encoder;
 pub mod thermistor;

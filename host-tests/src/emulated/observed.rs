@@ -4,9 +4,9 @@ use emulator::board::{BG431BEsc1, MoteusR4, Wired};
 use emulator::bus::{Bus as _, Width};
 use emulator::chip::Chip;
 use emulator::variables::Variable;
-use joint_firmware::default_configuration::{B_G431B_ESC1, BoardConfiguration, MOTEUS_R4};
+use joint_firmware::default_configuration::{B_G431B_ESC1, BoardConfiguration, MOTEUS_R4, MoteusR4Encoder};
 use joint_firmware::objects::Operation;
-use joint_firmware::sensors::as5047p;
+use joint_firmware::sensors::rotor_encoder::RotorEncoder;
 use libtest_mimic::Failed;
 
 /// Variables that the twin reads on a board.
@@ -88,7 +88,7 @@ impl Observed for MoteusR4 {
             ("Some", Some(content)) => Some(memory.bits(&content)? as u16),
             _ => None,
         };
-        Ok(Reading { angle: answer.and_then(as5047p::angle), referenced: true })
+        Ok(Reading { angle: answer.and_then(MoteusR4Encoder::angle), referenced: true })
     }
 }
 

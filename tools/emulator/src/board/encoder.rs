@@ -10,7 +10,7 @@ const COUNTS: (u32, u32) = (16, 1 << 20);
 /// An encoder, and how it is mounted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Encoder {
-    /// Counts a turn, 16 to 1,048,576: of an incremental encoder four a line. An AS5047P has 16,384.
+    /// Counts a turn, 16 to 1,048,576: of an incremental encoder four a line. A chip has those that it has.
     pub counts: u32,
     /// `true` if it counts down while the rotor turns forward.
     pub reversed: bool,

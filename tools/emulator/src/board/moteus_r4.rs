@@ -14,12 +14,13 @@ use crate::chip::variant::{STM32G474CE, Variant};
 use crate::chip::wiring::{Pin, Pwm, Quadrature, SpiFrame, TimerName, Wiring};
 use crate::chip::{Chip, Deviation};
 use crate::cpu::Cpu;
-use crate::parts::as5047p::{As5047p, Field};
+use crate::parts::as5047p::As5047p;
 use crate::parts::drv8353::Drv8353;
+use crate::parts::rotor_encoder::RotorEncoder;
 use plant::ParameterError;
 
-/// Counts of the AS5047P.
-const COUNTS: u32 = 1 << 14;
+/// Encoder that is fitted.
+type Rotor = As5047p;
 /// Shunt, Ohm.
 const SHUNT: f64 = 0.5e-3;
 const VDD: f64 = 3.3;
@@ -60,7 +61,7 @@ pub struct MoteusR4 {
     inputs: Inputs,
     line: Line,
     driver: Drv8353,
-    encoder: As5047p,
+    encoder: Rotor,
     magnet: Encoder,
     /// INLA to INLC.
     switched_on: bool,
@@ -74,12 +75,12 @@ impl MoteusR4 {
     /// Board with a plant behind it, whose encoder's direction and zero are those of the magnet.
     pub fn new(drivetrain: Drivetrain) -> Self {
         Self {
-            magnet: Encoder { counts: COUNTS, ..drivetrain.encoder() },
+            magnet: Encoder { counts: Rotor::COUNTS, ..drivetrain.encoder() },
             drivetrain,
             inputs: Inputs::default(),
             line: Line::new(1_000_000),
             driver: Drv8353::new(),
-            encoder: As5047p::new(),
+            encoder: Rotor::default(),
             switched_on: false,
             led: false,
             revision: R4_11,
@@ -124,7 +125,7 @@ impl Wired for MoteusR4 {
 
     fn with_encoder(self, encoder: Encoder) -> Result<Self, ParameterError> {
         encoder.validate()?;
-        encoder.counts_within((COUNTS, COUNTS))?;
+        encoder.counts_within((Rotor::COUNTS, Rotor::COUNTS))?;
         Ok(Self { magnet: encoder, ..self })
     }
 
@@ -193,7 +194,10 @@ impl Wiring for MoteusR4 {
             ENABLE => self.driver.enable(at, level == Some(true)),
             HIZ => self.switched_on = level == Some(true),
             DRIVER_SELECT => self.driver.select(level == Some(false)),
-            ENCODER_SELECT => self.encoder.select(level == Some(false)),
+            ENCODER_SELECT => {
+                let (magnet, drivetrain) = (&self.magnet, &mut self.drivetrain);
+                self.encoder.select(level == Some(false), || magnet.nearest(drivetrain.sample(at).encoder));
+            }
             // Between the supply and the pin.
             LED => self.led = level == Some(false),
             BRAKE => return self.drivetrain.set_brake(level == Some(true)),
@@ -224,7 +228,7 @@ impl Wiring for MoteusR4 {
             }
             2 => {
                 let angle = self.magnet.nearest(self.drivetrain.sample(at).encoder);
-                let answer = self.encoder.exchange(frame, &Field::at(angle as u16));
+                let answer = self.encoder.exchange(frame, angle);
                 self.inputs.encoder_line.map(|high| if high { u16::MAX } else { 0 }).or(answer)
             }
             _ => None,

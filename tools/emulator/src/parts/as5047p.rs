@@ -7,6 +7,7 @@
 //! Assumption: what a command reads is what holds when its frame ends. Dynamic compensation is ideal: ANGLECOM is the
 //! angle itself.
 
+use super::rotor_encoder::RotorEncoder;
 use crate::chip::wiring::SpiFrame;
 
 /// Fastest clock, Hz.
@@ -58,14 +59,11 @@ const fn with_parity(word: u16) -> u16 {
     word | ((word.count_ones() as u16 & 1) << 15)
 }
 
-impl As5047p {
-    /// Sensor after power-up: the first answer is zero.
-    pub fn new() -> Self {
-        Self::default()
-    }
+impl RotorEncoder for As5047p {
+    const COUNTS: u32 = 1 << 14;
 
-    /// The select line, low or not. One frame belongs into a selection; more are a framing error.
-    pub fn select(&mut self, selected: bool) {
+    /// One frame belongs into a selection; more are a framing error.
+    fn select(&mut self, selected: bool, _: impl FnOnce() -> u32) {
         if self.selected && !selected && self.frames > 1 {
             self.errors |= FRAMING;
         }
@@ -74,8 +72,14 @@ impl As5047p {
         }
     }
 
+    fn exchange(&mut self, frame: &SpiFrame, count: u32) -> Option<u16> {
+        self.sense(frame, &Field::at(count as u16))
+    }
+}
+
+impl As5047p {
     /// A frame that ended, and what the sensor saw. None where it is not selected: it leaves the line alone.
-    pub fn exchange(&mut self, frame: &SpiFrame, field: &Field) -> Option<u16> {
+    pub fn sense(&mut self, frame: &SpiFrame, field: &Field) -> Option<u16> {
         if !self.selected {
             return None;
         }
@@ -129,15 +133,15 @@ mod tests {
     }
 
     fn exchange(encoder: &mut As5047p, frame: &SpiFrame, angle: u16) -> u16 {
-        encoder.select(true);
-        let answer = encoder.exchange(frame, &Field::at(angle)).unwrap();
-        encoder.select(false);
+        encoder.select(true, || 0);
+        let answer = encoder.sense(frame, &Field::at(angle)).unwrap();
+        encoder.select(false, || 0);
         answer
     }
 
     #[test]
     fn an_angle_comes_with_the_frame_after_its_command() {
-        let mut encoder = As5047p::new();
+        let mut encoder = As5047p::default();
         exchange(&mut encoder, &frame(0xffff), 0x1234);
         assert_eq!(exchange(&mut encoder, &frame(0xffff), 0x0007) & ADDRESS, 0x1234);
         let answer = exchange(&mut encoder, &frame(0xffff), 0);
@@ -147,7 +151,7 @@ mod tests {
 
     #[test]
     fn wrong_parity_raises_the_flag_until_the_errors_are_read() {
-        let mut encoder = As5047p::new();
+        let mut encoder = As5047p::default();
         exchange(&mut encoder, &frame(0x7fff), 5);
         for _ in 0..3 {
             assert_eq!(exchange(&mut encoder, &frame(0xffff), 5) & ERROR, ERROR);
@@ -160,7 +164,7 @@ mod tests {
     #[test]
     fn registers_that_are_not_there_and_writes_are_invalid() {
         for command in [with_parity(READ | 0x1000), with_parity(0x0018)] {
-            let mut encoder = As5047p::new();
+            let mut encoder = As5047p::default();
             exchange(&mut encoder, &frame(command), 5);
             exchange(&mut encoder, &frame(with_parity(READ | 1)), 5);
             assert_eq!(exchange(&mut encoder, &frame(0), 5) & ADDRESS, INVALID);
@@ -170,30 +174,30 @@ mod tests {
     #[test]
     fn a_clock_that_is_too_fast_another_mode_and_two_frames_are_framing_errors() {
         for wrong in [SpiFrame { frequency: 10_625_000, ..frame(0xffff) }, SpiFrame { mode: 0, ..frame(0xffff) }] {
-            let mut encoder = As5047p::new();
+            let mut encoder = As5047p::default();
             exchange(&mut encoder, &wrong, 5);
             assert_eq!(exchange(&mut encoder, &frame(0xffff), 5) & ERROR, ERROR);
         }
-        let mut encoder = As5047p::new();
-        encoder.select(true);
-        encoder.exchange(&frame(0xffff), &Field::at(5));
-        encoder.exchange(&frame(0xffff), &Field::at(5));
-        encoder.select(false);
+        let mut encoder = As5047p::default();
+        encoder.select(true, || 0);
+        encoder.sense(&frame(0xffff), &Field::at(5));
+        encoder.sense(&frame(0xffff), &Field::at(5));
+        encoder.select(false, || 0);
         assert_eq!(exchange(&mut encoder, &frame(0xffff), 5) & ERROR, ERROR);
     }
 
     #[test]
     fn not_selected_it_leaves_the_line_alone() {
-        assert_eq!(As5047p::new().exchange(&frame(0xffff), &Field::at(5)), None);
+        assert_eq!(As5047p::default().sense(&frame(0xffff), &Field::at(5)), None);
     }
 
     #[test]
     fn the_diagnostics_tell_of_the_field() {
-        let mut encoder = As5047p::new();
+        let mut encoder = As5047p::default();
         let weak = Field { gain: 255, low: true, ..Field::at(0) };
-        encoder.select(true);
-        encoder.exchange(&frame(with_parity(READ | 0x3ffc)), &weak);
-        encoder.select(false);
+        encoder.select(true, || 0);
+        encoder.sense(&frame(with_parity(READ | 0x3ffc)), &weak);
+        encoder.select(false, || 0);
         assert_eq!(exchange(&mut encoder, &frame(0), 0) & ADDRESS, 1 << 11 | 1 << 8 | 255);
     }
 }

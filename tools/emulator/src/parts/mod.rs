@@ -2,3 +2,4 @@
 
 pub mod as5047p;
 pub mod drv8353;
+pub mod rotor_encoder;
