@@ -9,7 +9,9 @@ use super::stop_options::StopConfiguration;
 use crate::motor::angle::EncoderAlignment;
 use crate::motor::number::lesser;
 use crate::motor::setting::{Name, SettingError, in_range, within_range};
-use friction_compensation::compensation::SettingsError;
+use friction_compensation::compensation::{Request, SettingsError};
+#[cfg(feature = "serde")]
+use serde::{Deserialize, Serialize};
 
 pub use super::limits::Limits;
 
@@ -19,8 +21,33 @@ pub const LOADS: bool = !cfg!(all(feature = "little-room", target_os = "none"));
 /// Control steps of a round of the motion loop, each of which does a [stage](super::motion_loop::Stage) of it.
 pub const MOTION_STEPS: u32 = 5;
 
+/// Values of keys in files of programs that did not have them yet, where these are not the default of their type; host.
+#[cfg(feature = "serde")]
+mod earlier {
+    pub const fn encoder_counts() -> u32 {
+        4_000
+    }
+
+    pub const fn voltage_fraction() -> f32 {
+        1.0
+    }
+
+    pub const fn friction_uncertainty() -> f32 {
+        super::FRICTION_UNCERTAINTY
+    }
+
+    pub const fn load_uncertainty() -> f32 {
+        super::LOAD_UNCERTAINTY
+    }
+
+    pub const fn oscillator_trim() -> u8 {
+        super::FACTORY_TRIM
+    }
+}
+
 /// Motor and encoder on its shaft.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
 pub struct MotorConfiguration {
     /// Resistance of a phase at 25 °C, Ω; 0.001 to 100.
     pub resistance: f32,
@@ -37,17 +64,20 @@ pub struct MotorConfiguration {
     pub loss_current: f32,
     /// Largest d current that weakens the field, A; 0 (off) to the current limit, and to flux linkage over inductance.
     /// See [`crate::motor::field_weakening`].
+    #[cfg_attr(feature = "serde", serde(default))]
     pub field_weakening_current: f32,
     /// Alignment of the encoder on the motor.
     pub alignment: EncoderAlignment,
     /// Age of an encoder sample when the control step sees it, s; 0 to 1 ms.
     pub encoder_latency: f32,
     /// Counts a turn of an incremental encoder, four times its lines; 16 to 65,535. An absolute one has no use for it.
+    #[cfg_attr(feature = "serde", serde(default = "earlier::encoder_counts"))]
     pub encoder_counts: u32,
 }
 
 /// Gear and joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
 pub struct GearConfiguration {
     /// Rotor revolutions per revolution of the joint, 1 to 500; negative where a positive rotor turns the joint
     /// backwards.
@@ -58,6 +88,7 @@ pub struct GearConfiguration {
 
 /// Gains with which the joint follows its commands.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
 pub struct Gains {
     /// Bandwidth of the current loop, Hz; 10 to an eighteenth of the control rate.
     pub current_bandwidth: f32,
@@ -65,6 +96,7 @@ pub struct Gains {
     pub observer_bandwidth: f32,
     /// Longest voltage vector, over the longest one that fits at any angle; 0.1 to 2 / sqrt 3, where it reaches the
     /// corners of the hexagon.
+    #[cfg_attr(feature = "serde", serde(default = "earlier::voltage_fraction"))]
     pub voltage_fraction: f32,
     /// Stiffness of the position mode, Nm/rad; 0 to 1e5.
     pub stiffness: f32,
@@ -80,8 +112,20 @@ pub struct Gains {
     pub braking_time: f32,
 }
 
+/// Form of [`Request`] in a file; host. A twin, because the crate that it belongs to is used without files.
+#[cfg(feature = "serde")]
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Request", rename_all = "kebab-case")]
+enum RequestText {
+    Off,
+    Physical,
+    PhysicalAndNetwork,
+    NetworkInShadow,
+}
+
 /// Source of the velocity that friction is computed for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(rename_all = "kebab-case"))]
 pub enum VelocitySource {
     /// The command's velocity where the mode has one (velocity, position, impedance), the measured one in torque mode.
     /// The compensation of the first three is then pure feedforward: no error of the model can destabilise the
@@ -100,6 +144,7 @@ pub const FRICTION_UNCERTAINTY: f32 = 0.6;
 /// Request of adaptation in service ([`super::adaptation`]).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(rename_all = "kebab-case"))]
 pub enum AdaptationRequest {
     /// No adaptation.
     #[default]
@@ -112,9 +157,11 @@ pub enum AdaptationRequest {
 
 /// Configuration of compensation.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
 pub struct CompensationConfiguration {
     /// Requested compensation.
-    pub request: friction_compensation::compensation::Request,
+    #[cfg_attr(feature = "serde", serde(with = "RequestText"))]
+    pub request: Request,
     /// Share of the estimate that is added; 0 to 1.
     pub gain: f32,
     /// Largest compensation torque, Nm; 0 to the torque limit.
@@ -127,14 +174,17 @@ pub struct CompensationConfiguration {
     pub standstill_velocity: f32,
     /// Uncertainty of friction: by how much it may be less than gain times the model, as a part of it; 0 to 1. It is
     /// what the energy guard may take of a compensation for the measured velocity; see [`super::friction_feedforward`].
+    #[cfg_attr(feature = "serde", serde(default = "earlier::friction_uncertainty"))]
     pub uncertainty: f32,
     /// Requested adaptation.
+    #[cfg_attr(feature = "serde", serde(default))]
     pub adaptation: AdaptationRequest,
 }
 
 /// Torques of the configured load that the joint adds by itself ([`super::load_feedforward`]).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(rename_all = "kebab-case"))]
 pub enum LoadFeedforwardRequest {
     /// None.
     #[default]
@@ -151,6 +201,7 @@ pub enum LoadFeedforwardRequest {
 /// set-points say.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(rename_all = "kebab-case"))]
 pub enum CollisionReaction {
     /// None: collisions are counted.
     #[default]
@@ -180,6 +231,7 @@ pub const LOAD_UNCERTAINTY: f32 = 0.3;
 /// Inertia and gravity at the joint's output, as far as a single joint can know them: an axis that does not move
 /// against gravity.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
 pub struct LoadConfiguration {
     /// Torques that are added.
     pub request: LoadFeedforwardRequest,
@@ -194,10 +246,13 @@ pub struct LoadConfiguration {
     /// Distance of the payload's centre of mass from the axis, m; 0 to 10.
     pub payload_arm: f32,
     /// Part of true inertia and gravity by which the configured ones may be wrong; 0 to 0.9.
+    #[cfg_attr(feature = "serde", serde(default = "earlier::load_uncertainty"))]
     pub uncertainty: f32,
     /// External torque beyond its uncertainty that is a collision, Nm; 0 to 2000.
+    #[cfg_attr(feature = "serde", serde(default))]
     pub collision_threshold: f32,
     /// Reaction to one.
+    #[cfg_attr(feature = "serde", serde(default))]
     pub collision_reaction: CollisionReaction,
 }
 
@@ -267,6 +322,7 @@ impl BridgeConfiguration {
 
 /// Heat paths of the motor.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
 pub struct ThermalConfiguration {
     /// Heat capacity of the winding, J/K.
     pub winding_capacity: f32,
@@ -288,10 +344,12 @@ const TRIM_STEPS: f32 = 10.0;
 
 /// Configuration of a joint: everything that it is and may do.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
 pub struct Configuration {
     /// Node on the CAN bus, 1 to 127; 255 where none is assigned yet.
     pub node_id: u8,
     /// Trim of the board's oscillator, steps of some 0.3 %; 54 to 74, from the factory 64.
+    #[cfg_attr(feature = "serde", serde(default = "earlier::oscillator_trim"))]
     pub oscillator_trim: u8,
     /// Motor and encoder.
     pub motor: MotorConfiguration,
@@ -302,10 +360,12 @@ pub struct Configuration {
     /// Gains.
     pub gains: Gains,
     /// Stops.
+    #[cfg_attr(feature = "serde", serde(default))]
     pub stops: StopConfiguration,
     /// Compensation.
     pub compensation: CompensationConfiguration,
     /// Load.
+    #[cfg_attr(feature = "serde", serde(default))]
     pub load: LoadConfiguration,
     /// Heat.
     pub thermal: ThermalConfiguration,

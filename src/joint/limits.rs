@@ -1,7 +1,11 @@
 //! Limits of a joint: what it is permitted, and where a fault is; task, host.
 
+#[cfg(feature = "serde")]
+use serde::{Deserialize, Serialize};
+
 /// Limits that the joint may never exceed.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
 pub struct Limits {
     /// Torque at the joint, Nm; 0.01 to 2000.
     pub torque: f32,
@@ -24,8 +28,10 @@ pub struct Limits {
     pub regeneration_band: f32,
     /// Supply at which a brake chopper conducts, V; 0 (none), or 1 V above the lowest supply to where the regeneration
     /// band begins. 0 on a board without an output for one.
+    #[cfg_attr(feature = "serde", serde(default))]
     pub chopper_voltage: f32,
     /// Largest part of the time in which it may conduct, over some 10 s; 0.001 to 1.
+    #[cfg_attr(feature = "serde", serde(default = "earlier_chopper_share"))]
     pub chopper_share: f32,
     /// Bridge temperature, °C; 40 to the board's highest. Current is derated over the last 20 K.
     pub bridge_temperature: f32,
@@ -33,6 +39,12 @@ pub struct Limits {
     pub winding_temperature: f32,
     /// Time without a command after which the joint brakes, s; 0.001 to the board's longest.
     pub command_deadline: f32,
+}
+
+/// Share in a file of a program that knew no brake chopper; host.
+#[cfg(feature = "serde")]
+const fn earlier_chopper_share() -> f32 {
+    0.1
 }
 
 /// Velocity limit over the widest fade of the torque towards it.

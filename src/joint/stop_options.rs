@@ -1,8 +1,12 @@
 //! Options of the joint's stops, in the numbers of CiA 402-2, and what of them the control step uses; task and control
 //! step. What they do: [stopping](super::stopping).
 
+#[cfg(feature = "serde")]
+use serde::{Deserialize, Serialize};
+
 /// Stop options of the joint, in the numbers of the profile's option codes.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
 pub struct StopConfiguration {
     /// Quick stop, 605Ah: 0, 1, 2, 5 or 6.
     pub quick_stop: u8,

@@ -9,6 +9,8 @@
 //! imitate it bit for bit; an encoder of 14 bits is 40 times coarser than the error of either.
 
 use friction_compensation::sine::cos_sin;
+#[cfg(feature = "serde")]
+use serde::{Deserialize, Serialize};
 
 /// Radians in a turn.
 pub const TAU: f32 = core::f32::consts::TAU;
@@ -50,6 +52,7 @@ impl ElectricalAngle {
 
 /// Counting direction of the encoder while the field turns forward, from phase A to B to C.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(rename_all = "kebab-case"))]
 pub enum Direction {
     /// Counts up.
     #[default]
@@ -71,12 +74,14 @@ impl Direction {
 
 /// Alignment of the encoder on the motor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(deny_unknown_fields))]
 pub struct EncoderAlignment {
     /// Pairs of poles: electrical turns in a mechanical one.
     pub pole_pairs: u32,
     /// Counting direction of the encoder.
     pub direction: Direction,
     /// Reading of `direction * pole_pairs * encoder` where the d axis lies on phase A.
+    #[cfg_attr(feature = "serde", serde(with = "turns"))]
     pub electrical_zero: ElectricalAngle,
 }
 
@@ -96,6 +101,31 @@ impl EncoderAlignment {
     #[inline(always)]
     pub fn electrical_speed(&self, encoder_speed: f32) -> f32 {
         self.direction.sign() * self.pole_pairs as f32 * encoder_speed
+    }
+}
+
+/// Form of [`EncoderAlignment::electrical_zero`] in a file: fraction of an electrical turn, of which a double has all 32
+/// bits; host.
+#[cfg(feature = "serde")]
+mod turns {
+    use super::{ElectricalAngle, STEPS};
+    use serde::de::Error;
+    use serde::{Deserialize, Deserializer, Serializer};
+
+    pub fn serialize<S: Serializer>(angle: &ElectricalAngle, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_f64(f64::from(angle.0) / f64::from(STEPS))
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<ElectricalAngle, D::Error> {
+        let turns = f64::deserialize(deserializer)?;
+        if !(0.0..1.0).contains(&turns) {
+            return Err(D::Error::custom(format_args!("electrical_zero is {turns} turns, must lie in 0 to below 1")));
+        }
+        let steps = turns * f64::from(STEPS);
+        let whole = steps as u64;
+        let nearest = whole + u64::from(steps - whole as f64 >= 0.5);
+        // An angle within half a step of a whole turn is zero again.
+        Ok(ElectricalAngle(nearest as u32))
     }
 }
 

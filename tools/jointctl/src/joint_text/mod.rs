@@ -4,16 +4,14 @@
 //! keys are refused, missing ones named, and the whole is checked by the same [`Configuration::prepare`] and the same
 //! thermal model that a joint starts with. Reading and writing lose no bit.
 //!
-//! - [`fields`]: what each key means, its unit and its range, as the file's comments say it
-//! - `mirror`: the record's form in the file
+//! The form of the file is serde's of the firmware's own records, which they have with its feature `serde`; [`fields`] is
+//! the meaning of each key, with unit and range, as the file's comments say it.
 
 pub mod fields;
-mod mirror;
 
 use fields::FIELDS;
 use joint_firmware::joint::configuration::{BridgeConfiguration, Configuration, ConfigurationError};
 use joint_firmware::motor::thermal::WindingTemperature;
-use mirror::Text;
 use std::path::{Path, PathBuf};
 
 /// Reason for which a file is not the configuration of a joint.
@@ -60,7 +58,7 @@ pub fn read(file: &Path, bridge: &BridgeConfiguration) -> Result<Configuration, 
 /// # Errors
 /// [`JointTextError`].
 pub fn from_text(text: &str, file: &Path, bridge: &BridgeConfiguration) -> Result<Configuration, JointTextError> {
-    let Text(configuration) = toml::from_str(text).map_err(|error| JointTextError::Toml {
+    let configuration: Configuration = toml::from_str(text).map_err(|error| JointTextError::Toml {
         file: file.to_owned(),
         message: error.to_string().trim_end().to_owned(),
     })?;
@@ -80,7 +78,7 @@ fn check(configuration: &Configuration, bridge: &BridgeConfiguration) -> Result<
 /// # Errors
 /// The configuration holds a number that TOML cannot: none that was read or prepared does.
 pub fn to_text(configuration: &Configuration) -> Result<String, toml::ser::Error> {
-    let plain = toml::to_string(&Text(*configuration))?;
+    let plain = toml::to_string(configuration)?;
     let mut text = String::from("# What this joint is and may do. SI units; every key is needed.\n\n");
     let mut table = "";
     for line in plain.lines() {

@@ -3,6 +3,7 @@ use friction_compensation::compensation::Request;
 use joint_firmware::joint::configuration::{
     AdaptationRequest, CollisionReaction, LoadConfiguration, LoadFeedforwardRequest, VelocitySource,
 };
+use joint_firmware::joint::stop_options::StopConfiguration;
 use joint_firmware::motor::angle::{Direction, ElectricalAngle};
 use plant::ActuatorParameters;
 use plant::virtual_joint::Setup;
@@ -85,7 +86,7 @@ fn with(field: &fields::Field, value: &str) -> String {
 
 #[test]
 fn what_lies_outside_a_stated_range_is_refused() {
-    for field in FIELDS {
+    for field in FIELDS.iter() {
         let Some((low, high)) = field.range else { continue };
         let below = if low == 0.0 { -1e-3 } else { low - 1e-3 * low.abs() };
         let above = high + 1e-3 * high;
@@ -101,7 +102,7 @@ fn what_lies_outside_a_stated_range_is_refused() {
                 "position" | "bus_voltage" => format!("[10.0, {value}]"),
                 _ => format!("{value:?}"),
             };
-            let text = with(&field, &value);
+            let text = with(field, &value);
             let refused = from_text(&text, Path::new("elbow.toml"), &setup(1).bridge);
             let Err(JointTextError::Refused { source, .. }) = &refused else {
                 panic!("{}.{} = {value}: {refused:?}", field.table, field.key);
@@ -143,6 +144,64 @@ fn a_file_without_limit_damping_is_refused_by_name() {
     let damping = good.lines().find(|line| line.starts_with("damping = ")).unwrap();
     let message = refusal(&good.replacen(damping, "", 1));
     assert!(message.contains("[limits]") && message.contains("missing field `damping`"), "{message}");
+}
+
+/// A key that came later has to be added here, with the value that it stands for.
+#[test]
+fn a_file_of_an_earlier_program_stands_for_what_that_program_did() {
+    let Setup { mut configuration, bridge } = setup(1);
+    let later = [
+        ("", "oscillator_trim"),
+        ("motor", "field_weakening_current"),
+        ("motor", "encoder_counts"),
+        ("limits", "chopper_voltage"),
+        ("limits", "chopper_share"),
+        ("gains", "voltage_fraction"),
+        ("compensation", "uncertainty"),
+        ("compensation", "adaptation"),
+        ("load", "uncertainty"),
+        ("load", "collision_threshold"),
+        ("load", "collision_reaction"),
+    ];
+    configuration.oscillator_trim = 60;
+    configuration.motor.field_weakening_current = 0.1;
+    configuration.motor.encoder_counts = 400;
+    configuration.limits.chopper_share = 0.7;
+    configuration.gains.voltage_fraction = 0.9;
+    configuration.stops.quick_stop = 6;
+    configuration.compensation.uncertainty = 0.1;
+    configuration.compensation.adaptation = AdaptationRequest::On;
+    configuration.load.inertia = 0.2;
+    configuration.load.uncertainty = 0.1;
+    configuration.load.collision_threshold = 5.0;
+    configuration.load.collision_reaction = CollisionReaction::Hold;
+    let written = to_text(&configuration).unwrap();
+    let without = |tables: &[&str]| {
+        let mut table = "";
+        let kept = written.lines().filter(|line| {
+            table = line.strip_prefix('[').and_then(|line| line.strip_suffix(']')).unwrap_or(table);
+            let key = line.split_once(" = ").map_or("", |(key, _)| key);
+            !later.contains(&(table, key)) && !tables.contains(&table)
+        });
+        let text = kept.collect::<Vec<_>>().join("\n");
+        from_text(&text, Path::new("joint.toml"), &bridge).unwrap_or_else(|error| panic!("{error}\n{text}"))
+    };
+    configuration.oscillator_trim = 64;
+    configuration.motor.field_weakening_current = 0.0;
+    configuration.motor.encoder_counts = 4_000;
+    configuration.limits.chopper_voltage = 0.0;
+    configuration.limits.chopper_share = 0.1;
+    configuration.gains.voltage_fraction = 1.0;
+    configuration.compensation.uncertainty = 0.6;
+    configuration.compensation.adaptation = AdaptationRequest::Off;
+    configuration.load.uncertainty = 0.3;
+    configuration.load.collision_threshold = 0.0;
+    configuration.load.collision_reaction = CollisionReaction::Off;
+    assert_eq!(without(&[]), configuration);
+    // Before there were stops and a load.
+    configuration.stops = StopConfiguration::DEFAULT;
+    configuration.load = LoadConfiguration::NONE;
+    assert_eq!(without(&["stops", "load"]), configuration);
 }
 
 #[test]
