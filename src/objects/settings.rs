@@ -10,9 +10,9 @@ use crate::joint::stop_options::StopConfiguration;
 use crate::motor::angle::Direction;
 use friction_compensation::compensation::Request;
 
-/// Declares the settings: their names, and the members that are real numbers.
+/// Declares the settings: their names and their members, first those that are real numbers.
 macro_rules! settings {
-    ($($name:ident => $($member:ident).+ $([$tuple:tt])?,)+ ; $($other:ident,)+) => {
+    ($($name:ident => $($member:ident).+ $([$tuple:tt])?,)+ ; $($other:ident => $($others:ident).+,)+) => {
         /// A setting of the configuration.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         #[allow(missing_docs, reason = "the members of the configuration have these names")]
@@ -28,6 +28,14 @@ macro_rules! settings {
                     $(Self::$name => &mut configuration.$($member).+ $(.$tuple)?,)+
                     $(Self::$other => return None,)+
                 })
+            }
+
+            /// Names that lead to the member, its own last: the key of a file below its tables; host.
+            pub const fn path(self) -> &'static [&'static str] {
+                match self {
+                    $(Self::$name => &[$(stringify!($member)),+],)+
+                    $(Self::$other => &[$(stringify!($others)),+],)+
+                }
             }
         }
     };
@@ -88,22 +96,22 @@ settings! {
     HousingToAmbient => thermal.housing_to_ambient,
     Ambient => thermal.ambient,
     ;
-    PolePairs,
-    EncoderCounts,
-    Direction,
-    ElectricalZero,
-    Request,
-    VelocitySource,
-    OscillatorTrim,
-    Adaptation,
-    LoadFeedforward,
-    CollisionReaction,
-    QuickStop,
-    Shutdown,
-    DisableOperation,
-    Halt,
-    FaultReaction,
-    LateCommand,
+    PolePairs => motor.alignment.pole_pairs,
+    EncoderCounts => motor.encoder_counts,
+    Direction => motor.alignment.direction,
+    ElectricalZero => motor.alignment.electrical_zero,
+    Request => compensation.request,
+    VelocitySource => compensation.velocity_source,
+    OscillatorTrim => oscillator_trim,
+    Adaptation => compensation.adaptation,
+    LoadFeedforward => load.request,
+    CollisionReaction => load.collision_reaction,
+    QuickStop => stops.quick_stop,
+    Shutdown => stops.shutdown,
+    DisableOperation => stops.disable_operation,
+    Halt => stops.halt,
+    FaultReaction => stops.fault_reaction,
+    LateCommand => stops.late_command,
 }
 
 impl Setting {
