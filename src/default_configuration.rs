@@ -7,16 +7,14 @@
 
 use crate::joint::BoardLimits;
 use crate::joint::configuration::{
-    AdaptationRequest, BridgeConfiguration, CompensationConfiguration, Configuration, FACTORY_TRIM,
-    FRICTION_UNCERTAINTY, Gains, GearConfiguration, Limits, LoadConfiguration, MotorConfiguration,
-    ThermalConfiguration, VelocitySource,
+    BridgeConfiguration, CompensationConfiguration, Configuration, FACTORY_TRIM, Gains, GearConfiguration, Limits,
+    LoadConfiguration, MotorConfiguration, ThermalConfiguration,
 };
 use crate::joint::stop_options::StopConfiguration;
 use crate::motor::angle::{Direction, ElectricalAngle, EncoderAlignment};
 use crate::sensors::analog::Analog;
 use crate::sensors::as5047p::As5047p;
 use crate::sensors::rotor_encoder;
-use friction_compensation::compensation::Request;
 use friction_compensation::friction::regime::MOST_SETS;
 
 /// Facts of a board, and the joint that it is until a configuration says otherwise.
@@ -210,16 +208,7 @@ const fn uncommissioned(bus_voltage: (f32, f32), regeneration_band: f32, encoder
             braking_time: 0.5,
         },
         stops: StopConfiguration::DEFAULT,
-        compensation: CompensationConfiguration {
-            request: Request::Off,
-            gain: 0.0,
-            clamp: 0.0,
-            slew: 1.0,
-            velocity_source: VelocitySource::Reference,
-            standstill_velocity: 0.1,
-            uncertainty: FRICTION_UNCERTAINTY,
-            adaptation: AdaptationRequest::Off,
-        },
+        compensation: CompensationConfiguration::OFF,
         load: LoadConfiguration::NONE,
         thermal: ThermalConfiguration {
             winding_capacity: 10.0,

@@ -181,6 +181,20 @@ pub struct CompensationConfiguration {
     pub adaptation: AdaptationRequest,
 }
 
+impl CompensationConfiguration {
+    /// No compensation: none is requested, and gain and clamp permit none.
+    pub const OFF: Self = Self {
+        request: Request::Off,
+        gain: 0.0,
+        clamp: 0.0,
+        slew: 1.0,
+        velocity_source: VelocitySource::Reference,
+        standstill_velocity: 0.1,
+        uncertainty: FRICTION_UNCERTAINTY,
+        adaptation: AdaptationRequest::Off,
+    };
+}
+
 /// Torques of the configured load that the joint adds by itself ([`super::load_feedforward`]).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]

@@ -3,16 +3,17 @@
 
 use crate::actuator::ActuatorParameters;
 use friction_compensation::compensation::Request;
+use joint_firmware::default_configuration::MOTEUS_R4;
 use joint_firmware::joint::BoardLimits;
 use joint_firmware::joint::configuration::{
-    AdaptationRequest, BridgeConfiguration, CompensationConfiguration, Configuration, FACTORY_TRIM,
-    FRICTION_UNCERTAINTY, Gains, GearConfiguration, Limits, LoadConfiguration, MotorConfiguration,
-    ThermalConfiguration, VelocitySource,
+    BridgeConfiguration, CompensationConfiguration, Configuration, Gains, GearConfiguration, Limits,
+    MotorConfiguration, ThermalConfiguration,
 };
-use joint_firmware::joint::stop_options::StopConfiguration;
 use joint_firmware::motor::angle::{Direction, ElectricalAngle, EncoderAlignment};
 use std::f64::consts::TAU;
 
+/// Values of what a virtual joint does not set: all that is off on a joint that nobody has commissioned.
+const UNCOMMISSIONED: Configuration = MOTEUS_R4.joint;
 /// Control rate of the virtual joint, Hz.
 pub const RATE: f32 = 20_000.0;
 /// Bandwidth of the position loop, Hz.
@@ -69,11 +70,10 @@ impl Setup {
             // Two thirds of the way up from the supply's own voltage: the rest is for its rise before the current
             // follows.
             regeneration_band: (0.2 * parameters.bus.source_voltage) as f32,
-            chopper_voltage: 0.0,
-            chopper_share: 0.1,
             bridge_temperature: 110.0,
             winding_temperature: 130.0,
             command_deadline: 0.1,
+            ..UNCOMMISSIONED.limits
         };
         // Least damping permitted, and enough for the margin where the quick stop's deceleration takes half the torque.
         let stopping = torque / (deceleration * f64::from(limits.position_margin)).sqrt();
@@ -82,48 +82,40 @@ impl Setup {
         Self {
             configuration: Configuration {
                 node_id: 1,
-                oscillator_trim: FACTORY_TRIM,
                 motor: MotorConfiguration {
                     resistance: phase_resistance as f32,
                     inductance_d: parameters.windings.inductance_d as f32,
                     inductance_q: parameters.windings.inductance_q as f32,
                     torque_constant: motor.torque_constant as f32,
                     current_limit: motor.current_limit as f32,
-                    loss_current: 0.0,
-                    field_weakening_current: 0.0,
                     alignment: EncoderAlignment {
                         pole_pairs: parameters.windings.pole_pairs as u32,
                         direction: Direction::Forward,
                         electrical_zero: ElectricalAngle(0),
                     },
                     encoder_latency: parameters.sensors.encoder.delay as f32 / RATE,
-                    encoder_counts: 4_000,
+                    ..UNCOMMISSIONED.motor
                 },
                 gear: GearConfiguration { ratio: motor.gear_ratio as f32, zero: 0.0 },
                 limits,
                 gains: Gains {
                     current_bandwidth: 800.0,
                     observer_bandwidth: 200.0,
-                    voltage_fraction: 1.0,
                     stiffness: stiffness as f32,
                     damping: damping as f32,
                     integral: (2.0 * stiffness) as f32,
                     acceleration: (0.5 * joint.usable_acceleration()) as f32,
                     quick_stop_deceleration: deceleration as f32,
                     braking_time: 1.0,
+                    ..UNCOMMISSIONED.gains
                 },
-                stops: StopConfiguration::DEFAULT,
                 compensation: CompensationConfiguration {
-                    request: Request::Off,
                     gain: 0.98,
                     clamp: (0.5 * torque) as f32,
                     slew: (50.0 * torque).min(30e3) as f32,
-                    velocity_source: VelocitySource::Reference,
                     standstill_velocity: 0.01,
-                    uncertainty: FRICTION_UNCERTAINTY,
-                    adaptation: AdaptationRequest::Off,
+                    ..CompensationConfiguration::OFF
                 },
-                load: LoadConfiguration::NONE,
                 thermal: ThermalConfiguration {
                     winding_capacity: joint.thermal.winding_capacity as f32,
                     housing_capacity: joint.thermal.housing_capacity as f32,
@@ -131,6 +123,7 @@ impl Setup {
                     housing_to_ambient: joint.thermal.housing_to_ambient as f32,
                     ambient: joint.thermal.ambient as f32,
                 },
+                ..UNCOMMISSIONED
             },
             bridge: BridgeConfiguration {
                 rate: RATE,
