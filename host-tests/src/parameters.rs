@@ -7,7 +7,7 @@ use friction_compensation::friction::maxwell_slip::{ELEMENTS, MAX_LEVEL, MAX_STI
 use friction_compensation::friction::network::{
     INPUTS, MAX_FRACTION, MAX_SCALE, MIN_FRACTION, NEURONS, NetworkParameters, Neuron,
 };
-use friction_compensation::friction::physical::{Coefficients, Dimension, PhysicalParameters, Terms};
+use friction_compensation::friction::physical::{Coefficients, Dimension, PhysicalParameters, Terms, held_by};
 use friction_compensation::friction::regime::{Criterion, MAX_CRITERIA, MOST_SETS, Measure, Selector};
 use friction_compensation::friction::ripple::Ripple;
 use friction_compensation::friction::state::{JointState, SIGNALS, Signal};
@@ -80,30 +80,23 @@ pub fn tame_within(random: &mut ChaCha8Rng, most_sets: usize) -> FrictionParamet
     if random.random() {
         parameters.common = tame_common(random);
     } else {
-        to_format_1(&mut parameters);
+        to_format(&mut parameters, 1);
     }
     parameters
 }
 
-/// Takes away what an image of format 1 cannot hold.
-pub fn to_format_1(parameters: &mut FrictionParameters) {
-    parameters.common = CommonTerms::NONE;
-    for set in &mut parameters.sets {
-        older(&mut set.physical, Terms::FORMAT_1, Coefficients::FORMAT_1);
+/// Takes away what an image of a format cannot hold.
+pub fn to_format(parameters: &mut FrictionParameters, format: u16) {
+    if format < 2 {
+        parameters.common = CommonTerms::NONE;
     }
-}
-
-/// Takes away what an image of format 2 cannot hold.
-pub fn to_format_2(parameters: &mut FrictionParameters) {
-    parameters.sets.iter_mut().for_each(|set| older(&mut set.physical, Terms::FORMAT_2, Coefficients::FORMAT_2));
-}
-
-/// Leaves the terms and the first coefficients.
-fn older(physical: &mut PhysicalParameters, terms: Terms, coefficients: usize) {
-    physical.terms = Terms(physical.terms.0 & terms.0);
-    let mut array = physical.coefficients.to_array();
-    array[coefficients..].fill(0);
-    physical.coefficients = Coefficients::from_array(array);
+    let (terms, coefficients) = held_by(format);
+    for set in &mut parameters.sets {
+        set.physical.terms = Terms(set.physical.terms.0 & terms.0);
+        let mut array = set.physical.coefficients.to_array();
+        array[coefficients..].fill(0);
+        set.physical.coefficients = Coefficients::from_array(array);
+    }
 }
 
 /// Pre-sliding over 0.3 to 100 mrad and two ripples of up to 0.2 Nm, some of them absent.

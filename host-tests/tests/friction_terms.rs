@@ -102,7 +102,7 @@ fn error(random: &mut ChaCha8Rng, domain: &Domain, parameters: &PhysicalParamete
 #[test]
 fn each_term_alone_and_all_together_follow_their_formula() {
     let mut random = ChaCha8Rng::seed_from_u64(1);
-    let single = (0..16).map(|bit| (Terms::NAMES[bit], with_base(Terms(1 << bit))));
+    let single = (0..Terms::COUNT).map(|bit| (Terms::NAMES[bit], with_base(Terms(1 << bit))));
     let combinations = [
         ("all", Terms::ALL),
         ("coulomb and stribeck", Terms::COULOMB.union(Terms::STRIBECK)),
@@ -167,7 +167,7 @@ fn own_coefficients(term: Terms) -> &'static [&'static str] {
 #[test]
 fn a_term_that_is_switched_off_contributes_nothing() {
     let mut random = ChaCha8Rng::seed_from_u64(2);
-    for bit in 0..16 {
+    for bit in 0..Terms::COUNT {
         let term = Terms(1 << bit);
         let mut matters = false;
         for _ in 0..20 {

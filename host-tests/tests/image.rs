@@ -5,7 +5,6 @@ use friction_compensation::friction::common::CommonTerms;
 use friction_compensation::friction::domain::Range;
 use friction_compensation::friction::maxwell_slip::{MAX_LEVEL, MAX_STIFFNESS};
 use friction_compensation::friction::network::{MAX_SCALE, NetworkParameters, Neuron};
-use friction_compensation::friction::physical::Terms;
 use friction_compensation::friction::regime::{Criterion, Measure};
 use friction_compensation::friction::state::{SIGNALS, Signal};
 use friction_compensation::friction::{FrictionModel, FrictionParameters, ParameterSet};
@@ -15,7 +14,7 @@ use friction_compensation::parameters::image::{
 };
 use friction_compensation::quantity::Torque;
 use host_tests::image_bytes::{encoded, sealed};
-use host_tests::parameters::{extreme, frictionless, image, tame, tame_common, to_format_1, to_format_2};
+use host_tests::parameters::{extreme, frictionless, image, tame, tame_common, to_format};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -25,11 +24,9 @@ fn parameters(random: &mut ChaCha8Rng, format: u16, sets: usize, networks: bool)
         let mut parameters = tame(random);
         let in_use = &parameters.sets[..parameters.selector.sets()];
         if in_use.len() == sets && in_use.iter().all(|set| set.network.is_some() == networks) {
-            match format {
-                1 => to_format_1(&mut parameters),
-                2 => to_format_2(&mut parameters),
-                _ if parameters.sets.iter().any(|set| set.physical.terms.contains(Terms::VELOCITY_WEAKENING)) => {}
-                _ => continue,
+            to_format(&mut parameters, format);
+            if format > 2 && parameters.sets.iter().all(|set| set.physical.format() < format) {
+                continue;
             }
             while format > 1 && parameters.common == CommonTerms::NONE {
                 parameters.common = tame_common(random);
@@ -123,7 +120,7 @@ fn lengths_and_numbers_appear_in_the_messages() {
     assert_eq!(message(&damaged), format!("too long: {} bytes, at most {length} are allowed here", length + 1));
     damaged = bytes.clone();
     damaged[4] = 9;
-    assert_eq!(message(&damaged), "format version 9 is not known, this program reads versions 1 to 3");
+    assert_eq!(message(&damaged), format!("format version 9 is not known, this program reads versions 1 to {FORMAT}"));
     damaged = bytes.clone();
     damaged[28] = 7;
     assert_eq!(message(&sealed(damaged)), "effort unit (offset 28) is 7, must be 0 to 3");

@@ -1,10 +1,12 @@
 //! Friction model: pure functions of the joint's state, in fixed point, the same bits on every machine.
 //!
-//! `state` says what the model looks at, `domain` where it was identified, `physical` and `network` are its two parts,
-//! `smooth` holds the functions that both share, `regime` chooses between parameter sets, `common` holds what these
-//! have in common: pre-sliding (`maxwell_slip`) and `ripple`. Here they are put together: [`FrictionModel`] is prepared
-//! once from an image's parameters, outside the control interrupt, and evaluated there at a fixed rate.
+//! `state` says what the model looks at, `domain` where it was identified, `physical` (whose terms are listed in
+//! `coefficients`) and `network` are its two parts, `smooth` holds the functions that both share, `regime` chooses
+//! between parameter sets, `common` holds what these have in common: pre-sliding (`maxwell_slip`) and `ripple`. Here
+//! they are put together: [`FrictionModel`] is prepared once from an image's parameters, outside the control interrupt,
+//! and evaluated there at a fixed rate.
 
+mod coefficients;
 pub mod common;
 pub mod domain;
 pub mod maxwell_slip;

@@ -27,6 +27,9 @@
 //! scale: so a small coefficient of a large signal keeps its resolution. Products have 47 fraction bits and are summed
 //! in 64 bits; the sum wraps, an image is used only after its certificate has proved that it fits.
 
+pub use super::coefficients::{Coefficients, Dimension, NEWEST_FORMAT, Terms, held_by};
+
+use super::coefficients::{Factors, oldest_format};
 use super::common::CommonTorques;
 use super::domain::{Domain, Range};
 use super::smooth::{atan, odd_sines, stribeck_of_product, tanh_of_product};
@@ -37,205 +40,6 @@ use crate::quantity::Torque;
 /// Number of position harmonics.
 pub const HARMONICS: usize = 5;
 
-/// Terms that take part.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Terms(pub u32);
-
-impl Terms {
-    /// c0.
-    pub const CONSTANT: Self = Self(1 << 0);
-    /// c_q q.
-    pub const POSITION: Self = Self(1 << 1);
-    /// c_T th.
-    pub const TEMPERATURE: Self = Self(1 << 2);
-    /// c_tau tau.
-    pub const LOAD: Self = Self(1 << 3);
-    /// f_v v.
-    pub const VISCOUS: Self = Self(1 << 4);
-    /// Factor 1 + k_v th of the viscous term.
-    pub const VISCOUS_TEMPERATURE: Self = Self(1 << 5);
-    /// f_2 v |v|.
-    pub const QUADRATIC: Self = Self(1 << 6);
-    /// F_c tanh(v / v_c).
-    pub const COULOMB: Self = Self(1 << 7);
-    /// Part k_c th of the Coulomb term's factor.
-    pub const COULOMB_TEMPERATURE: Self = Self(1 << 8);
-    /// Part k_l |tau| of the Coulomb term's factor.
-    pub const COULOMB_LOAD: Self = Self(1 << 9);
-    /// The Stribeck term.
-    pub const STRIBECK: Self = Self(1 << 10);
-    /// The hysteresis term.
-    pub const HYSTERESIS: Self = Self(1 << 11);
-    /// The position harmonics.
-    pub const HARMONICS: Self = Self(1 << 12);
-    /// I_a a.
-    pub const ROTOR_INERTIA: Self = Self(1 << 13);
-    /// f_a |v|.
-    pub const VISCOUS_ASYMMETRY: Self = Self(1 << 14);
-    /// Factor 1 + w (1 - tanh(v / v_w)^2) of dry friction.
-    pub const VELOCITY_WEAKENING: Self = Self(1 << 15);
-    /// Every term.
-    pub const ALL: Self = Self((1 << 16) - 1);
-    /// Every term of an image of format 2.
-    pub const FORMAT_2: Self = Self((1 << 15) - 1);
-    /// Every term of an image of format 1.
-    pub const FORMAT_1: Self = Self((1 << 14) - 1);
-
-    /// Names of the terms, from bit 0 up.
-    pub const NAMES: [&'static str; 16] = [
-        "constant",
-        "position",
-        "temperature",
-        "load",
-        "viscous",
-        "viscous_temperature",
-        "quadratic",
-        "coulomb",
-        "coulomb_temperature",
-        "coulomb_load",
-        "stribeck",
-        "hysteresis",
-        "harmonics",
-        "rotor_inertia",
-        "viscous_asymmetry",
-        "velocity_weakening",
-    ];
-
-    /// True where every term of `other` takes part.
-    #[inline(always)]
-    pub const fn contains(self, other: Self) -> bool {
-        self.0 & other.0 == other.0
-    }
-
-    /// The terms of both.
-    pub const fn union(self, other: Self) -> Self {
-        Self(self.0 | other.0)
-    }
-}
-
-/// Quantity that a coefficient is multiplied with: decides its unit and its scale in SI.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Dimension {
-    /// Signal whose full scale is contained in the stored number, and its power.
-    pub per: Option<(Signal, u8)>,
-    /// True for torques, false for dimensionless numbers.
-    pub torque: bool,
-}
-
-macro_rules! coefficients {
-    ($($(#[$doc:meta])* $name:ident: $torque:literal $(per $signal:ident ^ $power:literal)?;)*) => {
-        /// The coefficients as they are stored and transferred: Q16.16 at full scale of the signals.
-        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-        pub struct Coefficients {
-            $($(#[$doc])* pub $name: i32,)*
-        }
-
-        impl Coefficients {
-            /// Number of coefficients.
-            pub const COUNT: usize = [$(stringify!($name)),*].len();
-            /// Names, in the order of [`Coefficients::to_array`].
-            pub const NAMES: [&'static str; Self::COUNT] = [$(stringify!($name)),*];
-            /// Dimensions, in the same order.
-            pub const DIMENSIONS: [Dimension; Self::COUNT] = [
-                $(Dimension { torque: $torque, per: coefficients!(@per $($signal $power)?) }),*
-            ];
-
-            /// All coefficients in a fixed order.
-            pub const fn to_array(&self) -> [i32; Self::COUNT] {
-                [$(self.$name),*]
-            }
-
-            /// The coefficients in the order of [`Coefficients::to_array`].
-            pub const fn from_array(array: [i32; Self::COUNT]) -> Self {
-                let [$($name),*] = array;
-                Self { $($name),* }
-            }
-        }
-    };
-    (@per) => { None };
-    (@per $signal:ident $power:literal) => { Some((Signal::$signal, $power)) };
-}
-
-coefficients! {
-    /// c0, Nm.
-    constant: true;
-    /// c_q, Nm at full-scale position.
-    position: true per Position ^ 1;
-    /// c_T, Nm at full-scale temperature difference.
-    temperature: true per Temperature ^ 1;
-    /// c_tau, Nm at full-scale theoretical torque.
-    load: true per TheoreticalTorque ^ 1;
-    /// f_v, Nm at full-scale velocity.
-    viscous: true per Velocity ^ 1;
-    /// k_v at full-scale temperature difference.
-    viscous_temperature: false per Temperature ^ 1;
-    /// f_2, Nm at full-scale velocity.
-    quadratic: true per Velocity ^ 2;
-    /// F_c for positive velocity, Nm.
-    coulomb_positive: true;
-    /// F_c for negative velocity, Nm.
-    coulomb_negative: true;
-    /// k_c at full-scale temperature difference.
-    coulomb_temperature: false per Temperature ^ 1;
-    /// k_l at full-scale theoretical torque.
-    coulomb_load: false per TheoreticalTorque ^ 1;
-    /// 1 / v_c times full-scale velocity.
-    coulomb_slope: false per Velocity ^ 1;
-    /// F_brk for positive velocity, Nm.
-    breakaway_positive: true;
-    /// F_brk for negative velocity, Nm.
-    breakaway_negative: true;
-    /// 1 / v_st times full-scale velocity.
-    stribeck_slope: false per Velocity ^ 1;
-    /// b_h, Nm (per rad of arc tangent).
-    hysteresis: true;
-    /// s times full-scale velocity.
-    hysteresis_velocity_slope: false per Velocity ^ 1;
-    /// z.
-    hysteresis_width: false;
-    /// k_a times full-scale acceleration.
-    hysteresis_acceleration_slope: false per Acceleration ^ 1;
-    /// h times full-scale position, rad.
-    harmonic_frequency: false per Position ^ 1;
-    /// b_1 for positive velocity, Nm.
-    harmonic_positive_1: true;
-    /// b_2 for positive velocity, Nm.
-    harmonic_positive_2: true;
-    /// b_3 for positive velocity, Nm.
-    harmonic_positive_3: true;
-    /// b_4 for positive velocity, Nm.
-    harmonic_positive_4: true;
-    /// b_5 for positive velocity, Nm.
-    harmonic_positive_5: true;
-    /// b_1 for negative velocity, Nm.
-    harmonic_negative_1: true;
-    /// b_2 for negative velocity, Nm.
-    harmonic_negative_2: true;
-    /// b_3 for negative velocity, Nm.
-    harmonic_negative_3: true;
-    /// b_4 for negative velocity, Nm.
-    harmonic_negative_4: true;
-    /// b_5 for negative velocity, Nm.
-    harmonic_negative_5: true;
-    /// I_a, Nm at full-scale acceleration.
-    rotor_inertia: true per Acceleration ^ 1;
-    /// f_a, Nm at full-scale velocity.
-    viscous_asymmetry: true per Velocity ^ 1;
-    /// w for positive velocity: breakaway over Coulomb friction, less one.
-    weakening_positive: false;
-    /// w for negative velocity.
-    weakening_negative: false;
-    /// 1 / v_w times full-scale velocity.
-    weakening_slope: false per Velocity ^ 1;
-}
-
-impl Coefficients {
-    /// Number of coefficients of an image of format 1, the first ones.
-    pub const FORMAT_1: usize = 31;
-    /// Number of coefficients of an image of format 2.
-    pub const FORMAT_2: usize = 32;
-}
-
 /// A physical model as it is stored and transferred.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PhysicalParameters {
@@ -243,6 +47,13 @@ pub struct PhysicalParameters {
     pub terms: Terms,
     /// Coefficients.
     pub coefficients: Coefficients,
+}
+
+impl PhysicalParameters {
+    /// The oldest format of an image that holds the model.
+    pub fn format(&self) -> u16 {
+        oldest_format(self.terms, &self.coefficients)
+    }
 }
 
 /// A pair of values, one for each direction of the velocity.
@@ -266,50 +77,6 @@ pub struct Scaling {
     /// Powers of two.
     factors: [i32; SIGNALS],
     reference_temperature: i32,
-}
-
-/// The coefficients that are used as they are; see [`Coefficients`].
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Factors {
-    pub(crate) constant: i32,
-    pub(crate) position: i32,
-    pub(crate) temperature: i32,
-    pub(crate) load: i32,
-    pub(crate) viscous: i32,
-    pub(crate) viscous_temperature: i32,
-    pub(crate) quadratic: i32,
-    pub(crate) coulomb_slope: i32,
-    pub(crate) coulomb_temperature: i32,
-    pub(crate) coulomb_load: i32,
-    pub(crate) stribeck_slope: i32,
-    pub(crate) hysteresis_velocity_slope: i32,
-    pub(crate) hysteresis_width: i32,
-    pub(crate) hysteresis_acceleration_slope: i32,
-    pub(crate) rotor_inertia: i32,
-    pub(crate) viscous_asymmetry: i32,
-    pub(crate) weakening_slope: i32,
-}
-
-impl Factors {
-    const NONE: Self = Self {
-        constant: 0,
-        position: 0,
-        temperature: 0,
-        load: 0,
-        viscous: 0,
-        viscous_temperature: 0,
-        quadratic: 0,
-        coulomb_slope: 0,
-        coulomb_temperature: 0,
-        coulomb_load: 0,
-        stribeck_slope: 0,
-        hysteresis_velocity_slope: 0,
-        hysteresis_width: 0,
-        hysteresis_acceleration_slope: 0,
-        rotor_inertia: 0,
-        viscous_asymmetry: 0,
-        weakening_slope: 0,
-    };
 }
 
 /// One parameter set ready to be evaluated: coefficients of absent terms are zero, products of constants are formed.
@@ -482,25 +249,6 @@ impl PreparedTerms {
             }
             amplitudes
         };
-        let coefficients = Factors {
-            constant: on(Terms::CONSTANT, c.constant),
-            position: on(Terms::POSITION, c.position),
-            temperature: on(Terms::TEMPERATURE, c.temperature),
-            load: on(Terms::LOAD, c.load),
-            viscous: on(Terms::VISCOUS, c.viscous),
-            viscous_temperature: on(Terms::VISCOUS_TEMPERATURE, c.viscous_temperature),
-            quadratic: on(Terms::QUADRATIC, c.quadratic),
-            coulomb_slope: c.coulomb_slope,
-            coulomb_temperature: on(Terms::COULOMB_TEMPERATURE, c.coulomb_temperature),
-            coulomb_load: on(Terms::COULOMB_LOAD, c.coulomb_load),
-            stribeck_slope: c.stribeck_slope,
-            hysteresis_velocity_slope: c.hysteresis_velocity_slope,
-            hysteresis_width: c.hysteresis_width,
-            hysteresis_acceleration_slope: c.hysteresis_acceleration_slope,
-            rotor_inertia: on(Terms::ROTOR_INERTIA, c.rotor_inertia),
-            viscous_asymmetry: on(Terms::VISCOUS_ASYMMETRY, c.viscous_asymmetry),
-            weakening_slope: c.weakening_slope,
-        };
         // Halves first: their sum and difference fit.
         let (forward, backward) = match parameters.terms.contains(Terms::VELOCITY_WEAKENING) {
             true => (c.weakening_positive >> 1, c.weakening_negative >> 1),
@@ -508,7 +256,7 @@ impl PreparedTerms {
         };
         Self {
             terms: parameters.terms,
-            coefficients,
+            coefficients: Factors::new(parameters.terms, &c),
             coulomb,
             stribeck: Directional {
                 positive: c.breakaway_positive.saturating_sub(coulomb.positive),

@@ -1,11 +1,11 @@
 //! Reading and writing the bytes of an image, field by field, in the order of the [layout](super).
 
-use super::{CRC_LENGTH, Effort, GoldenVector, Image, ImageError, MAGIC, MAX_GOLDEN, Target};
+use super::{COMMON_TERMS, CRC_LENGTH, Effort, GoldenVector, Image, ImageError, MAGIC, MAX_GOLDEN, Target};
 use crate::friction::common::CommonTerms;
 use crate::friction::domain::{Domain, Range};
 use crate::friction::maxwell_slip::{ELEMENTS, MAX_LEVEL, MAX_STIFFNESS, MaxwellElement};
 use crate::friction::network::{INPUTS, MAX_FRACTION, MAX_SCALE, MIN_FRACTION, NEURONS, NetworkParameters};
-use crate::friction::physical::{Coefficients, PhysicalParameters, Terms};
+use crate::friction::physical::{Coefficients, PhysicalParameters, Terms, held_by};
 use crate::friction::regime::{Criterion, MAX_SETS, MOST_SETS, Measure, Selector};
 use crate::friction::ripple::{RIPPLES, Ripple};
 use crate::friction::state::{SIGNALS, Signal};
@@ -15,7 +15,7 @@ use crate::quantity::Torque;
 
 /// Fields before the parameter sets.
 pub(in crate::parameters) struct Header {
-    /// 1 or 2.
+    /// 1 to [`FORMAT`](super::FORMAT).
     pub(in crate::parameters) format: u16,
     pub(in crate::parameters) version: u32,
     pub(in crate::parameters) target: Target,
@@ -125,7 +125,7 @@ pub(super) fn decode_header(reader: &mut Reader) -> Header {
         header.sets = MAX_SETS as u8;
     }
     header.limits = Limits { output: reader.u32(), torque_gain: reader.u32(), velocity_slope: reader.u32() };
-    if format > 1 {
+    if format >= COMMON_TERMS {
         decode_common(reader, &mut header.common);
     }
     header
@@ -181,11 +181,7 @@ pub(super) fn decode_end(reader: &mut Reader) {
 fn decode_physical(reader: &mut Reader, format: u16, physical: &mut PhysicalParameters) {
     let offset = reader.offset;
     let terms = u32::from(reader.u16());
-    let (known, count) = match format {
-        1 => (Terms::FORMAT_1, Coefficients::FORMAT_1),
-        2 => (Terms::FORMAT_2, Coefficients::FORMAT_2),
-        _ => (Terms::ALL, Coefficients::COUNT),
-    };
+    let (known, count) = held_by(format);
     if terms & !known.0 != 0 {
         let (low, high) = (0, known.0 as i64);
         reader.refuse(ImageError::Field { name: "terms", offset, value: terms as i64, low, high });
@@ -244,7 +240,7 @@ pub(super) fn encode_content(image: &Image, writer: &mut Writer) {
     for limit in [limits.output, limits.torque_gain, limits.velocity_slope] {
         writer.put(&limit.to_le_bytes());
     }
-    if format > 1 {
+    if format >= COMMON_TERMS {
         encode_common(&friction.common, writer);
     }
     for set in friction.sets.iter().take(sets) {
@@ -276,11 +272,7 @@ fn encode_common(common: &CommonTerms, writer: &mut Writer) {
 fn encode_set(set: &ParameterSet, format: u16, writer: &mut Writer) {
     writer.put(&(set.physical.terms.0 as u16).to_le_bytes());
     writer.put(&[0; 2]);
-    let count = match format {
-        1 => Coefficients::FORMAT_1,
-        2 => Coefficients::FORMAT_2,
-        _ => Coefficients::COUNT,
-    };
+    let (_, count) = held_by(format);
     for coefficient in set.physical.coefficients.to_array().into_iter().take(count) {
         writer.i32(coefficient);
     }
@@ -416,7 +408,5 @@ impl Writer<'_> {
     }
 }
 
-/// The sizes that the layout states.
-const _: () = assert!(4 + 4 * Coefficients::FORMAT_1 == 128 && 4 + 4 * Coefficients::FORMAT_2 == 132);
-const _: () = assert!(4 + 4 * Coefficients::COUNT == 144);
+/// The sizes that the layout states; those of a set without a network are beside it.
 const _: () = assert!(4 * NEURONS * (INPUTS + 1) + 11 * 14 + 6 == 280 && 8 * ELEMENTS + 20 * RIPPLES == 72);

@@ -1,9 +1,9 @@
 //! The parameter image: one binary blob that holds a joint's friction model; task or host, never the control interrupt.
 //!
-//! # Layout, format versions 1 and 2
+//! # Layout, format versions 1 to 3
 //!
-//! Format 2 has [common terms](crate::friction::common) and one coefficient more. An image is written in the oldest
-//! format that can hold it, and one of format 1 means the same bits that it always did.
+//! Format 2 has [common terms](crate::friction::common) and one coefficient more, format 3 three coefficients more. An
+//! image is written in the oldest format that can hold it, and one of format 1 means the same bits that it always did.
 //!
 //! All numbers are little-endian two's complement. Q16.16 means a 32-bit integer that counts 1/65536 of the unit.
 //! Reserved bytes are zero. "Full scale" is explained in [`Domain::shifts`](crate::friction::domain::Domain::shifts).
@@ -11,7 +11,7 @@
 //! | offset | bytes | content |
 //! |---|---|---|
 //! | 0 | 4 | magic: the ASCII characters `JFPI` |
-//! | 4 | 2 | format version, 1 or 2 |
+//! | 4 | 2 | format version, 1 to 3 |
 //! | 6 | 2 | length of the image in bytes, checksum included; at most [`MAX_LENGTH`] |
 //! | 8 | 4 | image version, rises with every image of a joint |
 //! | 12 | 4 | product that the image is for, 0 = any |
@@ -67,7 +67,7 @@ use super::certificate::Limits;
 use crate::friction::common::{Common, CommonTerms, CommonTorques};
 use crate::friction::maxwell_slip::{Bent, MAX_LEVEL, MAX_STIFFNESS};
 use crate::friction::network::{MAX_FRACTION, MAX_SCALE, MIN_FRACTION};
-use crate::friction::physical::{Coefficients, Terms};
+use crate::friction::physical::{NEWEST_FORMAT, Terms, held_by};
 use crate::friction::regime::MAX_SETS;
 use crate::friction::state::{JointState, SIGNALS, Signal};
 use crate::friction::{Estimate, FrictionModel, FrictionParameters, ParameterSet};
@@ -75,8 +75,10 @@ use codec::{Reader, Writer, decode_content, encode_content};
 
 /// The magic bytes.
 pub const MAGIC: [u8; 4] = *b"JFPI";
-/// The newest format version that this code reads and writes; the first is 1.
-pub const FORMAT: u16 = 3;
+/// The newest format version that this code reads and writes, that of the newest coefficient; the first is 1.
+pub const FORMAT: u16 = NEWEST_FORMAT;
+/// The format version that common terms came with.
+const COMMON_TERMS: u16 = 2;
 /// Steps a second of the sequence of golden vectors.
 pub const GOLDEN_RATE: u32 = 1_000;
 /// Longest image: a flash page less 32 bytes for the slot's header.
@@ -85,9 +87,17 @@ pub const MAX_LENGTH: usize = 2048 - 32;
 pub const MAX_GOLDEN: usize = 8;
 /// Longest image that this program has room for: [`MAX_LENGTH`], or less where it has room for fewer parameter sets.
 pub const ROOM: usize = {
-    let longest = 216 + MAX_SETS * (144 + 280) + MAX_GOLDEN * 36 + CRC_LENGTH;
+    let longest = 216 + MAX_SETS * (set_length(FORMAT) + 280) + MAX_GOLDEN * 36 + CRC_LENGTH;
     if longest < MAX_LENGTH { longest } else { MAX_LENGTH }
 };
+
+/// Bytes of a parameter set without a network.
+const fn set_length(format: u16) -> usize {
+    4 + 4 * held_by(format).1
+}
+
+/// The sizes that the layout states.
+const _: () = assert!(set_length(1) == 128 && set_length(2) == 132 && set_length(3) == 144 && FORMAT == 3);
 
 const HEADER_LENGTH: usize = 144;
 const CRC_LENGTH: usize = 4;
@@ -339,20 +349,8 @@ impl Image {
     /// The oldest format that can hold the image.
     pub fn format(&self) -> u16 {
         let FrictionParameters { common, sets, .. } = &self.friction;
-        let without = |terms: Terms, coefficients: usize| {
-            let holds = |set: &ParameterSet| {
-                let newer = set.physical.coefficients.to_array().into_iter().skip(coefficients);
-                terms.contains(set.physical.terms) && newer.fold(0, |any, bits| any | bits) == 0
-            };
-            sets.iter().all(holds)
-        };
-        if *common == CommonTerms::NONE && without(Terms::FORMAT_1, Coefficients::FORMAT_1) {
-            1
-        } else if without(Terms::FORMAT_2, Coefficients::FORMAT_2) {
-            2
-        } else {
-            3
-        }
+        let of_common = if *common == CommonTerms::NONE { 1 } else { COMMON_TERMS };
+        sets.iter().map(|set| set.physical.format()).fold(of_common, u16::max)
     }
 
     /// Evaluates every golden vector with `model`, which must have been prepared from this image.
