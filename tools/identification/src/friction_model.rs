@@ -22,6 +22,8 @@
 //! p = 1 - r with the relief r where a joint that shares the drive leads, and 1 elsewhere (003, section II-C). In an
 //! image these are two parameter sets; what all sets have in common, elements and ripple, is the same in both.
 
+pub use crate::friction_parameter::{Term, Terms};
+
 use crate::friction_parameter::{FrictionParameter, HARMONICS};
 use friction_compensation::friction::maxwell_slip::ELEMENTS;
 use serde::{Deserialize, Serialize};
@@ -34,125 +36,6 @@ pub const STRIBECK_PEAK: f64 = 2.331_643_981_597_124;
 pub const RIPPLES: usize = friction_compensation::friction::ripple::RIPPLES;
 /// Deflection of each pre-sliding element: z, -1 to 1.
 pub type Bent = [f64; ELEMENTS];
-
-/// One summand, or one factor, of the friction formula that can be on or off.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Term {
-    /// c0.
-    Constant,
-    /// c_q q.
-    Position,
-    /// c_T th.
-    Temperature,
-    /// c_tau tau_t.
-    Load,
-    /// f_v v.
-    Viscous,
-    /// The factor k_v th of the viscous friction.
-    ViscousTemperature,
-    /// f_2 v |v|.
-    Quadratic,
-    /// F_c tanh(v / v_c).
-    Coulomb,
-    /// The factor k_c th of the Coulomb friction.
-    CoulombTemperature,
-    /// The factor k_l |tau_t| of the Coulomb friction.
-    CoulombLoad,
-    /// The Stribeck peak.
-    Stribeck,
-    /// The hysteresis over velocity and acceleration.
-    Hysteresis,
-    /// The position harmonics.
-    Harmonics,
-    /// I_a a.
-    RotorInertia,
-    /// f_a |v|: half the difference of the viscous friction of both directions.
-    ViscousAsymmetry,
-    /// Factor of dry friction that falls with speed.
-    VelocityWeakening,
-    /// The Maxwell-slip elements.
-    PreSliding,
-    /// The first ripple over the position.
-    Ripple,
-    /// The second ripple over the position.
-    SecondRipple,
-    /// The relief of dry friction while the joint that shares the drive leads.
-    Relief,
-}
-
-impl Term {
-    /// All terms, in the order of the formula.
-    pub const ALL: [Self; 20] = [
-        Self::Constant,
-        Self::Position,
-        Self::Temperature,
-        Self::Load,
-        Self::Viscous,
-        Self::ViscousTemperature,
-        Self::Quadratic,
-        Self::Coulomb,
-        Self::CoulombTemperature,
-        Self::CoulombLoad,
-        Self::Stribeck,
-        Self::Hysteresis,
-        Self::Harmonics,
-        Self::RotorInertia,
-        Self::ViscousAsymmetry,
-        Self::VelocityWeakening,
-        Self::PreSliding,
-        Self::Ripple,
-        Self::SecondRipple,
-        Self::Relief,
-    ];
-    /// The terms that each parameter set of an image has for itself; of the others, elements and ripples are common to
-    /// all sets, and the relief is the difference between two.
-    pub const OF_A_SET: usize = 16;
-}
-
-/// A set of terms; written to files as the list of their names.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(from = "Vec<Term>", into = "Vec<Term>")]
-pub struct Terms(u32);
-
-impl Terms {
-    /// The set of the given terms.
-    pub fn of(terms: &[Term]) -> Self {
-        terms.iter().fold(Self::default(), |set, &term| set.with(term))
-    }
-
-    /// True when the term is on.
-    pub const fn contains(self, term: Term) -> bool {
-        self.0 & (1 << term as u32) != 0
-    }
-
-    /// The set with the term on.
-    pub const fn with(self, term: Term) -> Self {
-        Self(self.0 | 1 << term as u32)
-    }
-
-    /// The set with the term off.
-    pub const fn without(self, term: Term) -> Self {
-        Self(self.0 & !(1 << term as u32))
-    }
-
-    /// The terms that are on, in the order of the formula.
-    pub fn iter(self) -> impl Iterator<Item = Term> {
-        Term::ALL.into_iter().filter(move |&term| self.contains(term))
-    }
-}
-
-impl From<Vec<Term>> for Terms {
-    fn from(terms: Vec<Term>) -> Self {
-        Self::of(&terms)
-    }
-}
-
-impl From<Terms> for Vec<Term> {
-    fn from(terms: Terms) -> Self {
-        terms.iter().collect()
-    }
-}
 
 /// Variables that friction depends on, in the units of the joint (rad or m, s, Nm or N, A, V; degrees Celsius).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

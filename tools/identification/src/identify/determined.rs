@@ -5,12 +5,10 @@
 //! on another motion the parts no longer cancel.
 
 use super::freedom::Freedom;
-use super::layout::Role;
 use super::linear::{OWN_PART, add_to_normal_sums, dependences, inverse, normal_equations, normal_sums, sum_over_rows};
 use super::nonlinear::Fit;
 use super::observations::Row;
-use crate::friction_model::Term;
-use crate::friction_parameter::FrictionParameter as P;
+use crate::friction_parameter::{FrictionParameter as P, Role};
 use crate::rigid::RigidRegressor;
 use nalgebra::DMatrix;
 
@@ -48,27 +46,11 @@ pub fn own_part_of_offset(rows: &[Row], regressors: &[RigidRegressor]) -> f64 {
 
 /// The parameter whose column a freedom adds; nothing for several at once.
 fn size(freedom: Freedom) -> Option<P> {
-    Some(match freedom {
-        Freedom::AsymmetricCoulomb => P::CoulombNegative,
-        Freedom::AsymmetricBreakaway => P::BreakawayNegative,
-        Freedom::Term(Term::Constant) => P::Offset,
-        Freedom::Term(Term::Position) => P::PositionSlope,
-        Freedom::Term(Term::Temperature) => P::TemperatureSlope,
-        Freedom::Term(Term::Load) => P::LoadSlope,
-        Freedom::Term(Term::ViscousTemperature) => P::ViscousTemperature,
-        Freedom::Term(Term::Quadratic) => P::Quadratic,
-        Freedom::Term(Term::CoulombTemperature) => P::CoulombTemperature,
-        Freedom::Term(Term::CoulombLoad) => P::CoulombLoad,
-        Freedom::Term(Term::Stribeck) => P::BreakawayPositive,
-        Freedom::Term(Term::Hysteresis) => P::Hysteresis,
-        Freedom::Term(Term::RotorInertia) => P::RotorInertia,
-        Freedom::Term(Term::ViscousAsymmetry) => P::ViscousAsymmetry,
-        Freedom::Term(Term::VelocityWeakening) => P::WeakeningPositive,
-        Freedom::Term(Term::Relief) => P::Relief,
-        Freedom::Term(
-            Term::Viscous | Term::Coulomb | Term::Harmonics | Term::PreSliding | Term::Ripple | Term::SecondRipple,
-        ) => return None,
-    })
+    match freedom {
+        Freedom::AsymmetricCoulomb => Some(P::CoulombNegative),
+        Freedom::AsymmetricBreakaway => Some(P::BreakawayNegative),
+        Freedom::Term(term) => term.facts().size,
+    }
 }
 
 #[cfg(test)]

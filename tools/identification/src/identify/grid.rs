@@ -4,12 +4,11 @@
 //! The mean square has many minima only over the shapes (slopes, hysteresis, harmonic frequency), a handful of numbers.
 //! They are gone through group by group, the other groups held at the best point so far.
 
-use super::layout::Role;
 use super::linear::bounded_step;
 use super::nonlinear::{Candidate, Effort, Fit, Problem, Residuals};
 use super::observations::{Row, decimated};
 use crate::friction_model::{FrictionModel, Term};
-use crate::friction_parameter::FrictionParameter as P;
+use crate::friction_parameter::{FrictionParameter as P, Role};
 use crate::levenberg_marquardt::LeastSquares;
 use crate::presets::Structure;
 use crate::rigid::RigidParameters;

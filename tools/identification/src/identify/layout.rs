@@ -6,7 +6,7 @@
 
 use super::observations::Limits;
 use crate::friction_model::{FrictionModel, Ripple, Term};
-use crate::friction_parameter::{FrictionParameter as P, HARMONICS};
+use crate::friction_parameter::{Bounds, FrictionParameter as P, HARMONICS, Role};
 use crate::presets::Structure;
 use crate::rigid::{RigidModel, RigidParameters, RigidRegressor};
 use nalgebra::DVector;
@@ -42,17 +42,34 @@ const PERIODS_BESIDE_GRAVITY: f64 = 1.5;
 /// without limit against each other, and friction becomes many times the measured effort for hardly any gain.
 const FREQUENCY_ABOVE_GRAVITY: f64 = 2.0;
 
-/// Role of a column in the model.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Role {
-    /// The model is linear in it.
-    Coefficient,
-    /// Factor of a coefficient: linear while that is held.
-    Factor,
-    /// Searched as it is.
-    Shape,
-    /// Searched as a logarithm.
-    Slope,
+/// Bounds of a number without any.
+const FREE: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
+/// Bounds of a number that is not negative.
+const POSITIVE: (f64, f64) = (0.0, f64::INFINITY);
+
+/// Terms whose columns stand before those of the rigid part.
+const FIRST: [Term; 2] = [Term::Viscous, Term::Constant];
+/// Terms whose columns stand right behind those of the rigid part.
+const SECOND: [Term; 2] = [Term::RotorInertia, Term::Load];
+
+/// The other terms that have a column of their own in this role, in the order of the formula.
+fn rest(role: Role) -> impl Iterator<Item = Term> {
+    let others = Term::ALL.into_iter().filter(|term| !FIRST.contains(term) && !SECOND.contains(term));
+    others.filter(move |term| term.facts().column.is_some_and(|column| column.0 == role))
+}
+
+/// The numbers of a column's bounds.
+fn numbers(bounds: Bounds, limits: &Limits) -> (f64, f64) {
+    match bounds {
+        Bounds::Free => FREE,
+        Bounds::Positive => POSITIVE,
+        Bounds::OverTemperatures => {
+            let effect = TEMPERATURE_EFFECT / limits.warming.max(f64::MIN_POSITIVE);
+            (-effect, effect)
+        }
+        Bounds::OverLoads => (0.0, LOAD_EFFECT / limits.load.max(f64::MIN_POSITIVE)),
+        Bounds::OfRelief => (0.0, RELIEF),
+    }
 }
 
 /// A physical parameter.
@@ -116,13 +133,8 @@ impl Layout {
         let regressors = rigid.regressors();
         layout.coulomb(structure);
         let on = |term| structure.terms.contains(term);
-        const FREE: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
-        const POSITIVE: (f64, f64) = (0.0, f64::INFINITY);
-        if on(Term::Viscous) {
-            layout.own(P::Viscous, Role::Coefficient, POSITIVE);
-        }
-        if on(Term::Constant) {
-            layout.own(P::Offset, Role::Coefficient, FREE);
+        for term in FIRST {
+            layout.term(structure, limits, term);
         }
         if !structure.holds_rigid() {
             for &regressor in &regressors {
@@ -131,17 +143,8 @@ impl Layout {
                 layout.links.push(Link { parameter: Parameter::Rigid(regressor), column, factor: 1.0, made_for: true });
             }
         }
-        for (term, parameter, bounds) in [
-            (Term::RotorInertia, P::RotorInertia, POSITIVE),
-            (Term::Load, P::LoadSlope, FREE),
-            (Term::Position, P::PositionSlope, FREE),
-            (Term::Temperature, P::TemperatureSlope, FREE),
-            (Term::Quadratic, P::Quadratic, FREE),
-            (Term::ViscousAsymmetry, P::ViscousAsymmetry, FREE),
-        ] {
-            if on(term) {
-                layout.own(parameter, Role::Coefficient, bounds);
-            }
+        for term in SECOND.into_iter().chain(rest(Role::Coefficient)) {
+            layout.term(structure, limits, term);
         }
         if on(Term::PreSliding) {
             (0..limits.elements).for_each(|n| layout.own(P::Element(n), Role::Coefficient, POSITIVE));
@@ -159,16 +162,8 @@ impl Layout {
         if on(Term::Hysteresis) {
             layout.own(P::Hysteresis, Role::Coefficient, POSITIVE);
         }
-        let by_temperature = TEMPERATURE_EFFECT / limits.warming.max(f64::MIN_POSITIVE);
-        for (term, parameter, bounds) in [
-            (Term::ViscousTemperature, P::ViscousTemperature, (-by_temperature, by_temperature)),
-            (Term::CoulombTemperature, P::CoulombTemperature, (-by_temperature, by_temperature)),
-            (Term::CoulombLoad, P::CoulombLoad, (0.0, LOAD_EFFECT / limits.load.max(f64::MIN_POSITIVE))),
-            (Term::Relief, P::Relief, (0.0, RELIEF)),
-        ] {
-            if on(term) {
-                layout.own(parameter, Role::Factor, bounds);
-            }
+        for term in rest(Role::Factor) {
+            layout.term(structure, limits, term);
         }
         if on(Term::VelocityWeakening) {
             let sides: &[&[P]] = match structure.asymmetric_breakaway {
@@ -203,6 +198,16 @@ impl Layout {
     fn own(&mut self, parameter: P, role: Role, bounds: (f64, f64)) {
         let column = self.column(parameter, role, bounds);
         self.link(parameter, column, 1.0, true);
+    }
+
+    /// The column of a term that has one of its own.
+    fn term(&mut self, structure: &Structure, limits: &Limits, term: Term) {
+        let facts = term.facts();
+        if let (true, Some(parameter), Some((role, bounds))) =
+            (structure.terms.contains(term), facts.size, facts.column)
+        {
+            self.own(parameter, role, numbers(bounds, limits));
+        }
     }
 
     fn coulomb(&mut self, structure: &Structure) {

@@ -1,10 +1,11 @@
 //! Fitting one structure of terms by Levenberg-Marquardt over all its parameters, with an exact Jacobian; host.
 
 use super::fold_rows::FoldRows;
-use super::layout::{Layout, PARAMETERS, Parameter, Role};
+use super::layout::{Layout, PARAMETERS, Parameter};
 use super::linear::{OWN_PART, add_to_normal_sums, dependences, normal_equations, normal_sums, sum_over_rows};
 use super::observations::{Limits, Row};
 use crate::friction_model::{FrictionModel, Term};
+use crate::friction_parameter::Role;
 use crate::levenberg_marquardt::{Damping, LeastSquares, NormalEquations, Options, minimise};
 use crate::presets::Structure;
 use crate::rigid::{RigidModel, RigidParameters, RigidRegressor};

@@ -16,6 +16,7 @@ use super::grid::{search, search_from};
 use super::nonlinear::{Fit, Problem};
 use crate::choice::{Comparison, TermRule, compare, rank};
 use crate::friction_model::{FrictionModel, Term, Terms};
+use crate::friction_parameter::Considered;
 use crate::presets::{Preset, Structure};
 use crate::rigid::RigidModel;
 use rayon::prelude::*;
@@ -33,33 +34,27 @@ const ALWAYS: [Term; 3] = [Term::Constant, Term::Viscous, Term::Coulomb];
 
 /// The terms that the data can support, and why others are left out.
 fn supported(problem: &Problem, rigid: &RigidModel) -> (Structure, Vec<String>) {
-    use Term::*;
-    let mut terms = Terms::of(&[Constant, Position, Viscous, Quadratic, Coulomb, CoulombLoad, Stribeck, Hysteresis]);
-    terms = terms.with(ViscousAsymmetry).with(VelocityWeakening);
     let limits = &problem.limits;
-    for (term, found) in [
-        (PreSliding, limits.elements > 0),
-        (Ripple, limits.ripples > 0),
-        (SecondRipple, limits.ripples > 1),
-        (Relief, limits.both_lead),
-    ] {
-        terms = if found { terms.with(term) } else { terms };
-    }
+    let warm = limits.temperature_range >= TEMPERATURE_RANGE;
+    let found = |term: &Term| match term.facts().considered {
+        Considered::Always => true,
+        Considered::Never => false,
+        Considered::WithoutRigidInertia => !rigid.has_inertia(),
+        Considered::PositionsCovered => limits.position_covered,
+        Considered::TemperaturesCovered => warm,
+        Considered::ElementsChosen => limits.elements > 0,
+        Considered::RipplesChosen(number) => limits.ripples >= number,
+        Considered::BothLead => limits.both_lead,
+    };
+    let terms = Term::ALL.into_iter().filter(found).fold(Terms::default(), Terms::with);
     let mut notes = Vec::new();
-    if !rigid.has_inertia() {
-        terms = terms.with(RotorInertia);
-    }
-    if problem.limits.position_covered {
-        terms = terms.with(Harmonics);
-    } else {
+    if !limits.position_covered {
         notes.push("position harmonics are not considered: motion does not cover the position range both ways".into());
     }
-    if problem.limits.temperature_range >= TEMPERATURE_RANGE {
-        terms = terms.with(Temperature).with(ViscousTemperature).with(CoulombTemperature);
-    } else {
+    if !warm {
         notes.push(format!(
             "temperature terms are not considered: the train samples cover {:.1} K, {TEMPERATURE_RANGE} K are needed",
-            problem.limits.temperature_range
+            limits.temperature_range
         ));
     }
     let structure = Structure { terms, asymmetric_coulomb: true, asymmetric_breakaway: true, ..Structure::default() };
@@ -157,18 +152,8 @@ fn changed(structure: &Structure, freedom: Freedom, on: bool) -> Option<Structur
     let breaks_away = has(Term::Stribeck) || has(Term::VelocityWeakening);
     let possible = match freedom {
         Freedom::AsymmetricBreakaway => breaks_away,
-        Freedom::AsymmetricCoulomb
-        | Freedom::Term(
-            Term::CoulombLoad
-            | Term::CoulombTemperature
-            | Term::Stribeck
-            | Term::VelocityWeakening
-            | Term::PreSliding
-            | Term::Ripple
-            | Term::SecondRipple
-            | Term::Relief,
-        ) => has(Term::Coulomb),
-        _ => true,
+        Freedom::AsymmetricCoulomb => has(Term::Coulomb),
+        Freedom::Term(term) => term.facts().beside.is_none_or(has),
     };
     changed.asymmetric_breakaway &= breaks_away;
     changed.coupled_slopes &= has(Term::Stribeck);
