@@ -49,7 +49,7 @@ macro_rules! physical_model {
         )* }
     ) => {
         /// Bits of [`Terms`].
-        #[allow(non_camel_case_types, reason = "named as the constants are")]
+        #[allow(non_camel_case_types, clippy::upper_case_acronyms, reason = "named as the constants are")]
         enum Bit { $($term),* }
 
         impl Terms {
