@@ -5,6 +5,7 @@ use friction_compensation::friction::common::CommonTerms;
 use friction_compensation::friction::domain::Range;
 use friction_compensation::friction::maxwell_slip::{MAX_LEVEL, MAX_STIFFNESS};
 use friction_compensation::friction::network::{MAX_SCALE, NetworkParameters, Neuron};
+use friction_compensation::friction::physical::Terms;
 use friction_compensation::friction::regime::{Criterion, Measure};
 use friction_compensation::friction::state::{SIGNALS, Signal};
 use friction_compensation::friction::{FrictionModel, FrictionParameters, ParameterSet};
@@ -451,7 +452,7 @@ fn what_could_not_be_read_back_is_not_written() {
         refused(&|image| image.friction.selector.criteria[1] = Some(Criterion { leave: 5, ..criterion })),
         "second criterion without a first"
     );
-    assert_eq!(refused(&|image| image.friction.sets[0].physical.terms = Terms(1 << 16)), "terms");
+    assert_eq!(refused(&|image| image.friction.sets[0].physical.terms = Terms(1 << Terms::COUNT)), "terms");
     assert_eq!(refused(&|image| with_network(image, 9)), "fraction bits");
     assert_eq!(refused(&|image| with_network(image, 21)), "fraction bits");
     for scale in [MAX_SCALE + 1, -MAX_SCALE - 1] {
