@@ -104,8 +104,8 @@ impl EncoderAlignment {
     }
 }
 
-/// Form of [`EncoderAlignment::electrical_zero`] in a file: fraction of an electrical turn, of which a double has all 32
-/// bits; host.
+/// Form of [`EncoderAlignment::electrical_zero`] in a file: fraction of an electrical turn, whose 32 bits a double
+/// holds exactly; host.
 #[cfg(feature = "serde")]
 mod turns {
     use super::{ElectricalAngle, STEPS};

@@ -4,8 +4,8 @@
 //! keys are refused, missing ones named, and the whole is checked by the same [`Configuration::prepare`] and the same
 //! thermal model that a joint starts with. Reading and writing lose no bit.
 //!
-//! The form of the file is serde's of the firmware's own records, which they have with its feature `serde`; [`fields`] is
-//! the meaning of each key, with unit and range, as the file's comments say it.
+//! The form of the file is that of the firmware's own records, which have serde with its feature `serde`; [`fields`]
+//! is the meaning of each key, with unit and range, as the file's comments say it.
 
 pub mod fields;
 
