@@ -23,8 +23,8 @@ impl RotorEncoder for As5047p {
     const SELECT: u32 = 350;
     const ANSWERS_AFTER: u32 = 1;
 
-    /// A data line stuck high fails (the error flag is set); one stuck low reads as a valid angle of zero, which only the
-    /// joint's own check for a standing angle can find.
+    /// A data line stuck high fails (the error flag is set); one stuck low reads as a valid angle of zero, which only
+    /// the joint's own check for a standing angle can find.
     #[inline(always)]
     fn angle(frame: u16) -> Option<u32> {
         let even = frame.count_ones() & 1 == 0;
