@@ -285,7 +285,7 @@ fn select() -> u32 {
 }
 
 /// Begins a frame with the encoder, which has been selected: the first edge of the clock may come some time after that.
-/// What was done meanwhile has mostly taken longer; what is left is waited for, a bounded number of times.
+/// The measurements made meanwhile have mostly taken longer; the rest is waited for, a bounded number of times.
 #[inline(always)]
 fn begin_frame(selected: u32) {
     for _ in 0..SELECT_CYCLES {
