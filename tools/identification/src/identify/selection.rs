@@ -367,4 +367,15 @@ mod tests {
         let other = FrictionModel { quadratic: 1.0, ..FrictionModel::default() };
         assert!(bears_speed(&other, 2.0), "without the term its coefficient means nothing");
     }
+
+    #[test]
+    fn without_coulomb_friction_none_of_its_parts_and_factors_is_tried() {
+        use Term::*;
+        let without = Structure { terms: Terms::of(&[Constant, Viscous]), ..Structure::default() };
+        let impossible = |term: &Term| changed(&without, Freedom::Term(*term), true).is_none();
+        assert_eq!(
+            Term::ALL.into_iter().filter(impossible).collect::<Vec<_>>(),
+            [CoulombTemperature, CoulombLoad, Stribeck, VelocityWeakening, PreSliding, Ripple, SecondRipple, Relief]
+        );
+    }
 }
