@@ -2,7 +2,8 @@
 //!
 //! Source: Canudas de Wit, Olsson, Åström, Lischinsky 1995, eq. 1-3 and 6. Added here: both torque levels and the
 //! viscous coefficient differ per direction; the level of the dry friction depends on temperature, on position, on
-//! the torque that the gear transmits and on a joint that shares the drive ([`crate::pair`]).
+//! the torque that the gear transmits and on a joint that shares the drive ([`crate::pair`]). Where its laws depart
+//! from the firmware's model: [`crate::friction_shape`].
 //!
 //! The bristle is stiff (sigma0 v / g reaches 1e5 per second), so it is stepped by the backward Euler rule: stable
 //! for every step, and passive in every step. With z' = (z1 - z0)/h = v - lambda z1 and lambda = sigma0 |v| / g,
@@ -15,6 +16,7 @@
 //! the micro-damping fades: sigma1(v) = sigma1 / (1 + sigma1 lambda / (4 sigma0)).
 
 use crate::error::{ParameterError, within};
+use crate::friction_shape::{FrictionShape, Memory};
 use serde::{Deserialize, Serialize};
 
 /// Temperature at which the friction parameters hold, °C.
@@ -76,6 +78,9 @@ pub struct FrictionParameters {
     /// Variation over position: r(q) = 1 + sum of amplitude sin(periods q + phase). Put a zero amplitude where only
     /// one is wanted.
     pub ripple: [Ripple; 2],
+    /// Laws in which it departs from the firmware's model, if it does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shape: Option<FrictionShape>,
 }
 
 impl FrictionParameters {
@@ -102,7 +107,7 @@ impl FrictionParameters {
             within("friction.ripple.amplitude", ripple.amplitude, 0.0, 0.4)?;
             within("friction.ripple.phase", ripple.phase, -std::f64::consts::PI, std::f64::consts::PI)?;
         }
-        Ok(())
+        self.shape.map_or(Ok(()), |shape| shape.validate())
     }
 
     /// Dry friction g at a constant `velocity` (rad/s), Nm, never negative: the Stribeck curve without its viscous
@@ -112,12 +117,16 @@ impl FrictionParameters {
         let coulomb = self.coulomb.at(velocity);
         let breakaway = self.breakaway.at(velocity);
         let ratio = velocity / self.stribeck_velocity;
-        let stribeck = coulomb + (breakaway - coulomb) * libm::exp(-ratio * ratio);
+        let weakening = self.shape.map_or_else(|| libm::exp(-ratio * ratio), |shape| shape.stribeck(ratio));
+        let stribeck = coulomb + (breakaway - coulomb) * weakening;
         let temperature = libm::exp(-self.coulomb_thinning * (surroundings.temperature - REFERENCE_TEMPERATURE));
-        let load = 1.0 + self.gear_loss * surroundings.gear_torque.abs() / coulomb;
+        let torque = surroundings.gear_torque.abs();
+        let torque = self.shape.map_or(torque, |shape| shape.load(torque));
+        let load = 1.0 + self.gear_loss * torque / coulomb;
         let mut ripple = 1.0;
         for r in &self.ripple {
-            ripple += r.amplitude * libm::sin(r.periods_per_revolution * surroundings.position + r.phase);
+            let phase = r.periods_per_revolution * surroundings.position + r.phase;
+            ripple += r.amplitude * self.shape.map_or_else(|| libm::sin(phase), |shape| shape.ripple(phase));
         }
         stribeck * temperature * load * ripple * surroundings.relief
     }
@@ -125,7 +134,8 @@ impl FrictionParameters {
     /// Viscous coefficient for the direction of `velocity` (rad/s) at `temperature` (°C), Nm s/rad.
     #[must_use]
     pub fn viscous_coefficient(&self, velocity: f64, temperature: f64) -> f64 {
-        self.viscous.at(velocity) * libm::exp(-self.viscous_thinning * (temperature - REFERENCE_TEMPERATURE))
+        let thinning = libm::exp(-self.viscous_thinning * (temperature - REFERENCE_TEMPERATURE));
+        self.viscous.at(velocity) * thinning * self.shape.map_or(1.0, |shape| shape.viscous(velocity))
     }
 }
 
@@ -149,10 +159,11 @@ impl Default for Surroundings {
     }
 }
 
-/// The friction's own state: how far the bristles are bent.
+/// The friction's own state: how far the bristles are bent, and what friction remembers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Bristles {
     deflection: f64,
+    memory: Memory,
 }
 
 impl Bristles {
@@ -179,13 +190,18 @@ impl Bristles {
         step: f64,
     ) -> FrictionStep {
         let stiffness = parameters.bristle_stiffness;
-        let relaxation = stiffness * velocity.abs() / parameters.dry_level(velocity, surroundings);
+        let (mut level_at, mut dry, mut wet) = (velocity, 1.0, 1.0);
+        if let Some(shape) = &parameters.shape {
+            level_at = self.memory.velocity(shape, velocity);
+            (dry, wet) = (self.memory.dry(shape), self.memory.viscous(shape));
+        }
+        let relaxation = stiffness * velocity.abs() / (dry * parameters.dry_level(level_at, surroundings));
         let damping = parameters.bristle_damping;
         let fading_damping = damping / (1.0 + damping * relaxation / (4.0 * stiffness));
         FrictionStep {
             stiffness,
             damping: fading_damping,
-            viscous: parameters.viscous_coefficient(velocity, surroundings.temperature),
+            viscous: parameters.viscous_coefficient(velocity, surroundings.temperature) * wet,
             deflection: self.deflection,
             relaxation,
             step,
@@ -194,8 +210,11 @@ impl Bristles {
 
     /// Bends the bristles through one prepared step that ended at `velocity` (rad/s); returns the friction torque,
     /// Nm, which opposes a motion of its own sign.
-    pub fn advance(&mut self, prepared: &FrictionStep, velocity: f64) -> f64 {
+    pub fn advance(&mut self, parameters: &FrictionParameters, prepared: &FrictionStep, velocity: f64) -> f64 {
         self.deflection = prepared.deflection_after(velocity);
+        if let Some(shape) = &parameters.shape {
+            self.memory.advance(shape, velocity, prepared.step);
+        }
         prepared.torque(velocity)
     }
 
@@ -208,7 +227,7 @@ impl Bristles {
         step: f64,
     ) -> f64 {
         let prepared = self.prepare(parameters, velocity, surroundings, step);
-        self.advance(&prepared, velocity)
+        self.advance(parameters, &prepared, velocity)
     }
 }
 

@@ -139,6 +139,7 @@ impl FrictionParameters {
             coulomb_thinning: self.coulomb_thinning * factors.coulomb_thinning,
             gear_loss: self.gear_loss * factors.gear_loss,
             ripple,
+            shape: self.shape,
         };
         scaled.validate()?;
         Ok(scaled)

@@ -2,13 +2,15 @@
 //!
 //! Velocity and bristles are solved together by the backward Euler rule, the position follows from the new velocity
 //! (semi-implicit Euler): a frictionless pendulum keeps its energy, and stiff bristles cannot make the joint
-//! unstable.
+//! unstable. Behind a [`transmission`](crate::transmission) the link is a second body, and both velocities are solved
+//! together.
 
 use crate::contact::Contact;
 use crate::error::{ParameterError, within};
 use crate::friction::{Bristles, FrictionStep, Surroundings};
 use crate::parameters::JointParameters;
 use crate::thermal::Heat;
+use crate::transmission::{Line, Transmission};
 
 /// Longest integration step, s.
 pub const MAXIMUM_STEP: f64 = 1e-4;
@@ -20,10 +22,15 @@ pub const GEAR_LOAD_LAG: f64 = 2e-3;
 /// The joint's true motion, torques and temperatures; none of it is measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State {
-    /// Position of the link, rad; zero hangs straight down, not wrapped.
+    /// Position of the motor at the scale of the link, rad; zero hangs straight down, not wrapped. Without a
+    /// transmission that gives way it is the link's.
     pub position: f64,
-    /// Velocity, rad/s.
+    /// Its velocity, rad/s.
     pub velocity: f64,
+    /// Position of the link, rad.
+    pub link_position: f64,
+    /// Velocity of the link, rad/s.
+    pub link_velocity: f64,
     /// Acceleration over the last step, rad/s².
     pub acceleration: f64,
     /// Torque of the motor at the link before friction, Nm.
@@ -36,7 +43,7 @@ pub struct State {
     pub gear_torque: f64,
     /// Heat that the friction makes, W; never negative.
     pub friction_loss: f64,
-    /// Temperatures of winding and housing, °C.
+    /// Temperatures of winding, housing and gear, °C.
     pub heat: Heat,
 }
 
@@ -57,6 +64,7 @@ pub struct Answer {
 pub struct Joint {
     parameters: JointParameters,
     bristles: Bristles,
+    transmission: Option<Transmission>,
     contact: Option<Contact>,
     relief: f64,
     state: State,
@@ -73,6 +81,8 @@ impl Joint {
         let state = State {
             position: 0.0,
             velocity: 0.0,
+            link_position: 0.0,
+            link_velocity: 0.0,
             acceleration: 0.0,
             motor_torque: 0.0,
             friction_torque: 0.0,
@@ -81,14 +91,16 @@ impl Joint {
             friction_loss: 0.0,
             heat: Heat::uniform(temperature),
         };
-        Ok(Self { parameters, bristles: Bristles::default(), contact: None, relief: 1.0, state })
+        let transmission = parameters.transmission.map(Transmission::new);
+        Ok(Self { parameters, bristles: Bristles::default(), transmission, contact: None, relief: 1.0, state })
     }
 
-    /// The same joint at `position` (rad) and `velocity` (rad/s), with unbent bristles.
+    /// The same joint at `position` (rad) and `velocity` (rad/s), with unbent bristles and no twist.
     #[must_use]
     pub fn released_at(mut self, position: f64, velocity: f64) -> Self {
-        self.state.position = position;
-        self.state.velocity = velocity;
+        (self.state.position, self.state.link_position) = (position, position);
+        (self.state.velocity, self.state.link_velocity) = (velocity, velocity);
+        self.transmission = self.parameters.transmission.map(Transmission::new);
         self.bristles = Bristles::default();
         self
     }
@@ -131,13 +143,17 @@ impl Joint {
         self.contact.as_ref()
     }
 
-    /// Kinetic, potential, bristle and contact energy, J; zero when it hangs at rest.
+    /// Kinetic, potential, bristle, transmission and contact energy, J; zero when it hangs at rest.
     #[must_use]
     pub fn stored_energy(&self) -> f64 {
-        let kinetic = 0.5 * self.parameters.inertia() * self.state.velocity * self.state.velocity;
-        let potential = self.parameters.load.gravity_amplitude() * (1.0 - libm::cos(self.state.position));
-        let contact = self.contact.map_or(0.0, |contact| contact.energy(self.state.position));
-        kinetic + potential + self.bristles.energy(&self.parameters.friction) + contact
+        let State { position, velocity, link_position, link_velocity, .. } = self.state;
+        let (motor, load) = (&self.parameters.motor, &self.parameters.load);
+        let kinetic = 0.5 * motor.reflected_inertia() * velocity * velocity
+            + 0.5 * load.total_inertia() * link_velocity * link_velocity;
+        let potential = load.gravity_amplitude() * (1.0 - libm::cos(link_position));
+        let twisted = self.transmission.map_or(0.0, |transmission| transmission.energy(position - link_position));
+        let contact = self.contact.map_or(0.0, |contact| contact.energy(link_position));
+        kinetic + potential + self.bristles.energy(&self.parameters.friction) + twisted + contact
     }
 
     /// Moves on by `duration` (s, above zero) while the torque-producing `current` (A, limited to the current limit)
@@ -179,12 +195,50 @@ impl Joint {
     /// The friction of the next step.
     fn next_friction(&self, step: f64) -> FrictionStep {
         let State { position, velocity, gear_torque, heat, .. } = self.state;
-        let surroundings = Surroundings { position, gear_torque, temperature: heat.housing, relief: self.relief };
+        let surroundings = Surroundings { position, gear_torque, temperature: heat.gear, relief: self.relief };
         self.bristles.prepare(&self.parameters.friction, velocity, &surroundings, step)
     }
 
     fn step(&mut self, motor_torque: f64, copper_loss: f64, external_torque: f64, step: f64) {
         let friction = self.next_friction(step);
+        let before = self.state.velocity;
+        let (load_torque, transmitted) = match self.transmission.take() {
+            None => self.move_as_one(&friction, motor_torque, external_torque, step),
+            Some(mut transmission) => {
+                let moved = self.move_as_two(&mut transmission, &friction, motor_torque, external_torque, step);
+                self.transmission = Some(transmission);
+                moved
+            }
+        };
+        let parameters = &self.parameters;
+        let state = &mut self.state;
+        state.acceleration = (state.velocity - before) / step;
+        state.position += step * state.velocity;
+
+        let stored = self.bristles.energy(&parameters.friction);
+        state.friction_torque = self.bristles.advance(&parameters.friction, &friction, state.velocity);
+        let newly_stored = self.bristles.energy(&parameters.friction) - stored;
+        state.friction_loss = state.friction_torque * state.velocity - newly_stored / step;
+        state.motor_torque = motor_torque;
+        state.load_torque = load_torque;
+
+        let transmitted = transmitted.unwrap_or(load_torque + parameters.load.total_inertia() * state.acceleration);
+        state.gear_torque += (transmitted - state.gear_torque) * step / (step + GEAR_LOAD_LAG);
+        if self.transmission.is_none() {
+            (state.link_position, state.link_velocity) = (state.position, state.velocity);
+        }
+
+        state.heat.advance(&parameters.thermal, copper_loss, state.friction_loss, step);
+    }
+
+    /// New velocity where motor and link are one body; the load's torque.
+    fn move_as_one(
+        &mut self,
+        friction: &FrictionStep,
+        motor_torque: f64,
+        external_torque: f64,
+        step: f64,
+    ) -> (f64, Option<f64>) {
         let parameters = &self.parameters;
         let state = &mut self.state;
         let inertia = parameters.inertia();
@@ -204,19 +258,60 @@ impl Joint {
                 load_torque += pressed + slope * held;
             }
         }
-        state.acceleration = (state.velocity - before) / step;
-        state.position += step * state.velocity;
+        (load_torque, None)
+    }
 
-        let stored = self.bristles.energy(&parameters.friction);
-        state.friction_torque = self.bristles.advance(&friction, state.velocity);
-        let newly_stored = self.bristles.energy(&parameters.friction) - stored;
-        state.friction_loss = state.friction_torque * state.velocity - newly_stored / step;
-        state.motor_torque = motor_torque;
-        state.load_torque = load_torque;
-
-        let transmitted = load_torque + parameters.load.total_inertia() * state.acceleration;
-        state.gear_torque += (transmitted - state.gear_torque) * step / (step + GEAR_LOAD_LAG);
-
-        state.heat.advance(&parameters.thermal, copper_loss, state.friction_loss, step);
+    /// New velocities of motor and link, and the link's position; the load's torque and what the transmission gives.
+    fn move_as_two(
+        &mut self,
+        transmission: &mut Transmission,
+        friction: &FrictionStep,
+        motor_torque: f64,
+        external_torque: f64,
+        step: f64,
+    ) -> (f64, Option<f64>) {
+        let (parameters, state) = (&self.parameters, &mut self.state);
+        let (motor, link) = (state.velocity, state.link_velocity);
+        let inertias = [parameters.motor.reflected_inertia(), parameters.load.total_inertia()];
+        let driving = motor_torque - friction.torque(motor);
+        let load = parameters.load.gravity_torque(state.link_position) - external_torque;
+        let twist = state.position - state.link_position;
+        // Straight lines over both new velocities; of the ends that may touch, the first that need not pull.
+        let solved = |line: &Line, (pressed, slope): (f64, f64)| {
+            let between = line.torque(motor - link);
+            let right = [step * (driving - between), step * (between - load - pressed - slope * link)];
+            let coupled = -step * line.slope;
+            let (a, d) =
+                (inertias[0] + step * (friction.slope() + line.slope), inertias[1] + step * (slope + line.slope));
+            let determinant = a * d - coupled * coupled;
+            let motor = motor + (right[0] * d - coupled * right[1]) / determinant;
+            let link = link + (right[1] * a - coupled * right[0]) / determinant;
+            (motor, link, line.torque(motor - link), pressed + slope * link)
+        };
+        let mut found = solved(&Line::FREE, (0.0, 0.0));
+        'lines: for line in transmission.prepare(twist, motor - link, step) {
+            if let Some(contact) = &self.contact {
+                let held = solved(&line, contact.prepare(state.link_position, step));
+                if line.holds(held.0 - held.1) && contact.gives(held.3) {
+                    found = held;
+                    break 'lines;
+                }
+            }
+            let free = solved(&line, (0.0, 0.0));
+            let touches = |contact: &Contact| {
+                let (pressed, slope) = contact.prepare(state.link_position, step);
+                contact.gives(pressed + slope * free.1)
+            };
+            if line.holds(free.0 - free.1) && !self.contact.as_ref().is_some_and(touches) {
+                found = free;
+                break;
+            }
+        }
+        let (moved, carried, transmitted, pressed) = found;
+        transmission.advance(motor - link, moved - carried, step);
+        state.velocity = moved;
+        state.link_velocity = carried;
+        state.link_position += step * carried;
+        (load + pressed, Some(transmitted))
     }
 }

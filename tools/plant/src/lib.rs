@@ -22,10 +22,12 @@
 //! From the physics outwards:
 //!
 //! - [`friction`]: bristle friction, passive in every time step
+//! - [`friction_shape`]: laws in which friction departs from the firmware's model, and what it remembers
 //! - [`friction_factors`]: the same friction with other numbers, for models that are wrong on purpose
 //! - [`load`]: the link as a pendulum
 //! - [`motor`]: current to torque and copper loss
 //! - [`thermal`]: winding and housing
+//! - [`transmission`]: elasticity, hysteresis and backlash between motor and link
 //! - [`contact`]: what the link runs into
 //! - [`joint`]: all of these, integrated
 //! - [`actuator`]: the joint behind windings, bridge, supply and a drive's sensors, at the control rate; with faults
@@ -45,6 +47,7 @@ pub mod excitation;
 pub mod fourier;
 pub mod friction;
 pub mod friction_factors;
+pub mod friction_shape;
 pub mod joint;
 pub mod links;
 pub mod load;
@@ -53,6 +56,7 @@ pub mod pair;
 pub mod parameters;
 pub mod randomised;
 pub mod thermal;
+pub mod transmission;
 pub mod virtual_joint;
 
 mod noise;

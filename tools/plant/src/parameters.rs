@@ -5,6 +5,7 @@ use crate::friction::{Directional, FrictionParameters, Ripple};
 use crate::load::LoadParameters;
 use crate::motor::MotorParameters;
 use crate::thermal::ThermalParameters;
+use crate::transmission::TransmissionParameters;
 use serde::{Deserialize, Serialize};
 
 /// Range and speed in which the joint may be moved when it is recorded.
@@ -25,6 +26,9 @@ pub struct JointParameters {
     pub motor: MotorParameters,
     /// Link and payload.
     pub load: LoadParameters,
+    /// Elasticity between motor and link; without, they are one body.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub transmission: Option<TransmissionParameters>,
     /// Friction.
     pub friction: FrictionParameters,
     /// Heat.
@@ -46,6 +50,7 @@ impl JointParameters {
                 resistance: 0.3,
             },
             load: LoadParameters { inertia: 0.1, mass: 4.0, length: 0.4 },
+            transmission: None,
             friction: FrictionParameters {
                 coulomb: Directional { forward: 3.0, backward: 2.5 },
                 breakaway: Directional { forward: 4.2, backward: 3.5 },
@@ -60,6 +65,7 @@ impl JointParameters {
                     Ripple { periods_per_revolution: 4.0, amplitude: 0.08, phase: 0.7 },
                     Ripple { periods_per_revolution: 50.0, amplitude: 0.05, phase: -1.1 },
                 ],
+                shape: None,
             },
             thermal: ThermalParameters {
                 winding_capacity: 60.0,
@@ -67,6 +73,7 @@ impl JointParameters {
                 winding_to_housing: 0.8,
                 housing_to_ambient: 1.5,
                 ambient: 22.0,
+                gear: None,
             },
             limits: Limits { travel: 1.5, speed: 4.0 },
         }
@@ -96,6 +103,11 @@ impl JointParameters {
     pub fn validate(&self) -> Result<(), ParameterError> {
         self.motor.validate()?;
         self.load.validate()?;
+        if let Some(transmission) = &self.transmission {
+            transmission.validate()?;
+            // A body of its own needs an inertia.
+            within("load's total inertia behind a transmission", self.load.total_inertia(), 1e-6, 1000.0)?;
+        }
         self.friction.validate()?;
         self.thermal.validate()?;
         within("limits.travel", self.limits.travel, 0.05, 6.3)?;

@@ -40,7 +40,7 @@ impl JointParameters {
         let inertia = motor.reflected_inertia() + load.total_inertia();
         let friction = friction(&mut draw, motor.torque_limit(), inertia, limits.speed);
         let thermal = thermal(&mut draw);
-        Self { motor, load, friction, thermal, limits }
+        Self { motor, load, transmission: None, friction, thermal, limits }
     }
 }
 
@@ -99,6 +99,7 @@ fn friction(draw: &mut Noise, peak_torque: f64, inertia: f64, speed: f64) -> Fri
                 phase: draw.uniform(-PI, PI),
             },
         ],
+        shape: None,
     }
 }
 
@@ -111,5 +112,6 @@ fn thermal(draw: &mut Noise) -> ThermalParameters {
         winding_to_housing,
         housing_to_ambient,
         ambient: draw.uniform(15.0, 35.0),
+        gear: None,
     }
 }

@@ -181,7 +181,7 @@ fn row(joint: &VirtualJoint) -> Row {
         true_motor_torque: truth.motor_torque,
         true_friction_torque: truth.friction_torque,
         true_load_torque: truth.load_torque,
-        true_gear_temperature: truth.heat.housing,
+        true_gear_temperature: truth.heat.gear,
         ..Row::default()
     }
 }

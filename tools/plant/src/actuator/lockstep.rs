@@ -188,7 +188,7 @@ impl Actuator {
 
     /// Fits what hangs at the board's outputs, in place of what was there; a brake is closed where the link is.
     pub fn fit(&mut self, accessories: Accessories) {
-        self.fitted = Fitted::new(accessories, self.state.joint.position, self.parameters.joint.inertia());
+        self.fitted = Fitted::new(accessories, self.state.joint.link_position, self.parameters.joint.inertia());
         self.grip_again();
     }
 
@@ -279,7 +279,12 @@ impl Actuator {
         let idle = if self.bus.voltage() > LOWEST_SUPPLY { idle / self.bus.voltage() } else { 0.0 };
         let across = self.shoot_through(bridge_switching, duties) + self.fitted.conductance();
         self.bus.advance(rail_current + idle, across, period);
-        self.fitted.advance(self.bus.voltage(), self.state.joint.position, self.parameters.joint.inertia(), period);
+        self.fitted.advance(
+            self.bus.voltage(),
+            self.state.joint.link_position,
+            self.parameters.joint.inertia(),
+            period,
+        );
         self.grip_again();
 
         let ambient = self.parameters.joint.thermal.ambient;
@@ -313,6 +318,7 @@ impl Actuator {
         let rails = Rails { voltage: self.bus.voltage(), diode_drop: p.inverter.diode_drop };
         let velocity = p.windings.pole_pairs as f64 * self.state.rotor_velocity;
         let start = self.state.electrical_angle;
+        self.windings.warm(self.state.joint.heat.housing);
         let resistance = self.windings.phase_resistance(self.state.joint.heat.winding);
         let outside = p.inverter.on_resistance;
         let inductance = p.windings.inductance_d.min(p.windings.inductance_q);
@@ -408,7 +414,7 @@ impl Actuator {
         self.faults = faults;
         self.bus.set_source_voltage(faults.source_voltage);
         if faults.blocked != was_blocked {
-            self.joint.hold(Some(Contact::blocking(self.state.joint.position, self.parameters.joint.inertia())));
+            self.joint.hold(Some(Contact::blocking(self.state.joint.link_position, self.parameters.joint.inertia())));
             self.grip_again();
         }
     }

@@ -21,6 +21,7 @@
 //! - [`faults`]: what can break
 //! - [`parameters`], [`effects`], [`randomised`]: everything that describes an actuator, effects one by one, random
 //!   actuators
+//! - [`judging`]: random actuators that are less like the firmware's model, and what a data sheet says of them
 //! - [`lockstep`]: all of it together
 
 pub mod accessories;
@@ -31,6 +32,7 @@ pub mod faults;
 pub mod frame;
 pub mod freewheel;
 pub mod inverter;
+pub mod judging;
 pub mod legs;
 pub mod lockstep;
 pub mod parameters;

@@ -41,6 +41,7 @@ impl ActuatorParameters {
                 inductance_d: 1.8e-4,
                 inductance_q: 2.2e-4,
                 resistance_rise: COPPER_RISE,
+                flux_fall: 0.0,
                 electrical_zero: 0.6,
                 phase_order: PhaseOrder::Forward,
                 cogging: Cogging { amplitude: 0.003, periods_per_turn: 84.0, phase: 0.4 },

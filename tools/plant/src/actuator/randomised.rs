@@ -91,6 +91,7 @@ fn windings(draw: &mut Noise, joint: &JointParameters, voltage: f64) -> WindingP
         inductance_d,
         inductance_q: inductance_d * draw.uniform(1.0, 1.5),
         resistance_rise: COPPER_RISE,
+        flux_fall: 0.0,
         electrical_zero: draw.uniform(-PI, PI),
         phase_order: if draw.uniform(0.0, 1.0) < 0.5 { PhaseOrder::Forward } else { PhaseOrder::Exchanged },
         cogging: Cogging {

@@ -69,6 +69,9 @@ pub struct WindingParameters {
     pub inductance_q: f64,
     /// Relative rise of the resistance, 0 to 0.01 per K above [`REFERENCE_TEMPERATURE`]; copper: [`COPPER_RISE`].
     pub resistance_rise: f64,
+    /// Relative fall of the magnets' flux, 0 to 0.003 per K above 25 °C; ferrite 0.002, neodymium 0.001.
+    #[serde(default)]
+    pub flux_fall: f64,
     /// Electrical angle of the d axis before phase A when the rotor's angle is zero, -pi to pi rad.
     pub electrical_zero: f64,
     /// Order of the phases.
@@ -88,6 +91,7 @@ impl WindingParameters {
         within("windings.inductance_d", self.inductance_d, 1e-6, 0.1)?;
         within("windings.inductance_q", self.inductance_q, 1e-6, 0.1)?;
         within("windings.resistance_rise", self.resistance_rise, 0.0, 0.01)?;
+        within("windings.flux_fall", self.flux_fall, 0.0, 0.003)?;
         within("windings.electrical_zero", self.electrical_zero, -PI, PI)?;
         within("windings.cogging.amplitude", self.cogging.amplitude, 0.0, 10.0)?;
         within("windings.cogging.periods_per_turn", self.cogging.periods_per_turn, 1.0, 1000.0)?;
@@ -151,6 +155,12 @@ impl Windings {
         parameters.validate()?;
         motor.validate()?;
         Ok(Self { parameters, motor, flux: parameters.flux_linkage(&motor), current: [0.0; 2] })
+    }
+
+    /// Magnets of this temperature, °C, from now on.
+    pub fn warm(&mut self, temperature: f64) {
+        let fall = self.parameters.flux_fall * (temperature - REFERENCE_TEMPERATURE);
+        self.flux = self.parameters.flux_linkage(&self.motor) * (1.0 - fall);
     }
 
     /// Currents along d and q, A.

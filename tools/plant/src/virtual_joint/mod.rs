@@ -135,6 +135,15 @@ impl VirtualJoint {
         self
     }
 
+    /// The same after a reset of its board: the firmware's estimates start again, from the temperature that the bridge's
+    /// sensor shows.
+    #[must_use]
+    pub fn reset(mut self) -> Self {
+        self.winding = self.winding.starting_at(self.measured.bridge_temperature);
+        self.slow.gear_temperature = self.winding.housing();
+        self
+    }
+
     /// Changes the friction model between two control steps, as the firmware does after an upload.
     pub fn set_friction(&mut self, model: Option<FrictionModel>) {
         self.adaptation = Adaptation::NOTHING;

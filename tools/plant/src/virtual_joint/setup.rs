@@ -21,6 +21,9 @@ pub const POSITION_BANDWIDTH: f64 = 6.0;
 /// Damping ratio of the position loop.
 const DAMPING_RATIO: f64 = 1.0;
 
+/// Shortest time constant J / D of a motor alone, s: twice that of `joint::limit_law`.
+const QUIET: f64 = 2e-3;
+
 /// A board for every joint of the plant: it bears whatever may be asked of it, and sees as far as its sensors do.
 fn board_limits(parameters: &ActuatorParameters) -> BoardLimits {
     let (currents, bus) = (&parameters.sensors.currents, &parameters.sensors.bus);
@@ -137,6 +140,24 @@ impl Setup {
                 limits: board_limits(parameters),
             },
         }
+    }
+
+    /// The configuration that somebody makes who has a data sheet of such an actuator
+    /// ([`ActuatorParameters::as_data_sheet`]) and tunes it until it is quiet. Compensation is off.
+    #[must_use]
+    pub fn by_data_sheet(parameters: &ActuatorParameters, seed: u64) -> Self {
+        let sheet = parameters.as_data_sheet(seed);
+        let mut setup = Self::of(&sheet);
+        if parameters.joint.transmission.is_some() {
+            // Within the gap, and above the resonance, the motor is alone: its velocity loop has to bear the delays.
+            let gains = &mut setup.configuration.gains;
+            let most = (sheet.joint.motor.reflected_inertia() / QUIET) as f32;
+            let share = (most / gains.damping).min(1.0);
+            gains.damping *= share;
+            gains.stiffness *= share * share;
+            gains.integral *= share * share * share;
+        }
+        setup
     }
 
     /// The same with compensation as requested.

@@ -5,6 +5,7 @@ mod bridge;
 mod drive_sensors;
 mod faults;
 mod heat;
+mod judging;
 mod support;
 mod whole;
 mod windings;
