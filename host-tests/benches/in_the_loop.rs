@@ -4,7 +4,7 @@
 //! `cargo bench -p host-tests --bench in_the_loop > docs/in-the-loop.md`; some minutes.
 
 use host_tests::in_the_loop::{Moved, RandomJoint, for_seeds, median};
-use host_tests::left_alone::{Alone, ERROR, Knowledge, judged};
+use host_tests::left_alone::{Alone, ERROR, Kind, Knowledge, judged};
 use host_tests::variant::{ALL, DEFAULT, Variant};
 use plant::actuator::ActuatorParameters;
 use std::ops::Range;
@@ -26,7 +26,9 @@ fn main() {
     let alone: Vec<usize> = ALL
         .iter()
         .map(|variant| {
-            for_seeds(ALONE, |seed| judged(seed, &Alone::ALL, variant, Knowledge::Wrong).1.len()).into_iter().sum()
+            for_seeds(ALONE, |seed| judged((Kind::Randomised, seed), &Alone::ALL, variant, Knowledge::Wrong).1.len())
+                .into_iter()
+                .sum()
         })
         .collect();
 

@@ -10,8 +10,9 @@ use identification::metrics::relative_floor;
 use joint_firmware::joint::state_machine::{Controlword, State};
 use joint_firmware::joint::{Demand, Telemetry};
 use plant::VirtualJoint;
-use plant::actuator::ActuatorParameters;
+use plant::actuator::{ActuatorParameters, ActuatorState};
 use plant::excitation::{Trajectory, slow_reversals};
+use plant::friction::REFERENCE_TEMPERATURE;
 use plant::friction_factors::FrictionFactors;
 use plant::virtual_joint::{Setup, VirtualJointError};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -23,8 +24,10 @@ pub struct Errors {
     /// Mean of |friction - compensation| / |motor torque|, %, where the motor torque is at least a tenth of its RMS
     /// (001 eq. 11).
     pub torque: f64,
-    /// RMS of the position error, rad.
+    /// RMS of the position error, rad, where the encoder is.
     pub tracking: f64,
+    /// The same of the link.
+    pub link_tracking: f64,
     /// Shares of the steps in which a layer held compensation back.
     pub shares: Shares,
 }
@@ -70,6 +73,12 @@ pub struct RandomJoint {
     reversals: Trajectory,
 }
 
+/// Torque that arrives for each that the configuration believes in.
+pub fn delivered(parameters: &ActuatorParameters, setup: &Setup, state: &ActuatorState) -> f64 {
+    let fall = parameters.windings.flux_fall * (state.joint.heat.housing - REFERENCE_TEMPERATURE);
+    parameters.joint.motor.torque_constant * (1.0 - fall) / f64::from(setup.configuration.motor.torque_constant)
+}
+
 /// Friction that is left in torque mode, % of its RMS while the joint moves.
 #[derive(Clone, Copy, Debug)]
 pub struct InTorqueMode {
@@ -89,7 +98,9 @@ const SERVICE: f64 = 20.0;
 const TOUCH: f64 = 8.0;
 /// Warmth of a joint above its ambient at the beginning, K.
 const WARMTH: f64 = 10.0;
-/// Bandwidth of a hand, and of a controller around torque mode, rad/s.
+/// The same of one whose board is reset, K.
+const RESTARTED: f64 = 25.0;
+/// Bandwidth of a hand, and at most of a controller around torque mode, rad/s.
 const LEADING: f64 = 25.0;
 /// Time for which the joint is led, s; the first tenth is not counted.
 const LED: f64 = 10.0;
@@ -110,7 +121,19 @@ impl RandomJoint {
     /// Refusals of plant, firmware or fit, and a fault on the way.
     pub fn commissioned(seed: u64) -> Result<Self, String> {
         let parameters = ActuatorParameters::randomised(seed).aligned();
-        let off = Setup::of(&parameters);
+        Self::of(seed, parameters, Setup::of(&parameters))
+    }
+
+    /// The same with the [judging](ActuatorParameters::judging) joint of this number, configured by its data sheet.
+    ///
+    /// # Errors
+    /// Refusals of plant, firmware or fit, and a fault on the way.
+    pub fn judging(seed: u64) -> Result<Self, String> {
+        let parameters = ActuatorParameters::judging(seed).aligned();
+        Self::of(seed, parameters, Setup::by_data_sheet(&parameters, seed))
+    }
+
+    fn of(seed: u64, parameters: ActuatorParameters, off: Setup) -> Result<Self, String> {
         let found = commission(&parameters, &off, seed)?;
         let limits = &parameters.joint.limits;
         let acceleration = parameters.joint.usable_acceleration().min(20.0);
@@ -144,6 +167,22 @@ impl RandomJoint {
     /// A fault on the way.
     pub fn begun_at(&self, variant: &Variant, temperature: f64) -> Result<[f64; 2], String> {
         self.without_and_with(variant, &self.moves, temperature - self.parameters.joint.thermal.ambient)
+    }
+
+    /// Torque errors of moves of a joint that is 25 K warmer than the ambient while its board, reset, believes it to be
+    /// at the ambient temperature; without compensation and with it, %.
+    ///
+    /// # Errors
+    /// A fault on the way.
+    pub fn restarted_warm(&self, variant: &Variant) -> Result<[f64; 2], String> {
+        let on = self.off.compensating(Request::PhysicalAndNetwork);
+        let torque = |setup, model: Option<&FrictionModel>| {
+            let joint = variant.enabled(&self.parameters, setup, model.cloned(), RESTARTED, 99);
+            let joint = joint.map_err(|error| format!("joint {}, restarted: {error}", self.seed))?;
+            let mut joint = joint.believing(self.parameters.joint.thermal.ambient);
+            Ok::<_, String>(self.followed(&mut joint, variant, &self.moves)?.torque)
+        };
+        Ok([torque(&self.off, None)?, torque(&on, Some(&self.found.model))?])
     }
 
     /// Torque errors along a motion of its own, without compensation and with it, %.
@@ -241,17 +280,23 @@ impl RandomJoint {
         let amplitude = 0.25 * limits.travel;
         let fastest = (0.3 * plant.usable_acceleration().min(20.0) / amplitude).sqrt();
         let omega = fastest.min(0.5 * limits.speed / amplitude);
+        // A command is no stiffer than what the joint was tuned to.
+        let tuned = 0.5 * f64::from(setup.configuration.gains.damping) / plant.inertia();
+        let bandwidth = if by_hand { LEADING } else { LEADING.min(tuned) };
         let mut demand = Demand { controlword: Controlword::ENABLE_OPERATION, ..Demand::default() };
         let (mut hand, mut left, mut all) = (0.0, 0.0, 0.0);
         for n in 0..(LED / joint.period()) as u64 {
             let time = n as f64 * joint.period();
             if n % COMMAND_STEPS == 0 {
+                // A hand is on the link; a command knows what the encoder shows.
                 let now = joint.actuator().state().joint;
+                let (at, moving) =
+                    if by_hand { (now.link_position, now.link_velocity) } else { (now.position, now.velocity) };
                 let (sin, cos) = (omega * time).sin_cos();
-                let position = amplitude * (1.0 - cos) - now.position;
-                let velocity = amplitude * omega * sin - now.velocity;
+                let position = amplitude * (1.0 - cos) - at;
+                let velocity = amplitude * omega * sin - moving;
                 let acceleration = amplitude * omega * omega * cos;
-                let leading = plant.inertia() * (acceleration + LEADING * (LEADING * position + 2.0 * velocity));
+                let leading = plant.inertia() * (acceleration + bandwidth * (bandwidth * position + 2.0 * velocity));
                 let gravity = plant.load.gravity_torque(now.position);
                 let by_command = if by_hand { 0.0 } else { leading };
                 hand = leading - by_command;
@@ -265,7 +310,9 @@ impl RandomJoint {
             }
             let now = joint.actuator().state().joint;
             if time > 0.1 * LED && now.velocity.abs() > 0.02 * limits.speed {
-                left += (now.friction_torque - f64::from(telemetry.compensated.torque)).powi(2);
+                let added = f64::from(telemetry.compensated.torque)
+                    * delivered(&self.parameters, &self.off, joint.actuator().state());
+                left += (now.friction_torque - added).powi(2);
                 all += now.friction_torque.powi(2);
             }
         }
@@ -295,11 +342,13 @@ impl RandomJoint {
     fn followed(&self, joint: &mut VirtualJoint, variant: &Variant, trajectory: &Trajectory) -> Result<Errors, String> {
         let failed = |error: String| format!("joint {}, {}: {error}", self.seed, variant.name);
         let mut torques: Vec<(f64, f64)> = Vec::new();
-        let (mut squares, mut shares) = (0.0, Shares::default());
+        let (mut squares, mut link_squares, mut shares) = (0.0, 0.0, Shares::default());
         let outcome = follow(joint, trajectory, |time, telemetry, state| {
-            let left = state.joint.friction_torque - f64::from(telemetry.compensated.torque);
-            torques.push((state.joint.motor_torque, left));
-            squares += (trajectory.at(time).position - state.joint.position).powi(2);
+            let added = f64::from(telemetry.compensated.torque) * delivered(&self.parameters, &self.off, state);
+            torques.push((state.joint.motor_torque, state.joint.friction_torque - added));
+            let reference = trajectory.at(time).position;
+            squares += (reference - state.joint.position).powi(2);
+            link_squares += (reference - state.joint.link_position).powi(2);
             shares.count(telemetry);
         });
         outcome.map_err(|state| {
@@ -315,6 +364,7 @@ impl RandomJoint {
         Ok(Errors {
             torque: 100.0 * counted.iter().sum::<f64>() / counted.len() as f64,
             tracking: (squares / torques.len() as f64).sqrt(),
+            link_tracking: (link_squares / torques.len() as f64).sqrt(),
             shares: shares.of(torques.len()),
         })
     }

@@ -4,6 +4,7 @@
 use crate::borne::configured;
 use crate::commission::Commissioned;
 use crate::driving::{COMMAND_STEPS, follow, moves};
+use crate::in_the_loop::delivered;
 use crate::informed::informed;
 use crate::variant::{DEFAULT, Variant, measured};
 use friction_compensation::compensation::Request;
@@ -115,6 +116,31 @@ impl Alone {
     }
 }
 
+/// Kind of random joint.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// [`ActuatorParameters::randomised`], configured by what it is.
+    Randomised,
+    /// [`ActuatorParameters::judging`], configured by its data sheet.
+    Judging,
+}
+
+impl Kind {
+    /// Joint `seed` without its payload or with it, and its configuration.
+    fn joint(self, seed: u64, loaded: bool) -> (ActuatorParameters, Setup) {
+        let whole = match self {
+            Self::Randomised => ActuatorParameters::randomised(seed),
+            Self::Judging => ActuatorParameters::judging(seed),
+        };
+        let parameters = if loaded { whole.aligned() } else { whole.aligned().without_payload() };
+        let setup = match self {
+            Self::Randomised => Setup::of(&parameters),
+            Self::Judging => Setup::by_data_sheet(&parameters, seed),
+        };
+        (parameters, setup)
+    }
+}
+
 /// Knowledge that a joint that is left alone has of its friction.
 #[derive(Clone, Copy)]
 pub enum Knowledge<'a> {
@@ -159,16 +185,13 @@ const DAMPING: f32 = 0.2;
 /// # Errors
 /// A joint that does not stay enabled.
 pub fn run(
-    seed: u64,
+    (kind, seed): (Kind, u64),
     alone: Alone,
     variant: Option<&Variant>,
     knowledge: Knowledge,
     steps: u32,
 ) -> Result<Seen, String> {
-    let mut parameters = ActuatorParameters::randomised(seed).aligned();
-    if !alone.loaded() {
-        parameters = parameters.without_payload();
-    }
+    let (parameters, setup) = kind.joint(seed, alone.loaded());
     // Half of the models are wrong at the corners of the range, with most of them too strong.
     let factors = match seed % 4 {
         0 => FrictionFactors::drawn(seed, ERROR),
@@ -180,7 +203,7 @@ pub fn run(
     // If a way leads there, it ends in the same state with compensation and without.
     let acts = if matches!(knowledge, Knowledge::Image(_)) { Request::PhysicalAndNetwork } else { Request::Physical };
     let request = if compensates || alone.gravity().is_some() { acts } else { Request::Off };
-    let mut setup = Setup::of(&parameters).compensating(request);
+    let mut setup = setup.compensating(request);
     measured(&mut setup.configuration);
     let bears = alone.gravity().map_or(0.0, Gravity::factor);
     if alone.gravity().is_some() {
@@ -250,10 +273,11 @@ pub fn run(
         let state = joint.actuator().state().joint;
         pushing = (n == 6_000 || pushing) && n < 8_000 && state.velocity < 0.25 * speed;
         let external = if pushing { strength } else { 0.0 };
-        let gravity = parameters.joint.load.gravity_torque(state.position) as f32;
+        let gravity = parameters.joint.load.gravity_torque(state.position)
+            / delivered(&parameters, &setup, joint.actuator().state());
         let asks = n % COMMAND_STEPS as u32 == 0;
         if asks && alone == Alone::Borne {
-            demand.command.torque = gravity;
+            demand.command.torque = gravity as f32;
         } else if asks && alone == Alone::Sprung {
             let (position, velocity) = (state.position as f32, state.velocity as f32);
             demand.command.torque = -gains.stiffness * position - DAMPING * gains.damping * velocity;
@@ -320,28 +344,40 @@ const SETTLING: u32 = 6_000;
 const LAST: u32 = 10_000;
 
 /// Joint `seed` in situations with a compensation: the largest drift, rad, and what moved by itself.
-pub fn judged(seed: u64, situations: &[Alone], variant: &Variant, knowledge: Knowledge) -> (f64, Vec<String>) {
+pub fn judged(
+    (kind, seed): (Kind, u64),
+    situations: &[Alone],
+    variant: &Variant,
+    knowledge: Knowledge,
+) -> (f64, Vec<String>) {
     let (mut drift, mut bad) = (0.0f64, Vec::new());
     for &alone in situations {
         // With less friction a joint creeps for longer. What is a limit cycle goes on; creep comes to rest.
         let (short, long) = if alone.gravity().is_some() { (STEPS.0, SWINGING) } else { STEPS };
-        let (largest, moves) = compared(seed, alone, variant, knowledge, short);
+        let (largest, moves) = compared((kind, seed), alone, variant, knowledge, short);
         drift = drift.max(largest);
         if moves.is_some() {
-            bad.extend(compared(seed, alone, variant, knowledge, long).1);
+            bad.extend(compared((kind, seed), alone, variant, knowledge, long).1);
         }
     }
     (drift, bad)
 }
 
 /// The drift with compensation, and what joint and compensation did where that moves by itself.
-fn compared(seed: u64, alone: Alone, variant: &Variant, knowledge: Knowledge, steps: u32) -> (f64, Option<String>) {
-    let (with, without) = (run(seed, alone, Some(variant), knowledge, steps), run(seed, alone, None, knowledge, steps));
+fn compared(
+    joint: (Kind, u64),
+    alone: Alone,
+    variant: &Variant,
+    knowledge: Knowledge,
+    steps: u32,
+) -> (f64, Option<String>) {
+    let (with, without) =
+        (run(joint, alone, Some(variant), knowledge, steps), run(joint, alone, None, knowledge, steps));
     let moves = match (&with, &without) {
         (Ok(with), Ok(without)) => moves_by_itself(alone, with, without),
         _ => true,
     };
     let drift = with.as_ref().map_or(0.0, |with| with.drift);
-    let shown = || format!("joint {seed}, {alone:?}: {with:?}, without compensation {without:?}");
+    let shown = || format!("{joint:?}, {alone:?}: {with:?}, without compensation {without:?}");
     (drift, moves.then(shown))
 }

@@ -7,7 +7,7 @@
 //! all twenty are judged, and the median counts, too.
 
 use host_tests::in_the_loop::{InTorqueMode, Moved, RandomJoint, for_seeds, median};
-use host_tests::left_alone::{Alone, Knowledge, judged};
+use host_tests::left_alone::{Alone, Kind, Knowledge, judged};
 use host_tests::samples::{count, every};
 use host_tests::variant::{ADAPTIVE, DEFAULT};
 use plant::friction_factors::FrictionFactors;
@@ -89,7 +89,7 @@ fn found(seed: u64) -> Result<Found, String> {
         moved: [joint.without()?, joint.with(&DEFAULT)?],
         torque_mode: joint.in_torque_mode(&DEFAULT)?,
         uncertainty: joint.found.uncertainty,
-        moved_by_itself: judged(seed, &Alone::ALL, &DEFAULT, Knowledge::Image(&joint.found)).1,
+        moved_by_itself: judged((Kind::Randomised, seed), &Alone::ALL, &DEFAULT, Knowledge::Image(&joint.found)).1,
         cold: joint.begun_at(&DEFAULT, 0.0)?,
     })
 }

@@ -4,12 +4,14 @@
 //! `JOINT_SAMPLES=all` judges every joint of the published figures, else the first tenth of them.
 
 use host_tests::in_the_loop::for_seeds;
-use host_tests::left_alone::{Alone, ERROR, Knowledge, judged};
+use host_tests::left_alone::{Alone, ERROR, Kind, Knowledge, judged};
 use host_tests::samples::count;
 use host_tests::variant::{ADAPTIVE, DEFAULT, Variant};
 
 /// Random joints: a part, and all.
 const JOINTS: (u64, u64) = (100, 1000);
+/// Random joints that are less like the firmware's model.
+const JUDGING: (u64, u64) = (50, 1000);
 /// Random joints whose feedforward bears their payload.
 const BEARING: (u64, u64) = (10, 100);
 /// Random joints that have learned before.
@@ -17,22 +19,38 @@ const EXPERIENCED: (u64, u64) = (20, 200);
 
 #[test]
 fn no_joint_starts_to_move_or_keeps_moving_by_itself() {
-    leave_alone(JOINTS, &Alone::ALL, &DEFAULT, Knowledge::Wrong);
+    leave_alone(Kind::Randomised, JOINTS, &Alone::ALL, &DEFAULT, Knowledge::Wrong);
 }
 
 #[test]
 fn neither_does_one_whose_feedforward_bears_a_gravity_that_is_wrong_by_30_percent_or_reversed() {
-    leave_alone(BEARING, &Alone::BEARING, &DEFAULT, Knowledge::Wrong);
+    leave_alone(Kind::Randomised, BEARING, &Alone::BEARING, &DEFAULT, Knowledge::Wrong);
 }
 
 #[test]
 fn neither_does_one_that_has_learned_its_friction_before() {
-    leave_alone(EXPERIENCED, &Alone::ALL, &ADAPTIVE, Knowledge::Experienced);
+    leave_alone(Kind::Randomised, EXPERIENCED, &Alone::ALL, &ADAPTIVE, Knowledge::Experienced);
 }
 
-fn leave_alone((part, all): (u64, u64), situations: &[Alone], variant: &Variant, knowledge: Knowledge<'static>) {
+#[test]
+fn neither_does_one_that_gives_way_or_has_backlash_and_is_configured_by_its_data_sheet() {
+    leave_alone(Kind::Judging, JUDGING, &Alone::ALL, &DEFAULT, Knowledge::Wrong);
+}
+
+#[test]
+fn neither_does_such_a_joint_that_has_learned_its_friction_before() {
+    leave_alone(Kind::Judging, EXPERIENCED, &Alone::ALL, &ADAPTIVE, Knowledge::Experienced);
+}
+
+fn leave_alone(
+    kind: Kind,
+    (part, all): (u64, u64),
+    situations: &[Alone],
+    variant: &Variant,
+    knowledge: Knowledge<'static>,
+) {
     let joints = count(part, all);
-    let judged = for_seeds(0..joints, |seed| judged(seed, situations, variant, knowledge));
+    let judged = for_seeds(0..joints, |seed| judged((kind, seed), situations, variant, knowledge));
     let drift = judged.iter().fold(0.0f64, |largest, (drift, _)| largest.max(*drift));
     let bad: Vec<String> = judged.into_iter().flat_map(|(_, bad)| bad).collect();
     println!(

@@ -202,12 +202,12 @@ impl Joint {
     fn step(&mut self, motor_torque: f64, copper_loss: f64, external_torque: f64, step: f64) {
         let friction = self.next_friction(step);
         let before = self.state.velocity;
-        let (load_torque, transmitted) = match self.transmission.take() {
-            None => self.move_as_one(&friction, motor_torque, external_torque, step),
+        let (load_torque, transmitted) = match self.transmission {
+            None => (self.move_as_one(&friction, motor_torque, external_torque, step), None),
             Some(mut transmission) => {
                 let moved = self.move_as_two(&mut transmission, &friction, motor_torque, external_torque, step);
                 self.transmission = Some(transmission);
-                moved
+                (moved.0, Some(moved.1))
             }
         };
         let parameters = &self.parameters;
@@ -232,13 +232,7 @@ impl Joint {
     }
 
     /// New velocity where motor and link are one body; the load's torque.
-    fn move_as_one(
-        &mut self,
-        friction: &FrictionStep,
-        motor_torque: f64,
-        external_torque: f64,
-        step: f64,
-    ) -> (f64, Option<f64>) {
+    fn move_as_one(&mut self, friction: &FrictionStep, motor_torque: f64, external_torque: f64, step: f64) -> f64 {
         let parameters = &self.parameters;
         let state = &mut self.state;
         let inertia = parameters.inertia();
@@ -258,10 +252,10 @@ impl Joint {
                 load_torque += pressed + slope * held;
             }
         }
-        (load_torque, None)
+        load_torque
     }
 
-    /// New velocities of motor and link, and the link's position; the load's torque and what the transmission gives.
+    /// New velocities of motor and link, and the link's position; the load's torque and the transmission's.
     fn move_as_two(
         &mut self,
         transmission: &mut Transmission,
@@ -269,7 +263,7 @@ impl Joint {
         motor_torque: f64,
         external_torque: f64,
         step: f64,
-    ) -> (f64, Option<f64>) {
+    ) -> (f64, f64) {
         let (parameters, state) = (&self.parameters, &mut self.state);
         let (motor, link) = (state.velocity, state.link_velocity);
         let inertias = [parameters.motor.reflected_inertia(), parameters.load.total_inertia()];
@@ -289,12 +283,12 @@ impl Joint {
             (motor, link, line.torque(motor - link), pressed + slope * link)
         };
         let mut found = solved(&Line::FREE, (0.0, 0.0));
-        'lines: for line in transmission.prepare(twist, motor - link, step) {
+        for line in transmission.prepare(twist, motor - link, step) {
             if let Some(contact) = &self.contact {
                 let held = solved(&line, contact.prepare(state.link_position, step));
                 if line.holds(held.0 - held.1) && contact.gives(held.3) {
                     found = held;
-                    break 'lines;
+                    break;
                 }
             }
             let free = solved(&line, (0.0, 0.0));
@@ -312,6 +306,6 @@ impl Joint {
         state.velocity = moved;
         state.link_velocity = carried;
         state.link_position += step * carried;
-        (load + pressed, Some(transmitted))
+        (load + pressed, transmitted)
     }
 }

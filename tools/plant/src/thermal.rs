@@ -1,4 +1,5 @@
-//! Heat in two nodes: the winding, and the housing with the gear in it; or in three, where the gear is a node of its own.
+//! Heat in two nodes: the winding, and the housing with the gear in it; or in three, where the gear is a node of its
+//! own.
 //!
 //! Copper loss enters the winding, friction loss the gear, and the housing gives off to the ambient. Stepped by
 //! the backward Euler rule, so a long step is inaccurate but never unstable.

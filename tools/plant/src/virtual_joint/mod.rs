@@ -135,11 +135,11 @@ impl VirtualJoint {
         self
     }
 
-    /// The same after a reset of its board: the firmware's estimates start again, from the temperature that the bridge's
-    /// sensor shows.
+    /// The same with firmware that believes motor and gear to be at another temperature, °C: what a board does that was
+    /// reset while its joint was warm, and starts from the sensor on its bridge.
     #[must_use]
-    pub fn reset(mut self) -> Self {
-        self.winding = self.winding.starting_at(self.measured.bridge_temperature);
+    pub fn believing(mut self, temperature: f64) -> Self {
+        self.winding = self.winding.starting_at(temperature as f32);
         self.slow.gear_temperature = self.winding.housing();
         self
     }

@@ -21,8 +21,10 @@ pub const POSITION_BANDWIDTH: f64 = 6.0;
 /// Damping ratio of the position loop.
 const DAMPING_RATIO: f64 = 1.0;
 
-/// Shortest time constant J / D of a motor alone, s: twice that of `joint::limit_law`.
-const QUIET: f64 = 2e-3;
+/// Shortest time constant J / D against the delays of the loops, s (`joint::limit_law`).
+const SHORTEST: f64 = 1e-3;
+/// Time constant of gains that are quiet, s.
+const QUIET: f64 = 2.0 * SHORTEST;
 
 /// A board for every joint of the plant: it bears whatever may be asked of it, and sees as far as its sensors do.
 fn board_limits(parameters: &ActuatorParameters) -> BoardLimits {
@@ -149,15 +151,27 @@ impl Setup {
         let sheet = parameters.as_data_sheet(seed);
         let mut setup = Self::of(&sheet);
         if parameters.joint.transmission.is_some() {
-            // Within the gap, and above the resonance, the motor is alone: its velocity loop has to bear the delays.
-            let gains = &mut setup.configuration.gains;
-            let most = (sheet.joint.motor.reflected_inertia() / QUIET) as f32;
-            let share = (most / gains.damping).min(1.0);
-            gains.damping *= share;
-            gains.stiffness *= share * share;
-            gains.integral *= share * share * share;
+            setup.bear_alone(sheet.joint.motor.reflected_inertia());
         }
         setup
+    }
+
+    /// Gains and limits that a motor of this inertia, kg m², bears without its link: within a gap, and above the
+    /// resonance of an elastic gear, it is alone.
+    fn bear_alone(&mut self, inertia: f64) {
+        let Configuration { gains, limits, .. } = &mut self.configuration;
+        let share = ((inertia / QUIET) as f32 / gains.damping).min(1.0);
+        gains.damping *= share;
+        gains.stiffness *= share * share;
+        gains.integral *= share * share * share;
+        // The limits' damping is less for a higher velocity limit and a wider margin.
+        let most = (inertia / SHORTEST) as f32;
+        limits.velocity *= (limits.least_damping() / most).max(1.0);
+        if limits.damping > most {
+            limits.damping = most.max(limits.least_damping());
+            let fade = limits.torque / limits.damping;
+            limits.position_margin = limits.position_margin.max(fade * fade / gains.quick_stop_deceleration);
+        }
     }
 
     /// The same with compensation as requested.

@@ -15,7 +15,8 @@ fn every_judging_actuator_is_valid_and_every_class_occurs() {
         classes[class] += 1;
         if class < 2 {
             let transmission = parameters.joint.transmission.unwrap();
-            assert!(parameters.joint.motor.torque_limit() / transmission.stiffness <= 0.0501);
+            let twist = parameters.joint.motor.torque_limit() / transmission.stiffness;
+            assert!((2e-3..2e-2 + 1e-9).contains(&twist), "{twist} rad at peak torque");
         }
         // What it is built on is the other generator's.
         let base = ActuatorParameters::randomised(seed);

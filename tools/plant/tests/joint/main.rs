@@ -7,6 +7,7 @@ mod field_weakening;
 mod healthy;
 mod heartbeat;
 mod hostile;
+mod judging;
 mod limits;
 mod numeric_limits;
 mod open_loop;

@@ -84,8 +84,8 @@ fn rest_raises_friction_and_a_way_of_motion_undoes_it() {
         dragged(&mut bristles, &resting, 1.0, way)
     };
     let rested = after(0.0, 3.0);
-    // In steady motion a fifth of the film's rise stays, 0.5 rad / (0.5 rad + 2 s x 1 rad/s); what rest adds to it falls
-    // at 1 / (2 s) + 1 rad/s / 0.5 rad. Aging is gone by then.
+    // In steady motion a fifth of the film's rise stays, 0.5 rad / (0.5 rad + 2 s x 1 rad/s); what rest adds to it
+    // falls at 1 / (2 s) + 1 rad/s / 0.5 rad. Aging is gone by then.
     let film_left = 0.5 * 1.2 * 0.8 * (-2.5 * 0.06f64).exp();
     let left = after(20.0, 0.06) - rested;
     assert!((left - film_left).abs() < 0.01, "{left} Nm, expected {film_left} Nm");

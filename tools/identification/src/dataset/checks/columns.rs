@@ -24,6 +24,11 @@ const STUCK_TIME: f64 = 0.2;
 const STUCK_ROWS: usize = 20;
 /// Way, as a share of the position's range, that counts as moving meanwhile.
 const STUCK_SHARE: f64 = 0.05;
+/// Time before and after a row in which the joint keeps its direction, s, at this share of its greatest speed at least.
+const STEADY: f64 = 0.1;
+const STEADY_SHARE: f64 = 0.05;
+/// Share of such rows whose velocity may be against the motion.
+const TREMBLING_SHARE: f64 = 0.005;
 /// Rows in a row at the very largest value that count as clipped, and the share of all rows from which it is told.
 const CLIPPED_ROWS: usize = 5;
 const CLIPPED_SHARE: f64 = 0.005;
@@ -47,6 +52,7 @@ pub fn check(
     warnings.extend(seen.wrapping());
     warnings.extend(seen.stuck());
     warnings.extend(seen.clipping());
+    warnings.extend(seen.trembling());
     Ok(warnings)
 }
 
@@ -285,6 +291,53 @@ impl Seen<'_> {
             },
             _ => high - low > way,
         }
+    }
+
+    /// Friction follows every turn of a joint that trembles, and is hardly there in the mean.
+    fn trembling(&self) -> Option<Warning> {
+        let column = self.description.columns.velocity.as_ref()?;
+        let mut rows: Vec<(f64, f64)> = Vec::new();
+        for run in &self.extracted.runs {
+            let velocity = self.velocity(run)?;
+            let position = &run.raw.signals[Layout::POSITION];
+            let time = &run.raw.time;
+            let (mut before, mut after) = (0, 0);
+            for i in 0..time.len() {
+                before += time[before..].iter().take_while(|t| **t < time[i] - STEADY).count();
+                after += time[after..].iter().take_while(|t| **t < time[i] + STEADY).count();
+                let whole = after < time.len() && time[after] - time[before] < 3.0 * STEADY;
+                if !whole || run.raw.missing[before..=after].contains(&true) || !self.extracted.used[run.rows[i]] {
+                    continue;
+                }
+                let mean = |from: usize, to: usize| (position[to] - position[from]) / (time[to] - time[from]);
+                if before < i && i < after {
+                    let (then, now) = (mean(before, i), mean(i, after));
+                    let steady = if then * now > 0.0 { then.abs().min(now.abs()) } else { 0.0 };
+                    rows.push((steady, velocity[i] * then));
+                }
+            }
+        }
+        let mut speeds: Vec<f64> = rows.iter().map(|(steady, _)| *steady).collect();
+        speeds.sort_by(f64::total_cmp);
+        let least = STEADY_SHARE * speeds.get(speeds.len() * 99 / 100)?;
+        let moving = rows.iter().filter(|(steady, _)| *steady > least);
+        let (against, count) =
+            moving.fold((0, 0), |(against, count), (_, with)| (against + usize::from(*with < 0.0), count + 1));
+        let share = against as f64 / f64::from(count.max(1));
+        (share > TREMBLING_SHARE).then(|| Warning {
+            check: "trembling",
+            column: format!("velocity ({:?})", column.column),
+            rows: format!("{against} of {count} rows in which the joint keeps its direction for {STEADY} s either way"),
+            finding: format!(
+                "the velocity is against the motion in {:.1} % of them, limit {} %",
+                100.0 * share,
+                100.0 * TREMBLING_SHARE
+            ),
+            remedy: "a joint that hunts shows hardly any dry friction: lower its gains (damping first, a light rotor behind \
+                     an elastic gear or backlash bears little) and record again; noise of the sensor alone needs \
+                     differentiate.velocity_from = \"position\""
+                .to_owned(),
+        })
     }
 
     fn clipping(&self) -> Vec<Warning> {

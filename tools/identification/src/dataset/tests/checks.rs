@@ -134,6 +134,22 @@ fn a_signal_that_is_stuck_while_the_joint_moves_is_named_with_its_time() {
 }
 
 #[test]
+fn a_joint_that_trembles_is_named_with_the_rows_that_run_against_it() {
+    // Of the rows in steady motion, as many as are given run backwards.
+    let against = |every: usize| {
+        move |run: usize, i: usize, [t, q, v, u]: Sample| {
+            let turns = (i + 13 * run).is_multiple_of(every);
+            [t, q, if turns { -v } else { v }, u]
+        }
+    };
+    found("trembling", DESCRIBED, against(150), &["\"v\"", "against the motion in 0.7 %", "lower its gains"]);
+    assert_eq!(warnings_of(DESCRIBED, &csv(against(250))), []);
+    // A velocity that is late by three rows turns late, and is no trembling.
+    let late = |run: usize, i: usize, [t, q, _, u]: Sample| [t, q, sample(run, i.saturating_sub(3))[2], u];
+    assert!(!warnings_of(DESCRIBED, &csv(late)).iter().any(|w| w.check == "trembling"));
+}
+
+#[test]
 fn a_clipped_effort_is_named_with_its_limit() {
     let clipped = |_, _, [t, q, v, u]: Sample| [t, q, v, u.clamp(-2.0, 2.0)];
     found("clipping", DESCRIBED, clipped, &["\"u\"", "2", "clean.saturation = [{ column = \"u\", limit = 2 }]"]);
