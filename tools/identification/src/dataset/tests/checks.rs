@@ -143,10 +143,11 @@ fn a_joint_that_trembles_is_named_with_the_rows_that_run_against_it() {
         }
     };
     found("trembling", DESCRIBED, against(150), &["\"v\"", "against the motion in 0.7 %", "lower its gains"]);
-    assert_eq!(warnings_of(DESCRIBED, &csv(against(250))), []);
+    let trembles = |text: &str| warnings_of(DESCRIBED, text).iter().any(|w| w.check == "trembling");
+    assert!(!trembles(&csv(against(250))));
     // A velocity that is late by three rows turns late, and is no trembling.
     let late = |run: usize, i: usize, [t, q, _, u]: Sample| [t, q, sample(run, i.saturating_sub(3))[2], u];
-    assert!(!warnings_of(DESCRIBED, &csv(late)).iter().any(|w| w.check == "trembling"));
+    assert!(!trembles(&csv(late)));
 }
 
 #[test]
