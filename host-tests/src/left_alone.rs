@@ -290,8 +290,10 @@ pub fn run(
         let state = joint.actuator().state().joint;
         let position = state.position;
         let held = match alone {
+            // The spring is as stiff as the torque that arrives makes it.
             _ if alone.held() || alone == Alone::Sprung => {
-                0.5 * f64::from(gains.stiffness) * (position - spring).powi(2)
+                let arrives = delivered(&parameters, &setup, joint.actuator().state());
+                0.5 * arrives * f64::from(gains.stiffness) * (position - spring).powi(2)
             }
             // Work of a load that the command bears is no energy of the joint's.
             Alone::Borne => -parameters.joint.load.gravity_amplitude() * (1.0 - position.cos()),
