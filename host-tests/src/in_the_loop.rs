@@ -26,8 +26,6 @@ pub struct Errors {
     pub torque: f64,
     /// RMS of the position error, rad, where the encoder is.
     pub tracking: f64,
-    /// The same of the link.
-    pub link_tracking: f64,
     /// Shares of the steps in which a layer held compensation back.
     pub shares: Shares,
 }
@@ -342,13 +340,11 @@ impl RandomJoint {
     fn followed(&self, joint: &mut VirtualJoint, variant: &Variant, trajectory: &Trajectory) -> Result<Errors, String> {
         let failed = |error: String| format!("joint {}, {}: {error}", self.seed, variant.name);
         let mut torques: Vec<(f64, f64)> = Vec::new();
-        let (mut squares, mut link_squares, mut shares) = (0.0, 0.0, Shares::default());
+        let (mut squares, mut shares) = (0.0, Shares::default());
         let outcome = follow(joint, trajectory, |time, telemetry, state| {
             let added = f64::from(telemetry.compensated.torque) * delivered(&self.parameters, &self.off, state);
             torques.push((state.joint.motor_torque, state.joint.friction_torque - added));
-            let reference = trajectory.at(time).position;
-            squares += (reference - state.joint.position).powi(2);
-            link_squares += (reference - state.joint.link_position).powi(2);
+            squares += (trajectory.at(time).position - state.joint.position).powi(2);
             shares.count(telemetry);
         });
         outcome.map_err(|state| {
@@ -364,7 +360,6 @@ impl RandomJoint {
         Ok(Errors {
             torque: 100.0 * counted.iter().sum::<f64>() / counted.len() as f64,
             tracking: (squares / torques.len() as f64).sqrt(),
-            link_tracking: (link_squares / torques.len() as f64).sqrt(),
             shares: shares.of(torques.len()),
         })
     }

@@ -127,7 +127,7 @@ impl FrictionShape {
     }
 }
 
-/// What friction remembers of the motion before.
+/// Memory that friction has of the motion before.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Memory {
     speed: f64,

@@ -135,7 +135,7 @@ impl VirtualJoint {
         self
     }
 
-    /// The same with firmware that believes motor and gear to be at another temperature, °C: what a board does that was
+    /// The same with firmware that believes motor and gear to be at another temperature, °C: so does a board that was
     /// reset while its joint was warm, and starts from the sensor on its bridge.
     #[must_use]
     pub fn believing(mut self, temperature: f64) -> Self {

@@ -1,5 +1,5 @@
-//! What holds for joints of the model's kind holds for those whose gear gives way, configured by a data sheet: no fault
-//! in ordinary motion, and no way through a limit.
+//! Joints whose gear gives way, configured by a data sheet, keep the promises of those of the model's kind: no fault in
+//! ordinary motion, and no way through a limit.
 
 use crate::rig::{Rig, position, torque, velocity};
 use joint_firmware::joint::Command;
