@@ -24,10 +24,14 @@
 //! Nothing is learned where the command does not move the joint ([`Learning`]): a joint that is led by hand needs only
 //! as much torque as compensation already gives, and would learn that friction is what it gives. What acts stays in its
 //! box whatever happens ([`FACTOR`], [`Adaptation::viscous_bound`]), and compensation within its clamp.
+//!
+//! The energy guard calls a part of the image certain. What was learned beyond the image is not: a factor is right for
+//! the velocities at which it was learned, and no more. While the guard withholds, that goes first
+//! ([`Factors::guarded`]).
 
 use super::Telemetry;
 use super::active::Active;
-use super::configuration::AdaptationRequest;
+use super::configuration::{AdaptationRequest, VelocitySource};
 use super::state_machine::State;
 use crate::motor::number::{exceeds, greater, lesser, limited, magnitude, or_zero, square_root, within};
 use friction_compensation::compensation::{Acting, Reason};
@@ -96,6 +100,15 @@ pub struct Factors {
 impl Factors {
     /// The image as it is.
     pub const IMAGE: Self = Self { factor: 1.0, viscous: 0.0 };
+
+    /// Corrections that act until the next look: of what was learned beyond the image, the part that the energy guard
+    /// does not withhold at a control step. What was learned to be less stays.
+    #[must_use]
+    pub fn guarded(self, settings: &Settings, telemetry: &Telemetry) -> Self {
+        let withheld = withheld(settings, telemetry);
+        let beyond = |learned: f32| greater(learned, 0.0) * withheld;
+        Self { factor: self.factor - beyond(self.factor - 1.0), viscous: self.viscous - beyond(self.viscous) }
+    }
 }
 
 impl Default for Factors {
@@ -167,6 +180,10 @@ pub struct Settings {
     pub request: AdaptationRequest,
     /// The compensation's gain, 0 to 1.
     pub gain: f32,
+    /// Friction is computed for the reference velocity, where there is one.
+    pub for_reference: bool,
+    /// Part of the compensation that the energy guard may take where the joint moves, 0 to 1.
+    pub uncertain: f32,
     /// rad/s.
     pub standstill: f32,
     /// Nm.
@@ -182,6 +199,8 @@ impl Settings {
     pub const OFF: Self = Self {
         request: AdaptationRequest::Off,
         gain: 0.0,
+        for_reference: false,
+        uncertain: 1.0,
         standstill: 1.0,
         torque_limit: 1.0,
         velocity_limit: 1.0,
@@ -193,6 +212,8 @@ impl Settings {
         Self {
             request: active.adaptation.request,
             gain: active.adaptation.gain,
+            for_reference: active.compensation.source == VelocitySource::Reference,
+            uncertain: 1.0 - active.compensation.certain,
             standstill: active.compensation.standstill,
             torque_limit: active.limits.torque,
             velocity_limit: active.limits.velocity,
@@ -258,7 +279,7 @@ impl Adaptation {
         deviation: PRIOR,
     };
 
-    /// A look at a control step; [`LOOK_RATE`] times a second. What acts from here on.
+    /// A look at a control step; [`LOOK_RATE`] times a second. Corrections in service from here on.
     pub fn look(&mut self, settings: &Settings, telemetry: &Telemetry) -> Factors {
         if settings.request == AdaptationRequest::Off {
             *self = Self::NOTHING;
@@ -424,6 +445,17 @@ impl Adaptation {
 /// The image's torque with gain, Nm.
 pub(super) fn image_torque(telemetry: &Telemetry) -> f32 {
     telemetry.compensated.output.torque.to_bits() as f32 * (1.0 / 65_536.0)
+}
+
+/// Share of what is uncertain that the energy guard withholds at a control step, 0 to 1; none where friction is computed
+/// for a reference velocity. Near standstill, where the guard may take what is certain, too, it is rather too much.
+fn withheld(settings: &Settings, telemetry: &Telemetry) -> f32 {
+    if settings.for_reference && telemetry.wanted.velocity.is_some() {
+        return 0.0;
+    }
+    let moving = within(magnitude(telemetry.motion.velocity) / settings.standstill, 0.0, 1.0);
+    let missing = moving - telemetry.compensated.permitted;
+    within(missing / greater(moving * settings.uncertain, f32::MIN_POSITIVE), 0.0, 1.0)
 }
 
 /// Learning state of a control step: whether it tells something of friction.

@@ -26,13 +26,13 @@ pub fn prepared(active: &Active, new_model: bool) {
 pub struct Adapting {
     estimate: [Adaptation; ADAPTS as usize],
     model: u32,
-    acting: Factors,
+    in_service: Factors,
 }
 
 impl Adapting {
     /// Initial state: nothing learned.
     pub const NOTHING: Self =
-        Self { estimate: [Adaptation::NOTHING; ADAPTS as usize], model: 0, acting: Factors::IMAGE };
+        Self { estimate: [Adaptation::NOTHING; ADAPTS as usize], model: 0, in_service: Factors::IMAGE };
 
     /// Every millisecond: learns from a control step, and has the next ones use what was learned.
     pub fn look(&mut self, telemetry: &Telemetry) -> Report {
@@ -41,13 +41,13 @@ impl Adapting {
         if self.model != model {
             (self.model, *estimate) = (model, Adaptation::NOTHING);
         }
-        self.acting = estimate.look(&settings, telemetry);
-        control::set_factors(&self.acting);
+        self.in_service = estimate.look(&settings, telemetry);
+        control::set_factors(&self.in_service.guarded(&settings, telemetry));
         estimate.report(&settings)
     }
 
-    /// Factors that act.
-    pub fn acting(&self) -> Factors {
-        self.acting
+    /// Corrections in service.
+    pub fn in_service(&self) -> Factors {
+        self.in_service
     }
 }

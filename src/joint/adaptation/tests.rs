@@ -8,6 +8,8 @@ use friction_compensation::quantity::Torque;
 const SETTINGS: Settings = Settings {
     request: AdaptationRequest::On,
     gain: 0.8,
+    for_reference: true,
+    uncertain: 0.6,
     standstill: 0.01,
     torque_limit: 20.0,
     velocity_limit: 4.0,
@@ -213,4 +215,45 @@ fn an_image_misfits_from_a_fifth_and_two_deviations_on() {
 #[test]
 fn the_weights_fall_to_a_third_within_the_memory() {
     assert!((f64::from(FORGETTING) - f64::from(-ROW / MEMORY).exp()).abs() < 1e-7);
+}
+
+#[test]
+fn what_was_learned_beyond_the_image_goes_as_the_energy_guard_takes_the_uncertain_part() {
+    let learned = |factor, viscous| Factors { factor, viscous };
+    let mut telemetry = Telemetry::NOTHING;
+    let mut guarded = |velocity: f32, permitted: f32, reference: Option<f32>, settings: &Settings, factors: Factors| {
+        telemetry.motion.velocity = velocity;
+        telemetry.compensated.permitted = permitted;
+        telemetry.wanted.velocity = reference;
+        factors.guarded(settings, &telemetry)
+    };
+    let near = |found: Factors, factor: f32, viscous: f32| {
+        let off = [found.factor - factor, found.viscous - viscous].map(f32::abs);
+        assert!(off.iter().all(|off| *off < 1e-6), "{found:?} for {factor}, {viscous}");
+    };
+    for direction in [1.0, -1.0] {
+        // The guard takes 0.6 at the most; at half of the standstill velocity half of the compensation is there.
+        for (velocity, permitted, left) in [
+            (1.0, 1.0, 1.0),
+            (1.0, 0.7, 0.5),
+            (1.0, 0.4, 0.0),
+            (1.0, 0.1, 0.0),
+            (0.005, 0.5, 1.0),
+            (0.005, 0.35, 0.5),
+            (0.0, 0.0, 1.0),
+        ] {
+            let found = guarded(direction * velocity, permitted, None, &SETTINGS, learned(1.8, 0.2));
+            near(found, 1.0 + 0.8 * left, 0.2 * left);
+        }
+        near(guarded(direction, 0.4, None, &SETTINGS, learned(0.5, -0.2)), 0.5, -0.2);
+        near(guarded(direction, 0.4, None, &SETTINGS, learned(1.8, -0.2)), 1.0, -0.2);
+        // A feedforward is not guarded, and one of the measured velocity is.
+        assert_eq!(guarded(direction, 0.4, Some(direction), &SETTINGS, learned(1.8, 0.2)), learned(1.8, 0.2));
+        let measured = Settings { for_reference: false, ..SETTINGS };
+        near(guarded(direction, 0.4, Some(direction), &measured, learned(1.8, 0.2)), 1.0, 0.0);
+        // Nothing is uncertain: nothing is withheld.
+        let certain = Settings { uncertain: 0.0, ..SETTINGS };
+        assert_eq!(guarded(direction, 1.0, None, &certain, learned(1.8, 0.2)), learned(1.8, 0.2));
+    }
+    assert_eq!(guarded(f32::NAN, f32::NAN, None, &SETTINGS, Factors::IMAGE), Factors::IMAGE);
 }

@@ -80,7 +80,7 @@ impl Watching {
             seen.compensated.output.shadow = torque;
         }
         self.statistics.note(&seen);
-        let external = self.bearing.look(&telemetry, &self.adapting.acting());
+        let external = self.bearing.look(&telemetry, &self.adapting.in_service());
         let adaptation = self.adapting.look(&telemetry);
         can::observe(&Observed {
             telemetry,

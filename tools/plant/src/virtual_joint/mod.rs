@@ -13,7 +13,7 @@ use crate::error::ParameterError;
 use crate::joint::Answer;
 use friction_compensation::friction::FrictionModel;
 use joint_firmware::joint::active::SLOW_RATE;
-use joint_firmware::joint::adaptation::{self, Adaptation, LOOK_RATE};
+use joint_firmware::joint::adaptation::{self, Adaptation, Factors, LOOK_RATE};
 use joint_firmware::joint::configuration::ConfigurationError;
 use joint_firmware::joint::external_torque::{self, ExternalTorque};
 use joint_firmware::joint::load_feedforward::LoadFeedforward;
@@ -76,6 +76,8 @@ pub struct VirtualJoint {
     winding: WindingTemperature,
     slow: Slow,
     adaptation: Adaptation,
+    /// What it has learned, where it is on.
+    corrections: Factors,
     load: LoadFeedforward,
     /// Torque that the feedforward of the load adds, Nm.
     load_torque: f32,
@@ -114,6 +116,7 @@ impl VirtualJoint {
             winding,
             slow: Slow { gear_temperature: temperature as f32, ..Slow::default() },
             adaptation: Adaptation::NOTHING,
+            corrections: Factors::IMAGE,
             load: LoadFeedforward::NOTHING,
             load_torque: 0.0,
             external: ExternalTorque::NOTHING,
@@ -214,9 +217,10 @@ impl VirtualJoint {
         }
         let telemetry = self.joint.telemetry();
         if self.steps.is_multiple_of(self.look_divider) {
-            let settings = external_torque::Settings::of(&self.active);
-            self.external.look(&settings, &telemetry, &self.slow.factors);
-            self.slow.factors = self.adaptation.look(&adaptation::Settings::of(&self.active), &telemetry);
+            self.external.look(&external_torque::Settings::of(&self.active), &telemetry, &self.corrections);
+            let settings = adaptation::Settings::of(&self.active);
+            self.corrections = self.adaptation.look(&settings, &telemetry);
+            self.slow.factors = self.corrections.guarded(&settings, &telemetry);
             self.load_torque = self.load.look(self.active.load(), &telemetry);
         }
         telemetry
