@@ -447,8 +447,9 @@ pub(super) fn image_torque(telemetry: &Telemetry) -> f32 {
     telemetry.compensated.output.torque.to_bits() as f32 * (1.0 / 65_536.0)
 }
 
-/// Share of what is uncertain that the energy guard withholds at a control step, 0 to 1; none where friction is computed
-/// for a reference velocity. Near standstill, where the guard may take what is certain, too, it is rather too much.
+/// Share of what is uncertain that the energy guard withholds at a control step, 0 to 1; none where friction is
+/// computed for a reference velocity. Near standstill, where the guard may take what is certain, too, it is rather too
+/// much.
 fn withheld(settings: &Settings, telemetry: &Telemetry) -> f32 {
     if settings.for_reference && telemetry.wanted.velocity.is_some() {
         return 0.0;
