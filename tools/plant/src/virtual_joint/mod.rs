@@ -76,7 +76,7 @@ pub struct VirtualJoint {
     winding: WindingTemperature,
     slow: Slow,
     adaptation: Adaptation,
-    /// What it has learned, where it is on.
+    /// Corrections in service: those that it has learned, where it is on.
     corrections: Factors,
     load: LoadFeedforward,
     /// Torque that the feedforward of the load adds, Nm.
